@@ -26,8 +26,16 @@ class Verdict:
         for model, path in SCENES.items():
             rows = judge(model, fourbar.load(path), here, order=False).rows
             for name in BY_NAME:
-                judged = [row for row in rows if row.engine == name and (row.compared or row.failed)]
-                used = [math.inf if math.isnan(row.error) else row.error / row.allowed for row in judged if row.error]
+                judged = [
+                    row
+                    for row in rows
+                    if row.engine == name and (row.compared or row.failed)
+                ]
+                used = [
+                    math.inf if math.isnan(row.error) else row.error / row.allowed
+                    for row in judged
+                    if row.error
+                ]
                 failing = sum(row.failed for row in judged) if judged else math.nan
                 verdicts[name, model] = max(used, default=math.nan), failing
         return verdicts

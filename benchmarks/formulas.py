@@ -16,7 +16,9 @@ class Solve:
     def setup(self, positions, stage):
         """Load the crank-rocker and command a turn."""
         self.scene = fourbar.load(MODELS / "crank_rocker.toml")
-        self.command = Command(np.linspace(0.0, 6.0, positions), np.ones(positions, np.int8), 10.0, 0.0)
+        self.command = Command(
+            np.linspace(0.0, 6.0, positions), np.ones(positions, np.int8), 10.0, 0.0
+        )
         self.time_solve(positions, stage)
 
     def time_solve(self, positions, stage):

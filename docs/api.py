@@ -35,11 +35,19 @@ def fields(kind: type) -> list[tuple[str, str, str]]:
     rows: list[tuple[str, str, str]] = []
     last: ast.AnnAssign | None = None
     for statement in parse(kind).body:
-        if isinstance(statement, ast.AnnAssign) and isinstance(statement.target, ast.Name):
+        if isinstance(statement, ast.AnnAssign) and isinstance(
+            statement.target, ast.Name
+        ):
             last = statement
             if not is_of_class(statement):
-                rows.append((statement.target.id, ast.unparse(statement.annotation), ""))
-        elif last and isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Constant):
+                rows.append(
+                    (statement.target.id, ast.unparse(statement.annotation), "")
+                )
+        elif (
+            last
+            and isinstance(statement, ast.Expr)
+            and isinstance(statement.value, ast.Constant)
+        ):
             if not is_of_class(last):
                 rows[-1] = (*rows[-1][:2], " ".join(str(statement.value.value).split()))
             last = None
@@ -49,7 +57,11 @@ def fields(kind: type) -> list[tuple[str, str, str]]:
 def signature(thing: Any) -> str:
     """Return the arguments as the source has them, without "self"; for a description, its fields."""
     node = parse(thing.fget if isinstance(thing, property) else thing)
-    constructors = [part for part in getattr(node, "body", ()) if getattr(part, "name", "") == "__init__"]
+    constructors = [
+        part
+        for part in getattr(node, "body", ())
+        if getattr(part, "name", "") == "__init__"
+    ]
     if hasattr(thing, "__dataclass_fields__") and constructors:
         names, defaults = constructors[0].args.args[1:], constructors[0].args.defaults
         pairs = zip(names, defaults, strict=True)
@@ -72,14 +84,22 @@ def row(name: str, kind: str, meaning: str) -> str:
     """Write one field as a row of a table; a quantity has its meaning from the table of quantities."""
     if not meaning and name in QUANTITY:
         meaning = f"{QUANTITY[name].meaning}, {QUANTITY[name].unit}".removesuffix(", 1")
-    return "| " + " | ".join(cell.replace("|", "\\|") for cell in (f"`{name}`", f"`{kind}`", meaning)) + " |"
+    return (
+        "| "
+        + " | ".join(
+            cell.replace("|", "\\|") for cell in (f"`{name}`", f"`{kind}`", meaning)
+        )
+        + " |"
+    )
 
 
 def unwrap(text: str) -> str:
     """Join the lines of each paragraph, except in lists, underlined sections and examples."""
     paragraphs = text.split("\n\n")
     return "\n\n".join(
-        lines if re.search(r"^(\s|--|>>>)", lines, re.MULTILINE) else " ".join(lines.split("\n"))
+        lines
+        if re.search(r"^(\s|--|>>>)", lines, re.MULTILINE)
+        else " ".join(lines.split("\n"))
         for lines in paragraphs
     )
 
@@ -88,14 +108,25 @@ def entry(name: str, thing: Any, level: str = "###") -> str:
     """Write heading, signature, docstring and fields of one name."""
     text = unwrap(inspect.getdoc(thing) or "")
     parts = [f"{level} {name}"]
-    if (callable(thing) and not inspect.isclass(thing)) or ("Parameters" in text and not issubclass(thing, Exception)):
+    if (callable(thing) and not inspect.isclass(thing)) or (
+        "Parameters" in text and not issubclass(thing, Exception)
+    ):
         parts.append(f"```python\n{name}{signature(thing)}\n```")
     parts.append(f"```text\n{text}\n```")
-    if inspect.isclass(thing) and "Parameters" not in text and not issubclass(thing, Exception):
+    if (
+        inspect.isclass(thing)
+        and "Parameters" not in text
+        and not issubclass(thing, Exception)
+    ):
         rows = [row(*field) for field in fields(thing)]
         if rows:
-            parts.append("\n".join(["| field | type | meaning |", "|---|---|---|", *rows]))
-    parts += [entry(f"{name}.{method}", getattr(thing, method), "####") for method in METHODS.get(name, ())]
+            parts.append(
+                "\n".join(["| field | type | meaning |", "|---|---|---|", *rows])
+            )
+    parts += [
+        entry(f"{name}.{method}", getattr(thing, method), "####")
+        for method in METHODS.get(name, ())
+    ]
     return "\n\n".join(parts)
 
 
@@ -104,9 +135,17 @@ def results(functions: list[str], names: list[str]) -> dict[str, type]:
     kinds: dict[str, type] = {}
     for name in functions:
         thing = getattr(fourbar, name)
-        returned = inspect.get_annotations(thing).get("return") if inspect.isfunction(thing) else None
+        returned = (
+            inspect.get_annotations(thing).get("return")
+            if inspect.isfunction(thing)
+            else None
+        )
         for kind in (returned, *getattr(returned, "__args__", ())):
-            if inspect.isclass(kind) and kind.__module__.startswith("fourbar.") and kind.__name__ not in names:
+            if (
+                inspect.isclass(kind)
+                and kind.__module__.startswith("fourbar.")
+                and kind.__name__ not in names
+            ):
                 kinds[kind.__name__] = kind
     return dict(sorted(kinds.items()))
 
@@ -116,7 +155,16 @@ def text() -> str:
     names = [name for name in dir(fourbar) if name != "__version__"]
     functions = [name for name in names if not inspect.isclass(getattr(fourbar, name))]
     classes = [name for name in names if name not in functions]
-    parts = ["## Functions", *(entry(name, getattr(fourbar, name)) for name in functions)]
-    parts += ["## What they return", *(entry(name, kind) for name, kind in results(functions, names).items())]
-    parts += ["## Descriptions, results and errors", *(entry(name, getattr(fourbar, name)) for name in classes)]
+    parts = [
+        "## Functions",
+        *(entry(name, getattr(fourbar, name)) for name in functions),
+    ]
+    parts += [
+        "## What they return",
+        *(entry(name, kind) for name, kind in results(functions, names).items()),
+    ]
+    parts += [
+        "## Descriptions, results and errors",
+        *(entry(name, getattr(fourbar, name)) for name in classes),
+    ]
     return "\n\n".join(part.strip() for part in parts) + "\n"

@@ -20,7 +20,12 @@ from matplotlib.figure import Figure
 import fourbar
 from fourbar.quantities import PIN_FORCES
 from fourbar.show.plot.labels import Label, Labels
-from fourbar.show.plot.linkage import draw_mechanism, draw_support, locate_pins, scale_of
+from fourbar.show.plot.linkage import (
+    draw_mechanism,
+    draw_support,
+    locate_pins,
+    scale_of,
+)
 from fourbar.show.plot.style import BAR_COLOURS, INK, MUTED, OPEN, apply_style
 from fourbar.show.plot.view import make_view
 from fourbar.writing import write_text
@@ -46,7 +51,9 @@ SIZE, LOW = (3.6, 2.6), (3.6, 1.4)
 
 def read_problem(name: str) -> dict[str, Any]:
     """Read a problem as it stands in models/problems."""
-    problem: dict[str, Any] = json.loads((PROBLEMS / f"{name}.json").read_text(encoding="utf-8"))
+    problem: dict[str, Any] = json.loads(
+        (PROBLEMS / f"{name}.json").read_text(encoding="utf-8")
+    )
     return problem
 
 
@@ -72,14 +79,32 @@ def write_effect(value: Any) -> str:
 def write_data(problem: dict[str, Any]) -> list[str]:
     """Write lengths and bars as a table, and effects, drive and command as its last rows."""
     lengths, bars = problem["scene"]["lengths"], problem["scene"].get("bars", {})
-    columns = [name for name in dict.fromkeys((*lengths, *bars)) if name not in ("ground_angle", "offset")]
+    columns = [
+        name
+        for name in dict.fromkeys((*lengths, *bars))
+        if name not in ("ground_angle", "offset")
+    ]
     rows = [["bar", *columns], ["---"] * (len(columns) + 1)]
-    rows.append(["length, m", *(write_number(lengths[name]) if name in lengths else "" for name in columns)])
-    for key, head in (("mass", "mass, kg"), ("inertia", "inertia, kg m²"), ("centre", "centre, m")):
+    rows.append(
+        [
+            "length, m",
+            *(
+                write_number(lengths[name]) if name in lengths else ""
+                for name in columns
+            ),
+        ]
+    )
+    for key, head in (
+        ("mass", "mass, kg"),
+        ("inertia", "inertia, kg m²"),
+        ("centre", "centre, m"),
+    ):
         cells = [bars.get(name, {}).get(key) for name in columns]
         if any(cell is not None for cell in cells):
             write = write_pair if key == "centre" else write_number
-            rows.append([head, *("" if cell is None else write(cell) for cell in cells)])
+            rows.append(
+                [head, *("" if cell is None else write(cell) for cell in cells)]
+            )
     return [f"|{'|'.join(row)}|" for row in rows]
 
 
@@ -97,23 +122,36 @@ def write_question(problem: dict[str, Any]) -> str:
         parts.append(f"Drive: {write_effect(scene['drive'])}.")
     angles = np.atleast_1d(command["theta_2"])
     rates = f"ω₂ {write_number(command['omega_2'])} rad/s"
-    rates += f", α₂ {write_number(command['alpha_2'])} rad/s²" if command.get("alpha_2") else ""
+    rates += (
+        f", α₂ {write_number(command['alpha_2'])} rad/s²"
+        if command.get("alpha_2")
+        else ""
+    )
     branch = f"branch {command['branch'] if np.ndim(command['branch']) == 0 else 'in the file'}"
     if problem["ask"] == "release":
         times = problem["times"]
         start = f"Released at θ₂ {write_number(math.degrees(angles[0]))}°"
-        parts.append(f"{start}, {rates}, {branch}; {len(times)} instants up to {times[-1]:g} s.")
+        parts.append(
+            f"{start}, {rates}, {branch}; {len(times)} instants up to {times[-1]:g} s."
+        )
     else:
         ends = [write_number(math.degrees(angle)) for angle in (angles[0], angles[-1])]
-        parts.append(f"θ₂ from {ends[0]}° to {ends[1]}° in {len(angles)} positions, {rates}, {branch}.")
-    asked = [f"`{quantity}`" for quantity in problem["answers"] if quantity not in PIN_FORCES]
+        parts.append(
+            f"θ₂ from {ends[0]}° to {ends[1]}° in {len(angles)} positions, {rates}, {branch}."
+        )
+    asked = [
+        f"`{quantity}`" for quantity in problem["answers"] if quantity not in PIN_FORCES
+    ]
     return f"{' '.join(parts)} **Asked:** {', '.join(asked)}."
 
 
 def read_rows() -> list[dict[str, str]]:
     """Read the table of the benchmark, each engine with its version."""
     with TABLE.open(encoding="utf-8", newline="") as file:
-        return [{**row, "engine": name_row(row["engine"], row["version"])} for row in csv.DictReader(file)]
+        return [
+            {**row, "engine": name_row(row["engine"], row["version"])}
+            for row in csv.DictReader(file)
+        ]
 
 
 def write_matrix(names: list[str]) -> list[str]:
@@ -122,13 +160,28 @@ def write_matrix(names: list[str]) -> list[str]:
     reasons: dict[str, list[str]] = {}
     for row in read_rows():
         if row["letters"]:
-            letters.setdefault(row["engine"], {})[row["problem"]] = read_cell_text(row["letters"])
-        if row["level"] in ("B", "C", WORSE, MISSING) and row["reason"] not in ("", "not read"):
+            letters.setdefault(row["engine"], {})[row["problem"]] = read_cell_text(
+                row["letters"]
+            )
+        if row["level"] in ("B", "C", WORSE, MISSING) and row["reason"] not in (
+            "",
+            "not read",
+        ):
             reasons.setdefault(row["reason"], []).append(row["engine"])
-    rows = [["engine", *(str(number) for number in range(1, len(names) + 1))], ["---", *[":-:"] * len(names)]]
-    rows += [[engine, *(cells.get(name, MISSING) for name in names)] for engine, cells in letters.items()]
+    rows = [
+        ["engine", *(str(number) for number in range(1, len(names) + 1))],
+        ["---", *[":-:"] * len(names)],
+    ]
+    rows += [
+        [engine, *(cells.get(name, MISSING) for name in names)]
+        for engine, cells in letters.items()
+    ]
     lines = [f"|{'|'.join(row)}|" for row in rows]
-    return [*lines, "", *(f"- {name_together(engines)}: {why}" for why, engines in reasons.items())]
+    return [
+        *lines,
+        "",
+        *(f"- {name_together(engines)}: {why}" for why, engines in reasons.items()),
+    ]
 
 
 def name_together(engines: list[str]) -> str:
@@ -138,7 +191,9 @@ def name_together(engines: list[str]) -> str:
         if len(set(words)) > 1:
             break
         common.append(words[0])
-    return " ".join(common).rstrip(":,") or ", ".join(dict.fromkeys(engine.partition(":")[0] for engine in engines))
+    return " ".join(common).rstrip(":,") or ", ".join(
+        dict.fromkeys(engine.partition(":")[0] for engine in engines)
+    )
 
 
 def write_findings(*, known: bool) -> list[str]:
@@ -147,9 +202,14 @@ def write_findings(*, known: bool) -> list[str]:
     for finding in read_findings():
         fields = finding.fields
         if fields["Reported"].startswith(("known", "stated")) == known:
-            dates = " ".join(f"*{name}:* {fields[name]}." for name in ("Since", "Until", "Reported"))
+            dates = " ".join(
+                f"*{name}:* {fields[name]}." for name in ("Since", "Until", "Reported")
+            )
             script = finding.script.name
-            lines += [f"- **{finding.engine[0]}**: {finding.sentence}", f"  - {fields['Found']}"]
+            lines += [
+                f"- **{finding.engine[0]}**: {finding.sentence}",
+                f"  - {fields['Found']}",
+            ]
             lines.append(f"  - {dates} [{script}](findings/{script})")
     return lines
 
@@ -158,18 +218,35 @@ def write_runs() -> list[str]:
     """Write the worst error of torque and forces in one loop, for each engine in its finest timestep or at states."""
     runs: dict[str, dict[str, dict[str, str]]] = {}
     for row in read_rows():
-        if row["problem"] == LOOP and row["setting"] != "exact" and row["quantity"] in ("gap at B", *TORQUE_AND_FORCES):
-            runs.setdefault(row["engine"], {}).setdefault(row["setting"], {})[row["quantity"]] = row["error"]
+        if (
+            row["problem"] == LOOP
+            and row["setting"] != "exact"
+            and row["quantity"] in ("gap at B", *TORQUE_AND_FORCES)
+        ):
+            runs.setdefault(row["engine"], {}).setdefault(row["setting"], {})[
+                row["quantity"]
+            ] = row["error"]
             runs[row["engine"]][row["setting"]]["seconds"] = row["seconds"]
-    rows = [["engine", "pin forces", "steps a turn", "error", "gap at B", "s"], ["---"] * 2 + ["---:"] * 4]
+    rows = [
+        ["engine", "pin forces", "steps a turn", "error", "gap at B", "s"],
+        ["---"] * 2 + ["---:"] * 4,
+    ]
     for engine, settings in runs.items():
         setting, errors = list(settings.items())[-1]
-        steps = "states" if "states" in setting else setting.rpartition(" ")[2].removesuffix("/rev")
+        steps = (
+            "states"
+            if "states" in setting
+            else setting.rpartition(" ")[2].removesuffix("/rev")
+        )
         if "torque" not in errors:
             continue
         pins = [pin for pin in PIN_FORCES if errors.get(pin, "nan") != "nan"]
         worst = max(float(errors[name]) for name in ("torque", *pins))
-        cells = [f"{worst:.1g}", f"{float(errors['gap at B']):.1g}" if "gap at B" in errors else "", errors["seconds"]]
+        cells = [
+            f"{worst:.1g}",
+            f"{float(errors['gap at B']):.1g}" if "gap at B" in errors else "",
+            errors["seconds"],
+        ]
         read = "all" if len(pins) == len(PIN_FORCES) else ", ".join(pins)
         rows.append([engine, read, steps, *cells])
     return [f"|{'|'.join(row)}|" for row in rows]
@@ -185,10 +262,18 @@ def draw_problem(name: str) -> str:
         if sliding:
             draw_slider_crank(axes, problem, labels)
         else:
-            view = make_view(fourbar.load(PROBLEMS / f"{name}.toml"), SHOWN_AT.get(name))
+            view = make_view(
+                fourbar.load(PROBLEMS / f"{name}.toml"), SHOWN_AT.get(name)
+            )
             factor, _, size = scale_of(view)
             pins = locate_pins(view, factor)
-            axes.plot(*zip(pins["O2"], pins["O4"], strict=True), color=MUTED, lw=1.0, ls=(0, (8, 3, 2, 3)), zorder=1)
+            axes.plot(
+                *zip(pins["O2"], pins["O4"], strict=True),
+                color=MUTED,
+                lw=1.0,
+                ls=(0, (8, 3, 2, 3)),
+                zorder=1,
+            )
             for pin in ("O2", "O4"):
                 draw_support(axes, pins[pin], size, labels)
             draw_mechanism(axes, view, view.here, 0, labels)
@@ -198,8 +283,12 @@ def draw_problem(name: str) -> str:
         labels.settle(figure)
         drawn = io.StringIO()
         with matplotlib.rc_context({"svg.fonttype": "none", "svg.hashsalt": name}):
-            figure.savefig(drawn, format="svg", metadata={"Date": None, "Creator": None})
-    return COORDINATES.sub(lambda part: LONG_NUMBER.sub(r"\1", part.group()), drawn.getvalue())
+            figure.savefig(
+                drawn, format="svg", metadata={"Date": None, "Creator": None}
+            )
+    return COORDINATES.sub(
+        lambda part: LONG_NUMBER.sub(r"\1", part.group()), drawn.getvalue()
+    )
 
 
 def draw_slider_crank(axes: Any, problem: dict[str, Any], labels: Labels) -> None:
@@ -207,22 +296,47 @@ def draw_slider_crank(axes: Any, problem: dict[str, Any], labels: Labels) -> Non
     lengths, theta_2 = problem["scene"]["lengths"], problem["command"]["theta_2"][4]
     theta_3, stroke = (problem["answers"][key][4] for key in ("theta_3", "stroke"))
     crank, size, level = lengths["crank"], 0.1 * lengths["rod"], lengths["offset"]
-    pins = {"O2": (0.0, 0.0), "A": (crank * math.cos(theta_2), crank * math.sin(theta_2)), "B": (stroke, level)}
-    assert math.isclose(pins["A"][1] + lengths["rod"] * math.sin(theta_3), level, abs_tol=1e-12)
+    pins = {
+        "O2": (0.0, 0.0),
+        "A": (crank * math.cos(theta_2), crank * math.sin(theta_2)),
+        "B": (stroke, level),
+    }
+    assert math.isclose(
+        pins["A"][1] + lengths["rod"] * math.sin(theta_3), level, abs_tol=1e-12
+    )
     draw_support(axes, pins["O2"], 0.5 * size, labels)
     guide = [(-crank, level), (1.3 * (crank + lengths["rod"]), level)]
-    corners = [(stroke + x * size, level + 0.6 * y * size) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1))]
+    corners = [
+        (stroke + x * size, level + 0.6 * y * size)
+        for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1))
+    ]
     axes.plot(*zip(*guide, strict=True), color=MUTED, lw=1.0, ls=(0, (8, 3, 2, 3)))
     axes.plot(*zip(*corners, strict=True), color=BAR_COLOURS[4], lw=2.0, zorder=3)
     for line in (guide, corners):
         labels.keep_off(axes, *line)
     for bar, (start, stop) in ((2, ("O2", "A")), (3, ("A", "B"))):
         ends = pins[start], pins[stop]
-        axes.plot(*zip(*ends, strict=True), color=BAR_COLOURS[bar], lw=4.5, solid_capstyle="round", zorder=4)
+        axes.plot(
+            *zip(*ends, strict=True),
+            color=BAR_COLOURS[bar],
+            lw=4.5,
+            solid_capstyle="round",
+            zorder=4,
+        )
         labels.keep_off(axes, *ends, width=4.5)
     for pin, point in pins.items():
         axes.plot(*[[value] for value in point], "o", ms=6.0, mew=1.2, zorder=6, **OPEN)
-        labels.add(Label(axes, "$O_2$" if pin == "O2" else f"${pin}$", point, (0.5 * stroke, 0.0), INK, 9.0, 2.5))
+        labels.add(
+            Label(
+                axes,
+                "$O_2$" if pin == "O2" else f"${pin}$",
+                point,
+                (0.5 * stroke, 0.0),
+                INK,
+                9.0,
+                2.5,
+            )
+        )
     if problem["scene"].get("loads"):
         axes.annotate("", (stroke + 1.1 * size, level), (stroke + 3.0 * size, level),
                       arrowprops={"arrowstyle": "-|>", "color": INK, "lw": 1.4})  # fmt: skip

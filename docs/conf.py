@@ -32,7 +32,9 @@ SPACE = '<mspace width="0.17em" />'
 def append_reference(app, page, source):
     """Append to a page what is made of the code: docstrings, and options of commands."""
     if page in ("api", "commands"):
-        source[0] += "\n" + runpy.run_path(str(Path(__file__).with_name(f"{page}.py")))["text"]()
+        source[0] += (
+            "\n" + runpy.run_path(str(Path(__file__).with_name(f"{page}.py")))["text"]()
+        )
 
 
 def setup(app):
@@ -40,9 +42,15 @@ def setup(app):
 
     def written(display):
         def write(page, node):
-            formula = convert(node.astext().replace("{aligned}", "{align*}"), display=display)
+            formula = convert(
+                node.astext().replace("{aligned}", "{align*}"), display=display
+            )
             page.body.append(
-                re.sub(r"<mi>[a-z]{3}</mi>(?!<mo[^>]*>&#x00028;)", rf"<mrow>{SPACE}\g<0>{SPACE}</mrow>", formula)
+                re.sub(
+                    r"<mi>[a-z]{3}</mi>(?!<mo[^>]*>&#x00028;)",
+                    rf"<mrow>{SPACE}\g<0>{SPACE}</mrow>",
+                    formula,
+                )
             )
             raise SkipNode
 

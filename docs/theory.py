@@ -7,7 +7,10 @@ from pathlib import Path
 import fourbar
 
 TARGET = Path(__file__).with_suffix(".svg")
-LINKAGE, THETA_2 = fourbar.uniform(100, 40, 120, 80), math.radians(40)  # Norton, example 4-1
+LINKAGE, THETA_2 = (
+    fourbar.uniform(100, 40, 120, 80),
+    math.radians(40),
+)  # Norton, example 4-1
 LEFT, BASE, SCALE = 55.0, 235.0, 2.5
 """px: of O2 from the left and from above, of a unit of length."""
 
@@ -22,7 +25,9 @@ def line(kind: str, *points: complex) -> str:
     return f'<path class="{kind}" d="M{" L".join(map(screen, points))}"/>'
 
 
-def arc(centre: complex, radius: float, start: float, stop: float, kind: str = "arc") -> str:
+def arc(
+    centre: complex, radius: float, start: float, stop: float, kind: str = "arc"
+) -> str:
     """Draw an arc from one angle to another, rad."""
     steps = [start + (stop - start) * i / 40 for i in range(41)]
     return line(kind, *(centre + cmath.rect(radius, angle) for angle in steps))
@@ -36,10 +41,16 @@ def label(z: complex, text: str) -> str:
 
 def text() -> str:
     """Draw the picture."""
-    solution = fourbar.solve(fourbar.Scene(LINKAGE, fourbar.Motion(THETA_2)), "position")
+    solution = fourbar.solve(
+        fourbar.Scene(LINKAGE, fourbar.Motion(THETA_2)), "position"
+    )
     O2, O4 = 0j, complex(LINKAGE.ground)
     A, B = (complex(*p[0]) for p in (solution.A, solution.B))
-    theta_3, theta_4, delta = float(solution.theta_3[0]), float(solution.theta_4[0]), cmath.phase(O4 - A)
+    theta_3, theta_4, delta = (
+        float(solution.theta_3[0]),
+        float(solution.theta_4[0]),
+        cmath.phase(O4 - A),
+    )
     ray = 26.0
     parts = [
         line("ground", O2, O4),
@@ -51,7 +62,10 @@ def text() -> str:
         arc(O4, 18, 0, theta_4),
         arc(A, 34, 0, delta),
         arc(B, 14, theta_3 + math.pi, theta_4 + math.pi),
-        *(f'<circle cx="{screen(z).split()[0]}" cy="{screen(z).split()[1]}" r="5"/>' for z in (O2, A, B, O4)),
+        *(
+            f'<circle cx="{screen(z).split()[0]}" cy="{screen(z).split()[1]}" r="5"/>'
+            for z in (O2, A, B, O4)
+        ),
         label(O2 - 7 - 5j, "O₂"),
         label(A - 4 + 5j, "A"),
         label(B + 4 + 4j, "B"),

@@ -54,7 +54,9 @@ if _TYPE_CHECKING:
     from fourbar.formulas.points import coupler_curve as coupler_curve
     from fourbar.formulas.points import instant_centres as instant_centres
     from fourbar.formulas.points import point_coefficients as point_coefficients
-    from fourbar.formulas.transmission import transmission_extremes as transmission_extremes
+    from fourbar.formulas.transmission import (
+        transmission_extremes as transmission_extremes,
+    )
     from fourbar.show.duty import bearing_load as bearing_load
     from fourbar.show.duty import motor_duty as motor_duty
     from fourbar.show.duty import shaking_force as shaking_force
@@ -72,14 +74,30 @@ if _TYPE_CHECKING:
     from fourbar.studies.study import vary as vary
 
 _EFFECTS = (
-    *("Flywheel", "Friction", "Gravity", "LinearDrive", "Load", "PinFriction", "Spring", "SpringEnd", "Springs"),
+    *(
+        "Flywheel",
+        "Friction",
+        "Gravity",
+        "LinearDrive",
+        "Load",
+        "PinFriction",
+        "Spring",
+        "SpringEnd",
+        "Springs",
+    ),
     *("Table", "Torsion", "Viscous"),
 )
 _ON_FIRST_USE = {
     **{name: "fourbar.effects" for name in _EFFECTS},
     **{name: "fourbar.files" for name in ("dump", "load", "save")},
-    **{name: "fourbar.formulas.points" for name in ("coupler_curve", "instant_centres", "point_coefficients")},
-    **{name: "fourbar.show.duty" for name in ("bearing_load", "motor_duty", "shaking_force", "shaking_moment")},
+    **{
+        name: "fourbar.formulas.points"
+        for name in ("coupler_curve", "instant_centres", "point_coefficients")
+    },
+    **{
+        name: "fourbar.show.duty"
+        for name in ("bearing_load", "motor_duty", "shaking_force", "shaking_moment")
+    },
     **{name: "fourbar.studies.derivatives" for name in ("Sensitivity", "sensitivity")},
     **{name: "fourbar.studies.study" for name in ("Study", "vary")},
     **{name: "fourbar.evaluation.free_motion" for name in ("Released", "release")},
@@ -103,7 +121,11 @@ def __getattr__(name: str) -> _Any:
 
 def __dir__() -> list[str]:
     """List the public names; the modules behind them stay out of the list."""
-    public = [name for name, value in globals().items() if name[0] != "_" and not isinstance(value, _ModuleType)]
+    public = [
+        name
+        for name, value in globals().items()
+        if name[0] != "_" and not isinstance(value, _ModuleType)
+    ]
     return sorted([*public, *_ON_FIRST_USE, "__version__"])
 
 

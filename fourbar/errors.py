@@ -31,13 +31,19 @@ class InputError(FourBarError):
     file : the file it stands in, where there is one.
     """
 
-    def __init__(self, key: str, value: object, allowed: str, file: str | None = None) -> None:
+    def __init__(
+        self, key: str, value: object, allowed: str, file: str | None = None
+    ) -> None:
         self.key, self.value, self.allowed, self.file = key, value, allowed, file
         shown = " ".join(repr(value).split())  # arrays take several lines
         if len(shown) > LONGEST_SHOWN:  # of a long path the end says which
-            shown = f"{shown[: LONGEST_SHOWN // 2 - 3]}...{shown[-LONGEST_SHOWN // 2 :]}"
+            shown = (
+                f"{shown[: LONGEST_SHOWN // 2 - 3]}...{shown[-LONGEST_SHOWN // 2 :]}"
+            )
         prefix = f"{file}: " if file else ""
-        super().__init__(f"{prefix}{key}{'' if value is None else f' = {shown}'}: {allowed}")
+        super().__init__(
+            f"{prefix}{key}{'' if value is None else f' = {shown}'}: {allowed}"
+        )
 
     def __reduce__(self) -> tuple[type, tuple[object, ...]]:
         """Let the error cross from one process to another as it was made."""
@@ -52,7 +58,9 @@ def expect(name: str, value: object, *kinds: type) -> None:
     """Raise InputError where an argument is none of the kinds that a function takes."""
     if not isinstance(value, kinds):
         wanted = " or ".join(kind.__name__ for kind in kinds)
-        raise InputError(name, value, f"must be of type {wanted}, not {type(value).__name__}")
+        raise InputError(
+            name, value, f"must be of type {wanted}, not {type(value).__name__}"
+        )
 
 
 class NotAssembledError(FourBarError):
@@ -75,19 +83,36 @@ def say_install(extra: str) -> str:
 
     def needed(name: str) -> list[str]:
         wanted = f"extra == [\"']{name}[\"']"
-        packages = [line.partition(";")[0].strip() for line in requires("fourbar") or () if re.search(wanted, line)]
-        inner = [line.removeprefix("fourbar[").removesuffix("]").split(",") for line in packages if "fourbar[" in line]
+        packages = [
+            line.partition(";")[0].strip()
+            for line in requires("fourbar") or ()
+            if re.search(wanted, line)
+        ]
+        inner = [
+            line.removeprefix("fourbar[").removesuffix("]").split(",")
+            for line in packages
+            if "fourbar[" in line
+        ]
         direct = [line for line in packages if "fourbar[" not in line]
-        return direct + [line for names in inner for name in names for line in needed(name)]
+        return direct + [
+            line for names in inner for name in names for line in needed(name)
+        ]
 
-    return "pip install " + " ".join(f'"{each}"' for each in dict.fromkeys(needed(extra)))
+    return "pip install " + " ".join(
+        f'"{each}"' for each in dict.fromkeys(needed(extra))
+    )
 
 
 HOLDS, FAILED, BAD_INPUT, BROKEN, INTERRUPTED = 0, 1, 2, 3, 130
 """All holds; a comparison fails or none was made; bad input; the environment or the program failed; interrupted."""
 
 
-def run(group: "click.Group", program: str, arguments: list[str] | None = None, extra: str = "all") -> int:
+def run(
+    group: "click.Group",
+    program: str,
+    arguments: list[str] | None = None,
+    extra: str = "all",
+) -> int:
     """Run a command of a group; the exit status is what the command returns, or says what went wrong.
 
     `extra`: the one that brings what the program needs, named where a module is missing.
@@ -96,10 +121,15 @@ def run(group: "click.Group", program: str, arguments: list[str] | None = None, 
 
     words = sys.argv[1:] if arguments is None else arguments
     # a program without a console, or one started with `>&-`, has none
-    streams = tuple(stream or open(os.devnull, "w", encoding="utf-8") for stream in (sys.stdout, sys.stderr))  # noqa: SIM115
+    streams = tuple(
+        stream or open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
+        for stream in (sys.stdout, sys.stderr)
+    )
     sys.stdout, sys.stderr = streams
     if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(errors="replace")  # a terminal that has no Greek still gets its table
+        sys.stdout.reconfigure(
+            errors="replace"
+        )  # a terminal that has no Greek still gets its table
     try:
         returned = group.main(args=words, prog_name=program, standalone_mode=False)
         status = HOLDS if returned is None else int(returned)
@@ -118,12 +148,17 @@ def run(group: "click.Group", program: str, arguments: list[str] | None = None, 
     except ModuleNotFoundError as error:
         return _say(f"{error.name} is not installed: {say_install(extra)}", BROKEN)
     except OSError as error:
-        file = error.filename2 or error.filename or "output"  # of a file that is put in place the second is its place
+        file = (
+            error.filename2 or error.filename or "output"
+        )  # of a file that is put in place the second is its place
         return _say(f"{file}: {error.strerror or error}", BROKEN)
     except Exception as error:
         if "--traceback" in words or os.environ.get("FOURBAR_TRACEBACK"):
             raise
-        return _say(f"internal error: {type(error).__name__}: {error} (FOURBAR_TRACEBACK=1 shows where)", BROKEN)
+        return _say(
+            f"internal error: {type(error).__name__}: {error} (FOURBAR_TRACEBACK=1 shows where)",
+            BROKEN,
+        )
 
 
 def _read_exit(raised: SystemExit, streams: tuple[TextIO, ...]) -> int:
@@ -133,7 +168,11 @@ def _read_exit(raised: SystemExit, streams: tuple[TextIO, ...]) -> int:
     output then, and does so for every pipe that breaks, that of a worker too.
     """
     if sys.stdout is not streams[0]:
-        return HOLDS if any(map(_is_unread, streams)) else _say("a pipe inside the program broke", BROKEN)
+        return (
+            HOLDS
+            if any(map(_is_unread, streams))
+            else _say("a pipe inside the program broke", BROKEN)
+        )
     if isinstance(raised.__context__, BrokenPipeError):
         return HOLDS
     if raised.code is None or isinstance(raised.code, int):
@@ -148,7 +187,9 @@ def _is_unread(stream: TextIO) -> bool:
     try:
         poll = select.poll()
         poll.register(stream.fileno(), select.POLLOUT)
-        return any(event & (select.POLLERR | select.POLLHUP) for _, event in poll.poll(0))
+        return any(
+            event & (select.POLLERR | select.POLLHUP) for _, event in poll.poll(0)
+        )
     except (OSError, ValueError):  # one without a file
         return False
 
@@ -158,7 +199,9 @@ def _flush() -> None:
     try:
         sys.stdout.flush()
     except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # or the interpreter reports it at its end
+        os.dup2(
+            os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno()
+        )  # or the interpreter reports it at its end
 
 
 def _say(message: str, status: int) -> int:
@@ -170,10 +213,14 @@ def _say(message: str, status: int) -> int:
 
 def clean_line(text: str) -> str:
     """Return one line without control characters: a title or file name does not steer the terminal."""
-    return " ".join("".join(letter if letter.isprintable() else " " for letter in text).split())
+    return " ".join(
+        "".join(letter if letter.isprintable() else " " for letter in text).split()
+    )
 
 
-def _report_interruption(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
+def _report_interruption(
+    kind: type[BaseException], error: BaseException, trace: TracebackType | None
+) -> None:
     """Print one line also where the libraries are still being imported, and nothing can catch it yet."""
     if not issubclass(kind, KeyboardInterrupt):
         sys.__excepthook__(kind, error, trace)
@@ -184,7 +231,10 @@ def _report_interruption(kind: type[BaseException], error: BaseException, trace:
 
 STARTED_AS = [("-m", name) for name in ("fourbar", "validation", "fourbar_validation")]
 """The commands of this project: another program that imports it reports its own interruptions."""
-if Path(sys.argv[0] if sys.argv else "").stem in ("fourbar", "fourbar-validation") or any(
+if Path(sys.argv[0] if sys.argv else "").stem in (
+    "fourbar",
+    "fourbar-validation",
+) or any(
     pair in STARTED_AS for pair in zip(sys.orig_argv, sys.orig_argv[1:], strict=False)
 ):
     sys.excepthook = _report_interruption

@@ -31,13 +31,23 @@ NO_NUMBERS = (bool, str, bytes, complex)
 A_BRANCH = "must be +1 (open) or -1 (crossed)"
 MOST_STEPS = 100_000_000
 """Intervals of any motion or curve."""
-ANY, AT_LEAST_ZERO, POSITIVE = "a finite number", "a finite number >= 0", "a finite number > 0"
+ANY, AT_LEAST_ZERO, POSITIVE = (
+    "a finite number",
+    "a finite number >= 0",
+    "a finite number > 0",
+)
 """Bounds of a number, as errors say them."""
 
 
 def is_within(number: float, bound: str) -> bool:
     """Return True if a finite number satisfies a bound."""
-    return number > 0.0 if bound == POSITIVE else number >= 0.0 if bound == AT_LEAST_ZERO else True
+    return (
+        number > 0.0
+        if bound == POSITIVE
+        else number >= 0.0
+        if bound == AT_LEAST_ZERO
+        else True
+    )
 
 
 def require(key: str, value: object, unit: str = "1", bound: str = ANY) -> float:
@@ -73,7 +83,9 @@ def convert_to_unit(key: str, value: object, unit: str) -> object:
     """Convert each text like "48 cm" of a value, in lists too, as `require` does; numbers and arrays stay."""
     if isinstance(value, (list, tuple)):
         return [convert_to_unit(key, entry, unit) for entry in value]
-    return require(key, value, unit) if unit != "1" and isinstance(value, str) else value
+    return (
+        require(key, value, unit) if unit != "1" and isinstance(value, str) else value
+    )
 
 
 def require_numbers(
@@ -127,7 +139,9 @@ def check_numbers(description: Any, key: str) -> None:
         value, full_key = getattr(description, name), f"{key}.{name}".strip(".")
         if value is not None or stated.left_out is not None:
             checked = (
-                require_pair(full_key, value, stated.unit) if stated.pair else require(full_key, value, *stated[:2])
+                require_pair(full_key, value, stated.unit)
+                if stated.pair
+                else require(full_key, value, *stated[:2])
             )
             object.__setattr__(description, name, checked)
 
@@ -164,7 +178,11 @@ class Bar:
     @property
     def moment_of_inertia(self) -> float:
         """Moment of inertia about the mass centre, kg m^2; if left out, that of a uniform slender bar, m L^2/12."""
-        return self.mass * self.length * self.length / 12.0 if self.inertia is None else self.inertia
+        return (
+            self.mass * self.length * self.length / 12.0
+            if self.inertia is None
+            else self.inertia
+        )
 
     @property
     def mass_centre(self) -> tuple[float, float]:
@@ -202,10 +220,18 @@ class FourBar:
         check_numbers(self, "lengths")
         for name, bar in zip(("input", "coupler", "output"), self.moving, strict=True):
             if not isinstance(bar, Bar):
-                raise InputError(f"bars.{name}", bar, "must be a Bar, like fourbar.Bar(0.1) for a bar of 0.1 m")
+                raise InputError(
+                    f"bars.{name}",
+                    bar,
+                    "must be a Bar, like fourbar.Bar(0.1) for a bar of 0.1 m",
+                )
         longest = max(self.lengths)
         if not math.isfinite(4.0 * longest):
-            raise InputError("lengths", self.lengths, "must be at most a quarter of the greatest double, 4.5e307 m")
+            raise InputError(
+                "lengths",
+                self.lengths,
+                "must be at most a quarter of the greatest double, 4.5e307 m",
+            )
         # exact sum: a linkage that closes by one rounding is still a linkage
         if math.fsum((*self.lengths, -2.0 * longest)) < 0.0:
             raise InputError(
@@ -231,7 +257,12 @@ class FourBar:
 
 
 def uniform(
-    ground: float | str, input: float | str, coupler: float | str, output: float | str, *, per_metre: float | str = 1.0
+    ground: float | str,
+    input: float | str,
+    coupler: float | str,
+    output: float | str,
+    *,
+    per_metre: float | str = 1.0,
 ) -> FourBar:
     """Make a linkage of uniform slender bars of the given lengths (m) and mass per metre (kg/m).
 
@@ -240,6 +271,8 @@ def uniform(
     """
     density = require("per_metre", per_metre, "kg/m", AT_LEAST_ZERO)
     named = zip(BAR_NAMES.values(), (ground, input, coupler, output), strict=True)
-    d, *moving = (require(f"lengths.{name}", length, "m", POSITIVE) for name, length in named)
+    d, *moving = (
+        require(f"lengths.{name}", length, "m", POSITIVE) for name, length in named
+    )
     two, three, four = (Bar(length, mass=density * length) for length in moving)
     return FourBar(d, two, three, four)

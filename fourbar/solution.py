@@ -13,10 +13,25 @@ from numpy.typing import NDArray
 
 from fourbar.errors import InputError, expect
 from fourbar.linkage import POSITIVE, require
-from fourbar.quantities import LINE_QUANTITIES, NOT_ASSEMBLED, PIN_FORCES, SCALARS, STATUS_NAMES, UNITS, Quantities
+from fourbar.quantities import (
+    LINE_QUANTITIES,
+    NOT_ASSEMBLED,
+    PIN_FORCES,
+    SCALARS,
+    STATUS_NAMES,
+    UNITS,
+    Quantities,
+)
 from fourbar.scene import Command
 from fourbar.scene.scene import load_show
-from fourbar.writing import describe_extent, list_names, make_data_frame, write_between, write_object, write_text
+from fourbar.writing import (
+    describe_extent,
+    list_names,
+    make_data_frame,
+    write_between,
+    write_object,
+    write_text,
+)
 
 Array = NDArray[np.float64]
 
@@ -76,7 +91,11 @@ class Solution(Quantities):
 
     def __repr__(self) -> str:
         """Say in ten lines what it holds."""
-        counts = zip(STATUS_NAMES, np.bincount(self.status_code.ravel(), minlength=len(STATUS_NAMES)), strict=True)
+        counts = zip(
+            STATUS_NAMES,
+            np.bincount(self.status_code.ravel(), minlength=len(STATUS_NAMES)),
+            strict=True,
+        )
         shown = list_parts(
             {name: find_values(self, name) for name in _list_quantities(self)},
             scalars=("theta_2", "torque", "drive_force"),
@@ -84,8 +103,12 @@ class Solution(Quantities):
         on = f"on bar {self.drive_bar}" if self.drive is None else "along a line"
         lines = [
             f"Solution {self.title!r}: {describe_extent(self.theta_2)}, drive {on}",
-            "status: " + ", ".join(f"{count} {name}" for name, count in counts if count),
-            *(f"{name}: {write_between(values)} {find_unit(name.strip('|'))}" for name, values in shown.items()),
+            "status: "
+            + ", ".join(f"{count} {name}" for name, count in counts if count),
+            *(
+                f"{name}: {write_between(values)} {find_unit(name.strip('|'))}"
+                for name, values in shown.items()
+            ),
         ]
         return "\n".join([*lines, list_names("evaluated", self.evaluated())])
 
@@ -112,7 +135,12 @@ class Solution(Quantities):
         return [name for name in UNITS if getattr(self, name) is not None]
 
     def to_csv(
-        self, path: str | Path | None = None, *, degrees: bool = False, units: Conversion = SI, decimal: str = "."
+        self,
+        path: str | Path | None = None,
+        *,
+        degrees: bool = False,
+        units: Conversion = SI,
+        decimal: str = ".",
     ) -> str | None:
         """Write one line per position with every digit: returned as text, or written to a file atomically.
 
@@ -126,7 +154,9 @@ class Solution(Quantities):
         expect("degrees", degrees, bool)
         if decimal not in (".", ","):
             raise InputError("decimal", decimal, 'must be "." or ","')
-        text = write_csv(self, {**require_units(units), **(DEGREES if degrees else SI)}, decimal)
+        text = write_csv(
+            self, {**require_units(units), **(DEGREES if degrees else SI)}, decimal
+        )
         if path is None:
             return text
         write_text(path, text)
@@ -138,7 +168,9 @@ class Solution(Quantities):
         Raises DependencyError where pandas is not installed.
         """
         columns = {
-            name: values for name, values in list_scalars(self, require_units(units)).items() if values is not None
+            name: values
+            for name, values in list_scalars(self, require_units(units)).items()
+            if values is not None
         }
         return make_data_frame({**list_leading(self), **columns})
 
@@ -148,16 +180,24 @@ def split_parts(name: str, values: Array) -> dict[str, Array]:
     if name in SCALARS:
         return {name: values}
     parts = {f"{name}_x": values[..., 0], f"{name}_y": values[..., 1]}
-    return {f"|{name}|": np.hypot(values[..., 0], values[..., 1]), **parts} if name in PIN_FORCES else parts
+    return (
+        {f"|{name}|": np.hypot(values[..., 0], values[..., 1]), **parts}
+        if name in PIN_FORCES
+        else parts
+    )
 
 
-def list_parts(values: Mapping[str, Array | None], scalars: tuple[str, ...]) -> dict[str, Array]:
+def list_parts(
+    values: Mapping[str, Array | None], scalars: tuple[str, ...]
+) -> dict[str, Array]:
     """List the given scalars and the magnitudes of the pin forces, as far as they have values."""
     parts: dict[str, Array] = {}
     for name in (*scalars, *PIN_FORCES):
         if (quantity := values.get(name)) is not None:
             parts |= {
-                part: array for part, array in split_parts(name, quantity).items() if part[-2:] not in ("_x", "_y")
+                part: array
+                for part, array in split_parts(name, quantity).items()
+                if part[-2:] not in ("_x", "_y")
             }
     return parts
 
@@ -191,10 +231,24 @@ def write_csv(solution: Solution, units: Conversion = SI, decimal: str = ".") ->
         for name, values in list_scalars(solution, units).items()
     }
     text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n", delimiter=";" if decimal == "," else ",")
+    writer = csv.writer(
+        text, lineterminator="\n", delimiter=";" if decimal == "," else ","
+    )
     writer.writerow([*first, *columns])
-    for start, row in zip(zip(*first.values(), strict=True), zip(*columns.values(), strict=True), strict=True):
-        writer.writerow([*start, *(repr(cell).replace(".", decimal) if math.isfinite(cell) else "" for cell in row)])
+    for start, row in zip(
+        zip(*first.values(), strict=True),
+        zip(*columns.values(), strict=True),
+        strict=True,
+    ):
+        writer.writerow(
+            [
+                *start,
+                *(
+                    repr(cell).replace(".", decimal) if math.isfinite(cell) else ""
+                    for cell in row
+                ),
+            ]
+        )
     return text.getvalue()
 
 
@@ -208,7 +262,10 @@ def list_leading(solution: Solution) -> dict[str, list[Any]]:
     }
     if solution.theta_2.ndim == 1:
         return first
-    return {"member": np.repeat(np.arange(len(solution)), size // len(solution)).tolist(), **first}
+    return {
+        "member": np.repeat(np.arange(len(solution)), size // len(solution)).tolist(),
+        **first,
+    }
 
 
 def list_scalars(solution: Solution, units: Conversion = SI) -> dict[str, Array | None]:
@@ -223,9 +280,13 @@ def list_scalars(solution: Solution, units: Conversion = SI) -> dict[str, Array 
         heading = f" [{find_unit_in(unit, units)[0]}]" if units and unit != "1" else ""
         if name not in SCALARS:
             for axis, letter in enumerate("xy"):
-                columns[f"{name}_{letter}{heading}"] = None if values is None else values[..., axis].ravel()
+                columns[f"{name}_{letter}{heading}"] = (
+                    None if values is None else values[..., axis].ravel()
+                )
             if name in PIN_FORCES:
-                columns[f"|{name}|{heading}"] = None if values is None else np.hypot(*values.T).T.ravel()
+                columns[f"|{name}|{heading}"] = (
+                    None if values is None else np.hypot(*values.T).T.ravel()
+                )
         else:
             columns[name + heading] = None if values is None else values.ravel()
     if solution.time is None and (time := _compute_times(solution)) is not None:
@@ -235,7 +296,12 @@ def list_scalars(solution: Solution, units: Conversion = SI) -> dict[str, Array 
 
 def _compute_times(solution: Solution) -> Array | None:
     """Compute when each position of a sweep at one constant speed is passed, s; None for any other."""
-    if solution.omega_2 is None or solution.alpha_2 is None or solution.theta_2.ndim > 1 or not solution.omega_2.all():
+    if (
+        solution.omega_2 is None
+        or solution.alpha_2 is None
+        or solution.theta_2.ndim > 1
+        or not solution.omega_2.all()
+    ):
         return None
     if np.ptp(solution.omega_2) != 0.0 or solution.alpha_2.any():
         return None
@@ -246,9 +312,19 @@ def _compute_times(solution: Solution) -> Array | None:
 
 def require_units(units: object) -> Conversion:
     """Return units as `fourbar.units` makes them; InputError for others."""
-    plain = isinstance(units, Mapping) and all(isinstance(to, tuple) and len(to) == 2 for to in units.values())
-    if not isinstance(units, Mapping) or not plain or not all(isinstance(name, str) for name, _ in units.values()):
-        raise InputError("units", units, 'must be as fourbar.units makes them, like fourbar.units("mm N.mm")')
+    plain = isinstance(units, Mapping) and all(
+        isinstance(to, tuple) and len(to) == 2 for to in units.values()
+    )
+    if (
+        not isinstance(units, Mapping)
+        or not plain
+        or not all(isinstance(name, str) for name, _ in units.values())
+    ):
+        raise InputError(
+            "units",
+            units,
+            'must be as fourbar.units makes them, like fourbar.units("mm N.mm")',
+        )
     for _, factor in units.values():
         require("units", factor, "1", POSITIVE)
     return units
@@ -262,8 +338,14 @@ def find_unit_in(unit: str, units: Conversion) -> tuple[str, float]:
 def _list_quantities(solution: "Solution") -> list[str]:
     """List every quantity of a solution, evaluated or not; time and those of a linear drive only where there is one."""
     left_out = () if solution.drive is not None else LINE_QUANTITIES
-    names = [name for name in UNITS if name not in left_out and (name != "time" or solution.time is not None)]
-    points = dict.fromkeys((*solution.points, *solution.velocity, *solution.acceleration))
+    names = [
+        name
+        for name in UNITS
+        if name not in left_out and (name != "time" or solution.time is not None)
+    ]
+    points = dict.fromkeys(
+        (*solution.points, *solution.velocity, *solution.acceleration)
+    )
     return names + [f"{start}{name}" for name in points for start in ("", "v_", "a_")]
 
 
@@ -289,14 +371,22 @@ def unwrap(angles: Array) -> None:
 
     `angles`: (n,), or (m, n) for as many sweeps.
     """
-    if angles.shape[-1] < 2 or (np.ptp(angles) < np.pi and not (angles[..., 0] == -np.pi).any()):
+    if angles.shape[-1] < 2 or (
+        np.ptp(angles) < np.pi and not (angles[..., 0] == -np.pi).any()
+    ):
         return
     rows = angles.reshape(-1, angles.shape[-1])
     finite = ~np.isnan(rows)
-    place = np.where(finite, np.arange(rows.shape[1]), np.argmax(finite, axis=1)[:, None])
+    place = np.where(
+        finite, np.arange(rows.shape[1]), np.argmax(finite, axis=1)[:, None]
+    )
     raw = np.take_along_axis(rows, np.maximum.accumulate(place, axis=1), axis=1)
     jumps = np.diff(raw, axis=1, prepend=raw[:, :1])
     # -pi as a double lies inside (-pi, pi], yet reads as the excluded end
     start = np.where(raw[:, :1] == -np.pi, 2.0 * np.pi, 0.0)
-    turned = rows + start - (2.0 * np.pi) * np.cumsum(np.round(jumps / (2.0 * np.pi)), axis=1)
+    turned = (
+        rows
+        + start
+        - (2.0 * np.pi) * np.cumsum(np.round(jumps / (2.0 * np.pi)), axis=1)
+    )
     angles[...] = turned.reshape(angles.shape)

@@ -46,7 +46,9 @@ class Members(Protocol):
     def at(self) -> Command:
         """Return the command, (m, n)."""
 
-    def members(self, rows: slice | None, count: int, begins: Scene | None = None) -> Scene:
+    def members(
+        self, rows: slice | None, count: int, begins: Scene | None = None
+    ) -> Scene:
         """Make the scene of some members, or of all as columns, each repeated for `count` positions."""
 
     def begin(self, rows: slice) -> Scene:
@@ -88,7 +90,11 @@ def solve(
         if not hasattr(scene, "members"):
             raise InputError("scene", scene, "must be a Scene, or a Study of `vary`")
         if at is not None:
-            raise InputError("at", "a command", "a study states its own positions: vary the commanded angle")
+            raise InputError(
+                "at",
+                "a command",
+                "a study states its own positions: vary the commanded angle",
+            )
         study = scene
         scene, commanded = study.scene, study.at
     elif at is not None:
@@ -106,12 +112,25 @@ def solve(
     code = np.zeros(shape, dtype=np.uint8)
     with np.errstate(all="ignore"):
         arrays = None
-        if shape == (1,) and study is None and commanded.independent is None and out is None:
-            arrays = _solve_alone(_begin(scene, commanded, last_stage, side), commanded, last_stage, names, code)
+        if (
+            shape == (1,)
+            and study is None
+            and commanded.independent is None
+            and out is None
+        ):
+            arrays = _solve_alone(
+                _begin(scene, commanded, last_stage, side),
+                commanded,
+                last_stage,
+                names,
+                code,
+            )
         if arrays is None:
             arrays, evaluated = make_arrays(names, shape, out), None
             blocks = (
-                _list_members(study, last_stage, side) if study else _list_blocks(scene, commanded, last_stage, side)
+                _list_members(study, last_stage, side)
+                if study
+                else _list_blocks(scene, commanded, last_stage, side)
             )
             for part, case, block in blocks:
                 # kept until the next block is evaluated, so that its memory is used again
@@ -119,11 +138,16 @@ def solve(
                 _store_block(case, evaluated, arrays, code, part)
     unwrap_angles(arrays, commanded.bar)
     if commanded.stroke is not None:
-        for name in {"stroke", "stroke_speed"} & arrays.keys():  # as commanded, wherever it has a value
+        for name in {
+            "stroke",
+            "stroke_speed",
+        } & arrays.keys():  # as commanded, wherever it has a value
             arrays[name][...] = getattr(commanded, name) + 0.0 * arrays[name]
     if study is not None:
         study.refuse(arrays, code)
-    solution = make_solution(scene if study is None else study.members(None, 1), commanded, code, arrays)
+    solution = make_solution(
+        scene if study is None else study.members(None, 1), commanded, code, arrays
+    )
     solution.time, solution.stopped_at = commanded.time, stopped_at
     return solution
 
@@ -139,11 +163,15 @@ def _begin(scene: Scene, commanded: Command, last_stage: int, side: int) -> Case
     return case.with_start(stated if stated.bar == commanded.bar else commanded)
 
 
-def _list_blocks(scene: Scene, commanded: Command, last_stage: int, side: int) -> Iterator[tuple[Part, Case, Command]]:
+def _list_blocks(
+    scene: Scene, commanded: Command, last_stage: int, side: int
+) -> Iterator[tuple[Part, Case, Command]]:
     """List the positions of one linkage block by block, those of a released one by their independent angle."""
     case, free = _begin(scene, commanded, last_stage, side), commanded.independent
     if free is None:
-        for part in _split(len(commanded.angle), BLOCK if last_stage < ERROR else LONG_BLOCK):
+        for part in _split(
+            len(commanded.angle), BLOCK if last_stage < ERROR else LONG_BLOCK
+        ):
             yield (part,), case, commanded.part(part)
         return
     for bar in (2, 4):
@@ -152,7 +180,9 @@ def _list_blocks(scene: Scene, commanded: Command, last_stage: int, side: int) -
             yield (index,), case.freed(bar, free.side[index]), commanded.part(index)
 
 
-def _list_members(study: Members, last_stage: int, side: int) -> Iterator[tuple[Part, Case, Command]]:
+def _list_members(
+    study: Members, last_stage: int, side: int
+) -> Iterator[tuple[Part, Case, Command]]:
     """List the positions of many linkages block by block, each number repeated for the positions of its member."""
     (m, n), size = study.at.angle.shape, BLOCK if last_stage < ERROR else LONG_BLOCK
     for rows in _split(m, max(1, size // n)):
@@ -186,7 +216,11 @@ def take_members(commanded: Command, rows: slice, columns: slice) -> Command:
 
 
 def _store_block(
-    case: Case, evaluated: Evaluated, arrays: Mapping[str, Array], code: NDArray[np.uint8], part: Part
+    case: Case,
+    evaluated: Evaluated,
+    arrays: Mapping[str, Array],
+    code: NDArray[np.uint8],
+    part: Part,
 ) -> None:
     """Write what was evaluated into the arrays of all positions, where it is no number with the status that says so."""
     codes, values, _ = evaluated
@@ -200,7 +234,9 @@ def _store_block(
             arrays[name][part] = value
         else:
             array = arrays[name]
-            if array.strides[-1] == array.itemsize:  # x and y next to each other: one copy
+            if (
+                array.strides[-1] == array.itemsize
+            ):  # x and y next to each other: one copy
                 array.view(complex)[*part, 0] = value
             else:
                 array[*part, 0], array[*part, 1] = value.real, value.imag
@@ -215,9 +251,15 @@ def _refuse(commanded: Command) -> None:
     expect("at.independent", commanded.independent, Independent, type(None))
     n = commanded.angle.size
     arrays: dict[str, Any] = {angle: commanded.angle, "branch": commanded.branch}
-    arrays |= {name: getattr(commanded, name) for name in ("condition", "stroke", "time", "lost")}
+    arrays |= {
+        name: getattr(commanded, name)
+        for name in ("condition", "stroke", "time", "lost")
+    }
     if commanded.independent is not None:
-        arrays |= {f"independent.{name}": values for name, values in commanded.independent._asdict().items()}
+        arrays |= {
+            f"independent.{name}": values
+            for name, values in commanded.independent._asdict().items()
+        }
     for key, value in arrays.items():
         if value is None and key != "branch":
             continue
@@ -234,8 +276,12 @@ def _refuse(commanded: Command) -> None:
     for name, value in rates.items():
         if isinstance(value, np.ndarray):
             if value.shape not in ((), (n,)) or value.dtype.kind not in "iuf":
-                raise InputError(f"at.{name}", value, f"must be numbers, shape () or {(n,)}")
-        elif not isinstance(value, float) and not (value is None and name == "stroke_speed"):
+                raise InputError(
+                    f"at.{name}", value, f"must be numbers, shape () or {(n,)}"
+                )
+        elif not isinstance(value, float) and not (
+            value is None and name == "stroke_speed"
+        ):
             expect(f"at.{name}", value, float, int, np.integer, np.floating)
             require(f"at.{name}", value)
     if commanded.remainder is not None:
@@ -245,11 +291,19 @@ def _refuse(commanded: Command) -> None:
 def find_last_stage(scene: Scene) -> str:
     """Return the last stage that a scene states enough for: error bars and all, or positions only."""
     motion = scene.motion
-    return "position" if motion.speed is None and motion.law is None and motion.free is None else STAGES[-1]
+    return (
+        "position"
+        if motion.speed is None and motion.law is None and motion.free is None
+        else STAGES[-1]
+    )
 
 
 def find_requested(
-    scene: Scene, shape: tuple[int, ...], commanded: Command, stage: str | None, out: Mapping[str, Array] | None
+    scene: Scene,
+    shape: tuple[int, ...],
+    commanded: Command,
+    stage: str | None,
+    out: Mapping[str, Array] | None,
 ) -> tuple[int, KeysView[str]]:
     """Return the number of the last stage evaluated, and the names of the quantities; an InputError as of `solve`.
 
@@ -262,50 +316,85 @@ def find_requested(
         if not isinstance(stage, str) or stage not in STAGES:
             raise InputError("stage", stage, "must be one of " + ", ".join(STAGES))
         last_stage = STAGES.index(stage)
-        names = _list_names(last_stage, _list_absent(scene), tuple(point.name for point in scene.points))
+        names = _list_names(
+            last_stage, _list_absent(scene), tuple(point.name for point in scene.points)
+        )
     else:
         expect("out", out, Mapping)
         names = out.keys()
-        foreign, stages = _list_foreign(scene), _list_stages(tuple(point.name for point in scene.points))
-        stages = {name: stage_of for name, stage_of in stages.items() if name not in foreign}
+        foreign, stages = (
+            _list_foreign(scene),
+            _list_stages(tuple(point.name for point in scene.points)),
+        )
+        stages = {
+            name: stage_of for name, stage_of in stages.items() if name not in foreign
+        }
         for name, array in out.items():
             if name not in stages:
                 raise InputError("out", name, "must be among " + ", ".join(stages))
             wanted_shape = shape if name in SCALARS else (*shape, 2)
             expect(f"out.{name}", array, np.ndarray)
-            if array.shape != wanted_shape or array.dtype != np.float64 or not array.flags.writeable:
+            if (
+                array.shape != wanted_shape
+                or array.dtype != np.float64
+                or not array.flags.writeable
+            ):
                 allowed = f"must be float64 of shape {wanted_shape}, writeable"
-                raise InputError(f"out.{name}", (array.shape, str(array.dtype)), allowed)
+                raise InputError(
+                    f"out.{name}", (array.shape, str(array.dtype)), allowed
+                )
         last_stage = max((STAGES.index(stages[name]) for name in out), default=0)
     if last_stage > 0 and commanded.speed is None:
-        raise InputError(f"motion.omega_{commanded.bar}", None, f"is needed for the stage {STAGES[last_stage]!r}")
-    return last_stage, names if commanded.bar == 2 else {**dict.fromkeys(names), "theta_2": None, "sin_mu": None}.keys()
+        raise InputError(
+            f"motion.omega_{commanded.bar}",
+            None,
+            f"is needed for the stage {STAGES[last_stage]!r}",
+        )
+    return last_stage, names if commanded.bar == 2 else {
+        **dict.fromkeys(names),
+        "theta_2": None,
+        "sin_mu": None,
+    }.keys()
 
 
-def make_arrays(names: Iterable[str], shape: tuple[int, ...], out: Mapping[str, Array] | None) -> dict[str, Array]:
+def make_arrays(
+    names: Iterable[str], shape: tuple[int, ...], out: Mapping[str, Array] | None
+) -> dict[str, Array]:
     """Return the arrays to write into: the given ones, and new ones for the rest."""
     stated = {} if out is None else out
     return {
-        name: stated[name] if name in stated else np.empty(shape if name in SCALARS else (*shape, 2)) for name in names
+        name: stated[name]
+        if name in stated
+        else np.empty(shape if name in SCALARS else (*shape, 2))
+        for name in names
     }
 
 
 def _list_stages(points: tuple[str, ...]) -> dict[str, str]:
     """List every quantity of a scene, those of its own points too, and its stage."""
-    return STAGE_OF | {start + name: stage for name in points for start, stage in POINT_STAGES.items()}
+    return STAGE_OF | {
+        start + name: stage for name in points for start, stage in POINT_STAGES.items()
+    }
 
 
 @cache
-def _list_names(last_stage: int, absent: tuple[str, ...], points: tuple[str, ...]) -> KeysView[str]:
+def _list_names(
+    last_stage: int, absent: tuple[str, ...], points: tuple[str, ...]
+) -> KeysView[str]:
     """List the quantities of the stages up to the last one last_stage."""
     before = STAGES[: last_stage + 1]
     return {
-        name: stage for name, stage in _list_stages(points).items() if stage in before and name not in absent
+        name: stage
+        for name, stage in _list_stages(points).items()
+        if stage in before and name not in absent
     }.keys()
 
 
 def make_solution(
-    scene: Scene, commanded: Command, code: NDArray[np.uint8], quantities_by_name: Mapping[str, Array]
+    scene: Scene,
+    commanded: Command,
+    code: NDArray[np.uint8],
+    quantities_by_name: Mapping[str, Array],
 ) -> Solution:
     """Put the arrays of a solution in their places."""
     of_points: dict[str, dict[str, Array]] = {start: {} for start in POINT_STAGES}
@@ -315,15 +404,25 @@ def make_solution(
                 arrays[point.name] = array
     quantities: Mapping[str, Any] = quantities_by_name
     if scene.points:
-        quantities = {name: array for name, array in quantities_by_name.items() if name in UNITS}
+        quantities = {
+            name: array for name, array in quantities_by_name.items() if name in UNITS
+        }
     branch, theta_2 = np.asarray(commanded.branch), commanded.angle
     if commanded.bar != 2:
         theta_2, sine = quantities["theta_2"], quantities["sin_mu"]
-        quantities = {name: array for name, array in quantities.items() if name != "theta_2"}
+        quantities = {
+            name: array for name, array in quantities.items() if name != "theta_2"
+        }
         branch = np.where(np.abs(sine) > 0.0, np.sign(sine), branch).astype(np.int8)
-    solution = Solution(scene.title, scene.drive_bar, code, branch, theta_2=theta_2, **quantities)
+    solution = Solution(
+        scene.title, scene.drive_bar, code, branch, theta_2=theta_2, **quantities
+    )
     solution.drive, solution.at = scene.drive, commanded
-    solution.points, solution.velocity, solution.acceleration = of_points[""], of_points["v_"], of_points["a_"]
+    solution.points, solution.velocity, solution.acceleration = (
+        of_points[""],
+        of_points["v_"],
+        of_points["a_"],
+    )
     solution.ground = (scene.linkage.ground, scene.linkage.ground_angle)
     return solution
 
@@ -337,7 +436,11 @@ def unwrap_angles(arrays: Mapping[str, Array], bar: int) -> None:
 
 
 def _solve_alone(
-    case: Case, commanded: Command, last_stage: int, names: KeysView[str], code: NDArray[np.uint8]
+    case: Case,
+    commanded: Command,
+    last_stage: int,
+    names: KeysView[str],
+    code: NDArray[np.uint8],
 ) -> dict[str, Array] | None:
     """Solve a single position in plain numbers, for arrays of one entry cost several times as much.
 
@@ -353,7 +456,10 @@ def _solve_alone(
         return None
     vectors = table.view(float).reshape(-1, 1, 2)
     scalars = vectors[:, :, 0]
-    return {name: (scalars if name in SCALARS else vectors)[i] for i, name in enumerate(values)}
+    return {
+        name: (scalars if name in SCALARS else vectors)[i]
+        for i, name in enumerate(values)
+    }
 
 
 def _list_foreign(scene: Scene) -> tuple[str, ...]:
@@ -366,4 +472,8 @@ def _list_absent(scene: Scene) -> tuple[str, ...]:
     absent = _list_foreign(scene)
     if not any(effect.dry for effect in scene.effects):
         absent = (*absent, *DRY_FRICTION_QUANTITIES)
-    return absent if any(effect.loaded_pins for effect in scene.effects) else (*absent, *PIN_LOAD_QUANTITIES)
+    return (
+        absent
+        if any(effect.loaded_pins for effect in scene.effects)
+        else (*absent, *PIN_LOAD_QUANTITIES)
+    )

@@ -21,7 +21,9 @@ TEMPORARY = ".part"
 """Suffix of the name of an unfinished file."""
 
 
-def read_bytes(path: str | Path, key: str, largest: int, *, shown: str | None = None) -> bytes:
+def read_bytes(
+    path: str | Path, key: str, largest: int, *, shown: str | None = None
+) -> bytes:
     """Read an ordinary file; its kind and its size are looked at before it is opened.
 
     Parameters
@@ -50,7 +52,9 @@ def read_bytes(path: str | Path, key: str, largest: int, *, shown: str | None = 
     except FileNotFoundError:
         raise refuse("file not found") from None
     except (OSError, ValueError) as error:  # ValueError: a NUL in the name
-        raise refuse(f"cannot be read: {getattr(error, 'strerror', None) or error}") from None
+        raise refuse(
+            f"cannot be read: {getattr(error, 'strerror', None) or error}"
+        ) from None
     if len(data) > largest:  # it grew, or is of those in /proc that say 0
         raise refuse(f"must not exceed {largest} bytes")
     return data
@@ -64,7 +68,9 @@ def read_text(path: str | Path, key: str, largest: int) -> str:
     try:
         return read_bytes(path, key, largest).decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise InputError(key, str(path), f"must be UTF-8 text; byte {error.start} is not") from None
+        raise InputError(
+            key, str(path), f"must be UTF-8 text; byte {error.start} is not"
+        ) from None
 
 
 @contextmanager
@@ -73,8 +79,13 @@ def name_file(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        both = (error.filename, error.filename2)  # a copy names what it reads first, whichever of the two is full
-        if error.filename is None or any(str(name).endswith(TEMPORARY) for name in both):
+        both = (
+            error.filename,
+            error.filename2,
+        )  # a copy names what it reads first, whichever of the two is full
+        if error.filename is None or any(
+            str(name).endswith(TEMPORARY) for name in both
+        ):
             error.filename, error.filename2 = str(path), None
         raise
 
@@ -84,8 +95,12 @@ def require_file(target: Path, *read: Path) -> None:
     if target.is_dir() or "\0" in str(target):
         raise InputError("path", str(target), "must name a file, not a folder")
     if not target.parent.is_dir():
-        raise InputError("path", str(target), f"there is no such folder: {target.parent}")
-    if any(target.exists() and file.exists() and target.samefile(file) for file in read):
+        raise InputError(
+            "path", str(target), f"there is no such folder: {target.parent}"
+        )
+    if any(
+        target.exists() and file.exists() and target.samefile(file) for file in read
+    ):
         raise InputError("path", str(target), "is read here, and would be lost")
 
 
@@ -108,7 +123,9 @@ def write_bytes(path: str | Path, data: bytes, *, private: bool = False) -> None
     import tempfile
 
     with name_file(target):
-        handle, temporary = tempfile.mkstemp(prefix=f".{target.name[:100]}.", suffix=TEMPORARY, dir=target.parent)
+        handle, temporary = tempfile.mkstemp(
+            prefix=f".{target.name[:100]}.", suffix=TEMPORARY, dir=target.parent
+        )
         try:
             with os.fdopen(handle, "wb") as file:
                 file.write(data)
@@ -148,7 +165,11 @@ def make_data_frame(columns: Mapping[str, Any]) -> "DataFrame":
 def describe_extent(theta_2: Any) -> str:
     """Say how many positions there are, of how many linkages."""
     count = f"{theta_2.shape[-1]} position{'s' if theta_2.shape[-1] != 1 else ''}"
-    return count if theta_2.ndim == 1 else f"{len(theta_2)} linkage{'s' if len(theta_2) != 1 else ''}, {count} each"
+    return (
+        count
+        if theta_2.ndim == 1
+        else f"{len(theta_2)} linkage{'s' if len(theta_2) != 1 else ''}, {count} each"
+    )
 
 
 def write_between(values: Any) -> str:
@@ -156,7 +177,11 @@ def write_between(values: Any) -> str:
     finite = values[np.isfinite(values)]
     if not finite.size:
         return "no value"
-    return f"{finite.min():.6g}" if finite.min() == finite.max() else f"{finite.min():.6g} to {finite.max():.6g}"
+    return (
+        f"{finite.min():.6g}"
+        if finite.min() == finite.max()
+        else f"{finite.min():.6g} to {finite.max():.6g}"
+    )
 
 
 def list_names(what: str, names: Iterable[str]) -> str:
@@ -168,7 +193,10 @@ def make_html(title: str, head: Sequence[str], rows: Iterable[Sequence[str]]) ->
     """Make what a notebook shows of a result."""
     from html import escape
 
-    lines = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows)
+    lines = "".join(
+        "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>"
+        for row in rows
+    )
     heads = "".join(f"<th>{escape(cell)}</th>" for cell in head)
     return f"<div><b>{escape(title)}</b><table><tr>{heads}</tr>{lines}</table></div>"
 
@@ -182,7 +210,11 @@ def null_nan(value: Any) -> Any:
     """Make lists, tables and numbers of Python of a value, None for what is not finite."""
     if isinstance(value, np.ndarray):
         plain = value.tolist()
-        return null_nan(plain) if value.dtype.kind == "f" and not np.isfinite(value).all() else plain
+        return (
+            null_nan(plain)
+            if value.dtype.kind == "f" and not np.isfinite(value).all()
+            else plain
+        )
     if hasattr(value, "_asdict"):
         value = value._asdict()
     if isinstance(value, dict):

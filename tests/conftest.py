@@ -9,7 +9,11 @@ from pathlib import Path
 
 import pytest
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+CHROMIUM = (
+    shutil.which("chromium")
+    or shutil.which("chromium-browser")
+    or shutil.which("google-chrome")
+)
 DRIVER = shutil.which("chromedriver")
 FLAGS = (
     "--headless",
@@ -29,7 +33,11 @@ HERE = {"posix": hasattr(os, "fork"), "linux": sys.platform == "linux"}
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
-        for system in (name for name, here in HERE.items() if not here and item.get_closest_marker(name)):
+        for system in (
+            name
+            for name, here in HERE.items()
+            if not here and item.get_closest_marker(name)
+        ):
             item.add_marker(pytest.mark.skip(reason=f"of {system} alone"))
 
 
@@ -45,7 +53,9 @@ def interruptible() -> Iterator[None]:
 def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator:
     """One browser for all tests of pages; each test opens its own page in it."""
     if CHROMIUM is None or DRIVER is None:
-        pytest.skip("pages are tested in Chromium: install chromium and chromedriver (chromium-driver)")
+        pytest.skip(
+            "pages are tested in Chromium: install chromium and chromedriver (chromium-driver)"
+        )
     from selenium import webdriver
 
     options = webdriver.ChromeOptions()
@@ -62,14 +72,24 @@ def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator:
 def browse(chromium, tmp_path: Path):
     """Opens page text at a width, light or dark; after the test the console must be empty."""
 
-    def open_page(text: str, width: int = 1100, *, dark: bool = False, still: bool = False):
+    def open_page(
+        text: str, width: int = 1100, *, dark: bool = False, still: bool = False
+    ):
         path = tmp_path / "page.html"
         path.write_text(text, encoding="utf-8")
-        metrics = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": False}
+        metrics = {
+            "width": width,
+            "height": 900,
+            "deviceScaleFactor": 1,
+            "mobile": False,
+        }
         chromium.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
         media = [
             {"name": "prefers-color-scheme", "value": "dark" if dark else "light"},
-            {"name": "prefers-reduced-motion", "value": "reduce" if still else "no-preference"},
+            {
+                "name": "prefers-reduced-motion",
+                "value": "reduce" if still else "no-preference",
+            },
         ]
         chromium.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": media})
         chromium.get(path.as_uri())

@@ -5,8 +5,12 @@ import sys
 from pathlib import Path
 
 HERE = str(Path(__file__).parent)
-sys.path.insert(0, HERE)  # where the checkout is not installed, and for the processes that are started from here
-os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, (HERE, os.environ.get("PYTHONPATH"))))
+sys.path.insert(
+    0, HERE
+)  # where the checkout is not installed, and for the processes that are started from here
+os.environ["PYTHONPATH"] = os.pathsep.join(
+    filter(None, (HERE, os.environ.get("PYTHONPATH")))
+)
 
 from fourbar_validation.cli import main  # noqa: E402
 

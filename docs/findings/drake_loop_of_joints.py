@@ -17,11 +17,12 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 
 LINK = '<link name="{}"><pose>{} {} 0 0 0 0</pose></link>'
-JOINT = (
-    '<joint name="{0}{1}" type="revolute"><parent>{0}</parent><child>{1}</child><axis><xyz>0 0 1</xyz></axis></joint>'
-)
+JOINT = '<joint name="{0}{1}" type="revolute"><parent>{0}</parent><child>{1}</child><axis><xyz>0 0 1</xyz></axis></joint>'  # noqa: E501
 links = "".join(LINK.format(*link) for link in (("a", 0, 0), ("b", 0, 1), ("c", 1, 1)))
-joints = "".join(JOINT.format(*pair) for pair in (("world", "a"), ("a", "b"), ("b", "c"), ("world", "c")))
+joints = "".join(
+    JOINT.format(*pair)
+    for pair in (("world", "a"), ("a", "b"), ("b", "c"), ("world", "c"))
+)
 SDF = f'<sdf version="1.9"><model name="loop">{links}{joints}</model></sdf>'
 
 if hasattr(MultibodyPlant, "SetEnableLoopTopology"):
@@ -29,7 +30,13 @@ if hasattr(MultibodyPlant, "SetEnableLoopTopology"):
     plant.SetEnableLoopTopology(True)
     Parser(plant).AddModelsFromString(SDF, "sdf")
     plant.Finalize()
-    print("enabled:", plant.num_loop_constraints(), "loop constraint,", plant.num_velocities(), "velocities")
+    print(
+        "enabled:",
+        plant.num_loop_constraints(),
+        "loop constraint,",
+        plant.num_velocities(),
+        "velocities",
+    )
 plant = MultibodyPlant(1e-3)
 Parser(plant).AddModelsFromString(SDF, "sdf")
 try:

@@ -27,8 +27,14 @@ genesis.init(backend=genesis.cpu, precision="64", logging_level="error")
 found = {}
 file = Path(tempfile.mkdtemp()) / "pendulum.xml"
 file.write_text(XML)
-for name, given in (("by default", {}), ("default_armature=None", {"default_armature": None})):
-    world = genesis.Scene(sim_options=genesis.options.SimOptions(dt=1e-6, gravity=(0.0, -9.81, 0.0)), show_viewer=False)
+for name, given in (
+    ("by default", {}),
+    ("default_armature=None", {"default_armature": None}),
+):
+    world = genesis.Scene(
+        sim_options=genesis.options.SimOptions(dt=1e-6, gravity=(0.0, -9.81, 0.0)),
+        show_viewer=False,
+    )
     bar = world.add_entity(genesis.morphs.MJCF(file=str(file), **given))
     world.build()
     world.step()

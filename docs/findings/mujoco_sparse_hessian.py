@@ -21,17 +21,28 @@ BAR = (
     '<site name="{1}" pos=".2 0 0"/>{2}</body>'
 )
 couplers = BAR.format(0.2, "one", "") + BAR.format(0.2, "other", "")
-bars = BAR.format(0, "rocker", "") + BAR.format(0, "second", "") + BAR.format(0, "crank", couplers)
+bars = (
+    BAR.format(0, "rocker", "")
+    + BAR.format(0, "second", "")
+    + BAR.format(0, "crank", couplers)
+)
 LOOPS = '<equality><connect site1="rocker" site2="one"/><connect site1="second" site2="other"/></equality>'
 found = {}
 for jacobian in ("dense", "sparse"):
     for iterations in (1, 100):
-        option = f'<option jacobian="{jacobian}" iterations="{iterations}" tolerance="0"/>'
-        model = mujoco.MjModel.from_xml_string(f"<mujoco>{option}<worldbody>{bars}</worldbody>{LOOPS}</mujoco>")
+        option = (
+            f'<option jacobian="{jacobian}" iterations="{iterations}" tolerance="0"/>'
+        )
+        model = mujoco.MjModel.from_xml_string(
+            f"<mujoco>{option}<worldbody>{bars}</worldbody>{LOOPS}</mujoco>"
+        )
         data = mujoco.MjData(model)
         data.qpos[:], data.qvel[:] = np.sin(np.arange(5)), np.cos(np.arange(5))
         mujoco.mj_forward(model, data)
         found[jacobian, iterations] = data.qacc.copy()
         print(jacobian, iterations, data.qacc)
-if np.abs(found["sparse", 1] - found["dense", 1]).max() < 1e-9 * np.abs(found["dense", 1]).max():
+if (
+    np.abs(found["sparse", 1] - found["dense", 1]).max()
+    < 1e-9 * np.abs(found["dense", 1]).max()
+):
     sys.exit("fixed")

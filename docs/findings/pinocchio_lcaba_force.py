@@ -18,19 +18,43 @@ import pinocchio as pin
 model = pin.Model()
 placed = {"a": (0, [0, 0]), "b": (1, [1, 0]), "c": (0, [1, 2])}
 for name, (parent, at) in placed.items():
-    joint = model.addJoint(parent, pin.JointModelRZ(), pin.SE3(np.eye(3), np.array([*at, 0.0])), name)
-    model.appendBodyToJoint(joint, pin.Inertia(1.0, np.array([0.5, 0.0, 0.0]), 0.1 * np.eye(3)), pin.SE3.Identity())
-ends = (2, pin.SE3(np.eye(3), np.array([2.0, 0, 0])), 3, pin.SE3(np.eye(3), np.array([2.0, 0, 0])))
+    joint = model.addJoint(
+        parent, pin.JointModelRZ(), pin.SE3(np.eye(3), np.array([*at, 0.0])), name
+    )
+    model.appendBodyToJoint(
+        joint,
+        pin.Inertia(1.0, np.array([0.5, 0.0, 0.0]), 0.1 * np.eye(3)),
+        pin.SE3.Identity(),
+    )
+ends = (
+    2,
+    pin.SE3(np.eye(3), np.array([2.0, 0, 0])),
+    3,
+    pin.SE3(np.eye(3), np.array([2.0, 0, 0])),
+)
 q, v = np.array([np.pi, -np.pi / 2, np.pi]), np.array([1.0, -1.0, 0.5])
 found = {}
 for name in ("constraintDynamics", "lcaba"):
-    data, models, datas = model.createData(), pin.StdVec_RigidConstraintModel(), pin.StdVec_RigidConstraintData()
+    data, models, datas = (
+        model.createData(),
+        pin.StdVec_RigidConstraintModel(),
+        pin.StdVec_RigidConstraintData(),
+    )
     models.append(pin.RigidConstraintModel(pin.ContactType.CONTACT_3D, model, *ends,
                                            pin.ReferenceFrame.LOCAL_WORLD_ALIGNED))  # fmt: skip
     datas.append(models[0].createData())
     pin.initConstraintDynamics(model, data, models, datas)
     pin.computeJointMinimalOrdering(model, data, models)
-    a = getattr(pin, name)(model, data, q, v, np.zeros(3), models, datas, pin.ProximalSettings(1e-14, 1e-8, 10))
+    a = getattr(pin, name)(
+        model,
+        data,
+        q,
+        v,
+        np.zeros(3),
+        models,
+        datas,
+        pin.ProximalSettings(1e-14, 1e-8, 10),
+    )
     found[name] = a.copy(), datas[0].contact_force.linear.copy()
     print(name, "acceleration", found[name][0], "force", found[name][1])
 (a, one), (b, other) = found.values()

@@ -36,17 +36,26 @@ def torque(step: float, **settings: float) -> float:
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "loop.urdf"
         file.write_text(f'<robot name="loop">{URDF}</robot>')
-        body = bullet.loadURDF(str(file), useFixedBase=True, flags=bullet.URDF_USE_INERTIA_FROM_FILE)
+        body = bullet.loadURDF(
+            str(file), useFixedBase=True, flags=bullet.URDF_USE_INERTIA_FROM_FILE
+        )
     bullet.setPhysicsEngineParameter(fixedTimeStep=step, **settings)
     bullet.setGravity(0, -9.81, 0)
     for joint, (angle, speed) in enumerate(((1.5, 1.0), (-1.5, -1.0), (1.5, 1.0))):
-        bullet.changeDynamics(body, joint, linearDamping=0, angularDamping=0, jointDamping=0)
+        bullet.changeDynamics(
+            body, joint, linearDamping=0, angularDamping=0, jointDamping=0
+        )
         bullet.resetJointState(body, joint, angle, speed)
         bullet.setJointMotorControl2(body, joint, bullet.VELOCITY_CONTROL, force=0)
-    bullet.setJointMotorControl2(body, 0, bullet.VELOCITY_CONTROL, targetVelocity=1.0, force=1e9)
+    bullet.setJointMotorControl2(
+        body, 0, bullet.VELOCITY_CONTROL, targetVelocity=1.0, force=1e9
+    )
     end = [0.5, 0, 0]  # from the mass centre
     bullet.changeConstraint(
-        bullet.createConstraint(body, 1, body, 2, bullet.JOINT_POINT2POINT, [0, 0, 0], end, end), maxForce=1e9
+        bullet.createConstraint(
+            body, 1, body, 2, bullet.JOINT_POINT2POINT, [0, 0, 0], end, end
+        ),
+        maxForce=1e9,
     )
     for _ in range(round(0.1 / step)):
         bullet.stepSimulation()
@@ -59,6 +68,8 @@ apart = {}
 for step in (1e-4, 1e-5):
     default, none = torque(step), torque(step, solverResidualThreshold=0.0)
     apart[step] = abs(default - none)
-    print(f"step {step:g} s: torque {default:.9f} N m by default, {none:.9f} with no threshold")
+    print(
+        f"step {step:g} s: torque {default:.9f} N m by default, {none:.9f} with no threshold"
+    )
 if not (apart[1e-5] > 1e-5 and apart[1e-5] > 100.0 * apart[1e-4]):
     sys.exit("fixed")

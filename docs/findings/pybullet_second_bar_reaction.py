@@ -35,11 +35,15 @@ def reaction(q: tuple[float, float], v: tuple[float, float]) -> tuple[float, flo
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "two.urdf"
         file.write_text(URDF)
-        body = bullet.loadURDF(str(file), useFixedBase=True, flags=bullet.URDF_USE_INERTIA_FROM_FILE)
+        body = bullet.loadURDF(
+            str(file), useFixedBase=True, flags=bullet.URDF_USE_INERTIA_FROM_FILE
+        )
     bullet.setPhysicsEngineParameter(fixedTimeStep=STEP)
     bullet.setGravity(0, 0, 0)
     for joint in range(2):
-        bullet.changeDynamics(body, joint, linearDamping=0, angularDamping=0, jointDamping=0)
+        bullet.changeDynamics(
+            body, joint, linearDamping=0, angularDamping=0, jointDamping=0
+        )
         bullet.resetJointState(body, joint, q[joint], v[joint])
         bullet.setJointMotorControl2(body, joint, bullet.VELOCITY_CONTROL, force=0)
         bullet.enableJointForceTorqueSensor(body, joint, True)
@@ -49,7 +53,10 @@ def reaction(q: tuple[float, float], v: tuple[float, float]) -> tuple[float, flo
     a1, a2 = ((state[1] - speed) / STEP for state, speed in zip(states, v, strict=True))
     w, turning = v[0] + v[1], a1 + a2
     parts = []
-    for part in (math.cos, math.sin):  # of the mass centre of bar 2: at the end of bar 1, and half a bar further
+    for part in (
+        math.cos,
+        math.sin,
+    ):  # of the mass centre of bar 2: at the end of bar 1, and half a bar further
         across = (lambda x: -math.sin(x)) if part is math.cos else math.cos
         parts.append(a1 * across(q[0]) - v[0] ** 2 * part(q[0])
                      + 0.5 * (turning * across(q[0] + q[1]) - w**2 * part(q[0] + q[1])))  # fmt: skip
@@ -60,6 +67,8 @@ worst = {}
 for v in ((2.0, -3.0), (2.0, 0.0), (0.0, -3.0)):
     reported, right = reaction((0.3, 0.7), v)
     worst[v] = abs(reported - right)
-    print(f"speeds {v}: second joint {reported:.4f} N, mass times acceleration {right:.4f} N")
+    print(
+        f"speeds {v}: second joint {reported:.4f} N, mass times acceleration {right:.4f} N"
+    )
 if not (worst[2.0, -3.0] > 1.0 and max(worst[2.0, 0.0], worst[0.0, -3.0]) < 1e-3):
     sys.exit("fixed")

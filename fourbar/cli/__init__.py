@@ -5,7 +5,14 @@ import sys
 import click
 
 from fourbar import __version__
-from fourbar.cli.evaluate import analyze, classify, equilibrium, extremes, new, tolerance
+from fourbar.cli.evaluate import (
+    analyze,
+    classify,
+    equilibrium,
+    extremes,
+    new,
+    tolerance,
+)
 from fourbar.cli.export import animate, edit, mjcf, plot, sdf, usd
 from fourbar.errors import run
 
@@ -21,11 +28,16 @@ SECTIONS = {
 class SectionedGroup(click.Group):
     """A group whose help lists its commands in sections, each description whole."""
 
-    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+    def format_commands(
+        self, ctx: click.Context, formatter: click.HelpFormatter
+    ) -> None:
         """Write the sections."""
         for title, commands in SECTIONS.items():
             with formatter.section(title):
-                rows = [(str(command.name), command.get_short_help_str(limit=200)) for command in commands]
+                rows = [
+                    (str(command.name), command.get_short_help_str(limit=200))
+                    for command in commands
+                ]
                 formatter.write_dl([(f"{name:<11}", text) for name, text in rows])
 
 
@@ -36,7 +48,9 @@ class SectionedGroup(click.Group):
     epilog="Begin with: fourbar new first.toml --lengths 300mm 100mm 250mm 220mm",
 )
 @click.version_option(__version__, "-V", "--version", prog_name="fourbar")
-@click.option("--traceback", is_flag=True, help="Show where an internal error happened.")
+@click.option(
+    "--traceback", is_flag=True, help="Show where an internal error happened."
+)
 @click.pass_context
 def group(context: click.Context, traceback: bool) -> None:
     """Evaluate closed formulas of the planar four-bar: from a scene file to torque and pin forces.

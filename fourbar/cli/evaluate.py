@@ -15,10 +15,17 @@ from fourbar.solution import DEGREES, Conversion
 
 @click.command()
 @click.argument("lengths", nargs=4, metavar="D A B C")
-@click.option("--all", "everything", is_flag=True, help="Print the limits of all bars, not only of the output.")
+@click.option(
+    "--all",
+    "everything",
+    is_flag=True,
+    help="Print the limits of all bars, not only of the output.",
+)
 @given.json_option
 @given.text_option(*given.TABLES)
-def classify(lengths: tuple[str, ...], everything: bool, as_json: bool, out: Path | None) -> None:
+def classify(
+    lengths: tuple[str, ...], everything: bool, as_json: bool, out: Path | None
+) -> None:
     """Classify a linkage by its lengths: which bars turn, and how far.
 
     D A B C are ground, input, coupler and output: four bare numbers are ratios; lengths like 30cm work too.
@@ -29,17 +36,25 @@ def classify(lengths: tuple[str, ...], everything: bool, as_json: bool, out: Pat
 
     ratios = [given.is_bare(text) for text in lengths]
     if any(ratios) and not all(ratios):
-        raise InputError("D A B C", " ".join(lengths), "must be four ratios, or four lengths each with its unit")
+        raise InputError(
+            "D A B C",
+            " ".join(lengths),
+            "must be four ratios, or four lengths each with its unit",
+        )
     d, a, b, c = given.read_lengths(lengths)
     linkage = FourBar(d, Bar(a), Bar(b), Bar(c))
     units = None if all(ratios) else suit_units(lengths[0])
     lines = write_type(linkage, units, everything=everything)
-    given.print_to(write_type_json(linkage) if as_json else "\n".join([*lines, ""]), out)
+    given.print_to(
+        write_type_json(linkage) if as_json else "\n".join([*lines, ""]), out
+    )
 
 
 @click.command()
 @click.argument("file", type=given.FILE, required=False)
-@click.option("-o", "--out", type=given.FILE, metavar="FILE", help="Name of the new file.")
+@click.option(
+    "-o", "--out", type=given.FILE, metavar="FILE", help="Name of the new file."
+)
 @click.option(
     "--lengths",
     nargs=4,
@@ -47,8 +62,14 @@ def classify(lengths: tuple[str, ...], everything: bool, as_json: bool, out: Pat
     metavar="D A B C",
     help="Lengths of ground, input, coupler, output, like 300mm.",
 )
-@click.option("--unit", metavar="UNIT", help="Unit of lengths that are given without one, like mm.")
-def new(file: Path | None, out: Path | None, lengths: tuple[str, ...], unit: str | None) -> None:
+@click.option(
+    "--unit",
+    metavar="UNIT",
+    help="Unit of lengths that are given without one, like mm.",
+)
+def new(
+    file: Path | None, out: Path | None, lengths: tuple[str, ...], unit: str | None
+) -> None:
     """Write a new scene file with these lengths and comments that explain the rest.
 
     Each length has a unit, like 300mm; or --unit mm is the unit of all.
@@ -61,23 +82,38 @@ def new(file: Path | None, out: Path | None, lengths: tuple[str, ...], unit: str
     file = file or out
     assert file is not None
     if file.exists():
-        raise InputError("FILE", str(file), "file exists; give the new scene another name")
+        raise InputError(
+            "FILE", str(file), "file exists; give the new scene another name"
+        )
     bare = [text for text in lengths if given.is_bare(text)]
     if bare and unit is None:
         raise InputError(
-            "--lengths", bare[0], "the unit is missing; write each with its own, like 300mm, or --unit mm once"
+            "--lengths",
+            bare[0],
+            "the unit is missing; write each with its own, like 300mm, or --unit mm once",
         )
-    write_text(file, write_new_scene([f"{text} {unit}" if text in bare else text for text in lengths]))
-    shown = str(file) if " " not in str(file) else f'"{file}"'  # to be copied into any shell
+    write_text(
+        file,
+        write_new_scene(
+            [f"{text} {unit}" if text in bare else text for text in lengths]
+        ),
+    )
+    shown = (
+        str(file) if " " not in str(file) else f'"{file}"'
+    )  # to be copied into any shell
     click.echo(f"wrote {file}; edit it, then: fourbar analyze {shown}")
 
 
 def _choose_form(table: bool, as_json: bool, as_csv: bool, out: Path | None) -> str:
     """Choose between "summary", "table", "json" and "csv", by the options or by the ending of the file."""
     if as_json and as_csv:
-        raise click.UsageError("--json and --csv are two forms of the output; give one of them")
+        raise click.UsageError(
+            "--json and --csv are two forms of the output; give one of them"
+        )
     if table and (as_json or as_csv):
-        raise click.UsageError("--table, --every and --all shape the table; --json and --csv hold every position")
+        raise click.UsageError(
+            "--table, --every and --all shape the table; --json and --csv hold every position"
+        )
     if table:
         return "table"
     if as_json or (given.ends_in(out, ".json") and not as_csv):
@@ -88,15 +124,41 @@ def _choose_form(table: bool, as_json: bool, as_csv: bool, out: Path | None) -> 
 @click.command()
 @given.scene_argument
 @click.option("--table", is_flag=True, help="Print the positions one by one.")
-@click.option("--every", type=click.IntRange(min=1), metavar="N", help="Print every N-th position of the table.")
+@click.option(
+    "--every",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="Print every N-th position of the table.",
+)
 @click.option("--all", "every", flag_value=1, help="Print every position of the table.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object in SI units.")
-@click.option("--csv", "decimal", flag_value=".", help="Print one line per position in SI units.")
-@click.option("--csv-comma", "decimal", flag_value=",", help="Print CSV with decimal commas and semicolons.")
-@click.option("--degrees/--radians", default=None, help="Unit of the angles (default: degrees; rad in JSON and CSV).")
+@click.option(
+    "--json", "as_json", is_flag=True, help="Print one JSON object in SI units."
+)
+@click.option(
+    "--csv", "decimal", flag_value=".", help="Print one line per position in SI units."
+)
+@click.option(
+    "--csv-comma",
+    "decimal",
+    flag_value=",",
+    help="Print CSV with decimal commas and semicolons.",
+)
+@click.option(
+    "--degrees/--radians",
+    default=None,
+    help="Unit of the angles (default: degrees; rad in JSON and CSV).",
+)
 @given.own_units_option
-@click.option("--pressure", metavar="P", help='Pressure of the cylinder, like "210 bar"; adds the bore that it needs.')
-@click.option("--sensitivity", is_flag=True, help="Rank the numbers of the scene by what the results depend on.")
+@click.option(
+    "--pressure",
+    metavar="P",
+    help='Pressure of the cylinder, like "210 bar"; adds the bore that it needs.',
+)
+@click.option(
+    "--sensitivity",
+    is_flag=True,
+    help="Rank the numbers of the scene by what the results depend on.",
+)
 @given.text_option(*given.TABLES, ".csv")
 def analyze(  # noqa: PLR0913 - one for each option
     scene: Path,
@@ -117,7 +179,9 @@ def analyze(  # noqa: PLR0913 - one for each option
     form = _choose_form(table or every is not None, as_json, decimal is not None, out)
     if sensitivity:
         if form in ("csv", "table") or degrees or units:
-            raise click.UsageError("--sensitivity is a table, or with --json all of it, SI and rad")
+            raise click.UsageError(
+                "--sensitivity is a table, or with --json all of it, SI and rad"
+            )
         _print_sensitivity(scene, form == "json", out)
         return
     from fourbar.show.block import write_block, write_motor
@@ -141,11 +205,17 @@ def analyze(  # noqa: PLR0913 - one for each option
     if not solution.assembled.any():
         raise _assembles_nowhere(scene, described)
     if form == "json":
-        text = write_json(solution, shown, motor=write_motor(described, solution, shown))
+        text = write_json(
+            solution, shown, motor=write_motor(described, solution, shown)
+        )
     elif form == "csv":
         text = write_csv(solution, shown, decimal or ".")
     elif form == "table":
-        width = None if out or not sys.stdout.isatty() else shutil.get_terminal_size().columns
+        width = (
+            None
+            if out or not sys.stdout.isatty()
+            else shutil.get_terminal_size().columns
+        )
         text = print_positions(solution, width, shown, every=every)
     else:
         text = "\n".join([*write_block(described, solution, shown, pressure=bore), ""])
@@ -163,9 +233,17 @@ def _read_pressure(scene: Scene, pressure: str | None) -> float | None:
     if pressure is None:
         return None
     if scene.drive is None:
-        raise InputError("--pressure", pressure, "needs a cylinder; the scene's [drive] has no from and to")
+        raise InputError(
+            "--pressure",
+            pressure,
+            "needs a cylinder; the scene's [drive] has no from and to",
+        )
     if given.is_bare(pressure):
-        raise InputError("--pressure", pressure, f'the unit is missing; did you mean "{pressure} bar"?')
+        raise InputError(
+            "--pressure",
+            pressure,
+            f'the unit is missing; did you mean "{pressure} bar"?',
+        )
     return given.read_number("--pressure", pressure, "Pa", POSITIVE)
 
 
@@ -177,17 +255,44 @@ def _print_sensitivity(scene: Path, as_json: bool, out: Path | None) -> None:
         derivatives = sensitivity(stated)
     if not derivatives.solution.assembled.any():
         raise _assembles_nowhere(scene, stated)
-    given.print_to((write_sensitivity_json if as_json else write_sensitivity)(derivatives), out)
+    given.print_to(
+        (write_sensitivity_json if as_json else write_sensitivity)(derivatives), out
+    )
 
 
 @click.command()
 @given.scene_argument
-@click.option("--samples", type=int, metavar="N", help="Number of linkages that are tried (default: 8192).")
-@click.option("--seed", type=int, default=0, show_default=True, metavar="S", help="Seed of the quasi-random samples.")
+@click.option(
+    "--samples",
+    type=int,
+    metavar="N",
+    help="Number of linkages that are tried (default: 8192).",
+)
+@click.option(
+    "--seed",
+    type=int,
+    default=0,
+    show_default=True,
+    metavar="S",
+    help="Seed of the quasi-random samples.",
+)
 @given.json_option
 @given.units_option
-@click.option("-o", "--out", type=given.FILE, metavar="PLOT", help="Draw the bands into PLOT (svg, png or pdf).")
-def tolerance(scene: Path, samples: int | None, seed: int, as_json: bool, units: Conversion, out: Path | None) -> None:
+@click.option(
+    "-o",
+    "--out",
+    type=given.FILE,
+    metavar="PLOT",
+    help="Draw the bands into PLOT (svg, png or pdf).",
+)
+def tolerance(
+    scene: Path,
+    samples: int | None,
+    seed: int,
+    as_json: bool,
+    units: Conversion,
+    out: Path | None,
+) -> None:
     """Compute what the [tolerances] do to the results, and which dimension does most."""
     from fourbar.show import tolerances as shown
     from fourbar.show.plot import draw_tolerances, format_of
@@ -197,18 +302,30 @@ def tolerance(scene: Path, samples: int | None, seed: int, as_json: bool, units:
     _refuse_units_of_json(as_json, units)
     if out is not None:
         format_of(out)
-    with given.open_scene(scene) as stated, show_running("samples are solved") as progress:
-        spreads = tolerances(stated, SAMPLES if samples is None else samples, seed, progress=progress)
+    with (
+        given.open_scene(scene) as stated,
+        show_running("samples are solved") as progress,
+    ):
+        spreads = tolerances(
+            stated, SAMPLES if samples is None else samples, seed, progress=progress
+        )
     if (spreads.without == spreads.samples).all():
         raise _assembles_nowhere(scene, stated)
     if out is not None:
         draw_tolerances(spreads, out, units)
-    given.print_to(shown.write_json(spreads) if as_json else shown.write_text(spreads, {**DEGREES, **units}), None)
+    given.print_to(
+        shown.write_json(spreads)
+        if as_json
+        else shown.write_text(spreads, {**DEGREES, **units}),
+        None,
+    )
 
 
 def _refuse_units_of_json(as_json: bool, units: Conversion) -> None:
     if as_json and units:
-        raise click.UsageError("--json has SI units and radians; --units changes the table only")
+        raise click.UsageError(
+            "--json has SI units and radians; --units changes the table only"
+        )
 
 
 @click.command()
@@ -223,16 +340,29 @@ def _refuse_units_of_json(as_json: bool, units: Conversion) -> None:
 @given.json_option
 @given.units_option
 @given.text_option(*given.TABLES)
-def extremes(scene: Path, quantities: tuple[str, ...], as_json: bool, units: Conversion, out: Path | None) -> None:
+def extremes(
+    scene: Path,
+    quantities: tuple[str, ...],
+    as_json: bool,
+    units: Conversion,
+    out: Path | None,
+) -> None:
     """Prove bounds of torque, pin forces and transmission angle over the input's range."""
     from fourbar.show.studies import write_extremes, write_extremes_json
     from fourbar.show.tables import show_running
     from fourbar.studies.enclosure import extremes as proven
 
     _refuse_units_of_json(as_json, units)
-    with given.open_scene(scene) as stated, show_running("pieces of the interval are halved"):
+    with (
+        given.open_scene(scene) as stated,
+        show_running("pieces of the interval are halved"),
+    ):
         proof = proven(stated, quantities)
-    text = write_extremes_json(stated, proof) if as_json else write_extremes(stated, proof, {**DEGREES, **units})
+    text = (
+        write_extremes_json(stated, proof)
+        if as_json
+        else write_extremes(stated, proof, {**DEGREES, **units})
+    )
     given.print_to(text, out)
 
 
@@ -248,4 +378,7 @@ def equilibrium(scene: Path, as_json: bool, out: Path | None) -> None:
 
     with given.open_scene(scene) as described, show_running("the boxes are halved"):
         rest = found(described)
-    given.print_to((write_equilibria_json if as_json else write_equilibria)(described.title, rest), out)
+    given.print_to(
+        (write_equilibria_json if as_json else write_equilibria)(described.title, rest),
+        out,
+    )

@@ -15,7 +15,9 @@ if TYPE_CHECKING:
 
 
 without_loads_option = click.option(
-    "--without-loads", is_flag=True, help="Leave the loads to your program; the file format has none."
+    "--without-loads",
+    is_flag=True,
+    help="Leave the loads to your program; the file format has none.",
 )
 
 
@@ -30,22 +32,60 @@ without_loads_option = click.option(
     help="Figure: overview, linkage, coupler, kinematics, points, torque, forces, hodograph, energy, "
     "transmission, freebody, bars, sensitivity or stroke.",
 )
-@click.option("--position", metavar="PLACE", help='Position of linkage and free bodies, like "135 deg".')
-@click.option("--branches", default="one", show_default=True, metavar="WHICH", help="Draw one branch or both.")
-@click.option("--dimensions", is_flag=True, help="Write the lengths of the bars at them.")
+@click.option(
+    "--position",
+    metavar="PLACE",
+    help='Position of linkage and free bodies, like "135 deg".',
+)
+@click.option(
+    "--branches",
+    default="one",
+    show_default=True,
+    metavar="WHICH",
+    help="Draw one branch or both.",
+)
+@click.option(
+    "--dimensions", is_flag=True, help="Write the lengths of the bars at them."
+)
 @given.units_option
 def plot(
-    scene: Path, out: Path, figure: str, position: str | None, branches: str, dimensions: bool, units: Conversion
+    scene: Path,
+    out: Path,
+    figure: str,
+    position: str | None,
+    branches: str,
+    dimensions: bool,
+    units: Conversion,
 ) -> None:
     """Draw a scene as SVG, PNG or PDF."""
     from fourbar.show.plot import draw
 
     with given.open_scene(scene) as described, given.show_waiting(described):
-        unit, likely = ("rad", "deg") if described.motion.stroke is None else ("m", "mm")
-        if position is not None and given.is_bare(position):  # it may have been meant in any unit
-            raise InputError("--position", position, f'the unit is missing; did you mean "{position} {likely}"?')
-        place = None if position is None else given.read_number("--position", position, unit)
-        draw(described, out, figure, position=place, branches=branches, units=units, dimensions=dimensions)
+        unit, likely = (
+            ("rad", "deg") if described.motion.stroke is None else ("m", "mm")
+        )
+        if position is not None and given.is_bare(
+            position
+        ):  # it may have been meant in any unit
+            raise InputError(
+                "--position",
+                position,
+                f'the unit is missing; did you mean "{position} {likely}"?',
+            )
+        place = (
+            None
+            if position is None
+            else given.read_number("--position", position, unit)
+        )
+        draw(
+            described,
+            out,
+            figure,
+            position=place,
+            branches=branches,
+            units=units,
+            dimensions=dimensions,
+        )
 
 
 @click.command()
@@ -63,10 +103,17 @@ def plot(
     type=click.FloatRange(min=0.1, max=60.0),
     help="Duration of a film (default: 6, or that of the motion).",
 )
-@click.option("--vectors", is_flag=True, help="Draw velocity and acceleration at the points.")
+@click.option(
+    "--vectors", is_flag=True, help="Draw velocity and acceleration at the points."
+)
 @given.units_option
 def animate(
-    scene: Path, out: Path, pictures: tuple[str, ...], seconds: float | None, vectors: bool, units: Conversion
+    scene: Path,
+    out: Path,
+    pictures: tuple[str, ...],
+    seconds: float | None,
+    vectors: bool,
+    units: Conversion,
 ) -> None:
     """Animate a scene as a web page (.html) or a film (.gif, .mp4)."""
     from fourbar.show.animate import write
@@ -78,12 +125,24 @@ def animate(
             raise InputError("--picture", entry, "must be like coupler=FILE")
         attached[bar] = file
     with given.open_scene(scene) as described, given.show_waiting(described):
-        write(described, out, pictures=attached, seconds=seconds, units=units, vectors=vectors)
+        write(
+            described,
+            out,
+            pictures=attached,
+            seconds=seconds,
+            units=units,
+            vectors=vectors,
+        )
 
 
 @click.command()
 @click.argument("scene", type=given.FILE, required=False)
-@click.option("--lengths", nargs=4, metavar="D A B C", help="Lengths of ground, input, coupler, output, m.")
+@click.option(
+    "--lengths",
+    nargs=4,
+    metavar="D A B C",
+    help="Lengths of ground, input, coupler, output, m.",
+)
 @click.option("--omega", metavar="W", help="Speed of the input with --lengths, rad/s.")
 @click.option(
     "--for",
@@ -115,13 +174,19 @@ def mjcf(
     if (scene is None) == (lengths is None):
         raise click.UsageError("give a scene file or --lengths D A B C, one of the two")
     if scene is not None and omega is not None:
-        raise click.UsageError("--omega goes with --lengths; a scene states its own omega_2")
+        raise click.UsageError(
+            "--omega goes with --lengths; a scene states its own omega_2"
+        )
 
     if scene is not None:
         with given.open_scene(scene) as described:
             given.print_to(writer.write_mjcf_for(described, simulator, drive), out)
     elif lengths is not None:
-        speed = {} if omega is None else {"omega": given.read_number("--omega", omega, "rad/s")}
+        speed = (
+            {}
+            if omega is None
+            else {"omega": given.read_number("--omega", omega, "rad/s")}
+        )
         made = writer.make_scene(*given.read_lengths(lengths), **speed)
         given.print_to(writer.write_mjcf_for(made, simulator, drive), out)
         for line in writer.list_defaults(made):
@@ -162,11 +227,21 @@ def usd(scene: Path, without_loads: bool, out: Path) -> None:
 
 @click.command()
 @click.argument("scene", type=given.FILE, required=False)
-@click.option("--port", type=click.IntRange(0, 65535), default=0, help="Port of this machine (default: any free one).")
 @click.option(
-    "--exports", type=given.FILE, metavar="FOLDER", help="Folder of exports and reports (default: SCENE_exports)."
+    "--port",
+    type=click.IntRange(0, 65535),
+    default=0,
+    help="Port of this machine (default: any free one).",
 )
-@click.option("--no-browser", is_flag=True, help="Print the address and open no browser.")
+@click.option(
+    "--exports",
+    type=given.FILE,
+    metavar="FOLDER",
+    help="Folder of exports and reports (default: SCENE_exports).",
+)
+@click.option(
+    "--no-browser", is_flag=True, help="Print the address and open no browser."
+)
 def edit(scene: Path | None, port: int, exports: Path | None, no_browser: bool) -> None:
     """Edit a scene in the browser while torque and forces follow; without SCENE a new one.
 
@@ -181,5 +256,12 @@ def edit(scene: Path | None, port: int, exports: Path | None, no_browser: bool) 
     try:
         from fourbar.edit.server import edit as opened_there
     except ModuleNotFoundError as error:
-        raise DependencyError(f"{error.name} is not installed: {say_install('edit')}") from None
-    opened_there(scene, exports or scene.with_name(f"{scene.stem}_exports"), port, browse=not no_browser)
+        raise DependencyError(
+            f"{error.name} is not installed: {say_install('edit')}"
+        ) from None
+    opened_there(
+        scene,
+        exports or scene.with_name(f"{scene.stem}_exports"),
+        port,
+        browse=not no_browser,
+    )

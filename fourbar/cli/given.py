@@ -16,17 +16,29 @@ from fourbar.solution import Conversion
 MOST_POSITIONS = 1_000_000
 """Positions that `analyze` prints: about a gigabyte of text."""
 FILE = click.Path(path_type=Path)
-KEYS_OF_A_SCENE = ("motion", "lengths", "bars", "drive", "loads", "effects", "tolerances")
+KEYS_OF_A_SCENE = (
+    "motion",
+    "lengths",
+    "bars",
+    "drive",
+    "loads",
+    "effects",
+    "tolerances",
+)
 
 
-def _read_units(context: click.Context, parameter: click.Parameter, text: str | None) -> Conversion | None:
+def _read_units(
+    context: click.Context, parameter: click.Parameter, text: str | None
+) -> Conversion | None:
     from fourbar.show.units import units
 
     return None if text is None else units(text)
 
 
 scene_argument = click.argument("scene", type=FILE)
-out_option = click.option("-o", "--out", type=FILE, required=True, metavar="FILE", help="Write to FILE.")
+out_option = click.option(
+    "-o", "--out", type=FILE, required=True, metavar="FILE", help="Write to FILE."
+)
 TABLES = (".txt", ".json")
 units_option = click.option(
     "--units",
@@ -46,13 +58,25 @@ own_units_option = click.option(
 def text_option(*endings: str, required: bool = False) -> Callable[..., Any]:
     """Make -o of a command that writes text: no reader takes it under the ending of another form."""
 
-    def require_ending(context: click.Context, parameter: click.Parameter, out: Path | None) -> Path | None:
+    def require_ending(
+        context: click.Context, parameter: click.Parameter, out: Path | None
+    ) -> Path | None:
         if out is not None and out.suffix and out.suffix.lower() not in endings:
-            raise InputError("path", str(out), f"must end in {', '.join(endings)}, or have no ending")
+            raise InputError(
+                "path", str(out), f"must end in {', '.join(endings)}, or have no ending"
+            )
         return out
 
     told = "Write to FILE." if required else "Write to FILE instead of printing."
-    return click.option("-o", "--out", type=FILE, required=required, callback=require_ending, metavar="FILE", help=told)
+    return click.option(
+        "-o",
+        "--out",
+        type=FILE,
+        required=required,
+        callback=require_ending,
+        metavar="FILE",
+        help=told,
+    )
 
 
 def json_option(command: Callable[..., None]) -> Callable[..., None]:
@@ -62,9 +86,12 @@ def json_option(command: Callable[..., None]) -> Callable[..., None]:
     def formed(as_json: bool, **others: Any) -> None:
         command(as_json=as_json or ends_in(others.get("out"), ".json"), **others)
 
-    return click.option("--json", "as_json", is_flag=True, help="Print one JSON object in SI units and radians.")(
-        formed
-    )
+    return click.option(
+        "--json",
+        "as_json",
+        is_flag=True,
+        help="Print one JSON object in SI units and radians.",
+    )(formed)
 
 
 def ends_in(out: Path | None, suffix: str) -> bool:
@@ -111,7 +138,10 @@ def show_waiting(scene: Scene) -> Iterator[None]:
 def read_lengths(texts: tuple[str, ...]) -> list[float]:
     """Read the lengths of ground, input, coupler and output, m."""
     names = ("ground", "input", "coupler", "output")
-    return [read_number(f"length of {name}", text, "m", POSITIVE) for name, text in zip(names, texts, strict=True)]
+    return [
+        read_number(f"length of {name}", text, "m", POSITIVE)
+        for name, text in zip(names, texts, strict=True)
+    ]
 
 
 def is_bare(text: str) -> bool:

@@ -21,7 +21,12 @@ from fourbar.scene.numbers import Point
 
 Path = Sequence[str | int]
 WORDS = {
-    **{"branch": [*BRANCHES], "through": [*THROUGH], "side": [*SIDES], "ends": [*SPLINES]},
+    **{
+        "branch": [*BRANCHES],
+        "through": [*THROUGH],
+        "side": [*SIDES],
+        "ends": [*SPLINES],
+    },
     "frame": [*FRAMES],
 }
 """Entries that are one of a few words."""
@@ -43,7 +48,9 @@ def list_offers() -> dict[str, Any]:
     `fields`: empty fields with an example; `commands`: what can be commanded, with its fields; `parts`: what a button
     adds; `words`: what an entry is one of; `bars`: their names; `pairs`: the names of what pairs consist of.
     """
-    offers = tomllib.loads(files("fourbar.edit").joinpath("offers.toml").read_text(encoding="utf-8"))
+    offers = tomllib.loads(
+        files("fourbar.edit").joinpath("offers.toml").read_text(encoding="utf-8")
+    )
     parts, pairs = offers["parts"], dict[str, list[str]]()
     for kind in (Bar, Point, Load):
         for name, number in kind.numbers.items():
@@ -52,31 +59,57 @@ def list_offers() -> dict[str, Any]:
     for bar in (BAR_NAMES[number] for number in MOVING_BARS):
         for name, number in Bar.numbers.items():
             if number.pair:
-                parts.append({"at": ["bars", bar, name], "value": [EXAMPLES[number.unit], "0 deg"]})
+                parts.append(
+                    {
+                        "at": ["bars", bar, name],
+                        "value": [EXAMPLES[number.unit], "0 deg"],
+                    }
+                )
             elif number.left_out is not REQUIRED:
-                offers["fields"].setdefault("bars", {}).setdefault(bar, {})[name] = EXAMPLES[number.unit]
+                offers["fields"].setdefault("bars", {}).setdefault(bar, {})[name] = (
+                    EXAMPLES[number.unit]
+                )
     for key, effect in list_kinds().items():
         value = tomllib.loads(effect.example)[key]
         parts.append({"at": ["effects", key], "value": value})
         if isinstance(value, dict) and set(value) <= set(PINS):
-            parts += [{"at": ["effects", key, pin], "value": next(iter(value.values()))} for pin in PINS]
+            parts += [
+                {"at": ["effects", key, pin], "value": next(iter(value.values()))}
+                for pin in PINS
+            ]
         elif isinstance(value, list) and isinstance(value[0], str):
             pairs[key] = [*effect.numbers]
         elif isinstance(value, list):
-            parts.append({"at": ["effects", key, -1], "label": "another", "value": value[0]})
+            parts.append(
+                {"at": ["effects", key, -1], "label": "another", "value": value[0]}
+            )
     bars = {number: f"{number} {name}" for number, name in BAR_NAMES.items()}
-    return offers | {"commands": _offer_commands(), "words": WORDS, "pairs": pairs, "bars": bars}
+    return offers | {
+        "commands": _offer_commands(),
+        "words": WORDS,
+        "pairs": pairs,
+        "bars": bars,
+    }
 
 
 def _offer_commands() -> dict[str, Any]:
     """List what can be commanded by its name: label, and the fields that apply to it."""
     angles = {
-        names: (f"angle \u03b8{chr(0x2080 + bar)} of the {BAR_NAMES[bar]}", {"branch": "open", "through": "sign"})
+        names: (
+            f"angle \u03b8{chr(0x2080 + bar)} of the {BAR_NAMES[bar]}",
+            {"branch": "open", "through": "sign"},
+        )
         for bar, names in COMMANDS.items()
     }
-    commands = angles | {STROKE_COMMAND: ("stroke of the cylinder", {"side": "left", "branch": "open"})}
+    commands = angles | {
+        STROKE_COMMAND: ("stroke of the cylinder", {"side": "left", "branch": "open"})
+    }
     return {
-        names[0]: {"label": label, "fields": {name: MOVING[Motion.numbers[name].unit] for name in names} | words}
+        names[0]: {
+            "label": label,
+            "fields": {name: MOVING[Motion.numbers[name].unit] for name in names}
+            | words,
+        }
         for names, (label, words) in commands.items()
     }
 
@@ -111,30 +144,55 @@ class SceneDocument:
     def set(self, path: Path, text: str) -> None:
         """State one entry as it is typed: a text, or a number where the file has one; an empty text takes it away."""
         if len(text) > LONGEST_TEXT:
-            raise InputError(name_entry(path), text[:60], f"must have {LONGEST_TEXT} characters at most")
+            raise InputError(
+                name_entry(path),
+                text[:60],
+                f"must have {LONGEST_TEXT} characters at most",
+            )
         old = self.at(path)
         if not text.strip() and old is not None and not isinstance(path[-1], int):
             self.remove(path)
         elif text.strip() or old is not None:
-            example = old if old is not None else _find_table(list_offers()["fields"], path)
-            self.put(path, text if isinstance(example, str) or example is None else _read_number(text))
+            example = (
+                old if old is not None else _find_table(list_offers()["fields"], path)
+            )
+            self.put(
+                path,
+                text
+                if isinstance(example, str) or example is None
+                else _read_number(text),
+            )
 
     def put(self, path: Path, value: Any) -> None:
         """State an entry, with the tables that it stands in; an index of -1 appends to a list."""
         *into, last = path
         holder = self._find_holder(into)
         if isinstance(last, int) and last < 0:
-            holder.append(_make_table(value, tomlkit.nl()) if isinstance(holder, AoT) else _write_inline(value))
-        elif isinstance(holder, (Table, InlineTable)) or holder is self.tree or isinstance(last, int):
+            holder.append(
+                _make_table(value, tomlkit.nl())
+                if isinstance(holder, AoT)
+                else _write_inline(value)
+            )
+        elif (
+            isinstance(holder, (Table, InlineTable))
+            or holder is self.tree
+            or isinstance(last, int)
+        ):
             old = self.at(path)
-            if isinstance(old, Table):  # a table of its own is written anew, with its heading
+            if isinstance(
+                old, Table
+            ):  # a table of its own is written anew, with its heading
                 del holder[last]
                 old = None
-            own_table = len(path) == 1 and isinstance(value, dict)  # at the top of the file; anywhere else in one line
+            own_table = len(path) == 1 and isinstance(
+                value, dict
+            )  # at the top of the file; anywhere else in one line
             new = _make_table(value) if own_table else _write_inline(value)
             holder[last] = new if old is None else _make_like(old, value)
         else:
-            raise InputError(name_entry(path), value, "has no table that it could stand in")
+            raise InputError(
+                name_entry(path), value, "has no table that it could stand in"
+            )
 
     def remove(self, path: Path) -> None:
         """Take an entry away, and a table that it leaves empty."""
@@ -153,7 +211,11 @@ class SceneDocument:
         if path == ["loads"]:
             made: Item = tomlkit.aot()
         else:
-            made = tomlkit.table() if len(path) == 1 or path[0] == "bars" else tomlkit.inline_table()
+            made = (
+                tomlkit.table()
+                if len(path) == 1 or path[0] == "bars"
+                else tomlkit.inline_table()
+            )
         if len(path) > 1:
             self._find_holder(path[:-1])
         parent = self.at(path[:-1])
@@ -186,7 +248,10 @@ def _make_like(old: Any, value: Any) -> Any:
     """Return the value as an item with the comment and the blanks of what it replaces."""
     made = tomlkit.item(_write_inline(value))
     if isinstance(old, Item):
-        made.trivia.comment_ws, made.trivia.comment = old.trivia.comment_ws, old.trivia.comment
+        made.trivia.comment_ws, made.trivia.comment = (
+            old.trivia.comment_ws,
+            old.trivia.comment,
+        )
         made.trivia.trail = old.trivia.trail
     return made
 

@@ -41,29 +41,55 @@ class Handle(NamedTuple):
 
     def drawn(self) -> dict[str, Any]:
         """Write it for the page."""
-        plain = {name: [z.real, z.imag] for name, z in (("at", self.at), ("beyond", self.beyond))}
+        plain = {
+            name: [z.real, z.imag]
+            for name, z in (("at", self.at), ("beyond", self.beyond))
+        }
         return self._asdict() | plain
 
 
 def list_handles(scene: Scene, document: dict[str, Any]) -> list[Handle]:
     """List everything that can be dragged: mass centres, points, loads, and the ends of what acts on a line."""
     handles = [
-        Handle(f"mass centre of {name}", ("bars", name, "centre"), n, 0j, scene.linkage.bar(n).to_centre)
+        Handle(
+            f"mass centre of {name}",
+            ("bars", name, "centre"),
+            n,
+            0j,
+            scene.linkage.bar(n).to_centre,
+        )
         for n, name in BAR_NAMES.items()
         if n in MOVING_BARS and scene.linkage.bar(n).mass > 0.0
     ]
     for point in scene.points:
         path = ("points", point.name, "from_pin")
-        handles.append(Handle(f"point {point.name}", path, point.bar, 0j, cmath.rect(*point.from_pin)))
+        handles.append(
+            Handle(
+                f"point {point.name}", path, point.bar, 0j, cmath.rect(*point.from_pin)
+            )
+        )
     for n, load in enumerate(scene.loads):
         if load.force is not None:
             foot, turns = scene.linkage.bar(load.bar).to_centre, load.frame == "bar"
             force = ("loads", n, "force")
             handles.append(
-                Handle(f"load {n + 1}", ("loads", n, "at"), load.bar, foot, cmath.rect(*load.at), turns, force)
+                Handle(
+                    f"load {n + 1}",
+                    ("loads", n, "at"),
+                    load.bar,
+                    foot,
+                    cmath.rect(*load.at),
+                    turns,
+                    force,
+                )
             )
-    lines: list[tuple[tuple[str | int, ...], Any]] = [(("drive",), document.get("drive", {}))]
-    lines += [(("effects", "springs", n), s) for n, s in enumerate(document.get("effects", {}).get("springs", []))]
+    lines: list[tuple[tuple[str | int, ...], Any]] = [
+        (("drive",), document.get("drive", {}))
+    ]
+    lines += [
+        (("effects", "springs", n), s)
+        for n, s in enumerate(document.get("effects", {}).get("springs", []))
+    ]
     for path_of, entry in lines:
         for end in ("from", "to"):
             if isinstance(place := entry.get(end), dict):
@@ -89,21 +115,37 @@ class Dragged(NamedTuple):
     """Length of an arrow relative to the length that it is drawn with."""
 
 
-def drag(document: SceneDocument, scene: Scene, plain: dict[str, Any], dragged: Dragged) -> None:
+def drag(
+    document: SceneDocument, scene: Scene, plain: dict[str, Any], dragged: Dragged
+) -> None:
     """Change the numbers of the file for a drag that began in `scene`, whose entries are `plain`.
 
     Raises InputError where nothing of that name can be dragged, or the linkage does not assemble there.
     """
-    position = Command(np.array([dragged.theta_2]), np.array([dragged.branch], dtype=np.int8), None, 0.0)
+    position = Command(
+        np.array([dragged.theta_2]),
+        np.array([dragged.branch], dtype=np.int8),
+        None,
+        0.0,
+    )
     shown = solve(scene, "position", at=position)
     pins = {"O2": 0j, "A": complex(*shown.A[0]), "B": complex(*shown.B[0])}
     pins["O4"] = cmath.rect(scene.linkage.ground, scene.linkage.ground_angle)
     if isinstance(dragged.what, str):
         _drag_pin(document, dragged, pins)
         return
-    turned = {1: scene.linkage.ground_angle, 2: dragged.theta_2, 3: float(shown.theta_3[0]), 4: float(shown.theta_4[0])}
+    turned = {
+        1: scene.linkage.ground_angle,
+        2: dragged.theta_2,
+        3: float(shown.theta_3[0]),
+        4: float(shown.theta_4[0]),
+    }
     if not all(map(cmath.isfinite, (*pins.values(), *turned.values()))):
-        raise InputError("theta_2", dragged.theta_2, "the linkage does not assemble there; choose another position")
+        raise InputError(
+            "theta_2",
+            dragged.theta_2,
+            "the linkage does not assemble there; choose another position",
+        )
     for handle in list_handles(scene, plain):
         frame = cmath.rect(1.0, turned[handle.bar])
         foot = pins[{1: "O2", 2: "O2", 3: "A", 4: "O4"}[handle.bar]] + frame * handle.at
@@ -118,22 +160,49 @@ def drag(document: SceneDocument, scene: Scene, plain: dict[str, Any], dragged: 
             unit = find_unit(size, "N")
             force = to_si(size, unit) * dragged.stretch
             angle = cmath.phase(arrow) + (0.0 if force >= 0.0 else math.pi)
-            document.put((*handle.force, 0), write_rounded(force, abs(force) / 50.0, unit))
-            document.put((*handle.force, 1), _write_angle(document.at((*handle.force, 1)), angle, 0.02))
+            document.put(
+                (*handle.force, 0), write_rounded(force, abs(force) / 50.0, unit)
+            )
+            document.put(
+                (*handle.force, 1),
+                _write_angle(document.at((*handle.force, 1)), angle, 0.02),
+            )
             return
-    raise InputError("drag", dragged.what, "cannot be dragged; drag a pin, a point, a mass centre, an end or an arrow")
+    raise InputError(
+        "drag",
+        dragged.what,
+        "cannot be dragged; drag a pin, a point, a mass centre, an end or an arrow",
+    )
 
 
-def _drag_pin(document: SceneDocument, dragged: Dragged, pins: dict[str, complex]) -> None:
+def _drag_pin(
+    document: SceneDocument, dragged: Dragged, pins: dict[str, complex]
+) -> None:
     if dragged.what not in PINS:
         raise InputError("drag", dragged.what, "must be one of " + ", ".join(PINS))
-    lengths = {"A": {"input": "O2"}, "B": {"coupler": "A", "output": "O4"}, "O4": {"ground": "O2"}}[str(dragged.what)]
+    lengths = {
+        "A": {"input": "O2"},
+        "B": {"coupler": "A", "output": "O4"},
+        "O4": {"ground": "O2"},
+    }[str(dragged.what)]
     for bar, pin in lengths.items():
         key = ("lengths", bar)
-        document.put(key, _write_like(document.at(key), abs(dragged.to - pins[pin]), dragged.grain, "m", "m"))
+        document.put(
+            key,
+            _write_like(
+                document.at(key), abs(dragged.to - pins[pin]), dragged.grain, "m", "m"
+            ),
+        )
     if dragged.what == "O4":
         angle, key = cmath.phase(dragged.to), ("lengths", "ground_angle")
-        document.put(key, _write_angle(document.at(key), angle, dragged.grain / max(abs(dragged.to), dragged.grain)))
+        document.put(
+            key,
+            _write_angle(
+                document.at(key),
+                angle,
+                dragged.grain / max(abs(dragged.to), dragged.grain),
+            ),
+        )
 
 
 def parse_place(stated: Any) -> complex:
@@ -143,14 +212,18 @@ def parse_place(stated: Any) -> complex:
     return cmath.rect(to_si(stated[0], "m"), to_si(stated[1], "rad"))
 
 
-def put_place(document: SceneDocument, path: Path, place: complex, grain: float, by: str = "") -> None:
+def put_place(
+    document: SceneDocument, path: Path, place: complex, grain: float, by: str = ""
+) -> None:
     """State a place as the file does, by distance and angle or by x and y, in its units; `by` "xy" or "polar" changes.
 
     Where the file has no place yet, its unit is that of the ground's length.
     """
     old = document.at(path)
     before = "xy" if isinstance(old, dict) else "polar"
-    length = document.at((*path, "x" if before == "xy" else 0)) or document.at(("lengths", "ground"))
+    length = document.at((*path, "x" if before == "xy" else 0)) or document.at(
+        ("lengths", "ground")
+    )
     if (by or before) == "xy":
         parts: dict[str | int, str] = {
             name: _write_like(document.at((*path, name)) or length, x, grain, "m", "m")
@@ -158,7 +231,10 @@ def put_place(document: SceneDocument, path: Path, place: complex, grain: float,
         }
         stated: Any = parts
     else:
-        size, old_angle = abs(place), document.at((*path, 1)) if before == "polar" else None
+        size, old_angle = (
+            abs(place),
+            document.at((*path, 1)) if before == "polar" else None,
+        )
         angle = _write_angle(old_angle, cmath.phase(place), grain / max(size, grain))
         parts = {0: _write_like(length, size, grain, "m", "m"), 1: angle}
         stated = list(parts.values())
@@ -173,7 +249,9 @@ def _write_angle(old: object, angle: float, grain: float) -> str:
     return _write_like(old, angle, grain, "rad", "deg")
 
 
-def _write_like(old: object, value: float, grain: float, si: str, otherwise: str) -> str:
+def _write_like(
+    old: object, value: float, grain: float, si: str, otherwise: str
+) -> str:
     """Write a number of an SI unit in the unit that an older text of it has, or in another one where it has none."""
     unit = find_unit(old, otherwise)
     factor = to_si(f"1 {si}", unit)

@@ -32,7 +32,11 @@ from fourbar.solution import Conversion, write_csv
 from fourbar.solve import find_last_stage, solve
 from fourbar.writing import write_text
 
-ENDINGS = {**{kind: kind for kind in ("svg", "png", "pdf", "csv")}, "mjcf": "xml", "page": "html"}
+ENDINGS = {
+    **{kind: kind for kind in ("svg", "png", "pdf", "csv")},
+    "mjcf": "xml",
+    "page": "html",
+}
 """Ending of the file by the name of the format."""
 CHECKOUT = Path(__file__).parents[2]
 HARNESS = "fourbar_validation"
@@ -43,7 +47,12 @@ TICK = 0.5
 
 
 def evaluate_scene(
-    scene: Scene, plain: dict[str, Any], units: Conversion, *, settled: bool = False, pressure: float | None = None
+    scene: Scene,
+    plain: dict[str, Any],
+    units: Conversion,
+    *,
+    settled: bool = False,
+    pressure: float | None = None,
 ) -> dict[str, Any]:
     """Evaluate a scene for the page; `settled`: with error bars and summary, which cost more than the rest.
 
@@ -54,7 +63,9 @@ def evaluate_scene(
     stage = find_last_stage(scene) if settled else None
     solution = solve(scene, stage)
     if not solution.assembled.any():
-        raise NotAssembledError("motion.theta_2: the linkage assembles at none of the positions requested")
+        raise NotAssembledError(
+            "motion.theta_2: the linkage assembles at none of the positions requested"
+        )
     data = collect_live_data(scene, units, stage=stage, midway=True) | {
         "tolerances": None,
         "pictures": {},
@@ -74,12 +85,19 @@ def pack_frame(about: dict[str, Any]) -> bytes:
     if "data" in about:
         branches: dict[str, dict[str, Any]] = {}
         for sign, table in about["data"]["branches"].items():
-            branches[sign] = {name: column for name, column in table.items() if not isinstance(column, np.ndarray)}
+            branches[sign] = {
+                name: column
+                for name, column in table.items()
+                if not isinstance(column, np.ndarray)
+            }
             for name, column in table.items():
                 if isinstance(column, np.ndarray):
                     columns.append((sign, name, len(column), column.ndim))
                     arrays.append(np.ascontiguousarray(column, dtype="<f8").tobytes())
-        about = about | {"data": about["data"] | {"branches": branches}, "columns": columns}
+        about = about | {
+            "data": about["data"] | {"branches": branches},
+            "columns": columns,
+        }
     text = json.dumps(about, allow_nan=False, separators=(",", ":")).encode()
     text += b" " * (-(len(text) + 4) % 8)
     return b"".join((struct.pack("<I", len(text)), text, *arrays))
@@ -116,8 +134,12 @@ class Exports:
         """Draw the free bodies at a position, as the address of a picture."""
         from fourbar.show.plot.figures import draw_figure
 
-        text = draw_figure(scene, "freebody", position=position, units=units)._repr_svg_()
-        return "data:image/svg+xml;base64," + base64.b64encode(text.encode()).decode("ascii")
+        text = draw_figure(
+            scene, "freebody", position=position, units=units
+        )._repr_svg_()
+        return "data:image/svg+xml;base64," + base64.b64encode(text.encode()).decode(
+            "ascii"
+        )
 
 
 def find_harness() -> list[str]:
@@ -127,7 +149,9 @@ def find_harness() -> list[str]:
         return [sys.executable, "-m", HARNESS]
     if engines and (CHECKOUT / "validation" / "__main__.py").is_file():
         return [sys.executable, "-m", "validation"]
-    raise DependencyError(f"the harness with MuJoCo and Pinocchio is not installed: {say_install('validation')}")
+    raise DependencyError(
+        f"the harness with MuJoCo and Pinocchio is not installed: {say_install('validation')}"
+    )
 
 
 class HarnessRun:
@@ -160,7 +184,15 @@ class HarnessRun:
         began, lines = time.monotonic(), list[str]()
 
         def report(**more: Any) -> None:
-            self.tell({"check": {"seconds": time.monotonic() - began, "lines": lines[:SHOWN], **more}})
+            self.tell(
+                {
+                    "check": {
+                        "seconds": time.monotonic() - began,
+                        "lines": lines[:SHOWN],
+                        **more,
+                    }
+                }
+            )
 
         try:
             command = find_harness()
@@ -169,7 +201,13 @@ class HarnessRun:
             scene = self.folder / "scene.toml"
             write_text(scene, text)
             self.process = await asyncio.create_subprocess_exec(
-                *(*command, "run", str(scene.absolute()), "--out", str(self.folder.absolute())),
+                *(
+                    *command,
+                    "run",
+                    str(scene.absolute()),
+                    "--out",
+                    str(self.folder.absolute()),
+                ),
                 stdout=subprocess.PIPE,
                 stderr=subprocess.STDOUT,
                 cwd=CHECKOUT if command[-1] == "validation" else None,
@@ -180,7 +218,12 @@ class HarnessRun:
             while not (await asyncio.wait({reading}, timeout=TICK))[0]:
                 report(running=True)
             status = await self.process.wait()
-            report(running=False, stopped=status < 0, status=status, report=self.report.exists())
+            report(
+                running=False,
+                stopped=status < 0,
+                status=status,
+                report=self.report.exists(),
+            )
         except (DependencyError, OSError) as error:
             lines[:] = [str(error)]
             report(running=False, report=False)
@@ -188,5 +231,7 @@ class HarnessRun:
     @staticmethod
     async def _read(stream: asyncio.StreamReader, lines: list[str]) -> None:
         while line := await stream.readline():
-            if "\u2501" not in (text := line.decode(errors="replace").rstrip()):  # no bars of progress
+            if "\u2501" not in (
+                text := line.decode(errors="replace").rstrip()
+            ):  # no bars of progress
                 lines.append(text)

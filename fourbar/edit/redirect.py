@@ -39,7 +39,11 @@ class Redirect:
         """Lock the page, made where there is none; False where another server holds it."""
         while self.handle is None:
             try:
-                handle = os.open(self.path, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o600)
+                handle = os.open(
+                    self.path,
+                    os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0),
+                    0o600,
+                )
             except OSError as error:
                 if os.path.lexists(self.path):
                     reason = f"may be open in another workbench: {self.path} cannot be read ({error.strerror})"
@@ -51,7 +55,9 @@ class Redirect:
             if not _lock(handle):
                 os.close(handle)
                 return False
-            if not self.path.exists() or not os.path.samestat(os.fstat(handle), os.stat(self.path)):
+            if not self.path.exists() or not os.path.samestat(
+                os.fstat(handle), os.stat(self.path)
+            ):
                 os.close(handle)  # its server has just ended and taken it away
                 continue
             self.handle = handle
@@ -69,11 +75,17 @@ class Redirect:
         deadline = time.monotonic() + PATIENCE
         while time.monotonic() < deadline:
             if self.path.exists() and (
-                address := ADDRESS.search(self.path.read_text(encoding="utf-8", errors="replace"))
+                address := ADDRESS.search(
+                    self.path.read_text(encoding="utf-8", errors="replace")
+                )
             ):
                 return address[1]
             time.sleep(0.05)
-        raise InputError("scene file", str(self.scene), f"is open in another workbench, and {self.path} has no address")
+        raise InputError(
+            "scene file",
+            str(self.scene),
+            f"is open in another workbench, and {self.path} has no address",
+        )
 
     def open(self) -> None:
         """Open the page in the browser."""

@@ -58,7 +58,9 @@ class Workbench:
         self.address: asyncio.Future[str] = self.loop.create_future()
         self.pages: set[PageLine] = set()
         self.waiting: deque[tuple[PageLine, dict[str, Any]]] = deque()
-        self.one = ThreadPoolExecutor(1)  # the session is touched from this thread alone
+        self.one = ThreadPoolExecutor(
+            1
+        )  # the session is touched from this thread alone
         self.aside = ThreadPoolExecutor(1)  # what takes seconds
         self.working: asyncio.Task[None] | None = None
         self.timers: dict[str, asyncio.TimerHandle] = {}
@@ -92,21 +94,31 @@ class Workbench:
             with suppress(WebSocketClosedError):
                 # a page may close while it is sent: that is no error
                 sent = asyncio.ensure_future(line.write_message(data, binary=True))
-                sent.add_done_callback(lambda done: done.cancelled() or done.exception())
+                sent.add_done_callback(
+                    lambda done: done.cancelled() or done.exception()
+                )
 
     def take(self, line: "PageLine", asked: dict[str, Any]) -> None:
         """Put a request in the queue; a later one of the same gesture takes the place of one that waits."""
         if self.ended.is_set():  # a page may go on sending while the server ends
             return
         if asked.get("do") in ("check", "stop"):
-            self.check.start(self.session.now.text) if asked["do"] == "check" else self.check.stop()
+            self.check.start(self.session.now.text) if asked[
+                "do"
+            ] == "check" else self.check.stop()
             self.tell({"for": asked.get("id")}, to=line)
             return
         last = self.waiting[-1] if self.waiting else None
-        if last and asked.get("gesture") and (line, asked["gesture"]) == (last[0], last[1].get("gesture")):
+        if (
+            last
+            and asked.get("gesture")
+            and (line, asked["gesture"]) == (last[0], last[1].get("gesture"))
+        ):
             self.waiting.pop()
         if len(self.waiting) >= MOST_WAITING:
-            self.tell({"for": asked.get("id"), "refused": "too many requests wait"}, to=line)
+            self.tell(
+                {"for": asked.get("id"), "refused": "too many requests wait"}, to=line
+            )
             return
         self.waiting.append((line, asked))
         self.never("settle")
@@ -123,7 +135,10 @@ class Workbench:
             if about.pop("refer", False):
                 compared = await self.loop.run_in_executor(self.one, self._compare)
                 self.tell(compared, to=line if alone else None)
-            self.tell(about, to=line if alone or "refused" in about or "ask" in about else None)
+            self.tell(
+                about,
+                to=line if alone or "refused" in about or "ask" in about else None,
+            )
         self.later("settle", SETTLED, lambda: asyncio.create_task(self._settle()))
         self.later("keep", KEPT, lambda: self.one.submit(self._keep))
 
@@ -137,7 +152,9 @@ class Workbench:
         try:
             self.session.keep()
         except OSError as error:
-            self.loop.call_soon_threadsafe(self.tell, {"note": f"the state file cannot be written: {error}"})
+            self.loop.call_soon_threadsafe(
+                self.tell, {"note": f"the state file cannot be written: {error}"}
+            )
 
     async def _settle(self) -> None:
         """Send error bars and summary, unless something has changed again; changes are answered meanwhile."""
@@ -146,12 +163,17 @@ class Workbench:
         chosen = (session.unit_names, session.pressure_text)
 
         def is_present() -> bool:
-            return state is session.now and chosen == (session.unit_names, session.pressure_text)
+            return state is session.now and chosen == (
+                session.unit_names,
+                session.pressure_text,
+            )
 
         def evaluate() -> dict[str, Any] | None:
             if not is_present():
                 return None
-            return evaluate_scene(state.scene, state.plain, units, settled=True, pressure=pressure)
+            return evaluate_scene(
+                state.scene, state.plain, units, settled=True, pressure=pressure
+            )
 
         def describe(data: dict[str, Any]) -> dict[str, Any] | None:
             return session.describe(data, settled=True) if is_present() else None
@@ -166,7 +188,11 @@ class Workbench:
             return
         if about and not self.waiting:
             self.tell(about)
-            self.later("sample", STILL, lambda: asyncio.create_task(self._sample(state, about["data"])))
+            self.later(
+                "sample",
+                STILL,
+                lambda: asyncio.create_task(self._sample(state, about["data"])),
+            )
 
     async def _sample(self, state: SceneState, data: dict[str, Any]) -> None:
         """Send what the tolerances do, unless something has changed meanwhile."""
@@ -179,16 +205,22 @@ class Workbench:
         if scene.tolerances:
             with suppress(FourBarError):
                 places = data["over"]["values"] or data["theta_2"]
-                spreads = await self.loop.run_in_executor(self.aside, collect_tolerances, scene, places, give_up)
+                spreads = await self.loop.run_in_executor(
+                    self.aside, collect_tolerances, scene, places, give_up
+                )
                 if state is self.session.now:
                     self.tell({"tolerances": spreads})
 
-    async def serve(self, port: int, redirect: Redirect | None = None, *, browse: bool = False) -> None:
+    async def serve(
+        self, port: int, redirect: Redirect | None = None, *, browse: bool = False
+    ) -> None:
         """Serve until all pages have gone, or until Ctrl-C; `redirect` leads browsers and other servers here."""
         try:
             listening = socket.create_server((LOOPBACK, port))
         except (OSError, OverflowError) as error:
-            raise InputError("--port", port, f"the port cannot be opened: {error}") from None
+            raise InputError(
+                "--port", port, f"the port cannot be opened: {error}"
+            ) from None
         listening.setblocking(False)
         own_port = listening.getsockname()[1]
         self.entrance = Entrance(make_application(self, own_port), listening)
@@ -281,16 +313,28 @@ class Guarded(RequestHandler):
         """Refuse another Host or Origin (403), and a wrong token (404)."""
         origin = self.request.headers.get("Origin")
         wanted = {f"http://{host}" for host in self.hosts}
-        if self.request.host not in self.hosts or (origin is not None and origin not in wanted):
+        if self.request.host not in self.hosts or (
+            origin is not None and origin not in wanted
+        ):
             raise HTTPError(403)
-        if not hmac.compare_digest(self.path_kwargs["token"].encode(), self.bench.session.token.encode()):
+        if not hmac.compare_digest(
+            self.path_kwargs["token"].encode(), self.bench.session.token.encode()
+        ):
             raise HTTPError(404)
 
     def set_default_headers(self) -> None:
         """Keep the page and its address to this browser."""
         for name, value in {
-            **{"Cache-Control": "no-store", "Referrer-Policy": "no-referrer", "X-Content-Type-Options": "nosniff"},
-            **{"X-Frame-Options": "DENY", "Cross-Origin-Resource-Policy": "same-origin", "Server": "fourbar"},
+            **{
+                "Cache-Control": "no-store",
+                "Referrer-Policy": "no-referrer",
+                "X-Content-Type-Options": "nosniff",
+            },
+            **{
+                "X-Frame-Options": "DENY",
+                "Cross-Origin-Resource-Policy": "same-origin",
+                "Server": "fourbar",
+            },
         }.items():
             self.set_header(name, value)
 
@@ -312,7 +356,11 @@ class Page(Guarded):
         session = self.bench.session
         text = await asyncio.get_running_loop().run_in_executor(
             self.bench.one,
-            lambda: write_page(session.now.scene, units=session.units, live=f"ws://{self.request.host}/{token}/live"),
+            lambda: write_page(
+                session.now.scene,
+                units=session.units,
+                live=f"ws://{self.request.host}/{token}/live",
+            ),
         )
         self.finish(text)
 
@@ -367,10 +415,16 @@ class PageLine(WebSocketHandler, Guarded):
 
 def make_application(bench: Workbench, port: int) -> Application:
     """Make the application of a workbench that listens at a port."""
-    served = {"bench": bench, "hosts": frozenset(f"{name}:{port}" for name in (LOOPBACK, "localhost"))}
+    served = {
+        "bench": bench,
+        "hosts": frozenset(f"{name}:{port}" for name in (LOOPBACK, "localhost")),
+    }
     routes = {"": Page, "report": Report, "live": PageLine}
     return Application(
-        [(rf"/(?P<token>[A-Za-z0-9_-]+)/{place}", handler, served) for place, handler in routes.items()],
+        [
+            (rf"/(?P<token>[A-Za-z0-9_-]+)/{place}", handler, served)
+            for place, handler in routes.items()
+        ],
         log_function=lambda handler: None,
         websocket_max_message_size=LARGEST_REQUEST,
         websocket_ping_interval=20.0,

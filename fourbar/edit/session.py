@@ -73,7 +73,10 @@ class Session:
     """The scene file at `path`, changed step by step; whatever is refused leaves the last good state."""
 
     def __init__(self, path: Path, exports: Path) -> None:
-        self.path, self.exports = Path(os.path.realpath(path)), Exports(exports, path.stem)
+        self.path, self.exports = (
+            Path(os.path.realpath(path)),
+            Exports(exports, path.stem),
+        )
         self.state_file = self.path.with_name(self.path.name + ENDING)
         self.token = secrets.token_urlsafe(32)  # of this process alone
         self.unit_names, self.pressure_text = AS_THE_FILE, ""
@@ -95,9 +98,16 @@ class Session:
             state = json.loads(data)
             if state["schema"] != SCHEMA:
                 raise ValueError(f"schema {str(state['schema'])[:60]!r}")
-            self.texts, self.place = [str(text) for text in state["texts"]], int(state["place"])
+            self.texts, self.place = (
+                [str(text) for text in state["texts"]],
+                int(state["place"]),
+            )
             self.kept = {str(name): str(text) for name, text in state["kept"].items()}
-            self.reference, self.unit_names, self.disk = str(state["reference"]), str(state["units"]), state["disk"]
+            self.reference, self.unit_names, self.disk = (
+                str(state["reference"]),
+                str(state["units"]),
+                state["disk"],
+            )
             _require_units(self.unit_names)
             self.pressure_text = _read_pressure(state.get("pressure", ""))
             if self.place < 0 or self.reference not in self.kept:
@@ -118,10 +128,24 @@ class Session:
     def keep(self) -> None:
         """Write the state file, readable by its owner alone as the scene may be."""
         state = {
-            **{"schema": SCHEMA, "disk": self.disk, "texts": self.texts, "place": self.place, "kept": self.kept},
-            **{"reference": self.reference, "units": self.unit_names, "pressure": self.pressure_text},
+            **{
+                "schema": SCHEMA,
+                "disk": self.disk,
+                "texts": self.texts,
+                "place": self.place,
+                "kept": self.kept,
+            },
+            **{
+                "reference": self.reference,
+                "units": self.unit_names,
+                "pressure": self.pressure_text,
+            },
         }
-        write_bytes(self.state_file, json.dumps(state, ensure_ascii=False).encode(), private=True)
+        write_bytes(
+            self.state_file,
+            json.dumps(state, ensure_ascii=False).encode(),
+            private=True,
+        )
 
     def end(self, *, gone: bool) -> None:
         """Take the state file away where all is saved, or nothing was changed, and no page is left (`gone`)."""
@@ -153,12 +177,18 @@ class Session:
         return self._read_disk() == _hash_text(self.now.text.encode())
 
     def _read_disk(self) -> str | None:
-        return _hash_text(read_bytes(self.path, "scene file", LARGEST_FILE)) if self.path.exists() else None
+        return (
+            _hash_text(read_bytes(self.path, "scene file", LARGEST_FILE))
+            if self.path.exists()
+            else None
+        )
 
     def read(self, text: str) -> SceneState:
         """Read the text of a scene; InputError where the workbench takes none such."""
         if len(text.encode()) > LARGEST_FILE:
-            raise InputError("scene file", len(text), f"must not exceed {LARGEST_FILE} bytes")
+            raise InputError(
+                "scene file", len(text), f"must not exceed {LARGEST_FILE} bytes"
+            )
         scene = loads(text, str(self.path))
         require_steps(scene.motion, MOST_POSITIONS, "in the workbench", str(self.path))
         return SceneState(text, scene, tomllib.loads(text))
@@ -169,7 +199,9 @@ class Session:
         """Describe the present state, without error bars and summary."""
         return self.describe(evaluate_scene(self.now.scene, self.now.plain, self.units))
 
-    def describe(self, data: dict[str, Any], *, settled: bool = False) -> dict[str, Any]:
+    def describe(
+        self, data: dict[str, Any], *, settled: bool = False
+    ) -> dict[str, Any]:
         """Describe the present state, whose numbers are `data`; `settled`: with error bars and summary."""
         return {
             "data": data,
@@ -183,14 +215,19 @@ class Session:
             "reference": self.reference,
             "changed": self.now.text != self.kept[self.reference],
             "kept": [*self.kept],
-            "keys": {key: entry.unit for key, entry in list_entries(self.now.scene).items()},
+            "keys": {
+                key: entry.unit for key, entry in list_entries(self.now.scene).items()
+            },
             **({"saved": self.saved} if settled else {}),
         }
 
     def compared(self) -> dict[str, Any]:
         """Describe the state that the present one is held against."""
         kept = self.read(self.kept[self.reference])
-        return {"compared": self.reference, "data": evaluate_scene(kept.scene, kept.plain, self.units)}
+        return {
+            "compared": self.reference,
+            "data": evaluate_scene(kept.scene, kept.plain, self.units),
+        }
 
     def do(self, asked: dict[str, Any]) -> dict[str, Any]:
         """Do what a page asks for and describe the state after it; what is refused changes nothing."""
@@ -198,13 +235,21 @@ class Session:
         before = (self.texts, self.place, self.now)
         try:
             if action is None:
-                raise InputError("do", asked.get("do"), "must be one of " + ", ".join(ACTIONS))
+                raise InputError(
+                    "do", asked.get("do"), "must be one of " + ", ".join(ACTIONS)
+                )
             note = action(self, asked) or {}
             return self.answer() | note
-        except Exception as error:  # of a page whose request makes no sense too: the server goes on
+        except (
+            Exception
+        ) as error:  # of a page whose request makes no sense too: the server goes on
             self.texts, self.place, self.now = before
             self.document = SceneDocument(self.now.text)
-            words = str(error) if isinstance(error, FourBarError | OSError) else f"this cannot be done: {error}"
+            words = (
+                str(error)
+                if isinstance(error, FourBarError | OSError)
+                else f"this cannot be done: {error}"
+            )
             if isinstance(error, InputError):
                 words = f"{error.key}: {error.allowed}"
             return {"refused": words, "text": self.now.text, "plain": self.now.plain}
@@ -221,7 +266,9 @@ class Session:
         elif now.text != self.now.text:
             self.texts = [*self.texts[: self.place + 1], now.text]
             self.place += 1
-        while len(self.texts) > MOST_STATES or sum(map(len, self.texts)) > MOST_CHARACTERS:
+        while (
+            len(self.texts) > MOST_STATES or sum(map(len, self.texts)) > MOST_CHARACTERS
+        ):
             self.texts, self.place = self.texts[1:], self.place - 1
         self.now, self.gesture = now, gesture
         if not gesture:  # what was put in then stands as in a file; for each step of a gesture this is too slow
@@ -248,21 +295,38 @@ def _add(session: Session, asked: dict[str, Any]) -> None:
     if path[0] == "tolerances":
         entries = list_entries(session.now.scene)
         if name in entries:  # a thousandth of the number, until the designer says more
-            size = abs(float(read_place(session.now.scene, entries[name].place) or 1.0)) / 1000.0
+            size = (
+                abs(float(read_place(session.now.scene, entries[name].place) or 1.0))
+                / 1000.0
+            )
             value = f"{size:.1g} {entries[name].unit}"
     session.change(lambda document: document.put(path, value))
 
 
 def _drag(session: Session, asked: dict[str, Any]) -> None:
-    numbers = {name: float(asked[name]) for name in ("grain", "theta_2", "stretch") if name in asked}
-    dragged = Dragged(asked["what"], complex(*map(float, asked["to"])), branch=int(asked["branch"]), **numbers)
+    numbers = {
+        name: float(asked[name])
+        for name in ("grain", "theta_2", "stretch")
+        if name in asked
+    }
+    dragged = Dragged(
+        asked["what"],
+        complex(*map(float, asked["to"])),
+        branch=int(asked["branch"]),
+        **numbers,
+    )
     session.change(
-        lambda document: drag(document, session.base.scene, session.base.plain, dragged), str(asked.get("gesture", ""))
+        lambda document: drag(
+            document, session.base.scene, session.base.plain, dragged
+        ),
+        str(asked.get("gesture", "")),
     )
 
 
 def _write_text(session: Session, asked: dict[str, Any]) -> None:
-    text = session.read(str(asked["text"])).text  # refused in the words of the file's reader
+    text = session.read(
+        str(asked["text"])
+    ).text  # refused in the words of the file's reader
     session.change(lambda document: document.become(text))
 
 
@@ -270,7 +334,11 @@ def _move(session: Session, by: int) -> None:
     place = session.place + by
     if not 0 <= place < len(session.texts):
         raise InputError("history", place, "no further state to undo or redo")
-    session.now, session.place, session.gesture = session.read(session.texts[place]), place, ""
+    session.now, session.place, session.gesture = (
+        session.read(session.texts[place]),
+        place,
+        "",
+    )
     session.document = SceneDocument(session.now.text)
 
 
@@ -284,7 +352,9 @@ def _keep(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
 
 def _refer(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
     if asked["to"] not in session.kept:
-        raise InputError("reference", asked["to"], "must be one of " + ", ".join(session.kept))
+        raise InputError(
+            "reference", asked["to"], "must be one of " + ", ".join(session.kept)
+        )
     session.reference = asked["to"]
     return {"refer": True}
 
@@ -309,32 +379,52 @@ def _state_pressure(session: Session, asked: dict[str, Any]) -> None:
 def _command(session: Session, asked: dict[str, Any]) -> None:
     """Command another bar, or the cylinder, over what the present motion covers of it without turning back."""
     place = str(asked["command"])
-    names = {**{names[0]: names for names in COMMANDS.values()}, STROKE_COMMAND[0]: STROKE_COMMAND}
+    names = {
+        **{names[0]: names for names in COMMANDS.values()},
+        STROKE_COMMAND[0]: STROKE_COMMAND,
+    }
     if place not in names:
         raise InputError("command", place, "must be one of " + ", ".join(names))
     scene, document = session.now.scene, SceneDocument(session.now.text)
     before = solve(scene, "force" if scene.motion.speed is not None else "position")
     values = getattr(before, place)
     if values is None:
-        raise InputError("command", place, "needs a cylinder: add one in place of the bar first")
+        raise InputError(
+            "command", place, "needs a cylinder: add one in place of the bar first"
+        )
     first, last = _find_monotone(values)
     if last == first:
-        raise InputError("command", place, "does not move in this motion: choose another sweep first")
+        raise InputError(
+            "command", place, "does not move in this motion: choose another sweep first"
+        )
     middle = (first + last) // 2
-    inset = 1e-3 * (values[last] - values[first])  # so that rounding leads to no position beyond
+    inset = 1e-3 * (
+        values[last] - values[first]
+    )  # so that rounding leads to no position beyond
     ground = find_unit(session.now.plain["lengths"]["ground"], "m")
     unit, si = (ground, "m") if place == "stroke" else ("deg", "rad")
     factor = to_si(f"1 {si}", unit)
-    ends = [write_rounded(factor * x, abs(factor * inset), unit) for x in (values[first] + inset, values[last] - inset)]
+    ends = [
+        write_rounded(factor * x, abs(factor * inset), unit)
+        for x in (values[first] + inset, values[last] - inset)
+    ]
     rate = getattr(before, names[place][1], None)
-    speed = 0.1 * abs(values[last] - values[first]) if rate is None else float(rate[middle])
-    stated = {*chain(*names.values()), "side", "free", "law"} & session.now.plain["motion"].keys()
+    speed = (
+        0.1 * abs(values[last] - values[first]) if rate is None else float(rate[middle])
+    )
+    stated = {*chain(*names.values()), "side", "free", "law"} & session.now.plain[
+        "motion"
+    ].keys()
     for name in stated:
         document.remove(["motion", name])
-    document.put(["motion", place], {"from": ends[0], "to": ends[1], "steps": max(60, min(last - first, 360))})
+    document.put(
+        ["motion", place],
+        {"from": ends[0], "to": ends[1], "steps": max(60, min(last - first, 360))},
+    )
     if scene.motion.speed is not None:
         document.put(
-            ["motion", names[place][1]], write_rounded(factor * speed, abs(factor * speed) / 100.0, f"{unit}/s")
+            ["motion", names[place][1]],
+            write_rounded(factor * speed, abs(factor * speed) / 100.0, f"{unit}/s"),
         )
     pose, distances = _read_pose(before, middle), dict[str, float]()
     for branch, side in product(BRANCHES, SIDES if place == "stroke" else [""]):
@@ -350,14 +440,23 @@ def _command(session: Session, asked: dict[str, Any]) -> None:
 
 def _read_pose(solution: Solution, index: int) -> Any:
     """Return the directions of the three moving bars at one position."""
-    return np.exp(1j * np.array([solution.theta_2[index], solution.theta_3[index], solution.theta_4[index]]))
+    return np.exp(
+        1j
+        * np.array(
+            [solution.theta_2[index], solution.theta_3[index], solution.theta_4[index]]
+        )
+    )
 
 
 def _find_monotone(values: Any) -> tuple[int, int]:
     """Return the ends of the longest run in which numbers exist and rise, or fall, throughout."""
     signs = np.nan_to_num(np.sign(np.diff(values)))
     ends = np.concatenate([[0], np.flatnonzero(np.diff(signs)) + 1, [len(signs)]])
-    runs = [(int(start), int(stop)) for start, stop in pairwise(ends) if signs[start : start + 1].any()]
+    runs = [
+        (int(start), int(stop))
+        for start, stop in pairwise(ends)
+        if signs[start : start + 1].any()
+    ]
     return max(runs, key=lambda run: run[1] - run[0], default=(0, 0))
 
 
@@ -368,7 +467,9 @@ def _restate(session: Session, asked: dict[str, Any]) -> None:
     if by not in ("xy", "polar") or stated is None:
         raise InputError(name_entry(path), by, 'must be stated by "xy" or "polar"')
     place = parse_place(stated)
-    session.change(lambda document: put_place(document, path, place, 1e-6 * abs(place), by))
+    session.change(
+        lambda document: put_place(document, path, place, 1e-6 * abs(place), by)
+    )
 
 
 def _draw(session: Session, asked: dict[str, Any]) -> None:
@@ -383,9 +484,16 @@ def _draw(session: Session, asked: dict[str, Any]) -> None:
         document.become(text)
         for name, length in zip(bars, lengths, strict=True):
             document.put(["lengths", name], length)
-        angle = write_rounded(math.degrees(cmath.phase(O4 - O2)), math.degrees(grain / max(abs(O4 - O2), grain)), "deg")
+        angle = write_rounded(
+            math.degrees(cmath.phase(O4 - O2)),
+            math.degrees(grain / max(abs(O4 - O2), grain)),
+            "deg",
+        )
         document.put(["lengths", "ground_angle"], angle)
-        document.put(["motion", "branch"], "open" if ((B - A).conjugate() * (B - O4)).imag >= 0.0 else "crossed")
+        document.put(
+            ["motion", "branch"],
+            "open" if ((B - A).conjugate() * (B - O4)).imag >= 0.0 else "crossed",
+        )
 
     session.change(alter)
 
@@ -393,7 +501,9 @@ def _draw(session: Session, asked: dict[str, Any]) -> None:
 def _save(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
     """Write the file; where it is another one than was read, only on demand."""
     if session._read_disk() != session.disk and not asked.get("over"):
-        return {"ask": f"{session.path.name} was changed on the disk meanwhile. Overwrite it?"}
+        return {
+            "ask": f"{session.path.name} was changed on the disk meanwhile. Overwrite it?"
+        }
     data = session.now.text.encode()
     write_bytes(session.path, data)
     session.disk = _hash_text(data)
@@ -402,10 +512,13 @@ def _save(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
 
 ACTIONS: dict[str, Callable[[Session, dict[str, Any]], dict[str, Any] | None]] = {
     "set": lambda session, asked: session.change(
-        lambda of: of.set(asked["path"], str(asked["value"])), str(asked.get("gesture", ""))
+        lambda of: of.set(asked["path"], str(asked["value"])),
+        str(asked.get("gesture", "")),
     ),
     "add": _add,
-    "remove": lambda session, asked: session.change(lambda document: document.remove(asked["path"])),
+    "remove": lambda session, asked: session.change(
+        lambda document: document.remove(asked["path"])
+    ),
     "drag": _drag,
     "text": _write_text,
     "undo": lambda session, asked: _move(session, -1),
@@ -422,7 +535,9 @@ ACTIONS: dict[str, Callable[[Session, dict[str, Any]], dict[str, Any] | None]] =
         "note": f"wrote {session.exports.write(session.now.scene, str(asked['format']), session.units)}"
     },
     "bodies": lambda session, asked: {
-        "bodies": session.exports.free_bodies(session.now.scene, float(asked["position"]), session.units)
+        "bodies": session.exports.free_bodies(
+            session.now.scene, float(asked["position"]), session.units
+        )
     },
     "hello": lambda session, asked: {
         "offers": list_offers() | {"units": UNITS},

@@ -21,7 +21,9 @@ AT_REST = 50.0 * 2.0**-52
 
 def list_bodies(linkage: FourBar, effects: Iterable[Any] = ()) -> Bodies:
     """List the inertial properties of bars 2, 3, 4, with the inertia that effects (a flywheel) add."""
-    bodies = [Body(bar.mass, bar.moment_of_inertia, bar.to_centre) for bar in linkage.moving]
+    bodies = [
+        Body(bar.mass, bar.moment_of_inertia, bar.to_centre) for bar in linkage.moving
+    ]
     for effect in effects:
         for bar, inertia in effect.carried.items():
             bodies[bar - 2] = bodies[bar - 2]._replace(I=bodies[bar - 2].I + inertia)
@@ -58,7 +60,9 @@ class Actions:
             term.act(self, self.state)
         return self
 
-    def force(self, bar: int, force: Number, point: Number = 0.0j, beyond: Number = None) -> None:
+    def force(
+        self, bar: int, force: Number, point: Number = 0.0j, beyond: Number = None
+    ) -> None:
         """Add a force (complex, N, world axes) on a bar; on the ground it does nothing.
 
         Parameters
@@ -82,11 +86,15 @@ class Actions:
 
     def twist(self, bar: int, moment: Number) -> None:
         """Add a moment about a bar's first pin."""
-        self.moments[bar] = self.moments[bar] + moment if bar in self.moments else moment
+        self.moments[bar] = (
+            self.moments[bar] + moment if bar in self.moments else moment
+        )
 
     def couple(self, pin: str, couple: Number) -> None:
         """Add a couple on the second of the two bars that meet at a pin, and its opposite on the first, N m."""
-        self.couples[pin] = self.couples[pin] + couple if pin in self.couples else couple
+        self.couples[pin] = (
+            self.couples[pin] + couple if pin in self.couples else couple
+        )
 
     def pull(self, start: Any, end: Any, force: Number) -> None:
         """Add a force (complex, N, world axes) at a point of a bar, and its opposite at one of another bar.
@@ -100,13 +108,27 @@ class Actions:
             return
         first, second = PINS[pin]
         on_second = force if start.bar == second else -force
-        (from_start, square), (from_end, other_square) = (point.from_pin(pin, self.state) for point in (start, end))
-        by_one, by_other = from_start * self.state.direction(start.bar), from_end * self.state.direction(end.bar)
-        self.couple(pin, select(square < other_square, cross(-on_second, by_one), cross(-on_second, by_other)))
+        (from_start, square), (from_end, other_square) = (
+            point.from_pin(pin, self.state) for point in (start, end)
+        )
+        by_one, by_other = (
+            from_start * self.state.direction(start.bar),
+            from_end * self.state.direction(end.bar),
+        )
+        self.couple(
+            pin,
+            select(
+                square < other_square,
+                cross(-on_second, by_one),
+                cross(-on_second, by_other),
+            ),
+        )
         if first == 1:  # the pin is the first one of the other bar
             self.force(second, on_second)
         else:
-            self.through[pin] = self.through[pin] + on_second if pin in self.through else on_second
+            self.through[pin] = (
+                self.through[pin] + on_second if pin in self.through else on_second
+            )
 
     def pull_ends(self, start: Any, end: Any, force: Number) -> None:
         """Add the two forces where they act."""
@@ -134,15 +156,26 @@ class Actions:
         That of bars 3 and 4 is without what goes through pin A.
         """
         k = self.state.k
-        parts = [self.moments[bar] * h for bar, h in ((3, k.h3), (4, k.h4)) if bar in self.moments]
+        parts = [
+            self.moments[bar] * h
+            for bar, h in ((3, k.h3), (4, k.h4))
+            if bar in self.moments
+        ]
         if 3 in self.forces:
-            parts.append(cross(-self.state.lengths.a * k.h2 * self.forces[3], self.state.position.u2))
+            parts.append(
+                cross(
+                    -self.state.lengths.a * k.h2 * self.forces[3],
+                    self.state.position.u2,
+                )
+            )
         others = sum(parts[1:], parts[0]) if parts else 0.0
         total = others + self.moments[2] * k.h2 if 2 in self.moments else others
         for pin, couple in self.couples.items():
             total = total + couple * self.state.slip(pin)
             if pin != "O2":
-                others = others + couple * (k.h3 if pin == "A" else self.state.slip(pin))
+                others = others + couple * (
+                    k.h3 if pin == "A" else self.state.slip(pin)
+                )
         return total, others
 
     def about_B(self) -> Number:
@@ -165,7 +198,9 @@ class Actions:
         if not is_any(self.side != 0):
             return turning * sign(slip * self.state.speed)
         moving = np.where(turning, np.sign(slip * self.state.speed), self.side)
-        return np.where(np.equal(self.state.speed, 0.0), self.side * turning * np.sign(slip), moving)
+        return np.where(
+            np.equal(self.state.speed, 0.0), self.side * turning * np.sign(slip), moving
+        )
 
     def turning(self, pin: str) -> Number:
         """Mark where the two bars rotate relative to each other in a motion, as far as round-off can tell."""
@@ -251,7 +286,9 @@ class Effect:
     def act(self, actions: Actions, state: State) -> None:
         """Add its forces and couples on the bars."""
 
-    def solve_friction(self, actions: Actions, pins: PinForces, eliminate: Callable[..., PinForces]) -> SolvedFriction:
+    def solve_friction(
+        self, actions: Actions, pins: PinForces, eliminate: Callable[..., PinForces]
+    ) -> SolvedFriction:
         """Solve for what depends on the pin forces, where there are `loaded_pins`, and add it to the actions.
 
         `pins`: pin forces under the actions, without it. `eliminate`: computes the pin forces under some actions, and
@@ -266,7 +303,9 @@ class Effect:
         """Return the same effect in a motion that begins at this position, on this branch."""
         return self
 
-    def status(self, state: State, branch: NDArray[np.int8] | None) -> NDArray[np.uint8] | None:
+    def status(
+        self, state: State, branch: NDArray[np.int8] | None
+    ) -> NDArray[np.uint8] | None:
         """Return status codes, (n,): other than `OK` where it has no value; None: it has one everywhere."""
         return None
 
@@ -282,7 +321,10 @@ class PinRows(Effect):
     @classmethod
     def at(cls, **values: Any) -> Self:
         """Make it from the numbers of each pin: ``Viscous.at(O2=0.01)``, ``PinFriction.at(A=(mu, radius))``."""
-        rows = ((pin, *(value if isinstance(value, (tuple, list)) else (value,))) for pin, value in values.items())
+        rows = (
+            (pin, *(value if isinstance(value, (tuple, list)) else (value,)))
+            for pin, value in values.items()
+        )
         return cls(tuple(rows))  # type: ignore[call-arg]
 
     @property
@@ -300,14 +342,29 @@ class PinRows(Effect):
         expect(key, rows, tuple, list)
         by_pin: dict[str, tuple[Any, ...]] = {}
         for row in rows:
-            if not isinstance(row, (tuple, list)) or len(row) != 1 + len(numbers) or not isinstance(row[0], str):
-                raise InputError(key, row, f"must be (pin, {', '.join(name or 'value' for name in numbers)})")
+            if (
+                not isinstance(row, (tuple, list))
+                or len(row) != 1 + len(numbers)
+                or not isinstance(row[0], str)
+            ):
+                raise InputError(
+                    key,
+                    row,
+                    f"must be (pin, {', '.join(name or 'value' for name in numbers)})",
+                )
             pin, *values = row
             if pin not in PINS or pin in by_pin:
-                raise InputError(f"{key}.{pin}", row[1:], f"the pins are {', '.join(PINS)}, each once")
+                raise InputError(
+                    f"{key}.{pin}",
+                    row[1:],
+                    f"the pins are {', '.join(PINS)}, each once",
+                )
             pairs = zip(numbers.items(), values, strict=True)
             checked = (
-                require(f"{key}.{pin}.{name}".rstrip("."), value, *declared[:2]) for (name, declared), value in pairs
+                require(f"{key}.{pin}.{name}".rstrip("."), value, *declared[:2])
+                for (name, declared), value in pairs
             )
             by_pin[pin] = (pin, *checked)
-        object.__setattr__(self, self.field, tuple(by_pin[pin] for pin in PINS if pin in by_pin))
+        object.__setattr__(
+            self, self.field, tuple(by_pin[pin] for pin in PINS if pin in by_pin)
+        )

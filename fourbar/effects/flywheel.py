@@ -22,11 +22,18 @@ class Flywheel(Effect):
     bar: int = 2
     key: ClassVar[str] = "flywheel"
     example: ClassVar[str] = 'flywheel = { bar = 2, inertia = "0.02 kg m^2" }'
-    numbers: ClassVar[dict[str, Declared]] = {"inertia": Declared("kg m^2", AT_LEAST_ZERO)}
+    numbers: ClassVar[dict[str, Declared]] = {
+        "inertia": Declared("kg m^2", AT_LEAST_ZERO)
+    }
 
     def __post_init__(self) -> None:
         check_numbers(self, "effects.flywheel")
-        bar = require_whole("effects.flywheel.bar", self.bar, (2, 4), "must be 2 or 4, a bar on a fixed pin")
+        bar = require_whole(
+            "effects.flywheel.bar",
+            self.bar,
+            (2, 4),
+            "must be 2 or 4, a bar on a fixed pin",
+        )
         object.__setattr__(self, "bar", bar)
 
     @property

@@ -21,7 +21,10 @@ class Gravity(Effect):
     angle: float = -math.pi / 2
     key: ClassVar[str] = "gravity"
     example: ClassVar[str] = 'gravity = ["9.81 m/s^2", "-90 deg"]'
-    numbers: ClassVar[dict[str, Declared]] = {"magnitude": Declared("m/s^2"), "angle": Declared("rad")}
+    numbers: ClassVar[dict[str, Declared]] = {
+        "magnitude": Declared("m/s^2"),
+        "angle": Declared("rad"),
+    }
 
     def __post_init__(self) -> None:
         check_numbers(self, "effects.gravity")
@@ -33,7 +36,9 @@ class Gravity(Effect):
         # derivatives by the angle need the small component, and so does the error bar in longer numbers
         if namespace(u) is not np or shorten(self.angle) is not self.angle:
             return self.magnitude * u
-        return self.magnitude * vector(u.real * (abs(u.real) > U), u.imag * (abs(u.imag) > U))
+        return self.magnitude * vector(
+            u.real * (abs(u.real) > U), u.imag * (abs(u.imag) > U)
+        )
 
     @property
     def vector(self) -> tuple[float, float]:

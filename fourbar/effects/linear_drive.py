@@ -37,7 +37,9 @@ class LinearDrive:
     end: SpringEnd
 
     def __post_init__(self) -> None:
-        for name, point in zip(("start", "end"), require_ends("drive", self.start, self.end), strict=True):
+        for name, point in zip(
+            ("start", "end"), require_ends("drive", self.start, self.end), strict=True
+        ):
             object.__setattr__(self, name, point)
 
     @property
@@ -58,7 +60,9 @@ class LinearDrive:
         """Raise InputError where no motion changes the distance of the ends, as where one bar holds both."""
         if common := _list_bars(linkage, self.start) & _list_bars(linkage, self.end):
             allowed = f"keeps its distance from `from` at every position: bar {min(common)} holds both"
-            raise InputError("drive.to", f"bar {self.end.bar} at {self.end.distance:g} m", allowed)
+            raise InputError(
+                "drive.to", f"bar {self.end.bar} at {self.end.distance:g} m", allowed
+            )
 
     def line(self, state: State) -> tuple[Number, Number]:
         """Compute the stroke, m, and the unit vector from `start` to `end`, no number where they coincide."""
@@ -89,9 +93,13 @@ class LinearDrive:
         """
         _, a, b, c, _, _ = state.lengths
         h2, h3, h4 = sines[2], (-a / b) * sines[3], (-a / c) * sines[4]
-        turned = state._replace(k=state.k._replace(h2=h2, h3=h3, h4=h4, h23=h2 - h3, h43=h4 - h3))
+        turned = state._replace(
+            k=state.k._replace(h2=h2, h3=h3, h4=h4, h23=h2 - h3, h43=h4 - h3)
+        )
         reach = {1: (0.0, 0.0), 2: (0.0, 1.0), 3: (a, a / b), 4: (0.0, a / c)}
-        most = sum(reach[p.bar][0] + reach[p.bar][1] * abs(p.distance) for _, p in self.ends)
+        most = sum(
+            reach[p.bar][0] + reach[p.bar][1] * abs(p.distance) for _, p in self.ends
+        )
         return self.gain(turned), most
 
     def status(self, state: State, sines: dict[int, Number]) -> Number:
@@ -100,8 +108,13 @@ class LinearDrive:
         Places are rounded by the lengths over which they are reached, the line's direction by that over the stroke.
         """
         stroke, (lever, most) = self.line(state)[0], self.leverage(state, sines)
-        away = sum(state.lengths[:4]) + abs(self.start.distance) + abs(self.end.distance)
-        none, meet = abs(lever) * stroke <= NO_DIGIT_LEFT * most * away, stroke <= COINCIDE * away
+        away = (
+            sum(state.lengths[:4]) + abs(self.start.distance) + abs(self.end.distance)
+        )
+        none, meet = (
+            abs(lever) * stroke <= NO_DIGIT_LEFT * most * away,
+            stroke <= COINCIDE * away,
+        )
         if not is_any(none | meet):
             return None
         xp = namespace(meet)
@@ -112,5 +125,7 @@ def _list_bars(linkage: FourBar, point: SpringEnd) -> set[int]:
     """List the bars that hold a point: its own, and at one of its pins the other one too."""
     length = linkage.lengths[point.bar - 1]
     places = zip({1: ("O2", "O4"), **ENDS}[point.bar], (0.0, length), strict=True)
-    pins = [pin for pin, along in places if abs(point.in_bar - along) <= COINCIDE * length]
+    pins = [
+        pin for pin, along in places if abs(point.in_bar - along) <= COINCIDE * length
+    ]
     return {point.bar}.union(*(PINS[pin] for pin in pins))

@@ -9,10 +9,25 @@ import numpy as np
 
 from fourbar.effects.effect import Actions, Effect
 from fourbar.errors import InputError, expect
-from fourbar.formulas.arithmetic import PI_LOW, angle, is_any, make_like, namespace, nearest, polar, split_sum
+from fourbar.formulas.arithmetic import (
+    PI_LOW,
+    angle,
+    is_any,
+    make_like,
+    namespace,
+    nearest,
+    polar,
+    split_sum,
+)
 from fourbar.formulas.longer import shorten
 from fourbar.formulas.motion import State
-from fourbar.linkage import Declared, FourBar, check_numbers, require_bar, require_numbers
+from fourbar.linkage import (
+    Declared,
+    FourBar,
+    check_numbers,
+    require_bar,
+    require_numbers,
+)
 
 TURN = 2.0 * math.pi
 BEYOND_TURN = 2.0 * PI_LOW
@@ -38,10 +53,16 @@ class Table:
 
     def __post_init__(self) -> None:
         key = "loads.table"
-        angles = tuple(require_numbers(f"{key}.theta_2", self.theta_2, unit="rad").ravel().tolist())
+        angles = tuple(
+            require_numbers(f"{key}.theta_2", self.theta_2, unit="rad").ravel().tolist()
+        )
         factors = tuple(require_numbers(f"{key}.factor", self.factor).ravel().tolist())
         if len(angles) < 2 or len(angles) != len(factors):
-            raise InputError(key, (len(angles), len(factors)), "needs two or more angles and as many factors")
+            raise InputError(
+                key,
+                (len(angles), len(factors)),
+                "needs two or more angles and as many factors",
+            )
         if any(b <= a for a, b in pairwise(angles)):
             raise InputError(f"{key}.theta_2", angles, "must rise")
         object.__setattr__(self, "theta_2", angles)
@@ -49,7 +70,11 @@ class Table:
         if angles[-1] - angles[0] > TURN and not self.covers_a_turn:
             raise InputError(f"{key}.theta_2", angles, "must not exceed one turn")
         if self.covers_a_turn and factors[0] != factors[-1]:
-            raise InputError(f"{key}.factor", factors, "must end as it begins: its ends are one turn apart")
+            raise InputError(
+                f"{key}.factor",
+                factors,
+                "must end as it begins: its ends are one turn apart",
+            )
 
     @property
     def covers_a_turn(self) -> bool:
@@ -64,18 +89,38 @@ class Table:
         """
         first, xp = self.theta_2[0], namespace(theta_2)
         place = first + xp.remainder(shorten(angle(polar(1.0, theta_2))) - first, TURN)
-        points, factors = make_like(self.theta_2, theta_2), make_like(self.factor, theta_2)
+        points, factors = (
+            make_like(self.theta_2, theta_2),
+            make_like(self.factor, theta_2),
+        )
         if xp is np:
             place = self._require_covered(place)
-            k = np.clip(np.searchsorted(np.array(self.theta_2), place, "right") - 1, 0, len(self.theta_2) - 2)
+            k = np.clip(
+                np.searchsorted(np.array(self.theta_2), place, "right") - 1,
+                0,
+                len(self.theta_2) - 2,
+            )
         else:  # operations that every array library has
-            k = xp.sum(xp.astype(place[..., None] >= points[1:-1], xp.int32), axis=-1)[None]
-        pieces = (points[:-1], points[1:] - points[:-1], factors[:-1], factors[1:] - factors[:-1])
-        start, width, before, rise = (piece[k] if xp is np else piece[k][0] for piece in pieces)
+            k = xp.sum(xp.astype(place[..., None] >= points[1:-1], xp.int32), axis=-1)[
+                None
+            ]
+        pieces = (
+            points[:-1],
+            points[1:] - points[:-1],
+            factors[:-1],
+            factors[1:] - factors[:-1],
+        )
+        start, width, before, rise = (
+            piece[k] if xp is np else piece[k][0] for piece in pieces
+        )
         away, lost = split_sum(theta_2, -start)
         rest = xp.fmod(away, TURN)
         turns = nearest((theta_2 - place) / TURN)
-        past = rest + (nearest((away - rest) / TURN) - turns) * TURN + (lost - turns * BEYOND_TURN)
+        past = (
+            rest
+            + (nearest((away - rest) / TURN) - turns) * TURN
+            + (lost - turns * BEYOND_TURN)
+        )
         return before + rise * (past / width)
 
     def _require_covered(self, place: Any) -> Any:
@@ -124,7 +169,11 @@ class Load(Effect):
         object.__setattr__(self, "bar", require_bar("loads.bar", self.bar))
         expect("loads.frame", self.frame, str)
         if self.frame not in FRAMES:
-            raise InputError("loads.frame", self.frame, "must be " + " or ".join(f'"{frame}"' for frame in FRAMES))
+            raise InputError(
+                "loads.frame",
+                self.frame,
+                "must be " + " or ".join(f'"{frame}"' for frame in FRAMES),
+            )
         expect("loads.table", self.table, Table, type(None))
         check_numbers(self, "loads")
 
@@ -134,7 +183,11 @@ class Load(Effect):
         if self.table is not None:
             factor = self.table.at(state.theta_2)
         if self.force is not None:
-            force, arm, G = polar(*self.force), polar(*self.at), actions.bodies[self.bar - 2].z
+            force, arm, G = (
+                polar(*self.force),
+                polar(*self.at),
+                actions.bodies[self.bar - 2].z,
+            )
             if self.frame == "bar":
                 force, G, arm = force * state.direction(self.bar), G + arm, None
             actions.force(self.bar, factor * force, G, arm)
@@ -146,5 +199,11 @@ class Load(Effect):
         bar = linkage.bar(self.bar)
         total = abs(self.moment) / bar.length
         if self.force is not None:
-            total += abs(self.force[0]) * (1.0 + (abs(bar.mass_centre[0]) + abs(self.at[0])) / bar.length)
-        return total if self.table is None else total * max(abs(factor) for factor in self.table.factor)
+            total += abs(self.force[0]) * (
+                1.0 + (abs(bar.mass_centre[0]) + abs(self.at[0])) / bar.length
+            )
+        return (
+            total
+            if self.table is None
+            else total * max(abs(factor) for factor in self.table.factor)
+        )

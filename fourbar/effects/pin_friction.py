@@ -50,7 +50,9 @@ class PinFriction(PinRows):
 
     pins: tuple[tuple[str, float, float], ...]
     key: ClassVar[str] = "pin_friction"
-    example: ClassVar[str] = 'pin_friction = { A = { coefficient = 0.1, radius = "8 mm" } }'
+    example: ClassVar[str] = (
+        'pin_friction = { A = { coefficient = 0.1, radius = "8 mm" } }'
+    )
     numbers: ClassVar[dict[str, Declared]] = {
         "coefficient": Declared("1", AT_LEAST_ZERO),
         "radius": Declared("m", AT_LEAST_ZERO),
@@ -72,7 +74,9 @@ class PinFriction(PinRows):
         """The pins at which it acts."""
         return self.loaded_pins
 
-    def per_unit(self, actions: Actions, eliminate: Callable[..., PinForces]) -> dict[str, PinForces]:
+    def per_unit(
+        self, actions: Actions, eliminate: Callable[..., PinForces]
+    ) -> dict[str, PinForces]:
         """Compute the pin forces that a couple of 1 N m makes at each pin, against its rotation."""
         forces = {}
         for pin in self.loaded_pins:
@@ -81,10 +85,15 @@ class PinFriction(PinRows):
             forces[pin] = eliminate(single, with_inertia=False)
         return forces
 
-    def solve_friction(self, actions: Actions, pins: PinForces, eliminate: Callable[..., PinForces]) -> SolvedFriction:
+    def solve_friction(
+        self, actions: Actions, pins: PinForces, eliminate: Callable[..., PinForces]
+    ) -> SolvedFriction:
         """Add the couples that fulfil x_p = mu_p r_p |F_p(x)|, F_p = F0_p + sum over q of C_pq x_q."""
         names, arms = self.loaded_pins, {pin: mu * r for pin, mu, r in self.pins}
-        senses, per_unit = {pin: actions.sense(pin) for pin in names}, self.per_unit(actions, eliminate)
+        senses, per_unit = (
+            {pin: actions.sense(pin) for pin in names},
+            self.per_unit(actions, eliminate),
+        )
         shape = np.shape(pins.F12)
 
         def column(force: Any) -> Any:
@@ -92,28 +101,52 @@ class PinFriction(PinRows):
             flat = np.broadcast_to(_make_plain(force), shape).ravel()
             return np.stack([flat.real, flat.imag], axis=-1)
 
-        k = np.stack([np.broadcast_to(_make_plain(arms[pin]), shape).ravel() for pin in names], axis=1)
+        k = np.stack(
+            [np.broadcast_to(_make_plain(arms[pin]), shape).ravel() for pin in names],
+            axis=1,
+        )
         F = np.stack([column(getattr(pins, PIN_FORCE[pin])) for pin in names], axis=1)
         C = np.stack(
-            [np.stack([column(getattr(per_unit[q], PIN_FORCE[pin])) for q in names], axis=1) for pin in names], axis=1
+            [
+                np.stack(
+                    [column(getattr(per_unit[q], PIN_FORCE[pin])) for q in names],
+                    axis=1,
+                )
+                for pin in names
+            ],
+            axis=1,
         )
         sliding = solve_sliding(F, C, k)
-        couples = {pin: make_like(sliding.x[:, p].reshape(shape), pins.F12.real) for p, pin in enumerate(names)}
+        couples = {
+            pin: make_like(sliding.x[:, p].reshape(shape), pins.F12.real)
+            for p, pin in enumerate(names)
+        }
         if _make_plain(pins.F12) is not pins.F12:
             couples = self._refine(couples, pins, per_unit)
         for pin, couple in couples.items():
             actions.couple(pin, -senses[pin] * couple)
         loaded = eliminate(actions)
         residuals = [
-            np.abs(_make_plain(couple - arms[pin] * np.abs(getattr(loaded, PIN_FORCE[pin]))))
+            np.abs(
+                _make_plain(
+                    couple - arms[pin] * np.abs(getattr(loaded, PIN_FORCE[pin]))
+                )
+            )
             for pin, couple in couples.items()
         ]
-        status = np.where(sliding.number == ONE, OK, np.where(sliding.number == NONE, JAMMED, SEVERAL)).astype(np.uint8)
+        status = np.where(
+            sliding.number == ONE, OK, np.where(sliding.number == NONE, JAMMED, SEVERAL)
+        ).astype(np.uint8)
         return SolvedFriction(
-            loaded, sliding.from_jamming.reshape(shape), np.max(residuals, axis=0), status.reshape(shape)
+            loaded,
+            sliding.from_jamming.reshape(shape),
+            np.max(residuals, axis=0),
+            status.reshape(shape),
         )
 
-    def _refine(self, couples: dict[str, Any], pins: PinForces, per_unit: dict[str, PinForces]) -> dict[str, Any]:
+    def _refine(
+        self, couples: dict[str, Any], pins: PinForces, per_unit: dict[str, PinForces]
+    ) -> dict[str, Any]:
         """Take Newton's steps from couples in doubles, in the numbers of the forces: longer ones or with derivatives.
 
         (1 - J) dx = mu r |F + C x| - x, J the slope of the right-hand side by x: of numbers that carry their
@@ -123,14 +156,22 @@ class PinFriction(PinRows):
         for _ in range(2):
             gaps, slopes = [], []
             for pin in names:
-                by, force = [getattr(per_unit[q], PIN_FORCE[pin]) for q in names], getattr(pins, PIN_FORCE[pin])
+                by, force = (
+                    [getattr(per_unit[q], PIN_FORCE[pin]) for q in names],
+                    getattr(pins, PIN_FORCE[pin]),
+                )
                 for c, couple in zip(by, couples.values(), strict=True):
                     force = force + c * couple
                 gaps.append(arms[pin] * np.abs(force) - couples[pin])
                 along = _make_plain(force) / np.abs(_make_plain(force))
-                pulls = [_make_plain(arms[pin]) * (along.conjugate() * _make_plain(c)).real for c in by]
+                pulls = [
+                    _make_plain(arms[pin]) * (along.conjugate() * _make_plain(c)).real
+                    for c in by
+                ]
                 slopes.append(np.broadcast_arrays(*pulls, along.real)[:-1])
-            matrix = np.eye(len(names)) - np.moveaxis(np.array(slopes), (0, 1), (-2, -1))
+            matrix = np.eye(len(names)) - np.moveaxis(
+                np.array(slopes), (0, 1), (-2, -1)
+            )
             usable = np.asarray(np.isfinite(matrix).all(axis=(-2, -1)))
             usable[usable] = np.linalg.det(matrix[usable]) != 0.0
             inverse = np.zeros_like(matrix)
@@ -183,11 +224,19 @@ def solve_sliding(F: Array, C: Array, k: Array) -> Sliding:
         for start in range(0, len(unsure), SEARCHED):
             some = unsure[start : start + SEARCHED]
             numbers = np.concatenate(
-                [array[some].reshape(len(some), math.prod(array.shape[1:])) for array in (F, C, k)], axis=1
+                [
+                    array[some].reshape(len(some), math.prod(array.shape[1:]))
+                    for array in (F, C, k)
+                ],
+                axis=1,
             )
-            _, first, same = np.unique(numbers, axis=0, return_index=True, return_inverse=True)
+            _, first, same = np.unique(
+                numbers, axis=0, return_index=True, return_inverse=True
+            )
             first = some[first]
-            x[some], count[some] = (array[same.ravel()] for array in _search(F[first], C[first], k[first]))
+            x[some], count[some] = (
+                array[same.ravel()] for array in _search(F[first], C[first], k[first])
+            )
     with np.errstate(invalid="ignore"):
         for _ in range(2):  # removes the rounding of the search and of the quadratic
             right, slope = _compute_right_side(F, C, k, x)
@@ -196,7 +245,9 @@ def solve_sliding(F: Array, C: Array, k: Array) -> Sliding:
     matrix = np.eye(p) - slope
     far = np.ones(n)
     usable = np.isfinite(matrix).all(axis=(1, 2))
-    far[usable] = np.minimum(np.linalg.svd(matrix[usable], compute_uv=False)[:, -1], 1.0)
+    far[usable] = np.minimum(
+        np.linalg.svd(matrix[usable], compute_uv=False)[:, -1], 1.0
+    )
     return Sliding(x, count, far)
 
 
@@ -233,7 +284,9 @@ def _compute_right_side(F: Array, C: Array, k: Array, x: Array) -> tuple[Array, 
 def compute_step(gap: Array, slope: Array) -> Array:
     """Solve (1 - slope) step = gap, zero where that cannot be solved, (n, p)."""
     matrix = np.eye(gap.shape[1]) - slope
-    usable = np.asarray(np.isfinite(matrix).all(axis=(1, 2)) & np.isfinite(gap).all(axis=1))
+    usable = np.asarray(
+        np.isfinite(matrix).all(axis=(1, 2)) & np.isfinite(gap).all(axis=1)
+    )
     usable[usable] = np.linalg.det(matrix[usable]) != 0.0
     step = np.zeros_like(gap)
     step[usable] = np.linalg.solve(matrix[usable], gap[usable][..., None])[..., 0]
@@ -247,10 +300,16 @@ def _iterate(F: Array, C: Array, k: Array, x: Array) -> Array:
         right, slope = _compute_right_side(F, C, k, x)
         newton = np.maximum(x + compute_step(right - x, slope), 0.0)
         plain_gap = np.abs(_compute_right_side(F, C, k, right)[0] - right).max(axis=1)
-        newton_gap = np.abs(_compute_right_side(F, C, k, newton)[0] - newton).max(axis=1)
+        newton_gap = np.abs(_compute_right_side(F, C, k, newton)[0] - newton).max(
+            axis=1
+        )
         new = np.where((newton_gap < plain_gap)[:, None], newton, right)
-        new = np.where(done[:, None], x, new)  # solved problems keep their digits while others go on
-        done |= np.abs(new - x).max(axis=1, initial=0.0) <= ROUNDING * new.max(axis=1, initial=0.0)
+        new = np.where(
+            done[:, None], x, new
+        )  # solved problems keep their digits while others go on
+        done |= np.abs(new - x).max(axis=1, initial=0.0) <= ROUNDING * new.max(
+            axis=1, initial=0.0
+        )
         x = new
         if done.all():
             break
@@ -261,21 +320,48 @@ def _search(F: Array, C: Array, k: Array) -> tuple[Array, NDArray[np.int_]]:
     """Find the least solution of each problem, and how many there are, from starts over many magnitudes."""
     n, p = k.shape
     size = np.max(k * np.hypot(F[..., 0], F[..., 1]), axis=1)
-    directions = np.vstack([np.ones(p), np.eye(p) + 0.01, np.random.default_rng(0).uniform(0.0, 1.0, (STARTS // p, p))])
-    starts = np.vstack([np.zeros((1, p)), (np.logspace(-2, 3, 11)[:, None, None] * directions).reshape(-1, p)])
+    directions = np.vstack(
+        [
+            np.ones(p),
+            np.eye(p) + 0.01,
+            np.random.default_rng(0).uniform(0.0, 1.0, (STARTS // p, p)),
+        ]
+    )
+    starts = np.vstack(
+        [
+            np.zeros((1, p)),
+            (np.logspace(-2, 3, 11)[:, None, None] * directions).reshape(-1, p),
+        ]
+    )
     x = (size[:, None, None] * starts).reshape(-1, p)
-    problem, moving, before = np.repeat(np.arange(n), len(starts)), np.arange(len(x)), np.full_like(x, np.inf)
+    problem, moving, before = (
+        np.repeat(np.arange(n), len(starts)),
+        np.arange(len(x)),
+        np.full_like(x, np.inf),
+    )
     for _ in range(60):
         members, last = problem[moving], x[moving]
         right, slope = _compute_right_side(F[members], C[members], k[members], last)
-        new = np.clip(last + compute_step(right - last, slope), 0.0, 1e12 * size[members, None])
-        least_change = np.minimum(np.abs(new - last).max(axis=1), np.abs(new - before[moving]).max(axis=1))
+        new = np.clip(
+            last + compute_step(right - last, slope), 0.0, 1e12 * size[members, None]
+        )
+        least_change = np.minimum(
+            np.abs(new - last).max(axis=1), np.abs(new - before[moving]).max(axis=1)
+        )
         x[moving], before[moving] = new, last
-        moving = moving[least_change > SETTLED * new.max(axis=1)]  # the others stand still or alternate
+        moving = moving[
+            least_change > SETTLED * new.max(axis=1)
+        ]  # the others stand still or alternate
     right, _ = _compute_right_side(F[problem], C[problem], k[problem], x)
-    solves = np.abs(right - x).max(axis=1) <= 1e-9 * np.maximum(x.max(axis=1), size[problem])
+    solves = np.abs(right - x).max(axis=1) <= 1e-9 * np.maximum(
+        x.max(axis=1), size[problem]
+    )
     x, solves = x.reshape(n, -1, p), solves.reshape(n, -1)
     least = x[np.arange(n), np.argmin(np.where(solves, x.sum(axis=2), np.inf), axis=1)]
-    apart = np.abs(x - least[:, None]).max(axis=2) > SAME * np.maximum(x.max(axis=2), least.max(axis=1)[:, None])
-    count = np.where((solves & apart).any(axis=1), MANY, np.where(solves.any(axis=1), ONE, NONE))
+    apart = np.abs(x - least[:, None]).max(axis=2) > SAME * np.maximum(
+        x.max(axis=2), least.max(axis=1)[:, None]
+    )
+    count = np.where(
+        (solves & apart).any(axis=1), MANY, np.where(solves.any(axis=1), ONE, NONE)
+    )
     return np.where(count[:, None] == NONE, np.nan, least), count

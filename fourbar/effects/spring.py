@@ -8,7 +8,15 @@ from numpy.typing import NDArray
 
 from fourbar.effects.effect import Actions, Effect
 from fourbar.errors import InputError, expect
-from fourbar.formulas.arithmetic import dot, is_any, namespace, polar, select, sine_of, vector
+from fourbar.formulas.arithmetic import (
+    dot,
+    is_any,
+    namespace,
+    polar,
+    select,
+    sine_of,
+    vector,
+)
 from fourbar.formulas.motion import State
 from fourbar.linkage import (
     AT_LEAST_ZERO,
@@ -32,7 +40,9 @@ END_POSITION = Declared("m", left_out=(0.0, 0.0), pair=True)
 """Declaration of the position of an end on its bar."""
 GAS = {
     **dict.fromkeys(("extended", "stroke"), Declared("m", POSITIVE)),
-    **dict.fromkeys(("extended_force", "compressed_force"), Declared("N", AT_LEAST_ZERO)),
+    **dict.fromkeys(
+        ("extended_force", "compressed_force"), Declared("N", AT_LEAST_ZERO)
+    ),
 }
 """Numbers of a gas spring, which becomes one of the springs."""
 
@@ -58,15 +68,25 @@ class SpringEnd(NamedTuple):
 
     def of(self, state: State) -> Any:
         """Return the vector in the bar's frame, m, as a number of the library of a state."""
-        return self.in_bar if namespace(state.position.u2) is np else polar(self.distance, self.angle)
+        return (
+            self.in_bar
+            if namespace(state.position.u2) is np
+            else polar(self.distance, self.angle)
+        )
 
     def from_pin(self, pin: str, state: State) -> tuple[Any, Any]:
         """Return the vector from one of the bar's pins in the bar's frame, complex, m, and the square of its length."""
         arm = self.of(state)
         if pin != SECOND_PIN[self.bar]:
             return arm, self.distance * self.distance
-        half = sine_of(0.5 * self.angle)  # r cos phi - L near the pin, where the cosine rounds to 1
-        arm = vector((self.distance - state.lengths[self.bar - 1]) - 2.0 * self.distance * half * half, arm.imag)
+        half = sine_of(
+            0.5 * self.angle
+        )  # r cos phi - L near the pin, where the cosine rounds to 1
+        arm = vector(
+            (self.distance - state.lengths[self.bar - 1])
+            - 2.0 * self.distance * half * half,
+            arm.imag,
+        )
         return arm, dot(arm, arm)
 
     def place(self, state: State) -> Any:
@@ -80,10 +100,18 @@ def require_ends(key: str, start: object, end: object) -> tuple[SpringEnd, Sprin
     for name, point in (("from", start), ("to", end)):
         if not isinstance(point, SpringEnd):
             raise InputError(f"{key}.{name}", point, "must be a fourbar.SpringEnd")
-        bar = require_whole(f"{key}.{name}.bar", point.bar, BAR_NAMES, "must be 1, 2, 3 or 4")
-        ends.append(SpringEnd(bar, *require_pair(f"{key}.{name}.at", point[1:], END_POSITION.unit)))
+        bar = require_whole(
+            f"{key}.{name}.bar", point.bar, BAR_NAMES, "must be 1, 2, 3 or 4"
+        )
+        ends.append(
+            SpringEnd(
+                bar, *require_pair(f"{key}.{name}.at", point[1:], END_POSITION.unit)
+            )
+        )
     if ends[0].bar == ends[1].bar:
-        raise InputError(f"{key}.to.bar", ends[1].bar, "must be another bar than that of `from`")
+        raise InputError(
+            f"{key}.to.bar", ends[1].bar, "must be another bar than that of `from`"
+        )
     return ends[0], ends[1]
 
 
@@ -114,7 +142,11 @@ class Spring:
     }
 
     def __post_init__(self) -> None:
-        for name, point in zip(("start", "end"), require_ends("effects.springs", self.start, self.end), strict=True):
+        for name, point in zip(
+            ("start", "end"),
+            require_ends("effects.springs", self.start, self.end),
+            strict=True,
+        ):
             object.__setattr__(self, name, point)
         check_numbers(self, "effects.springs")
 
@@ -139,15 +171,27 @@ class Spring:
         extended_force : at no stroke, N, >= 0.
         compressed_force : at full stroke, N, no less; left out: the same.
         """
-        key, last = "effects.springs.gas", extended_force if compressed_force is None else compressed_force
+        key, last = (
+            "effects.springs.gas",
+            extended_force if compressed_force is None else compressed_force,
+        )
         pairs = zip(GAS.items(), (extended, stroke, extended_force, last), strict=True)
         extended, stroke, first, last = (
-            require(f"{key}.{name}", value, *declared[:2]) for (name, declared), value in pairs
+            require(f"{key}.{name}", value, *declared[:2])
+            for (name, declared), value in pairs
         )
         if stroke >= extended:
-            raise InputError(f"{key}.stroke", stroke, f"must be less than the extended length, {extended:.6g} m")
+            raise InputError(
+                f"{key}.stroke",
+                stroke,
+                f"must be less than the extended length, {extended:.6g} m",
+            )
         if last < first:
-            raise InputError(f"{key}.compressed_force", last, f"must be no less than the extended_force, {first:.6g} N")
+            raise InputError(
+                f"{key}.compressed_force",
+                last,
+                f"must be no less than the extended_force, {first:.6g} N",
+            )
         return cls(start, end, (last - first) / stroke, extended, -first)
 
     @property
@@ -188,18 +232,28 @@ class Springs(Effect):
         for spring in self.springs:
             across = spring.end.place(state) - spring.start.place(state)
             by_distance = spring.stiffness
-            if is_any(spring.slack != 0.0):  # NaN at a distance of 0, where the status says so
+            if is_any(
+                spring.slack != 0.0
+            ):  # NaN at a distance of 0, where the status says so
                 by_distance = by_distance + spring.slack / namespace(across).abs(across)
             actions.pull(spring.start, spring.end, by_distance * across)
 
-    def status(self, state: State, branch: NDArray[np.int8] | None) -> NDArray[np.uint8] | None:
+    def status(
+        self, state: State, branch: NDArray[np.int8] | None
+    ) -> NDArray[np.uint8] | None:
         """Return NO_DIRECTION where the two points of a spring with slack coincide."""
         codes = None
         for spring in self.springs:
             if not is_any(spring.slack != 0.0):
                 continue
             across = spring.end.place(state) - spring.start.place(state)
-            away = sum(state.lengths[:4]) + abs(spring.start.distance) + abs(spring.end.distance)
-            here = (namespace(across).abs(across) <= COINCIDE * away) & (spring.slack != 0.0)
+            away = (
+                sum(state.lengths[:4])
+                + abs(spring.start.distance)
+                + abs(spring.end.distance)
+            )
+            here = (namespace(across).abs(across) <= COINCIDE * away) & (
+                spring.slack != 0.0
+            )
             codes = select(here, NO_DIRECTION, OK if codes is None else codes)
         return codes

@@ -36,7 +36,9 @@ class Torsion(PinRows):
     """Whole turns of each pin where the motion begins, rad; not part of a scene."""
     counts_turns: ClassVar[bool] = True
     key: ClassVar[str] = "torsion"
-    example: ClassVar[str] = 'torsion = { B = { stiffness = "2 N m/rad", rest = "30 deg", preload = "0.1 N m" } }'
+    example: ClassVar[str] = (
+        'torsion = { B = { stiffness = "2 N m/rad", rest = "30 deg", preload = "0.1 N m" } }'
+    )
     numbers: ClassVar[dict[str, Declared]] = {
         "stiffness": Declared("N m/rad", POSITIVE),
         "rest": Declared("rad"),
@@ -64,14 +66,20 @@ class Torsion(PinRows):
         """Count whole turns where the motion begins."""
         away = [
             angle - rest
-            for angle, (_, _, rest, _) in zip(self._follow_angles(start, branch), self.springs, strict=True)
+            for angle, (_, _, rest, _) in zip(
+                self._follow_angles(start, branch), self.springs, strict=True
+            )
         ]
-        counted = copy(self)  # a constructor checks what a user gives, one number at a time
+        counted = copy(
+            self
+        )  # a constructor checks what a user gives, one number at a time
         turns = tuple(math.tau * np.floor(angle / math.tau + 0.5) for angle in away)
         object.__setattr__(counted, "turns", turns)
         return counted
 
-    def status(self, state: State, branch: NDArray[np.int8] | None) -> NDArray[np.uint8] | None:
+    def status(
+        self, state: State, branch: NDArray[np.int8] | None
+    ) -> NDArray[np.uint8] | None:
         """Return WOUND at half a turn from rest and beyond."""
         if self.turns is None or branch is None:
             return None
@@ -94,13 +102,21 @@ def _remove_jumps(state: State, branch: Number) -> dict[int, Number]:
     The diagonal from A to O4 swings about the ground's line where a < d, and otherwise about the input's, never by
     more than a quarter turn; bars 3 and 4 make angles with it that stay between 0 and half a turn.
     """
-    bar, theta_1, theta_2 = state.bar, state.theta_1, state.theta_2 if state.q is None else state.q
+    bar, theta_1, theta_2 = (
+        state.bar,
+        state.theta_1,
+        state.theta_2 if state.q is None else state.q,
+    )
     d, a, *_ = reorder_lengths(bar, state.lengths[:4])
-    turned = math.pi if bar == 4 else 0.0  # turn of the ground, and of the coupler with it
+    turned = (
+        math.pi if bar == 4 else 0.0
+    )  # turn of the ground, and of the coupler with it
     u2, u3, u4 = (state.direction(role) for role in ROLES[bar])
     theta_3, theta_4 = np.angle(u3) + turned, np.angle(u4)
     theta_1 = theta_1 + turned
-    phi = np.angle(state.position.diagonal if bar == 2 else d * np.exp(1j * theta_1) - a * u2)
+    phi = np.angle(
+        state.position.diagonal if bar == 2 else d * np.exp(1j * theta_1) - a * u2
+    )
     line = np.where(a < d, theta_1, theta_2 + math.pi)
     phi = line + wrap_angle(phi - line)
 
@@ -113,4 +129,7 @@ def _remove_jumps(state: State, branch: Number) -> dict[int, Number]:
         phi + branch * beyond(branch * (theta_3 - phi)) - turned,
         phi + math.pi - branch * beyond(branch * (phi + math.pi - theta_4)),
     )
-    return {1: np.full_like(theta_2, theta_1 - turned), **dict(zip(ROLES[bar], angles, strict=True))}
+    return {
+        1: np.full_like(theta_2, theta_1 - turned),
+        **dict(zip(ROLES[bar], angles, strict=True)),
+    }

@@ -43,7 +43,9 @@ Evaluated = tuple[NDArray[np.uint8], dict[str, Any], Position | None]
 """Status codes and quantities of some positions, vectors as x + i y, and where the drive must balance."""
 
 
-def find_undecided(factor: Any, constant: Any, size: Any, part: float = UNDECIDED) -> Any:
+def find_undecided(
+    factor: Any, constant: Any, size: Any, part: float = UNDECIDED
+) -> Any:
     """Mark where doubles cannot decide the sign of a factor of Heron's formula, a constant and 4 a d times a square."""
     return (constant < 0.0) & (abs(factor) < part * (abs(constant) + size))
 
@@ -82,22 +84,51 @@ class Case(NamedTuple):
         """Collect the numbers that stay the same over the positions, for a command of bar 2, 3 or 4."""
         terms, linkage = (*scene.loads, *scene.effects), scene.linkage
         path = prepare_path(Loop(*linkage.lengths, 0.0, 0.0), linkage.ground_angle, bar)
-        points = tuple((point.name, point.bar, polar(*point.from_pin)) for point in scene.points)
+        points = tuple(
+            (point.name, point.bar, polar(*point.from_pin)) for point in scene.points
+        )
         lengths, bodies = _restore_unit(linkage, path), list_bodies(linkage, terms)
-        return cls(linkage, lengths, bodies, terms, scene.drive_bar, path, points, drive=scene.drive)
+        return cls(
+            linkage,
+            lengths,
+            bodies,
+            terms,
+            scene.drive_bar,
+            path,
+            points,
+            drive=scene.drive,
+        )
 
     def lengthened(self) -> "Case":
         """Return the same case in longer numbers, all that is computed of the scene's own numbers too."""
-        linkage, terms, drive = change_numbers((self.linkage, self.terms, self.drive), lengthen)
+        linkage, terms, drive = change_numbers(
+            (self.linkage, self.terms, self.drive), lengthen
+        )
         d, a, b, c = linkage.lengths
-        path = prepare_path(Loop(d, a, b, c, 0.0, 0.0), linkage.ground_angle, self.path.bar)
+        path = prepare_path(
+            Loop(d, a, b, c, 0.0, 0.0), linkage.ground_angle, self.path.bar
+        )
         kept: Any = {  # a free motion meets a change point that the lengths miss by rounding
-            name: select(getattr(self.path.lengths, name) == 0.0, 0.0, getattr(path.lengths, name))
+            name: select(
+                getattr(self.path.lengths, name) == 0.0,
+                0.0,
+                getattr(path.lengths, name),
+            )
             for name in ("E1", "E2")
         }
-        path = path._replace(lengths=path.lengths._replace(**kept), may_stay_parallel=self.path.may_stay_parallel)
+        path = path._replace(
+            lengths=path.lengths._replace(**kept),
+            may_stay_parallel=self.path.may_stay_parallel,
+        )
         bodies, lengths = list_bodies(linkage, terms), _restore_unit(linkage, path)
-        return self._replace(linkage=linkage, lengths=lengths, bodies=bodies, terms=terms, path=path, drive=drive)
+        return self._replace(
+            linkage=linkage,
+            lengths=lengths,
+            bodies=bodies,
+            terms=terms,
+            path=path,
+            drive=drive,
+        )
 
     @property
     def names(self) -> DriveNames:
@@ -110,7 +141,11 @@ class Case(NamedTuple):
 
     def drive_speed(self, state: State) -> Any:
         """Compute the speed at which the drive works: of the driven bar, rad/s, or of the stroke, m/s."""
-        return state.omega(self.drive_bar) if self.drive is None else self.drive.gain(state) * state.speed
+        return (
+            state.omega(self.drive_bar)
+            if self.drive is None
+            else self.drive.gain(state) * state.speed
+        )
 
     def drive_condition(self, state: State) -> Any:
         """Compute the drive's leverage as a part of the most it could have, in [0, 1]."""
@@ -120,7 +155,14 @@ class Case(NamedTuple):
         return abs(lever) / most
 
     def state(
-        self, q: Any, position: Position, branch: Any, speed: Any, acceleration: Any, *, moving: bool = True
+        self,
+        q: Any,
+        position: Position,
+        branch: Any,
+        speed: Any,
+        acceleration: Any,
+        *,
+        moving: bool = True,
     ) -> State:
         """Compute positions and, if more is wanted, motion.
 
@@ -131,31 +173,65 @@ class Case(NamedTuple):
             position, k = path.motion(position, branch)
         else:
             position, speed, acceleration = path.in_order(position), 0.0, 0.0
-        state = State(self.lengths, self.linkage.ground_angle, q, position, k, speed, rates(k, speed, acceleration))
-        return state if path.bar == 2 else state._replace(theta_2=angle(position.u2), bar=path.bar, q=q, sine=sine)
+        state = State(
+            self.lengths,
+            self.linkage.ground_angle,
+            q,
+            position,
+            k,
+            speed,
+            rates(k, speed, acceleration),
+        )
+        return (
+            state
+            if path.bar == 2
+            else state._replace(
+                theta_2=angle(position.u2), bar=path.bar, q=q, sine=sine
+            )
+        )
 
     def assemble(
-        self, q: Any, half: HalfAngle, branch: Any, speed: Any, acceleration: Any, *, moving: bool = True
+        self,
+        q: Any,
+        half: HalfAngle,
+        branch: Any,
+        speed: Any,
+        acceleration: Any,
+        *,
+        moving: bool = True,
     ) -> State:
         """Close the loop at a half angle and compute its motion: the one way from an angle to what forces act on."""
-        return self.state(q, self.path.position(q, half, branch), branch, speed, acceleration, moving=moving)
+        return self.state(
+            q,
+            self.path.position(q, half, branch),
+            branch,
+            speed,
+            acceleration,
+            moving=moving,
+        )
 
     def at(self, commanded: Command) -> State:
         """Compute the positions of a command, and their motion."""
         half, _ = self.half_angle(commanded.angle, commanded.remainder)
         speed = 0.0 if commanded.speed is None else commanded.speed
-        return self.assemble(commanded.angle, half, commanded.branch, speed, commanded.acceleration)
+        return self.assemble(
+            commanded.angle, half, commanded.branch, speed, commanded.acceleration
+        )
 
     def freed(self, bar: int, side: Any) -> "Case":
         """Return the case of a linkage that is released, read in the angle of bar 2 or 4, which no couple drives."""
-        path = prepare_path(Loop(*self.linkage.lengths, 0.0, 0.0), self.linkage.ground_angle, bar)
+        path = prepare_path(
+            Loop(*self.linkage.lengths, 0.0, 0.0), self.linkage.ground_angle, bar
+        )
         path = path._replace(lengths=meet_change_points(path.lengths))
         return self._replace(drive_bar=bar, path=path, side=side)
 
     def started(self, start: Command) -> "Case":
         """Return a copy whose path-dependent effects begin at this position; it may hold many linkages."""
         state = self.at(start)
-        return self._replace(terms=tuple(term.counted_from(state, start.branch) for term in self.terms))
+        return self._replace(
+            terms=tuple(term.counted_from(state, start.branch) for term in self.terms)
+        )
 
     def with_start(self, motion: Command) -> "Case":
         """Let the effects begin where the linkage first assembles in a motion, if that keeps its branch."""
@@ -164,30 +240,52 @@ class Case(NamedTuple):
         if not assembled.any() or np.ptp(motion.branch) != 0:
             return self
         first = int(np.argmax(assembled))
-        return self.started(Command(motion.angle[first], motion.branch[first], 0.0, 0.0, motion.remainder))
+        return self.started(
+            Command(
+                motion.angle[first], motion.branch[first], 0.0, 0.0, motion.remainder
+            )
+        )
 
-    def half_angle(self, q: Array, remainder: Any) -> tuple[HalfAngle, NDArray[np.intp]]:
+    def half_angle(
+        self, q: Array, remainder: Any
+    ) -> tuple[HalfAngle, NDArray[np.intp]]:
         """Compute the half angles, and the indices of those evaluated in many digits."""
         lengths, half = self.path.lengths, self.path.half_angle(q)
         close: Any = remainder is not None
         if remainder is None:
-            for factor, constant in ((half.outer, lengths.E1), (half.inner, lengths.E2)):
-                if is_any(constant < 0.0):  # otherwise both terms are positive and nothing cancels
-                    close = close | find_undecided(factor, constant, 4.0 * lengths.a * lengths.d)
+            for factor, constant in (
+                (half.outer, lengths.E1),
+                (half.inner, lengths.E2),
+            ):
+                if is_any(
+                    constant < 0.0
+                ):  # otherwise both terms are positive and nothing cancels
+                    close = close | find_undecided(
+                        factor, constant, 4.0 * lengths.a * lengths.d
+                    )
         if not is_any(close):
             return half, NO_POSITIONS
         from fourbar.formulas.many_digits import decide_half_angles
 
         index = np.flatnonzero(np.broadcast_to(close, np.shape(q)))
-        half = decide_half_angles(self.linkage, self.path.unit, half, index, q, remainder, self.path.bar)
+        half = decide_half_angles(
+            self.linkage, self.path.unit, half, index, q, remainder, self.path.bar
+        )
         return half, index
 
-    def _compute_inertia(self, state: State, acceleration: Any, sine: Any) -> "_Inertia":
+    def _compute_inertia(
+        self, state: State, acceleration: Any, sine: Any
+    ) -> "_Inertia":
         """Compute d'Alembert's forces and moments, and what they add to the generalized force.
 
         `sine`: of theta_3 - theta_2 if the moment about pin B is wanted, otherwise None.
         """
-        a, position, k, square = self.lengths.a, state.position, state.k, state.speed * state.speed
+        a, position, k, square = (
+            self.lengths.a,
+            state.position,
+            state.k,
+            state.speed * state.speed,
+        )
         wrenches, mass_at_A = inertia_wrenches(a, self.bodies, position, state.moving)
         inertial = others = half_slope(a, self.bodies, position, k) * square
         if is_any(acceleration != 0.0):
@@ -195,8 +293,16 @@ class Case(NamedTuple):
             others = others + of_others * acceleration
             inertial = others + of_input * acceleration
         if self.path.bar != 2:  # bar 2 has inertia of its own
-            others = others - (about_first_pin(self.bodies[0]) * (k.h2 * k.dh2)) * square
-        about_B = 0.0 if sine is None else coupler_about_B(self.lengths, self.bodies[1], position, state.moving, sine)
+            others = (
+                others - (about_first_pin(self.bodies[0]) * (k.h2 * k.dh2)) * square
+            )
+        about_B = (
+            0.0
+            if sine is None
+            else coupler_about_B(
+                self.lengths, self.bodies[1], position, state.moving, sine
+            )
+        )
         return _Inertia(inertial, others, wrenches, mass_at_A, about_B)
 
     def dynamics(self, state: State, acceleration: Any, side: Any = 0) -> Dynamics:
@@ -209,13 +315,21 @@ class Case(NamedTuple):
         gain = state.k[self.drive_bar - 2] if unit is None else unit.work()[0]
         bodies = _FreeBodies(state, inertia, sines, unit, gain)
         friction = SolvedFriction(bodies.solve_pin_forces(actions))
-        for term in self.terms:  # a scene holds one effect of a kind, and one kind depends on the forces
+        for term in (
+            self.terms
+        ):  # a scene holds one effect of a kind, and one kind depends on the forces
             if term.loaded_pins:
-                friction = term.solve_friction(actions, friction.pins, bodies.solve_pin_forces)
+                friction = term.solve_friction(
+                    actions, friction.pins, bodies.solve_pin_forces
+                )
         Q = actions.work()[0]
-        return Dynamics(*friction, driving_torque(gain, inertia.total, Q), inertia.total - Q)
+        return Dynamics(
+            *friction, driving_torque(gain, inertia.total, Q), inertia.total - Q
+        )
 
-    def drive_interval(self, state: State, acceleration: Any, drive: Any) -> tuple[Any, Any, Any]:
+    def drive_interval(
+        self, state: State, acceleration: Any, drive: Any
+    ) -> tuple[Any, Any, Any]:
         """Compute the least and greatest torque or force of the drive; equal unless dry friction holds a pin at rest.
 
         The third is where one of them is NaN because friction jams the motion that would begin; None: nowhere.
@@ -227,8 +341,15 @@ class Case(NamedTuple):
         if np.all(state.speed) and all(np.all(actions.turning(pin)) for pin in pins):
             return drive, drive, None
         ahead, back = (self.dynamics(state, acceleration, side) for side in (1, -1))
-        jammed = [dynamics.status == JAMMED for dynamics in (ahead, back) if dynamics.status is not None]
-        low, high = np.minimum(ahead.drive, back.drive), np.maximum(ahead.drive, back.drive)
+        jammed = [
+            dynamics.status == JAMMED
+            for dynamics in (ahead, back)
+            if dynamics.status is not None
+        ]
+        low, high = (
+            np.minimum(ahead.drive, back.drive),
+            np.maximum(ahead.drive, back.drive),
+        )
         return low, high, np.any(jammed, axis=0) if jammed else None
 
 
@@ -264,7 +385,9 @@ class _FreeBodies(NamedTuple):
     gain: Any
     """h of the driven bar, or ds/dq of the linear drive, m."""
 
-    def solve_pin_forces(self, actions: Actions, *, with_inertia: bool = True) -> PinForces:
+    def solve_pin_forces(
+        self, actions: Actions, *, with_inertia: bool = True
+    ) -> PinForces:
         """Solve for the pin forces under some actions and the drive that balances them.
 
         A couple on one bar leaves the moments of the other two alone, which give the force between them. A force along
@@ -273,25 +396,44 @@ class _FreeBodies(NamedTuple):
         """
         inertia = self.inertia if with_inertia else _Inertia()
         if self.drive is not None:
-            actions = actions.plus(self.drive, driving_torque(self.gain, inertia.total, actions.work()[0]))
+            actions = actions.plus(
+                self.drive, driving_torque(self.gain, inertia.total, actions.work()[0])
+            )
         if len(self.sines) == 1:
             (bar,) = self.sines
             return self._solve_from_two_moments(bar, actions, inertia)
-        pins = {bar: self._solve_from_two_moments(bar, actions, inertia) for bar in self.sines}
+        pins = {
+            bar: self._solve_from_two_moments(bar, actions, inertia)
+            for bar in self.sines
+        }
         s2, s3, s4 = (abs(self.sines[bar]) for bar in MOVING_BARS)
         first, second = (s2 >= s3) & (s2 >= s4), s3 >= s4
         forces = zip(*(pins[bar] for bar in MOVING_BARS), strict=True)
-        return PinForces(*(select(first, x, select(second, y, z)) for x, y, z in forces))
+        return PinForces(
+            *(select(first, x, select(second, y, z)) for x, y, z in forces)
+        )
 
-    def _solve_from_two_moments(self, left_out: int, actions: Actions, inertia: _Inertia) -> PinForces:
+    def _solve_from_two_moments(
+        self, left_out: int, actions: Actions, inertia: _Inertia
+    ) -> PinForces:
         """Solve from the moments of the two bars other than the one left out."""
         lengths, position, moment = self.state.lengths, self.state.position, 0.0
         if left_out == 4:
             moment = -(actions.about_B() + inertia.about_B)
         elif left_out == 2 and is_any(lengths.d < lengths.a):
-            moment = (actions.work()[1] - inertia.of_others) / self.state.k.h2  # virtual work of bars 3 and 4
+            moment = (
+                actions.work()[1] - inertia.of_others
+            ) / self.state.k.h2  # virtual work of bars 3 and 4
         wrenches = actions.wrenches(inertia.wrenches)
-        pins = pin_forces(lengths, position, left_out, self.sines[left_out], wrenches, inertia.mass_at_A, moment)
+        pins = pin_forces(
+            lengths,
+            position,
+            left_out,
+            self.sines[left_out],
+            wrenches,
+            inertia.mass_at_A,
+            moment,
+        )
         return actions.at_pins(pins)
 
 

@@ -16,10 +16,22 @@ from typing import Any
 import numpy as np
 
 from fourbar.effects.effect import Actions, Effect, list_bodies
-from fourbar.errors import DependencyError, FourBarError, InputError, LimitError, expect, say_install
+from fourbar.errors import (
+    DependencyError,
+    FourBarError,
+    InputError,
+    LimitError,
+    expect,
+    say_install,
+)
 from fourbar.evaluation.case import Case
 from fourbar.formulas.motion import Coefficients, State, rates
-from fourbar.formulas.path import drive_sine, find_smooth_branch, meet_change_points, prepare_path
+from fourbar.formulas.path import (
+    drive_sine,
+    find_smooth_branch,
+    meet_change_points,
+    prepare_path,
+)
 from fourbar.formulas.pin_forces import Body
 from fourbar.formulas.position import HalfAngle, Position, loop
 from fourbar.formulas.torque import half_slope, inertia
@@ -93,9 +105,15 @@ def release(scene: Scene) -> Released:
     expect("scene", scene, Scene)
     free, start = scene.motion.free, command(scene)
     if free is None:
-        raise InputError("motion.free", None, "is needed for a release: its duration and steps")
+        raise InputError(
+            "motion.free", None, "is needed for a release: its duration and steps"
+        )
     if len(start.angle) != 1:
-        raise InputError(f"motion.{start.commanded}", scene.motion.angle, "a free motion is released at one angle")
+        raise InputError(
+            f"motion.{start.commanded}",
+            scene.motion.angle,
+            "a free motion is released at one angle",
+        )
     released = integrate(
         scene.linkage,
         (*scene.loads, *scene.effects),
@@ -123,7 +141,9 @@ def release(scene: Scene) -> Released:
 
 def _make_plain(numbers: Any) -> Any:
     """Convert numbers to Python's own, with which a formula of one position is several times quicker."""
-    return type(numbers)(*(x.item() if isinstance(x, np.generic | np.ndarray) else x for x in numbers))
+    return type(numbers)(
+        *(x.item() if isinstance(x, np.generic | np.ndarray) else x for x in numbers)
+    )
 
 
 class _Reading:
@@ -132,10 +152,14 @@ class _Reading:
     def __init__(self, linkage: FourBar, bar: int) -> None:
         path = prepare_path(loop(*linkage.lengths), linkage.ground_angle, bar)
         lengths = _make_plain(meet_change_points(path.lengths))
-        self.path = path._replace(lengths=lengths, u1=complex(path.u1), unit=float(path.unit))
+        self.path = path._replace(
+            lengths=lengths, u1=complex(path.u1), unit=float(path.unit)
+        )
         self.bar, self.sign = bar, 1.0
         self.changes = 0.0 in (self.path.lengths.E1, self.path.lengths.E2)
-        self.last: tuple[tuple[float, float], tuple[Position, Coefficients]] | None = None
+        self.last: tuple[tuple[float, float], tuple[Position, Coefficients]] | None = (
+            None
+        )
 
     def branch(self, q: float) -> float:
         """Return the sign of the root at q."""
@@ -158,9 +182,15 @@ class _Reading:
         except ZeroDivisionError:  # NumPy's numbers give inf or NaN instead
             return self._by(q, half, branch)
 
-    def _by(self, q: float, half: HalfAngle, branch: float) -> tuple[Position, Coefficients]:
+    def _by(
+        self, q: float, half: HalfAngle, branch: float
+    ) -> tuple[Position, Coefficients]:
         position, k = self.path.motion(self.path.position(q, half, branch), branch)
-        return (_make_plain(position), _make_plain(k)) if self.path.may_stay_parallel else (position, k)
+        return (
+            (_make_plain(position), _make_plain(k))
+            if self.path.may_stay_parallel
+            else (position, k)
+        )
 
 
 def _compute_sines(position: Position) -> dict[int, float]:
@@ -200,7 +230,9 @@ def integrate(
     """
     terms = tuple(terms)
     if any(term.loaded_pins for term in terms):
-        raise LimitError("a free motion cannot carry friction that depends on the pin forces")
+        raise LimitError(
+            "a free motion cannot carry friction that depends on the pin forces"
+        )
     with np.errstate(invalid="ignore", divide="ignore", over="ignore", under="ignore"):
         return _Run(linkage, terms, theta, omega, branch, follow, bar).through(times)
 
@@ -218,7 +250,13 @@ class _Run:
         follow: bool,
         bar: int,
     ) -> None:
-        self.linkage, self.terms, self.follow, self.branch, self.bar = linkage, terms, follow, branch, bar
+        self.linkage, self.terms, self.follow, self.branch, self.bar = (
+            linkage,
+            terms,
+            follow,
+            branch,
+            bar,
+        )
         self.lengths = _make_plain(loop(*linkage.lengths))
         two, three, four = (_make_plain(body) for body in list_bodies(linkage, terms))
         self.bodies: tuple[Body, Body, Body] = two, three, four
@@ -233,14 +271,24 @@ class _Run:
                 break
         position, k = self.reading.evaluate(theta)
         if not np.isfinite(position.u3):
-            raise InputError(f"motion.theta_{bar}", theta, "the linkage does not assemble there")
-        self.theta = {2: float(np.angle(position.u2)), 4: float(np.angle(position.u4)), bar: theta}
+            raise InputError(
+                f"motion.theta_{bar}", theta, "the linkage does not assemble there"
+            )
+        self.theta = {
+            2: float(np.angle(position.u2)),
+            4: float(np.angle(position.u4)),
+            bar: theta,
+        }
         self.y = np.array([theta, omega, 0.0])
         if not float(self._compute_inertia(position, k)) > 0.0:
-            raise FourBarError("nothing that moves has inertia: the free motion is undetermined")
+            raise FourBarError(
+                "nothing that moves has inertia: the free motion is undetermined"
+            )
         self._change_over()
         self.side = 0.0  # sense of motion if dry friction depends on it
-        self.holding = 0.0  # fraction of its torque with which dry friction holds at a standstill
+        self.holding = (
+            0.0  # fraction of its torque with which dry friction holds at a standstill
+        )
         ahead, back = self._try_both_senses()
         self.dry = ahead != back
         self.start_energy = self._compute_kinetic_energy()
@@ -259,15 +307,28 @@ class _Run:
     def _at(self) -> tuple[Position, Coefficients]:
         return self.reading.evaluate(float(self.y[0]))
 
-    def _compute_generalised_force(self, q: float, position: Position, k: Coefficients, rate: float) -> float:
+    def _compute_generalised_force(
+        self, q: float, position: Position, k: Coefficients, rate: float
+    ) -> float:
         """Compute Q under everything that acts, at a speed that is not zero where friction has to have a sense."""
         theta_2 = q if self.reading.bar == 2 else cmath.phase(position.u2)
-        state = State(self.lengths, self.linkage.ground_angle, theta_2, position, k, rate, rates(k, rate, 0.0))
+        state = State(
+            self.lengths,
+            self.linkage.ground_angle,
+            theta_2,
+            position,
+            k,
+            rate,
+            rates(k, rate, 0.0),
+        )
         return float(Actions(state, self.bodies).add(self.terms).work()[0])
 
     def _try_both_senses(self) -> list[float]:
         q = float(self.y[0])
-        return [self._compute_generalised_force(q, *self._at(), rate) for rate in (VANISHING, -VANISHING)]
+        return [
+            self._compute_generalised_force(q, *self._at(), rate)
+            for rate in (VANISHING, -VANISHING)
+        ]
 
     def _compute_rates(self, _: float, y: Array) -> list[float]:
         q, rate = float(y[0]), float(y[1])
@@ -277,7 +338,13 @@ class _Run:
         Q = self._compute_generalised_force(q, position, k, moving)
         slope = half_slope(self.lengths.a, self.bodies, position, k)
         # NumPy's division raises no error where the inertia vanishes
-        return [rate, float(np.float64(Q - slope * rate * rate) / self._compute_inertia(position, k)), Q * rate]
+        return [
+            rate,
+            float(
+                np.float64(Q - slope * rate * rate) / self._compute_inertia(position, k)
+            ),
+            Q * rate,
+        ]
 
     def _change_over(self) -> bool:
         """Take the other angle where it is further from its limit; keeps position, velocity and work."""
@@ -288,7 +355,9 @@ class _Run:
         elif abs(sines[self.reading.bar]) >= CHANGE_OVER * abs(sines[bar]):
             return False
         q, reading = self.theta[bar], self.readings[bar]
-        reading.sign *= math.copysign(1.0, _compute_sines(reading.evaluate(q)[0])[bar] * sines[bar])
+        reading.sign *= math.copysign(
+            1.0, _compute_sines(reading.evaluate(q)[0])[bar] * sines[bar]
+        )
         rate = float(self.y[1] * (k.h2 if bar == 2 else k.h4)) if self.y[1] else 0.0
         self.reading, self.y = reading, np.array([q, rate, self.y[2]])
         return True
@@ -297,7 +366,9 @@ class _Run:
         """Bring theta_2 and theta_4 up to date, continuous from one step to the next."""
         for bar, u in ((2, position.u2), (4, position.u4)):
             now = cmath.phase(u)
-            self.theta[bar] = now + 2.0 * math.pi * round((self.theta[bar] - now) / (2.0 * math.pi))
+            self.theta[bar] = now + 2.0 * math.pi * round(
+                (self.theta[bar] - now) / (2.0 * math.pi)
+            )
 
     def _starts(self) -> bool:
         """Return True if the linkage moves on; at a standstill dry friction holds it against any weaker force."""
@@ -319,7 +390,9 @@ class _Run:
         try:
             from scipy.integrate import DOP853
         except ModuleNotFoundError:
-            raise DependencyError(f"SciPy is needed for free motion: {say_install('studies')}") from None
+            raise DependencyError(
+                f"SciPy is needed for free motion: {say_install('studies')}"
+            ) from None
         end = float(times[-1])
         self.times, self.largest = times, self.start_energy
         moves = self._starts()
@@ -328,14 +401,27 @@ class _Run:
             if not moves:
                 self._report(end, lambda _: self.y)
                 break
-            solver = DOP853(self._compute_rates, self.t, self.y, end, rtol=SCIPY_LEAST, atol=ABSOLUTE)
+            solver = DOP853(
+                self._compute_rates,
+                self.t,
+                self.y,
+                end,
+                rtol=SCIPY_LEAST,
+                atol=ABSOLUTE,
+            )
             solver.rtol = RELATIVE
             moves = self._follow_solver(solver)
-        theta_2, omega_2, alpha_2, branch, bar, *independent = np.array(self.rows).reshape(-1, 10).T
+        theta_2, omega_2, alpha_2, branch, bar, *independent = (
+            np.array(self.rows).reshape(-1, 10).T
+        )
         time = np.asarray(times[: len(self.rows)])
         motion = Command(theta_2, branch.astype(np.int8), omega_2, alpha_2, None, time)
-        motion = motion._replace(independent=Independent(bar.astype(np.int8), *independent))
-        return Released(motion, self.drift / self.largest if self.largest else 0.0, self.stopped_at)
+        motion = motion._replace(
+            independent=Independent(bar.astype(np.int8), *independent)
+        )
+        return Released(
+            motion, self.drift / self.largest if self.largest else 0.0, self.stopped_at
+        )
 
     def _follow_solver(self, solver: Any) -> bool:
         """Take steps until the motion ends, or another solver is needed; return True if the linkage moves then."""
@@ -343,7 +429,9 @@ class _Run:
             self.steps += 1
             message = solver.step()
             if solver.status == "failed":
-                raise FourBarError(f"the free motion cannot be continued beyond {self.t!r} s: {message}")
+                raise FourBarError(
+                    f"the free motion cannot be continued beyond {self.t!r} s: {message}"
+                )
             if self.steps > STEPS:
                 allowed = f"this motion is followed for {STEPS} steps, here to {self.t:.6g} s; make it shorter"
                 raise InputError("motion.free.duration", float(self.times[-1]), allowed)
@@ -352,15 +440,21 @@ class _Run:
             if rested:
                 t = _find_root(dense, lambda y: float(y[1]), solver.t_old, t)
                 new = np.array([dense(t)[0], 0.0, dense(t)[2]])
-            if not self.follow and self.branch * self._compute_sine(new) < 0.0:  # bars 3, 4 were in line
-                self.stopped_at = t = _find_root(dense, self._compute_sine, solver.t_old, t)
+            if (
+                not self.follow and self.branch * self._compute_sine(new) < 0.0
+            ):  # bars 3, 4 were in line
+                self.stopped_at = t = _find_root(
+                    dense, self._compute_sine, solver.t_old, t
+                )
                 new = dense(t)
             self._report(t, dense)
             self.t, self.y = t, np.array(new)
             self._turn(self._at()[0])
             energy = self._compute_kinetic_energy() - self.start_energy
             self.drift = max(self.drift, abs(energy - float(self.y[2])))
-            self.largest = max(self.largest, abs(energy + self.start_energy), abs(float(self.y[2])))
+            self.largest = max(
+                self.largest, abs(energy + self.start_energy), abs(float(self.y[2]))
+            )
             if rested or self._change_over():
                 return self._starts()
             if self.stopped_at is not None:
@@ -390,11 +484,29 @@ class _Run:
         sine = _compute_sines(position)[2]
         branch = math.copysign(1.0, sine) if sine else float(self.branch)
         side = (self.side or self.holding) if self.dry and rate == 0.0 else 0.0
-        independent = (float(self.reading.bar), q, rate, growth, self.reading.branch(q), side)
-        return theta_2, float(moving.omega_2), float(moving.alpha_2), branch, *independent
+        independent = (
+            float(self.reading.bar),
+            q,
+            rate,
+            growth,
+            self.reading.branch(q),
+            side,
+        )
+        return (
+            theta_2,
+            float(moving.omega_2),
+            float(moving.alpha_2),
+            branch,
+            *independent,
+        )
 
 
-def _find_root(dense: Callable[[float], Array], f: Callable[[Array], float], low: float, high: float) -> float:
+def _find_root(
+    dense: Callable[[float], Array],
+    f: Callable[[Array], float],
+    low: float,
+    high: float,
+) -> float:
     """Find the time at which f of the motion is zero; the start of the step where it is zero there already."""
     from scipy.optimize import brentq
 

@@ -31,16 +31,25 @@ class Reader:
 
     def refuse(self, key: str, value: object, allowed: str) -> InputError:
         """Make the error for an entry, or for one that is left out (None), with the file's name."""
-        return InputError(key, _shorten(value), f"{'is missing; ' if value is None else ''}{allowed}", self.file)
+        return InputError(
+            key,
+            _shorten(value),
+            f"{'is missing; ' if value is None else ''}{allowed}",
+            self.file,
+        )
 
     def table(self, key: str, value: object, allowed: Iterable[str]) -> dict[str, Any]:
         """Read a table that holds no other keys than those allowed; `key` is "" for the top of the file."""
         names = list(allowed)
         if not isinstance(value, dict):
-            raise self.refuse(key, value, "must be a table with the keys " + ", ".join(names))
+            raise self.refuse(
+                key, value, "must be a table with the keys " + ", ".join(names)
+            )
         for name, entry in value.items():
             if name not in names:
-                allowed = f"unknown key; {_suggest(name, names)}allowed: {', '.join(names)}"
+                allowed = (
+                    f"unknown key; {_suggest(name, names)}allowed: {', '.join(names)}"
+                )
                 raise self.refuse(_join_key(key, name), entry, allowed)
         return value
 
@@ -55,23 +64,45 @@ class Reader:
         words = list(allowed)
         if not isinstance(value, str) or value not in words:
             raise self.refuse(
-                key, value, f"{_suggest(value, words)}must be " + " or ".join(f'"{word}"' for word in words)
+                key,
+                value,
+                f"{_suggest(value, words)}must be "
+                + " or ".join(f'"{word}"' for word in words),
             )
         return value
 
     def whole(self, key: str, value: object, least: int, most: int) -> int:
         """Read an integer of a range, both ends included."""
-        if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
-            raise self.refuse(key, value, f"must be a whole number from {least} to {most}")
+        if (
+            isinstance(value, bool)
+            or not isinstance(value, int)
+            or not least <= value <= most
+        ):
+            raise self.refuse(
+                key, value, f"must be a whole number from {least} to {most}"
+            )
         return value
 
     def number(self, key: str, value: object) -> float:
         """Read a number without a dimension."""
-        if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-            raise self.refuse(key, value, "must be a finite number without a unit, and without quotes")
+        if (
+            isinstance(value, bool)
+            or not isinstance(value, (int, float))
+            or not math.isfinite(value)
+        ):
+            raise self.refuse(
+                key, value, "must be a finite number without a unit, and without quotes"
+            )
         return float(value)
 
-    def quantity(self, key: str, value: object, unit: str, bound: str = ANY, default: float | None = None) -> float:
+    def quantity(
+        self,
+        key: str,
+        value: object,
+        unit: str,
+        bound: str = ANY,
+        default: float | None = None,
+    ) -> float:
         """Read a number with a unit, in `unit`; of unit "1" one without. `default`: what a value of None stands for."""
         if value is None and default is not None:
             return default
@@ -96,31 +127,54 @@ class Reader:
         """Read a number, or a magnitude with its angle, as it is declared."""
         if value is None and by.left_out is not REQUIRED:
             return by.left_out
-        return self.polar(key, value, by.unit) if by.pair else self.quantity(key, value, *by[:2])
+        return (
+            self.polar(key, value, by.unit)
+            if by.pair
+            else self.quantity(key, value, *by[:2])
+        )
 
-    def numbers(self, key: str, given: Mapping[str, object], numbers: Mapping[str, Declared]) -> dict[str, Any]:
+    def numbers(
+        self, key: str, given: Mapping[str, object], numbers: Mapping[str, Declared]
+    ) -> dict[str, Any]:
         """Read each of some numbers, by name."""
-        return {name: self.declared(f"{key}.{name}".rstrip("."), given.get(name), by) for name, by in numbers.items()}
+        return {
+            name: self.declared(f"{key}.{name}".rstrip("."), given.get(name), by)
+            for name, by in numbers.items()
+        }
 
     def quantities(self, key: str, value: object, unit: str) -> tuple[float, ...]:
         """Read a list of numbers with units, in `unit`."""
         if not isinstance(value, list):
-            raise self.refuse(key, value, f"must be a list like {self.QUANTITIES.format(unit)}")
-        return tuple(self.quantity(f"{key}[{index}]", entry, unit) for index, entry in enumerate(value))
+            raise self.refuse(
+                key, value, f"must be a list like {self.QUANTITIES.format(unit)}"
+            )
+        return tuple(
+            self.quantity(f"{key}[{index}]", entry, unit)
+            for index, entry in enumerate(value)
+        )
 
     def polar(self, key: str, value: object, unit: str) -> tuple[float, float]:
         """Read a pair [magnitude, angle], in `unit` and rad; that of a place may be { x, y } instead."""
         if isinstance(value, dict) and unit == "m" and self.COORDINATES:
             entry = self.table(key, value, ("x", "y"))
-            x, y = (self.quantity(f"{key}.{name}", entry.get(name), unit) for name in "xy")
+            x, y = (
+                self.quantity(f"{key}.{name}", entry.get(name), unit) for name in "xy"
+            )
             if not math.isfinite(math.hypot(x, y)):
                 raise self.refuse(key, value, "must be a finite distance away")
             self.coordinates[key] = x, y
             return convert_to_polar(x, y)
         if not isinstance(value, list) or len(value) != 2:
             form = self.COORDINATES.format(unit) if unit == "m" else ""
-            raise self.refuse(key, value, f"must be a pair like {self.POLAR.format(unit)} {form}".strip())
-        return (self.quantity(f"{key}[0]", value[0], unit), self.quantity(f"{key}[1]", value[1], "rad"))
+            raise self.refuse(
+                key,
+                value,
+                f"must be a pair like {self.POLAR.format(unit)} {form}".strip(),
+            )
+        return (
+            self.quantity(f"{key}[0]", value[0], unit),
+            self.quantity(f"{key}[1]", value[1], "rad"),
+        )
 
 
 def convert_to_polar(x: float, y: float) -> tuple[float, float]:
@@ -145,14 +199,20 @@ def write_quantity(value: float, unit: str) -> Any:
 
 def write_declared(value: Any, by: Declared) -> Any:
     """Write a number, or a magnitude with its angle, as it is declared."""
-    return write_polar(value[0], value[1], by.unit) if by.pair else write_quantity(value, by.unit)
+    return (
+        write_polar(value[0], value[1], by.unit)
+        if by.pair
+        else write_quantity(value, by.unit)
+    )
 
 
 def write_numbers(description: Any) -> dict[str, Any]:
     """Write the numbers that a description states; what it leaves out stays out."""
     values = {name: getattr(description, name) for name in description.numbers}
     return {
-        name: write_declared(value, description.numbers[name]) for name, value in values.items() if value is not None
+        name: write_declared(value, description.numbers[name])
+        for name, value in values.items()
+        if value is not None
     }
 
 
@@ -163,14 +223,20 @@ def write_polar(magnitude: float, angle: float, unit: str) -> list[str]:
 
 def _suggest(word: object, names: list[str]) -> str:
     """Suggest the valid word that is nearest to one that is not."""
-    close = difflib.get_close_matches(word[:LONGEST_SHOWN], names, 1) if isinstance(word, str) else []
+    close = (
+        difflib.get_close_matches(word[:LONGEST_SHOWN], names, 1)
+        if isinstance(word, str)
+        else []
+    )
     return f'did you mean "{close[0]}"? ' if close else ""
 
 
 def _join_key(key: str, name: str) -> str:
     """Join the dotted key; a name that is not a plain word is quoted, so that it stays on one line."""
     if not BARE_KEY.fullmatch(name):
-        name = repr(name if len(name) <= LONGEST_SHOWN else name[:LONGEST_SHOWN] + "...")
+        name = repr(
+            name if len(name) <= LONGEST_SHOWN else name[:LONGEST_SHOWN] + "..."
+        )
     return f"{key}.{name}" if key else name
 
 
@@ -181,7 +247,9 @@ def _shorten(value: object) -> object:
     if isinstance(value, dict):
         return _Words(f"a table of {len(value)} entries")
     if isinstance(value, list):
-        if len(value) <= 3 and all(isinstance(entry, (str, float, bool)) for entry in value):
+        if len(value) <= 3 and all(
+            isinstance(entry, (str, float, bool)) for entry in value
+        ):
             return [_shorten(entry) for entry in value]
         return _Words(f"a list of {len(value)} entries")
     if isinstance(value, int) and value.bit_length() > 64:

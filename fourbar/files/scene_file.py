@@ -13,7 +13,17 @@ from typing import Any
 import numpy as np
 
 from fourbar import writing
-from fourbar.effects import Effect, Gravity, LinearDrive, Load, Spring, SpringEnd, Springs, Table, list_kinds
+from fourbar.effects import (
+    Effect,
+    Gravity,
+    LinearDrive,
+    Load,
+    Spring,
+    SpringEnd,
+    Springs,
+    Table,
+    list_kinds,
+)
 from fourbar.effects.effect import PinRows
 from fourbar.effects.load import FRAMES
 from fourbar.effects.spring import END_POSITION, GAS
@@ -22,11 +32,28 @@ from fourbar.files.fields import BARE_KEY, Reader
 from fourbar.files.scene_text import BARS, BRANCHES, SIGMA
 from fourbar.linkage import ANY, BAR_NAMES, MOST_STEPS, PINS, POSITIVE, Bar, FourBar
 from fourbar.scene import Scene
-from fourbar.scene.motion import COMMANDS, DEFAULT_STEPS, SPLINES, STROKE_COMMAND, Free, FromLimit, Law, Motion, Sweep
+from fourbar.scene.motion import (
+    COMMANDS,
+    DEFAULT_STEPS,
+    SPLINES,
+    STROKE_COMMAND,
+    Free,
+    FromLimit,
+    Law,
+    Motion,
+    Sweep,
+)
 from fourbar.scene.numbers import Point, Tolerance
 from fourbar.scene.pictures import Picture
 from fourbar.solution import Array
-from fourbar.studies.keys import COMMAND_KEYS, LEFT_OUT, is_left_out, list_entries, read_place, refuse_key
+from fourbar.studies.keys import (
+    COMMAND_KEYS,
+    LEFT_OUT,
+    is_left_out,
+    list_entries,
+    read_place,
+    refuse_key,
+)
 
 LARGEST_FILE = 500_000
 """Bytes; a scene takes about a thousand."""
@@ -38,7 +65,18 @@ MOST_LOADS = 1000
 """Each load is a term at every position."""
 MOST_SPRINGS = 1000
 THROUGH = ("sign", "follow")
-TABLES = ("title", "source", "lengths", "bars", "motion", "drive", "points", "loads", "effects", "tolerances")
+TABLES = (
+    "title",
+    "source",
+    "lengths",
+    "bars",
+    "motion",
+    "drive",
+    "points",
+    "loads",
+    "effects",
+    "tolerances",
+)
 MOST_POINTS = 1000
 """Each is three columns of every table."""
 
@@ -63,7 +101,12 @@ def loads(text: str, name: str = "scene") -> Scene:
     shown = name if name.isprintable() else repr(name)
     for number, line in enumerate(text.split("\n"), 1):
         if line.count(".") > MOST_DOTS:
-            raise InputError("TOML", line[:40], f"line {number} holds more than {MOST_DOTS} dots", shown)
+            raise InputError(
+                "TOML",
+                line[:40],
+                f"line {number} holds more than {MOST_DOTS} dots",
+                shown,
+            )
     try:
         document = tomllib.loads(text)
     except RecursionError:
@@ -86,7 +129,12 @@ def _explain_unreadable(text: str, reason: str, shown: str) -> InputError:
     place = PLACE.search(reason)
     lines = text.split("\n")
     if place is None:
-        return InputError("TOML", text[:LONGEST_LINE], f"cannot be read: {' '.join(reason.split())[:120]}", shown)
+        return InputError(
+            "TOML",
+            text[:LONGEST_LINE],
+            f"cannot be read: {' '.join(reason.split())[:120]}",
+            shown,
+        )
     line, column = int(place[1] or len(lines)), int(place[2] or len(lines[-1]) + 1)
     start = max(0, column - 1 - LONGEST_LINE // 2)
     value = lines[line - 1][start : start + LONGEST_LINE].strip()
@@ -94,7 +142,9 @@ def _explain_unreadable(text: str, reason: str, shown: str) -> InputError:
     for bare in UNQUOTED.finditer(lines[line - 1]):
         if bare.start(1) < column <= bare.end(1) + 1:
             why = f'a number with a unit stands in quotes, like "{bare[1].strip()[:LONGEST_LINE]}"'
-    return InputError(f"line {line}, column {column}", value, f"cannot be read as TOML: {why}", shown)
+    return InputError(
+        f"line {line}, column {column}", value, f"cannot be read as TOML: {why}", shown
+    )
 
 
 def read_scene(read: Reader, document: dict[str, Any], folder: str) -> Scene:
@@ -104,17 +154,25 @@ def read_scene(read: Reader, document: dict[str, Any], folder: str) -> Scene:
     line = None
     if "from" in drive or "to" in drive:
         if "bar" in drive:
-            raise read.refuse("drive.bar", drive["bar"], "a drive acts on a bar or along a line: bar, or from and to")
+            raise read.refuse(
+                "drive.bar",
+                drive["bar"],
+                "a drive acts on a bar or along a line: bar, or from and to",
+            )
         line = LinearDrive(*_read_ends(read, "drive", drive))
     entries = top.get("loads", [])
     if not isinstance(entries, list) or len(entries) > MOST_LOADS:
-        raise read.refuse("loads", entries, f"must be written as [[loads]], at most {MOST_LOADS}")
+        raise read.refuse(
+            "loads", entries, f"must be written as [[loads]], at most {MOST_LOADS}"
+        )
     effects = read.table("effects", top.get("effects", {}), list_kinds())
     scene = Scene(
         _read_linkage(read, top),
         _read_motion(read, top.get("motion", {})),
         None if line else read.whole("drive.bar", drive.get("bar", 2), 2, 4),  # type: ignore[arg-type]
-        tuple(_load(read, f"loads[{index}]", entry) for index, entry in enumerate(entries)),
+        tuple(
+            _load(read, f"loads[{index}]", entry) for index, entry in enumerate(entries)
+        ),
         tuple(_read_effect(read, key, value) for key, value in effects.items()),
         read.text("title", top.get("title", "")),
         read.text("source", top.get("source", "")),
@@ -123,12 +181,16 @@ def read_scene(read: Reader, document: dict[str, Any], folder: str) -> Scene:
         drive=line,
     )
     scene = replace(scene, coordinates=tuple(read.coordinates.items()))
-    return replace(scene, tolerances=_read_tolerances(read, scene, top.get("tolerances", {})))
+    return replace(
+        scene, tolerances=_read_tolerances(read, scene, top.get("tolerances", {}))
+    )
 
 
 def _read_points(read: Reader, value: object) -> tuple[Point, ...]:
     if not isinstance(value, dict) or len(value) > MOST_POINTS:
-        raise read.refuse("points", value, f"must be a table of points, at most {MOST_POINTS}")
+        raise read.refuse(
+            "points", value, f"must be a table of points, at most {MOST_POINTS}"
+        )
     points = []
     for name, point in value.items():
         key = f"points.{name}" if BARE_KEY.fullmatch(name) else "points"
@@ -138,46 +200,83 @@ def _read_points(read: Reader, value: object) -> tuple[Point, ...]:
     return tuple(points)
 
 
-def _read_pictures(read: Reader, bars: dict[str, Any], folder: str) -> tuple[Picture, ...]:
+def _read_pictures(
+    read: Reader, bars: dict[str, Any], folder: str
+) -> tuple[Picture, ...]:
     """Read the names of the bars' pictures; the files themselves are read when they are shown."""
     return tuple(
-        Picture(number, read.text(f"bars.{name}.picture", bars[name]["picture"]), folder)
+        Picture(
+            number, read.text(f"bars.{name}.picture", bars[name]["picture"]), folder
+        )
         for name, number in BARS.items()
         if "picture" in bars.get(name, {})
     )
 
 
 def _read_linkage(read: Reader, top: dict[str, Any]) -> FourBar:
-    lengths = read.table("lengths", top.get("lengths", {}), (*BAR_NAMES.values(), "ground_angle"))
-    length = read.numbers("lengths", lengths, dict.fromkeys(BAR_NAMES.values(), Bar.numbers["length"]))
+    lengths = read.table(
+        "lengths", top.get("lengths", {}), (*BAR_NAMES.values(), "ground_angle")
+    )
+    length = read.numbers(
+        "lengths", lengths, dict.fromkeys(BAR_NAMES.values(), Bar.numbers["length"])
+    )
     tables = read.table("bars", top.get("bars", {}), BARS)
-    bars = {name: _read_bar(read, f"bars.{name}", tables.get(name, {}), length[name]) for name in BARS}
+    bars = {
+        name: _read_bar(read, f"bars.{name}", tables.get(name, {}), length[name])
+        for name in BARS
+    }
     ground = read.numbers("lengths", lengths, FourBar.numbers)
-    return FourBar(ground["ground"], bars["input"], bars["coupler"], bars["output"], ground["ground_angle"])
+    return FourBar(
+        ground["ground"],
+        bars["input"],
+        bars["coupler"],
+        bars["output"],
+        ground["ground_angle"],
+    )
 
 
 def _read_bar(read: Reader, key: str, value: object, length: float) -> Bar:
-    stated = {name: declared for name, declared in Bar.numbers.items() if name != "length"}
+    stated = {
+        name: declared for name, declared in Bar.numbers.items() if name != "length"
+    }
     entry = read.table(key, value, (*stated, "picture"))
     numbers = read.numbers(key, entry, stated)
-    if numbers["inertia"] is None and not math.isfinite(numbers["mass"] * length * length):
-        raise read.refuse(f"{key}.mass", entry.get("mass"), "must leave the inertia m L^2/12 a finite number")
+    if numbers["inertia"] is None and not math.isfinite(
+        numbers["mass"] * length * length
+    ):
+        raise read.refuse(
+            f"{key}.mass",
+            entry.get("mass"),
+            "must leave the inertia m L^2/12 a finite number",
+        )
     return Bar(length, **numbers)
 
 
 def _read_motion(read: Reader, value: object) -> Motion:
     numbers = [name for names in COMMANDS.values() for name in names]
-    entry = read.table("motion", value, (*numbers, *STROKE_COMMAND, "side", "branch", "through", "free", "law"))
+    entry = read.table(
+        "motion",
+        value,
+        (*numbers, *STROKE_COMMAND, "side", "branch", "through", "free", "law"),
+    )
     stated = [name for name in numbers if name in entry]
     arguments: dict[str, Any] = {
-        "branch": BRANCHES[read.choice("motion.branch", entry.get("branch", "open"), BRANCHES)],
+        "branch": BRANCHES[
+            read.choice("motion.branch", entry.get("branch", "open"), BRANCHES)
+        ],
         "through": read.choice("motion.through", entry.get("through", "sign"), THROUGH),
     }
     if of_stroke := [name for name in (*STROKE_COMMAND, "side") if name in entry]:
         for name in (*stated, *(name for name in ("free", "law") if name in entry)):
-            raise read.refuse(f"motion.{name}", entry[name], f"{of_stroke[0]} commands a cylinder, and nothing else is")
+            raise read.refuse(
+                f"motion.{name}",
+                entry[name],
+                f"{of_stroke[0]} commands a cylinder, and nothing else is",
+            )
         (place, speed, acceleration), unit = STROKE_COMMAND, "m"
-        arguments["side"] = read.choice("motion.side", entry.get("side"), ("left", "right"))
+        arguments["side"] = read.choice(
+            "motion.side", entry.get("side"), ("left", "right")
+        )
     else:
         bar = int(stated[0][-1]) if stated else 2
         for name in stated:
@@ -194,8 +293,13 @@ def _read_motion(read: Reader, value: object) -> Motion:
     )
     if "free" in entry:
         released = read.table("motion.free", entry["free"], ("duration", "steps"))
-        duration = read.quantity("motion.free.duration", released.get("duration"), "s", POSITIVE)
-        arguments["free"] = Free(duration, read.whole("motion.free.steps", released.get("steps"), 1, MOST_STEPS))
+        duration = read.quantity(
+            "motion.free.duration", released.get("duration"), "s", POSITIVE
+        )
+        arguments["free"] = Free(
+            duration,
+            read.whole("motion.free.steps", released.get("steps"), 1, MOST_STEPS),
+        )
     if "law" in entry:
         arguments["law"] = _read_law(read, entry["law"])
     return Motion(**arguments)
@@ -208,13 +312,20 @@ def _read_law(read: Reader, value: object) -> Law:
     stated = [name for name in angles if name in entry] or angles[:1]
     return Law(
         read.quantities(f"{key}.time", entry.get("time"), "s"),
-        steps=read.whole(f"{key}.steps", entry.get("steps", DEFAULT_STEPS), 1, MOST_STEPS),
+        steps=read.whole(
+            f"{key}.steps", entry.get("steps", DEFAULT_STEPS), 1, MOST_STEPS
+        ),
         ends=read.choice(f"{key}.ends", entry.get("ends", "free"), SPLINES),
-        **{name: read.quantities(f"{key}.{name}", entry.get(name), "rad") for name in stated},
+        **{
+            name: read.quantities(f"{key}.{name}", entry.get(name), "rad")
+            for name in stated
+        },
     )
 
 
-def _read_places(read: Reader, key: str, value: object, unit: str) -> float | Array | Sweep | FromLimit:
+def _read_places(
+    read: Reader, key: str, value: object, unit: str
+) -> float | Array | Sweep | FromLimit:
     """Read angles or strokes: one, a list of them, a sweep; an angle from a limit position too."""
     if value is None or isinstance(value, str):
         return read.quantity(key, value, unit)
@@ -223,15 +334,25 @@ def _read_places(read: Reader, key: str, value: object, unit: str) -> float | Ar
     from_limit = " or { limit, offset }" if unit == "rad" else ""
     if not isinstance(value, dict):
         like = "135 deg" if unit == "rad" else "1.5 m"
-        raise read.refuse(key, value, f'must be like "{like}", a list of such, {{ from, to, steps }}{from_limit}')
+        raise read.refuse(
+            key,
+            value,
+            f'must be like "{like}", a list of such, {{ from, to, steps }}{from_limit}',
+        )
     if from_limit and value.keys() & {"limit", "offset"}:
         near = read.table(key, value, ("limit", "offset"))
         offset = read.quantity(f"{key}.offset", near.get("offset"), "rad", default=0.0)
         # four bars have at most four limit positions of a bar; how many these have is not known here
         return FromLimit(read.whole(f"{key}.limit", near.get("limit"), 1, 4), offset)
     sweep = read.table(key, value, ("from", "to", "steps"))
-    start, stop = (read.quantity(f"{key}.{end}", sweep.get(end), unit) for end in ("from", "to"))
-    return Sweep(start, stop, read.whole(f"{key}.steps", sweep.get("steps", DEFAULT_STEPS), 1, MOST_STEPS))
+    start, stop = (
+        read.quantity(f"{key}.{end}", sweep.get(end), unit) for end in ("from", "to")
+    )
+    return Sweep(
+        start,
+        stop,
+        read.whole(f"{key}.steps", sweep.get("steps", DEFAULT_STEPS), 1, MOST_STEPS),
+    )
 
 
 def _load(read: Reader, key: str, value: object) -> Load:
@@ -241,13 +362,25 @@ def _load(read: Reader, key: str, value: object) -> Load:
         over = read.table(f"{key}.table", entry["table"], ("theta_2", "factor"))
         factors = over.get("factor")
         if not isinstance(factors, list):
-            raise read.refuse(f"{key}.table.factor", factors, "must be a list of numbers without a unit")
+            raise read.refuse(
+                f"{key}.table.factor",
+                factors,
+                "must be a list of numbers without a unit",
+            )
         angles = read.quantities(f"{key}.table.theta_2", over.get("theta_2"), "rad")
-        table = Table(angles, tuple(read.number(f"{key}.table.factor[{i}]", x) for i, x in enumerate(factors)))
+        table = Table(
+            angles,
+            tuple(
+                read.number(f"{key}.table.factor[{i}]", x)
+                for i, x in enumerate(factors)
+            ),
+        )
     if "force" not in entry and "moment" not in entry:
         raise read.refuse(key, value, "must have a force, a moment or both")
     if "at" in entry and "force" not in entry:
-        raise read.refuse(f"{key}.at", entry["at"], "needs a force: state one, or leave this out")
+        raise read.refuse(
+            f"{key}.at", entry["at"], "needs a force: state one, or leave this out"
+        )
     return Load(
         read.whole(f"{key}.bar", entry.get("bar"), 2, 4),
         **read.numbers(key, entry, Load.numbers),
@@ -267,13 +400,24 @@ def _read_effect(read: Reader, key: str, value: object) -> Effect:
     if issubclass(kind, PinRows):
         rows = []
         for pin, entry in read.table(path, value, PINS).items():
-            stated = {"": entry} if "" in kind.numbers else read.table(f"{path}.{pin}", entry, kind.numbers)
-            rows.append((pin, *read.numbers(f"{path}.{pin}", stated, kind.numbers).values()))
+            stated = (
+                {"": entry}
+                if "" in kind.numbers
+                else read.table(f"{path}.{pin}", entry, kind.numbers)
+            )
+            rows.append(
+                (pin, *read.numbers(f"{path}.{pin}", stated, kind.numbers).values())
+            )
         return kind(tuple(rows))  # type: ignore[no-any-return]
     bars = {field.name: field.default for field in fields(kind) if field.name == "bar"}
     stated = read.table(path, value, (*bars, *kind.numbers))
     bar = {
-        name: read.whole(f"{path}.{name}", stated.get(name, None if default is MISSING else default), 2, 4)
+        name: read.whole(
+            f"{path}.{name}",
+            stated.get(name, None if default is MISSING else default),
+            2,
+            4,
+        )
         for name, default in bars.items()
     }
     return kind(**bar, **read.numbers(path, stated, kind.numbers))  # type: ignore[no-any-return]
@@ -291,41 +435,65 @@ def _read_springs(read: Reader, key: str, value: object) -> Springs:
         if gas := "gas" in row:
             read.table(path, entry, ("from", "to", "gas"))
             words = read.table(f"{path}.gas", row["gas"], GAS)
-            stated = read.numbers(f"{path}.gas", {"compressed_force": words.get("extended_force"), **words}, GAS)
+            stated = read.numbers(
+                f"{path}.gas",
+                {"compressed_force": words.get("extended_force"), **words},
+                GAS,
+            )
         else:
             stated = read.numbers(path, row, Spring.numbers)
         try:
-            springs.append(Spring.gas(start, end, **stated) if gas else Spring(start, end, **stated))
+            springs.append(
+                Spring.gas(start, end, **stated)
+                if gas
+                else Spring(start, end, **stated)
+            )
         except InputError as error:  # which knows of one spring alone
-            raise read.refuse(error.key.replace(key, path), error.value, error.allowed) from None
+            raise read.refuse(
+                error.key.replace(key, path), error.value, error.allowed
+            ) from None
     return Springs(tuple(springs))
 
 
-def _read_ends(read: Reader, key: str, row: dict[str, Any]) -> tuple[SpringEnd, SpringEnd]:
+def _read_ends(
+    read: Reader, key: str, row: dict[str, Any]
+) -> tuple[SpringEnd, SpringEnd]:
     """Read the entries `from` and `to` of a line between two bars; an end without `at` is at the bar's first pin."""
     ends = []
     for name in ("from", "to"):
         path = f"{key}.{name}"
         entry = read.table(path, row.get(name), ("bar", "at"))
         bar = read.whole(f"{path}.bar", entry.get("bar"), 1, 4)
-        ends.append(SpringEnd(bar, *read.declared(f"{path}.at", entry.get("at"), END_POSITION)))
+        ends.append(
+            SpringEnd(bar, *read.declared(f"{path}.at", entry.get("at"), END_POSITION))
+        )
     return ends[0], ends[1]
 
 
-def _read_tolerances(read: Reader, scene: Scene, value: object) -> tuple[Tolerance, ...]:
+def _read_tolerances(
+    read: Reader, scene: Scene, value: object
+) -> tuple[Tolerance, ...]:
     """Read ``"lengths.input" = "0.05 mm"`` (plus or minus) or ``["0.02 mm", "sigma"]``."""
     entries, tolerances = list_entries(scene), []
     for key, stated in _flatten(read, value).items():
         name = f'tolerances."{key}"'
         if key in COMMAND_KEYS:
             raise read.refuse(
-                name, stated, "a commanded value has no tolerance; its speed and acceleration may have one"
+                name,
+                stated,
+                "a commanded value has no tolerance; its speed and acceleration may have one",
             )
         if key not in entries:
-            raise read.refuse(name, stated, refuse_key(key, stated, list(entries)).allowed)
+            raise read.refuse(
+                name, stated, refuse_key(key, stated, list(entries)).allowed
+            )
         entry, sigma = entries[key], isinstance(stated, list)
         if sigma and (len(stated) != 2 or stated[1] != SIGMA):
-            raise read.refuse(name, stated, f'must be like "0.05 {entry.unit}" or ["0.02 {entry.unit}", "{SIGMA}"]')
+            raise read.refuse(
+                name,
+                stated,
+                f'must be like "0.05 {entry.unit}" or ["0.02 {entry.unit}", "{SIGMA}"]',
+            )
         width = stated[0] if sigma else stated
         if is_left_out(scene, entry):
             raise read.refuse(name, width, LEFT_OUT)
@@ -335,11 +503,17 @@ def _read_tolerances(read: Reader, scene: Scene, value: object) -> tuple[Toleran
         tolerance, number = Tolerance(key, size, sigma), read_place(scene, entry.place)
         if number is None:
             raise read.refuse(
-                name, width, "is the tolerance of a number that the scene leaves out: state the number first"
+                name,
+                width,
+                "is the tolerance of a number that the scene leaves out: state the number first",
             )
         if entry.bound != ANY and tolerance.reach >= number:
             three = "three sigma of it " if sigma else ""
-            raise read.refuse(name, width, f"{three}must be less than the number itself, {number:.6g} {entry.unit}")
+            raise read.refuse(
+                name,
+                width,
+                f"{three}must be less than the number itself, {number:.6g} {entry.unit}",
+            )
         tolerances.append(tolerance)
     return tuple(tolerances)
 
@@ -347,8 +521,16 @@ def _read_tolerances(read: Reader, scene: Scene, value: object) -> tuple[Toleran
 def _flatten(read: Reader, value: object, before: str = "") -> dict[str, Any]:
     """Flatten a table to full keys, whether these are quoted or dotted."""
     if not isinstance(value, dict):
-        raise read.refuse("tolerances", value, 'must be a table of keys like "lengths.input" = "0.05 mm"')
+        raise read.refuse(
+            "tolerances",
+            value,
+            'must be a table of keys like "lengths.input" = "0.05 mm"',
+        )
     flat: dict[str, Any] = {}
     for key, entry in value.items():
-        flat |= _flatten(read, entry, f"{before}{key}.") if isinstance(entry, dict) else {f"{before}{key}": entry}
+        flat |= (
+            _flatten(read, entry, f"{before}{key}.")
+            if isinstance(entry, dict)
+            else {f"{before}{key}": entry}
+        )
     return flat

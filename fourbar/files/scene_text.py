@@ -15,7 +15,14 @@ from fourbar.effects import Effect, Gravity, Load, Springs, list_kinds
 from fourbar.effects.effect import PinRows
 from fourbar.effects.spring import END_POSITION
 from fourbar.errors import InputError, expect
-from fourbar.files.fields import Reader, convert_to_polar, write_declared, write_numbers, write_polar, write_quantity
+from fourbar.files.fields import (
+    Reader,
+    convert_to_polar,
+    write_declared,
+    write_numbers,
+    write_polar,
+    write_quantity,
+)
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, POSITIVE, Bar, FourBar
 from fourbar.scene import Scene
 from fourbar.scene.motion import BRANCH_NAMES, FromLimit, Law, Motion, Sweep
@@ -46,9 +53,15 @@ def dump(scene: Scene) -> str:
     no valid text.
     """
     expect("scene", scene, Scene)
-    top = {key: value for key, value in {"title": scene.title, "source": scene.source}.items() if value}
+    top = {
+        key: value
+        for key, value in {"title": scene.title, "source": scene.source}.items()
+        if value
+    }
     described, motion = describe(scene), _write_motion(scene.motion)
-    points = {point.name: {"bar": point.bar, **write_numbers(point)} for point in scene.points}
+    points = {
+        point.name: {"bar": point.bar, **write_numbers(point)} for point in scene.points
+    }
     bars = described["bars"]
     for picture in scene.pictures:
         bars.setdefault(BAR_NAMES[picture.bar], {})["picture"] = picture.name
@@ -67,16 +80,24 @@ def dump(scene: Scene) -> str:
     return "\n".join(_write_table(name, entries) for name, entries in tables if entries)
 
 
-def _restore_coordinates(tables: dict[str, Any], coordinates: tuple[tuple[str, tuple[float, float]], ...]) -> None:
+def _restore_coordinates(
+    tables: dict[str, Any], coordinates: tuple[tuple[str, tuple[float, float]], ...]
+) -> None:
     """Write places by x and y again that were read so and are the same still."""
     for key, (x, y) in coordinates:
-        *into, last = (int(step) if step.isdigit() else step for step in re.findall(r"[^.\[\]]+", key))
+        *into, last = (
+            int(step) if step.isdigit() else step
+            for step in re.findall(r"[^.\[\]]+", key)
+        )
         holder: Any = tables
         with suppress(LookupError, TypeError):
             for step in into:
                 holder = holder[step]
             if holder[last] == write_polar(*convert_to_polar(x, y), "m"):
-                holder[last] = {"x": write_quantity(x, "m"), "y": write_quantity(y, "m")}
+                holder[last] = {
+                    "x": write_quantity(x, "m"),
+                    "y": write_quantity(y, "m"),
+                }
 
 
 def describe(scene: Scene) -> dict[str, Any]:
@@ -92,13 +113,19 @@ def describe(scene: Scene) -> dict[str, Any]:
     effects = {effect.key: _write_effect(effect) for effect in scene.effects}
     if len(effects) != len(scene.effects):
         raise InputError(
-            "effects", [effect.key for effect in scene.effects], "a scene file holds one effect of each kind"
+            "effects",
+            [effect.key for effect in scene.effects],
+            "a scene file holds one effect of each kind",
         )
-    bars = {name: _write_bar(scene.linkage.bar(number)) for name, number in BARS.items()}
+    bars = {
+        name: _write_bar(scene.linkage.bar(number)) for name, number in BARS.items()
+    }
     return {
         "lengths": lengths,
         "bars": {name: entry for name, entry in bars.items() if entry},
-        "drive": {"bar": scene.drive_bar} if scene.drive is None else _write_ends(scene.drive),
+        "drive": {"bar": scene.drive_bar}
+        if scene.drive is None
+        else _write_ends(scene.drive),
         "loads": [_load_entry(load) for load in scene.loads],
         "effects": effects,
     }
@@ -116,7 +143,10 @@ def _write_motion(motion: Motion) -> dict[str, Any]:
     unit = "rad" if motion.stroke is None else "m"
     angles: Any = None
     if isinstance(stated, Sweep):
-        ends = {"from": write_quantity(stated.start, unit), "to": write_quantity(stated.stop, unit)}
+        ends = {
+            "from": write_quantity(stated.start, unit),
+            "to": write_quantity(stated.stop, unit),
+        }
         angles = {**ends, "steps": stated.steps}
     elif isinstance(stated, FromLimit):
         angles = {"limit": stated.limit, "offset": write_quantity(stated.offset, "rad")}
@@ -126,26 +156,42 @@ def _write_motion(motion: Motion) -> dict[str, Any]:
         angles = write_quantity(stated, unit)
     entry = {
         theta: angles,
-        omega: None if motion.speed is None else write_quantity(motion.speed, f"{unit}/s"),
-        alpha: write_quantity(motion.acceleration, f"{unit}/s^2") if law is None else None,
+        omega: None
+        if motion.speed is None
+        else write_quantity(motion.speed, f"{unit}/s"),
+        alpha: write_quantity(motion.acceleration, f"{unit}/s^2")
+        if law is None
+        else None,
         "law": None if law is None else _write_law(law),
         "branch": BRANCH_NAMES[motion.branch],
         "side": motion.side,
         "through": motion.through,
-        "free": None if free is None else {"duration": write_quantity(free.duration, "s"), "steps": free.steps},
+        "free": None
+        if free is None
+        else {"duration": write_quantity(free.duration, "s"), "steps": free.steps},
     }
     return {key: value for key, value in entry.items() if value is not None}
 
 
 def _write_law(law: Law) -> dict[str, Any]:
     times, angles = (
-        [write_quantity(x, unit) for x in numbers] for numbers, unit in ((law.time, "s"), (law.angle, "rad"))
+        [write_quantity(x, unit) for x in numbers]
+        for numbers, unit in ((law.time, "s"), (law.angle, "rad"))
     )
-    return {"time": times, f"theta_{law.bar}": angles, "steps": law.steps, "ends": law.ends}
+    return {
+        "time": times,
+        f"theta_{law.bar}": angles,
+        "steps": law.steps,
+        "ends": law.ends,
+    }
 
 
 def _load_entry(load: Load) -> dict[str, Any]:
-    entry: dict[str, Any] = {"bar": load.bar, **write_numbers(load), "frame": load.frame}
+    entry: dict[str, Any] = {
+        "bar": load.bar,
+        **write_numbers(load),
+        "frame": load.frame,
+    }
     if load.force is None:
         del entry["at"]
     if load.table is not None:
@@ -157,17 +203,28 @@ def _load_entry(load: Load) -> dict[str, Any]:
 def _write_effect(effect: Effect) -> Any:
     """Write the value of an effect under its key; InputError where a scene file has no form of it."""
     if list_kinds().get(effect.key) is not type(effect):
-        raise InputError(f"effects.{effect.key}", type(effect).__name__, "a scene file cannot state this effect")
+        raise InputError(
+            f"effects.{effect.key}",
+            type(effect).__name__,
+            "a scene file cannot state this effect",
+        )
     if isinstance(effect, Gravity):
-        return write_polar(effect.magnitude, effect.angle, effect.numbers["magnitude"].unit)
+        return write_polar(
+            effect.magnitude, effect.angle, effect.numbers["magnitude"].unit
+        )
     if isinstance(effect, Springs):
-        return [{**_write_ends(spring), **write_numbers(spring)} for spring in effect.springs]
+        return [
+            {**_write_ends(spring), **write_numbers(spring)}
+            for spring in effect.springs
+        ]
     if isinstance(effect, PinRows):
         rows = {}
         for pin, *values in effect.rows:
             texts = {
                 name: write_declared(x, declared)
-                for (name, declared), x in zip(effect.numbers.items(), values, strict=True)
+                for (name, declared), x in zip(
+                    effect.numbers.items(), values, strict=True
+                )
             }
             rows[pin] = texts.get("", texts)
         return rows
@@ -178,19 +235,30 @@ def _write_effect(effect: Effect) -> Any:
 def _write_ends(line: Any) -> dict[str, Any]:
     """Write the entries `from` and `to` of a line between two bars."""
     ends = {"from": line.start, "to": line.end}
-    return {name: {"bar": end.bar, "at": write_declared(end[1:], END_POSITION)} for name, end in ends.items()}
+    return {
+        name: {"bar": end.bar, "at": write_declared(end[1:], END_POSITION)}
+        for name, end in ends.items()
+    }
 
 
 def _write_table(name: str, entries: dict[str, Any]) -> str:
     """Write one TOML table."""
     heading = f"[{name}]\n" if name else ""
-    return heading + "".join(f"{key} = {_write_value(key, value)}\n" for key, value in entries.items())
+    return heading + "".join(
+        f"{key} = {_write_value(key, value)}\n" for key, value in entries.items()
+    )
 
 
 def _write_value(key: str, value: object) -> str:
     """Write a TOML value; strings escape as in JSON, and DEL too."""
     if isinstance(value, dict):
-        return "{ " + ", ".join(f"{name} = {_write_value(key, entry)}" for name, entry in value.items()) + " }"
+        return (
+            "{ "
+            + ", ".join(
+                f"{name} = {_write_value(key, entry)}" for name, entry in value.items()
+            )
+            + " }"
+        )
     if isinstance(value, list):
         # one line each where there are many, so that no line holds more than MOST_DOTS
         between = ", " if len(value) <= 3 else ",\n  "
@@ -209,7 +277,9 @@ def _write_tolerances(scene: Scene) -> dict[str, Any]:
     entries, rows = list_entries(scene), dict[str, Any]()
     for tolerance in scene.tolerances:
         if tolerance.key not in entries:
-            raise InputError("tolerances", tolerance.key, "no number of the scene has this key")
+            raise InputError(
+                "tolerances", tolerance.key, "no number of the scene has this key"
+            )
         width = write_quantity(tolerance.width, entries[tolerance.key].unit)
         rows[tolerance.key] = [width, SIGMA] if tolerance.sigma else width
     return rows
@@ -221,9 +291,14 @@ def write_new_scene(lengths: tuple[str, ...] | list[str]) -> str:
     Raises InputError for what is no length, and for bars that cannot close.
     """
     read = Reader("--lengths")
-    stated = [(name, " ".join(text.split())) for name, text in zip(BAR_NAMES.values(), lengths, strict=True)]
+    stated = [
+        (name, " ".join(text.split()))
+        for name, text in zip(BAR_NAMES.values(), lengths, strict=True)
+    ]
     d, a, b, c = (read.quantity(name, text, "m", POSITIVE) for name, text in stated)
     FourBar(d, Bar(a), Bar(b), Bar(c))
     lines = "\n".join(f'{name} = "{text}"' for name, text in stated)
     text = files("fourbar.files").joinpath("new.toml").read_text(encoding="utf-8")
-    return Template(text).substitute(lengths=lines, input=repr(a), coupler=repr(b), output=repr(c))
+    return Template(text).substitute(
+        lengths=lines, input=repr(a), coupler=repr(b), output=repr(c)
+    )

@@ -37,7 +37,11 @@ def _find_namespace(number: Number) -> Any:
     """Find the functions for a type seen for the first time: NumPy's for its own operands and for what is no array."""
     functions: Any = np
     array = hasattr(number, "__array_namespace__") or hasattr(number, "__dlpack__")
-    if array and not isinstance(number, np.generic) and not hasattr(number, "__array_ufunc__"):
+    if (
+        array
+        and not isinstance(number, np.generic)
+        and not hasattr(number, "__array_ufunc__")
+    ):
         from array_api_compat import array_namespace
 
         functions = array_namespace(number)
@@ -47,11 +51,19 @@ def _find_namespace(number: Number) -> Any:
 
 def make_like(values: Number, model: Number) -> Number:
     """Make plain numbers an array of another's library, kind and device."""
-    if (xp := namespace(model)) is np:  # Python's own numbers and those with derivatives have no dtype
-        return model.like(values) if hasattr(model, "like") else np.asarray(values, getattr(model, "dtype", float))
+    if (
+        xp := namespace(model)
+    ) is np:  # Python's own numbers and those with derivatives have no dtype
+        return (
+            model.like(values)
+            if hasattr(model, "like")
+            else np.asarray(values, getattr(model, "dtype", float))
+        )
     from array_api_compat import is_jax_array
 
-    device = {} if is_jax_array(model) else {"device": model.device}  # JAX brings plain numbers to the others
+    device = (
+        {} if is_jax_array(model) else {"device": model.device}
+    )  # JAX brings plain numbers to the others
     return xp.asarray(values, dtype=model.dtype, **device)
 
 
@@ -80,7 +92,11 @@ def select(mask: Number, x: Number, y: Number) -> Number:
         return x if mask else y
     if isinstance(mask, np.ndarray):
         return np.where(mask, x, y)
-    return mask.of_one(x, y) if hasattr(mask, "of_one") else namespace(mask).where(mask, x, y)
+    return (
+        mask.of_one(x, y)
+        if hasattr(mask, "of_one")
+        else namespace(mask).where(mask, x, y)
+    )
 
 
 def divisor(x: Number, mask: Number) -> Number:
@@ -114,12 +130,24 @@ def vector(x: Number, y: Number) -> Number:
     """Make x + i y, each part written once: over arrays the sum takes three times as long."""
     if type(x) is type(y) is float:
         return complex(x, y)
-    if not ((type(x) is float or isinstance(x, NUMPY)) and (type(y) is float or isinstance(y, NUMPY))):
+    if not (
+        (type(x) is float or isinstance(x, NUMPY))
+        and (type(y) is float or isinstance(y, NUMPY))
+    ):
         return x + 1j * y
-    kinds = {number.dtype.type if hasattr(number, "dtype") else float for number in (x, y)}
-    if not isinstance(x, np.ndarray) and not isinstance(y, np.ndarray) and kinds <= DOUBLES:
+    kinds = {
+        number.dtype.type if hasattr(number, "dtype") else float for number in (x, y)
+    }
+    if (
+        not isinstance(x, np.ndarray)
+        and not isinstance(y, np.ndarray)
+        and kinds <= DOUBLES
+    ):
         return np.complex128(complex(x, y))
-    z = np.empty(np.broadcast(x, y).shape, dtype=complex if kinds <= DOUBLES else np.result_type(x, y, np.complex64))
+    z = np.empty(
+        np.broadcast(x, y).shape,
+        dtype=complex if kinds <= DOUBLES else np.result_type(x, y, np.complex64),
+    )
     z.real, z.imag = x, y
     return z[()]
 
@@ -155,7 +183,11 @@ def conjugate(u: Number) -> Number:
 def sign(x: Number) -> Number:
     """Return -1, 0 or 1; NaN gives 0 in other libraries, because PyTorch does not map NumPy's rule."""
     xp = namespace(x)
-    return np.sign(x) if xp is np else xp.astype(x > 0.0, x.dtype) - xp.astype(x < 0.0, x.dtype)
+    return (
+        np.sign(x)
+        if xp is np
+        else xp.astype(x > 0.0, x.dtype) - xp.astype(x < 0.0, x.dtype)
+    )
 
 
 def nearest(x: Number) -> Number:

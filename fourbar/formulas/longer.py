@@ -29,14 +29,21 @@ def lengthen(number: Number) -> Number:
     """Return a double, or an array of them, as a longer number."""
     if not HAS_LONG_DOUBLES:
         return Pair(np.asarray(number, dtype=float), 0.0)
-    return number.astype(np.longdouble) if isinstance(number, np.ndarray) else np.longdouble(number)
+    return (
+        number.astype(np.longdouble)
+        if isinstance(number, np.ndarray)
+        else np.longdouble(number)
+    )
 
 
 def shorten(number: Number) -> Number:
     """Return a longer number as doubles; any other one as it is."""
     if isinstance(number, Pair):
         return number.high
-    if isinstance(number, (np.ndarray, np.generic)) and number.dtype in (np.longdouble, np.clongdouble):
+    if isinstance(number, (np.ndarray, np.generic)) and number.dtype in (
+        np.longdouble,
+        np.clongdouble,
+    ):
         return number.astype(complex if number.dtype.kind == "c" else float)
     return number
 
@@ -50,7 +57,9 @@ def change_numbers(value: Any, change: Callable[[Any], Any]) -> Any:
         return type(value)(*parts) if hasattr(value, "_fields") else tuple(parts)
     if not (names := _list_fields(value.__class__)):
         return value
-    changed = object.__new__(type(value))  # a constructor checks what a user gives, one number at a time
+    changed = object.__new__(
+        type(value)
+    )  # a constructor checks what a user gives, one number at a time
     for name in names:
         object.__setattr__(changed, name, change_numbers(getattr(value, name), change))
     return changed
@@ -98,20 +107,33 @@ class Pair(NDArrayOperatorsMixin):
     def __getitem__(self, index: Any) -> "Pair":
         return Pair(self.high[index], self.low[index])
 
-    def __array_ufunc__(self, function: Any, method: str, *inputs: Any, **options: Any) -> Any:
+    def __array_ufunc__(
+        self, function: Any, method: str, *inputs: Any, **options: Any
+    ) -> Any:
         if method != "__call__" or options or function not in FUNCTIONS:
             return NotImplemented
-        return FUNCTIONS[function](*(x if isinstance(x, Pair) else Pair(np.asarray(x), 0.0) for x in inputs))
+        return FUNCTIONS[function](
+            *(x if isinstance(x, Pair) else Pair(np.asarray(x), 0.0) for x in inputs)
+        )
 
-    def __array_function__(self, function: Any, types: Any, args: Sequence[Any], options: Any) -> Any:
+    def __array_function__(
+        self, function: Any, types: Any, args: Sequence[Any], options: Any
+    ) -> Any:
         if function is np.where:
             return _choose(*args)
-        return function(args[0].high) if function in (np.shape, np.ndim, np.iscomplexobj) else NotImplemented
+        return (
+            function(args[0].high)
+            if function in (np.shape, np.ndim, np.iscomplexobj)
+            else NotImplemented
+        )
 
 
 def _choose(mask: Any, x: Any, y: Any) -> Any:
     """Return x where a mask holds, y elsewhere."""
-    x, y = (number if isinstance(number, Pair) else Pair(np.asarray(number), 0.0) for number in (x, y))
+    x, y = (
+        number if isinstance(number, Pair) else Pair(np.asarray(number), 0.0)
+        for number in (x, y)
+    )
     return Pair(np.where(mask, x.high, y.high), np.where(mask, x.low, y.low))
 
 
@@ -160,7 +182,9 @@ def _join(x: Any, y: Any) -> Any:
 
 def _divide(x: Any, y: Any) -> Any:
     if np.iscomplexobj(y.high):
-        return _multiply(x, y.conjugate()) / (_multiply_real(y.real, y.real) + _multiply_real(y.imag, y.imag))
+        return _multiply(x, y.conjugate()) / (
+            _multiply_real(y.real, y.real) + _multiply_real(y.imag, y.imag)
+        )
     if np.iscomplexobj(x.high):
         return _join(_divide(x.real, y), _divide(x.imag, y))
     first = x.high / y.high
@@ -189,7 +213,10 @@ def _turn(x: Any) -> tuple[Any, Any]:
             total = 1.0 - square * total / float(k * (k - 1))
         sums.append(total)
     sine, cosine = rest * sums[0], sums[1]
-    odd, turned = quarters % 2.0 == 1.0, (quarters % 4.0 >= 2.0, (quarters + 1.0) % 4.0 >= 2.0)
+    odd, turned = (
+        quarters % 2.0 == 1.0,
+        (quarters % 4.0 >= 2.0, (quarters + 1.0) % 4.0 >= 2.0),
+    )
     sine, cosine = _choose(odd, cosine, sine), _choose(odd, sine, cosine)
     return _choose(turned[0], -sine, sine), _choose(turned[1], -cosine, cosine)
 
@@ -204,7 +231,9 @@ def _find_angle(y: Any, x: Any) -> Any:
 def _find_size(x: Any) -> Any:
     if not np.iscomplexobj(x.high):
         return _choose(x.high < 0.0, -x, x)
-    unit = np.ldexp(1.0, np.frexp(np.abs(x.high))[1])  # whose square stays in the range of doubles
+    unit = np.ldexp(
+        1.0, np.frexp(np.abs(x.high))[1]
+    )  # whose square stays in the range of doubles
     along, across = x.real / unit, x.imag / unit
     return _root(along * along + across * across) * unit
 
@@ -234,9 +263,19 @@ FUNCTIONS: dict[Any, Callable[..., Any]] = {
     np.fmod: lambda x, y: x - y * np.trunc(x.high / y.high),
     **{
         function: _compare(function)
-        for function in (np.less, np.less_equal, np.greater, np.greater_equal, np.equal, np.not_equal)
+        for function in (
+            np.less,
+            np.less_equal,
+            np.greater,
+            np.greater_equal,
+            np.equal,
+            np.not_equal,
+        )
     },
-    **{function: lambda x, f=function: f(x.high) for function in (np.sign, np.isnan, np.isfinite)},
+    **{
+        function: lambda x, f=function: f(x.high)
+        for function in (np.sign, np.isnan, np.isfinite)
+    },
     np.rint: lambda x: Pair(np.rint(x.high), 0.0),
     np.frexp: lambda x: np.frexp(x.high),
     np.copysign: lambda x, y: np.copysign(x.high, y.high),

@@ -5,7 +5,13 @@ from typing import Any
 import numpy as np
 
 from fourbar.formulas.arithmetic import make_like
-from fourbar.formulas.position import TOUCHING, HalfAngle, Loop, compute_factors, reorder_lengths
+from fourbar.formulas.position import (
+    TOUCHING,
+    HalfAngle,
+    Loop,
+    compute_factors,
+    reorder_lengths,
+)
 from fourbar.linkage import FourBar
 
 DIGITS = 120
@@ -41,16 +47,37 @@ def half_angle(
         return mpf(float(number[member] if np.ndim(number) else number))
 
     with mp.workdps(DIGITS):
-        d, a, b, c = (own(length) / own(unit) for length in reorder_lengths(bar, linkage.lengths))
-        h = (mpf(theta_2) + mpf(lost) - own(linkage.ground_angle) + (0 if offset is None else offset)) / 2
+        d, a, b, c = (
+            own(length) / own(unit) for length in reorder_lengths(bar, linkage.lengths)
+        )
+        h = (
+            mpf(theta_2)
+            + mpf(lost)
+            - own(linkage.ground_angle)
+            + (0 if offset is None else offset)
+        ) / 2
         if bar == 4:
             h -= mp.pi / 2
         s, k = mp.sin(h), mp.cos(h)
-        lengths = Loop(d, a, b, c, (b + c - a - d) * (a + b + c + d), (d - a - b + c) * (d - a + b - c))
+        lengths = Loop(
+            d,
+            a,
+            b,
+            c,
+            (b + c - a - d) * (a + b + c + d),
+            (d - a - b + c) * (d - a + b - c),
+        )
         half = compute_factors(lengths, s * s, k * k, s * k)
         size = 2 * (a + b + c + d) * mp.sqrt(half.inner + (b - c) ** 2)
-        least, most = (-TOUCHING * size, 0) if offset is None else (-RESIDUE * size, RESIDUE * size)
-        outer, inner = (0 * factor if least <= factor <= most else factor for factor in (half.outer, half.inner))
+        least, most = (
+            (-TOUCHING * size, 0)
+            if offset is None
+            else (-RESIDUE * size, RESIDUE * size)
+        )
+        outer, inner = (
+            0 * factor if least <= factor <= most else factor
+            for factor in (half.outer, half.inner)
+        )
         return half._replace(outer=outer, inner=inner)
 
 
@@ -74,14 +101,26 @@ def decide_half_angles(
     mask[index] = True
     high, low = np.zeros((2, 5, flat.size))
     for i in index:
-        for row, value in enumerate(half_angle(linkage, float(flat[i]), offset, unit, i, bar, left_out[i])):
+        for row, value in enumerate(
+            half_angle(linkage, float(flat[i]), offset, unit, i, bar, left_out[i])
+        ):
             high[row, i] = float(value)
             low[row, i] = float(value - high[row, i])
-    mask, rows = mask.reshape(shape), zip(half, high.reshape(5, *shape), low.reshape(5, *shape), strict=True)
-    return HalfAngle(*(np.where(mask, make_like(rounded, number) + rest, number)[()] for number, rounded, rest in rows))
+    mask, rows = (
+        mask.reshape(shape),
+        zip(half, high.reshape(5, *shape), low.reshape(5, *shape), strict=True),
+    )
+    return HalfAngle(
+        *(
+            np.where(mask, make_like(rounded, number) + rest, number)[()]
+            for number, rounded, rest in rows
+        )
+    )
 
 
-def limit_remainder(linkage: FourBar, limit: float, theta_2: float, offset: float, bar: int = 2) -> Any:
+def limit_remainder(
+    linkage: FourBar, limit: float, theta_2: float, offset: float, bar: int = 2
+) -> Any:
     """Compute (limit position + offset) - theta_2 in many digits, for the limit position whose double is `limit`.
 
     Where bars 3, 4 are collinear cos(theta_2 - theta_1) = (a^2 + d^2 - (b +- c)^2)/(2 a d); likewise as the loop is
@@ -99,6 +138,7 @@ def limit_remainder(linkage: FourBar, limit: float, theta_2: float, offset: floa
             exact += [theta_1 + sign * psi for sign in (1, -1)]
         turn = 2 * mp.pi
         nearest = min(
-            (angle + turn * mp.nint((limit - angle) / turn) for angle in exact), key=lambda angle: abs(angle - limit)
+            (angle + turn * mp.nint((limit - angle) / turn) for angle in exact),
+            key=lambda angle: abs(angle - limit),
         )
         return nearest + mpf(offset) - mpf(theta_2)

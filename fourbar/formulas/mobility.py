@@ -56,7 +56,11 @@ class Reach(NamedTuple):
     def sum(self, d: int, own: int, x: int, y: int) -> float:
         """Sum the lengths with these signs exactly, rounded once."""
         total = math.fsum((d * self.d, own * self.own, x * self.x, y * self.y))
-        return 0.0 if abs(total) <= TOUCHING * (self.d + self.own + self.x + self.y) else total
+        return (
+            0.0
+            if abs(total) <= TOUCHING * (self.d + self.own + self.x + self.y)
+            else total
+        )
 
     @property
     def beyond_stretched(self) -> float:
@@ -77,8 +81,14 @@ class Reach(NamedTuple):
         x, y = (1, 1) if stretched else (1, -1) if self.x >= self.y else (-1, 1)
         short_d, short_l = self.sum(-1, 1, x, y), self.sum(1, -1, x, y)
         short_e, perimeter = self.sum(1, 1, -x, -y), self.sum(1, 1, x, y)
-        at_near = math.atan2(math.sqrt(short_d) * math.sqrt(short_l), math.sqrt(short_e) * math.sqrt(perimeter))
-        at_far = math.atan2(math.sqrt(short_d) * math.sqrt(short_e), math.sqrt(short_l) * math.sqrt(perimeter))
+        at_near = math.atan2(
+            math.sqrt(short_d) * math.sqrt(short_l),
+            math.sqrt(short_e) * math.sqrt(perimeter),
+        )
+        at_far = math.atan2(
+            math.sqrt(short_d) * math.sqrt(short_e),
+            math.sqrt(short_l) * math.sqrt(perimeter),
+        )
         return 2.0 * at_near, 2.0 * at_far
 
 
@@ -91,7 +101,9 @@ def choose_unit(linkage: FourBar) -> float:
 def reach_of(linkage: FourBar, bar: int = 2) -> Reach:
     """Return bar 2, 3 or 4 against the rest of the loop; InputError for another bar."""
     bar = require_bar("bar", bar)
-    unit = choose_unit(linkage)  # exact, and no product of lengths leaves the range of doubles
+    unit = choose_unit(
+        linkage
+    )  # exact, and no product of lengths leaves the range of doubles
     d, *moving = (length / unit for length in linkage.lengths)
     driven = moving.pop(bar - 2)
     return Reach(d, driven, *moving)
@@ -121,7 +133,10 @@ def limit_positions(linkage: FourBar, bar: int = 2) -> tuple[LimitPosition, ...]
     theta_1 = linkage.ground_angle
     others = [k for k in MOVING_BARS if k != bar]
     limits: list[LimitPosition] = []
-    for stretched, beyond in ((False, reach.beyond_folded), (True, reach.beyond_stretched)):
+    for stretched, beyond in (
+        (False, reach.beyond_folded),
+        (True, reach.beyond_stretched),
+    ):
         if beyond <= 0.0:
             continue
         psi, eta = reach.triangle(stretched)
@@ -133,8 +148,16 @@ def limit_positions(linkage: FourBar, bar: int = 2) -> tuple[LimitPosition, ...]
                 vectors[others[1] if reach.x >= reach.y else others[0]] += math.pi
             psi_2, theta_3 = vectors[2] % TURN, theta_1 + vectors[3]
             theta_4 = theta_1 + vectors[4] + math.pi
-            branch = 0 if bar == 2 or straight else int(math.copysign(1.0, math.sin(theta_4 - theta_3)))
-            limits.append(LimitPosition(theta_1 + psi_2, _wrap(theta_3), _wrap(theta_4), branch, stretched))
+            branch = (
+                0
+                if bar == 2 or straight
+                else int(math.copysign(1.0, math.sin(theta_4 - theta_3)))
+            )
+            limits.append(
+                LimitPosition(
+                    theta_1 + psi_2, _wrap(theta_3), _wrap(theta_4), branch, stretched
+                )
+            )
     return tuple(sorted(limits))
 
 
@@ -150,10 +173,17 @@ def find_intervals(linkage: FourBar, bar: int = 2) -> tuple[tuple[float, float],
     inner = reach.triangle(False)[0] if reach.beyond_folded > 0.0 else None
     outer = reach.triangle(True)[0] if reach.beyond_stretched > 0.0 else None
     if inner is None:
-        return ((start, start + TURN),) if outer is None else ((start - outer, start + outer),)
+        return (
+            ((start, start + TURN),)
+            if outer is None
+            else ((start - outer, start + outer),)
+        )
     if outer is None:
         return ((start + inner, start + (TURN - inner)),)
-    return (start + inner, start + outer), (start + (TURN - outer), start + (TURN - inner))
+    return (start + inner, start + outer), (
+        start + (TURN - outer),
+        start + (TURN - inner),
+    )
 
 
 def turns_fully(linkage: FourBar, bar: int = 2) -> bool:
@@ -162,7 +192,9 @@ def turns_fully(linkage: FourBar, bar: int = 2) -> bool:
     return reach.beyond_folded <= 0.0 and reach.beyond_stretched <= 0.0
 
 
-def choose_range(linkage: FourBar, bar: int = 2, holding: float | None = None) -> tuple[float, float]:
+def choose_range(
+    linkage: FourBar, bar: int = 2, holding: float | None = None
+) -> tuple[float, float]:
     """Choose the range of a commanded bar's angle that is swept where a scene names none, rad.
 
     0..2 pi where the bar turns fully; otherwise the first of `find_intervals`, or the one that holds an angle,
@@ -174,7 +206,8 @@ def choose_range(linkage: FourBar, bar: int = 2, holding: float | None = None) -
     held = (
         interval
         for interval in every
-        if holding is not None and (holding - interval[0]) % TURN <= interval[1] - interval[0]
+        if holding is not None
+        and (holding - interval[0]) % TURN <= interval[1] - interval[0]
     )
     start, stop = next(held, every[0])
     margin = min(MARGIN, (stop - start) / NARROW)
@@ -186,7 +219,12 @@ def find_limit_angles(linkage: FourBar, bar: int = 2) -> tuple[float, ...]:
     theta_1 = linkage.ground_angle
     if bar == 2:
         return tuple(limit.theta_2 for limit in limit_positions(linkage))
-    return tuple(sorted(theta_1 + (limit[bar - 2] - theta_1) % TURN for limit in limit_positions(linkage, bar)))
+    return tuple(
+        sorted(
+            theta_1 + (limit[bar - 2] - theta_1) % TURN
+            for limit in limit_positions(linkage, bar)
+        )
+    )
 
 
 def change_points(linkage: FourBar, bar: int = 2) -> tuple[float, ...]:
@@ -217,7 +255,9 @@ def time_ratio(linkage: FourBar) -> float | None:
     """
     if not turns_fully(linkage) or change_points(linkage):
         return None
-    stroke = [limit.theta_2 for limit in limit_positions(linkage, 4) if limit.branch == 1]
+    stroke = [
+        limit.theta_2 for limit in limit_positions(linkage, 4) if limit.branch == 1
+    ]
     if len(stroke) != 2:
         return None
     delta = stroke[1] - stroke[0]
@@ -225,7 +265,9 @@ def time_ratio(linkage: FourBar) -> float | None:
     return (TURN - delta) / delta
 
 
-def follow_smooth_path(linkage: FourBar, theta_2: Array, branch: int, bar: int = 2) -> NDArray[np.int8]:
+def follow_smooth_path(
+    linkage: FourBar, theta_2: Array, branch: int, bar: int = 2
+) -> NDArray[np.int8]:
     """Choose the branch of each position of a sweep that runs smoothly through the change points, (n,).
 
     At a change point sin(theta_4 - theta_3) passes through zero with its slope, so the smooth path
@@ -245,7 +287,9 @@ def follow_smooth_path(linkage: FourBar, theta_2: Array, branch: int, bar: int =
     if steps.any():
         heading[1:] = steps
         moving = np.flatnonzero(heading)
-        latest = np.maximum.accumulate(np.where(heading != 0, np.arange(psi.size), moving[0]))
+        latest = np.maximum.accumulate(
+            np.where(heading != 0, np.arange(psi.size), moving[0])
+        )
         heading = heading[latest]
     rounding = AT_CHANGE_POINT * (np.abs(theta_2) + abs(linkage.ground_angle))
     for point in change_points(linkage, bar):
@@ -285,7 +329,9 @@ def circuits(linkage: FourBar) -> tuple[Circuit, ...]:
     return tuple(Circuit(interval, BOTH) for interval in ranges)
 
 
-def find_circuit(linkage: FourBar, theta_2: Array, branch: int | NDArray[np.int8]) -> NDArray[np.int8]:
+def find_circuit(
+    linkage: FourBar, theta_2: Array, branch: int | NDArray[np.int8]
+) -> NDArray[np.int8]:
     """Find the circuit (index into `circuits`) of each position, -1 where it does not assemble, (n,).
 
     `theta_2`: (n,), rad. `branch`: +1 or -1, or one of them for each position (n,).
@@ -295,11 +341,17 @@ def find_circuit(linkage: FourBar, theta_2: Array, branch: int | NDArray[np.int8
     if len(every) == 1:
         number = np.zeros(theta_2.shape, dtype=np.int8)
     elif len(every[0].branches) == 1:
-        number = np.where(np.broadcast_to(branch, theta_2.shape) == every[0].branches[0], 0, 1)
+        number = np.where(
+            np.broadcast_to(branch, theta_2.shape) == every[0].branches[0], 0, 1
+        )
     else:  # the two ranges are mirror images in the ground's line
         number = np.where((theta_2 - linkage.ground_angle) % TURN < 0.5 * TURN, 0, 1)
-    half = prepare_path(loop(*linkage.lengths), linkage.ground_angle).half_angle(theta_2)
-    return np.where((half.outer >= 0.0) & (half.inner >= 0.0), number, -1).astype(np.int8)
+    half = prepare_path(loop(*linkage.lengths), linkage.ground_angle).half_angle(
+        theta_2
+    )
+    return np.where((half.outer >= 0.0) & (half.inner >= 0.0), number, -1).astype(
+        np.int8
+    )
 
 
 GRASHOF = {
@@ -343,13 +395,20 @@ def classify(linkage: FourBar) -> LinkageType:
     Machine Theory 20 (1985).
     """
     unit = choose_unit(linkage)
-    lengths = dict(zip(BAR_NAMES, (length / unit for length in linkage.lengths), strict=True))
-    shortest, longest = min(lengths, key=lengths.__getitem__), max(lengths, key=lengths.__getitem__)
+    lengths = dict(
+        zip(BAR_NAMES, (length / unit for length in linkage.lengths), strict=True)
+    )
+    shortest, longest = (
+        min(lengths, key=lengths.__getitem__),
+        max(lengths, key=lengths.__getitem__),
+    )
     perimeter = math.fsum(lengths.values())
 
     def balance(bar: int, partner: int) -> float:
         """Compute the two bars minus the other two; 0 within the rounding of the lengths."""
-        total = math.fsum(length if k in (bar, partner) else -length for k, length in lengths.items())
+        total = math.fsum(
+            length if k in (bar, partner) else -length for k, length in lengths.items()
+        )
         return 0.0 if abs(total) <= TOUCHING * perimeter else total
 
     # all bars equal: every bar is both, and any other one is its partner
@@ -360,11 +419,19 @@ def classify(linkage: FourBar) -> LinkageType:
         return LinkageType(surplus, barker, code, name, shortest, longest, turning)
 
     if math.fsum((*lengths.values(), -2.0 * lengths[longest])) <= TOUCHING * perimeter:
-        return found(None, "structure", f"structure (the {BAR_NAMES[longest]} is as long as the other three)")
+        return found(
+            None,
+            "structure",
+            f"structure (the {BAR_NAMES[longest]} is as long as the other three)",
+        )
     if surplus > 0.0:
         return found(shortest, *GRASHOF[shortest])
     if surplus < 0.0:
-        return found(4 + longest, f"RRR{longest}", f"triple rocker (longest: {BAR_NAMES[longest]})")
+        return found(
+            4 + longest,
+            f"RRR{longest}",
+            f"triple rocker (longest: {BAR_NAMES[longest]})",
+        )
     opposite, with_input, with_output = (balance(1, k) == 0.0 for k in (3, 2, 4))
     if opposite + with_input + with_output == 3:
         return found(14, "S3X", "rhombus (triple change point)")
@@ -373,7 +440,11 @@ def classify(linkage: FourBar) -> LinkageType:
             return found(13, "S2X", PARALLELOGRAM)
         # d + b = a + c and d + c = a + b give d = a; d + b = a + c and d + a = b + c give d = c
         pairs = (
-            ("ground and input", "coupler and output") if with_output else ("ground and output", "input and coupler")
+            ("ground and input", "coupler and output")
+            if with_output
+            else ("ground and output", "input and coupler")
         )
         return found(13, "S2X", f"kite (equal: {pairs[0]}; {pairs[1]})")
-    return found(8 + shortest, CHANGE_POINT[shortest], f"change-point {GRASHOF[shortest][1]}")
+    return found(
+        8 + shortest, CHANGE_POINT[shortest], f"change-point {GRASHOF[shortest][1]}"
+    )

@@ -9,7 +9,15 @@ Source: R. L. Norton, Design of Machinery, ch. 6 and 7; B. Paul, Kinematics and 
 
 from typing import NamedTuple
 
-from fourbar.formulas.arithmetic import Number, conjugate, divisor, is_any, namespace, select, vector
+from fourbar.formulas.arithmetic import (
+    Number,
+    conjugate,
+    divisor,
+    is_any,
+    namespace,
+    select,
+    vector,
+)
 from fourbar.formulas.position import Loop, Position
 
 FAST = 4.0
@@ -58,12 +66,17 @@ def coefficients(lengths: Loop, position: Position) -> Coefficients:
     g = S * per_root
     xg = x * g
     leaning = xg * per_e2
-    n, rest = (grown + a * (a - d)) * per_e2 + leaning, (grown + d * (d - a)) * per_e2 - leaning
+    n, rest = (
+        (grown + a * (a - d)) * per_e2 + leaning,
+        (grown + d * (d - a)) * per_e2 - leaning,
+    )
     w = (xg - 0.5 * y) * per_e2
     if is_any(may_turn_fast(lengths)):
         fast = find_fast_turns(lengths, position)
         heron = E2 * (d + a) * (d + a) * outer + E1 * (b - c) * (b - c) * (2.0 * grown)
-        w = select(fast, -heron * per_root / divisor(x * S + y * position.root, fast), w)
+        w = select(
+            fast, -heron * per_root / divisor(x * S + y * position.root, fast), w
+        )
         n, rest = select(fast, 0.5 + w, n), select(fast, 0.5 - w, rest)
     dg = ((2.0 * ad * E2) * kk / inner - (2.0 * ad * E1) * ss / outer) * per_root
     dn = (x * dg - S * w) * per_e2
@@ -79,7 +92,9 @@ def find_fast_turns(lengths: Loop, position: Position) -> Number:
     """Mark where t and x g/e^2 are large and cancel: |d^2 - a^2| > FAST e^2, and x S, y root have the same sign."""
     d, a, b, c, _, _ = lengths
     y = (d - a) * (d + a)
-    return (abs(y) > FAST * position.e2) & ((y * position.root) * ((b - c) * position.half.sk) > 0.0)
+    return (abs(y) > FAST * position.e2) & (
+        (y * position.root) * ((b - c) * position.half.sk) > 0.0
+    )
 
 
 def take_sines_of_rates(lengths: Loop, position: Position, k: Coefficients) -> Position:
@@ -93,10 +108,20 @@ def take_sines_of_rates(lengths: Loop, position: Position, k: Coefficients) -> P
         return position
     fast, scale = find_fast_turns(lengths, position), position.sin_mu / d
     u3, u4 = position.u3 * conjugate(position.u1), position.u4 * conjugate(position.u1)
-    u3 = select(fast, vector(u3.real, c * scale * (k.h23 - k.h43)) * position.u1, position.u3)
+    u3 = select(
+        fast, vector(u3.real, c * scale * (k.h23 - k.h43)) * position.u1, position.u3
+    )
     u4 = select(fast, vector(u4.real, b * scale * k.h23) * position.u1, position.u4)
     return Position(
-        position.u1, position.u2, u3, u4, position.sin_mu, position.diagonal, position.e2, position.root, position.half
+        position.u1,
+        position.u2,
+        u3,
+        u4,
+        position.sin_mu,
+        position.diagonal,
+        position.e2,
+        position.root,
+        position.half,
     )
 
 
@@ -104,8 +129,20 @@ def put_parallel_pairs(k: Coefficients, first: Number, second: Number) -> Coeffi
     """Put in the exact coefficients of bars that stay parallel: h3, h4 = 0, 1 where `first`, 1, 0 where `second`."""
     either, xp = first | second, namespace(first)
     h3, h4 = xp.where(either, 1.0 * second, k.h3), xp.where(either, 1.0 * first, k.h4)
-    h23, h43 = xp.where(either, 1.0 * first, k.h23), xp.where(either, 1.0 * first - 1.0 * second, k.h43)
-    return Coefficients(k.h2, h3, h4, h23, h43, k.dh2, xp.where(either, 0.0, k.dh3), xp.where(either, 0.0, k.dh4))
+    h23, h43 = (
+        xp.where(either, 1.0 * first, k.h23),
+        xp.where(either, 1.0 * first - 1.0 * second, k.h43),
+    )
+    return Coefficients(
+        k.h2,
+        h3,
+        h4,
+        h23,
+        h43,
+        k.dh2,
+        xp.where(either, 0.0, k.dh3),
+        xp.where(either, 0.0, k.dh4),
+    )
 
 
 class Rates(NamedTuple):
@@ -199,7 +236,14 @@ class State(NamedTuple):
             of_2 = self.frame(2)
             v_pin, a_pin = of_2.velocity(pin), of_2.acceleration(pin)
         omega = self.omega(bar)
-        return Frame(self.direction(bar), pin, v_pin, a_pin, 1j * omega, vector(-omega * omega, self.alpha(bar)))
+        return Frame(
+            self.direction(bar),
+            pin,
+            v_pin,
+            a_pin,
+            1j * omega,
+            vector(-omega * omega, self.alpha(bar)),
+        )
 
     def point(self, bar: int, z: Number) -> Number:
         """Place the point z of a bar's frame at its first pin (complex: along + i across), m."""
@@ -222,4 +266,6 @@ class State(NamedTuple):
 
     def slip(self, pin: str) -> Number:
         """Return h_j - h_i of the bars i, j that meet at a pin."""
-        return {"O2": self.k.h2, "A": -self.k.h23, "B": self.k.h43, "O4": self.k.h4}[pin]
+        return {"O2": self.k.h2, "A": -self.k.h23, "B": self.k.h43, "O4": self.k.h4}[
+            pin
+        ]

@@ -25,7 +25,13 @@ from fourbar.formulas.arithmetic import (
     sine,
     vector,
 )
-from fourbar.formulas.motion import Coefficients, State, coefficients, rates, take_sines_of_rates
+from fourbar.formulas.motion import (
+    Coefficients,
+    State,
+    coefficients,
+    rates,
+    take_sines_of_rates,
+)
 from fourbar.formulas.motion import put_parallel_pairs as parallel_motion
 from fourbar.formulas.position import (
     TOUCHING,
@@ -77,11 +83,15 @@ class Path(NamedTuple):
         u2 = vector(half.kk - half.ss, 2.0 * half.sk) if along else direction(q)
         if along and self.bar == 4:
             u2 = -u2
-        if along and is_any(turned := self.theta_1 != 0.0):  # many linkages, some on level ground
+        if along and is_any(
+            turned := self.theta_1 != 0.0
+        ):  # many linkages, some on level ground
             u2 = select(turned, direction(q), u2)
         position = close_loop(self.lengths, self.u1, u2, half, branch, self.unit)
         if self.may_stay_parallel:
-            position = parallel_position(position, *find_parallel_pairs(self.lengths, half, branch))
+            position = parallel_position(
+                position, *find_parallel_pairs(self.lengths, half, branch)
+            )
         return position
 
     def angles(self, half: HalfAngle, branch: Number) -> tuple[Number, Number, Number]:
@@ -98,11 +108,16 @@ class Path(NamedTuple):
         theta_3 = np.arctan2(along + y * at_A, x * at_A - across)
         theta_4 = np.arctan2(along + y * at_O4, x * at_O4 - across)
         if np.any(self.theta_1):
-            theta_3, theta_4 = (np.remainder(np.pi - theta - self.theta_1, 2.0 * np.pi) for theta in (theta_3, theta_4))
+            theta_3, theta_4 = (
+                np.remainder(np.pi - theta - self.theta_1, 2.0 * np.pi)
+                for theta in (theta_3, theta_4)
+            )
             theta_3, theta_4 = np.pi - theta_3, np.pi - theta_4
         return theta_3, theta_4, root
 
-    def motion(self, position: Position, branch: Number) -> tuple[Position, Coefficients]:
+    def motion(
+        self, position: Position, branch: Number
+    ) -> tuple[Position, Coefficients]:
         """Compute positions and kinematic coefficients by q with the bars in their usual order, from `position`."""
         k = coefficients(self.lengths, position)
         position = take_sines_of_rates(self.lengths, position, k)
@@ -110,7 +125,11 @@ class Path(NamedTuple):
             first, second = find_parallel_pairs(self.lengths, position.half, branch)
             regular = ~namespace(position.root).isnan(position.root)
             k = parallel_motion(k, first & regular, second & regular)
-        return (position, k) if self.bar == 2 else (self.in_order(position), read_from(self.bar, k))
+        return (
+            (position, k)
+            if self.bar == 2
+            else (self.in_order(position), read_from(self.bar, k))
+        )
 
     def in_order(self, position: Position) -> Position:
         """Put the bars in their usual order; the triangle stays that of the reading."""
@@ -123,8 +142,20 @@ class Path(NamedTuple):
             u1, u2, u3, u4, a = -position.u1, position.u4, -position.u3, position.u2, c
         diagonal = (d * self.unit) * u1 - (a * self.unit) * u2
         # the root is NaN where speeds are 0/0; the sine still has its value
-        closed = position._replace(root=position.sin_mu * (2.0 * self.lengths.b * self.lengths.c))
-        return Position(u1, u2, u3, u4, self.drive_sine(closed, 2), diagonal, position.e2, position.root, position.half)
+        closed = position._replace(
+            root=position.sin_mu * (2.0 * self.lengths.b * self.lengths.c)
+        )
+        return Position(
+            u1,
+            u2,
+            u3,
+            u4,
+            self.drive_sine(closed, 2),
+            diagonal,
+            position.e2,
+            position.root,
+            position.half,
+        )
 
     def drive_sine(self, position: Position, drive_bar: int) -> Number:
         """Compute the sine between the two bars that are not driven; `motion` or `on_curve` made the positions."""
@@ -132,20 +163,35 @@ class Path(NamedTuple):
             return drive_sine(position, drive_bar)
         role = ROLES[self.bar][drive_bar - 2]
         if role == 2:
-            return position.sin_mu if self.bar == 2 else position.root * (0.5 / (self.lengths.b * self.lengths.c))
+            return (
+                position.sin_mu
+                if self.bar == 2
+                else position.root * (0.5 / (self.lengths.b * self.lengths.c))
+            )
         sine = drive_sine_of_triangle(self.lengths, position, role)
         if self.may_stay_parallel:  # all bars make one angle, whose sine is exact
-            first, second = find_parallel_pairs(self.lengths, position.half, sign(position.root))
-            with_first, with_second = (0.0, 2.0 * position.half.sk) if role == 3 else (-2.0 * position.half.sk, 0.0)
+            first, second = find_parallel_pairs(
+                self.lengths, position.half, sign(position.root)
+            )
+            with_first, with_second = (
+                (0.0, 2.0 * position.half.sk)
+                if role == 3
+                else (-2.0 * position.half.sk, 0.0)
+            )
             sine = select(first, with_first, select(second, with_second, sine))
-        return -sine if self.bar + drive_bar == 7 else sine  # the two bars have changed places
+        return (
+            -sine if self.bar + drive_bar == 7 else sine
+        )  # the two bars have changed places
 
 
 def prepare_path(lengths: Loop, theta_1: Number, bar: int = 2) -> Path:
     """Prepare the path in the angle of bar 2, 3 or 4."""
     d, a, b, c, _, _ = lengths
     unit = power_of_two(0.25 * (d + a + b + c))
-    reordered, u1 = loop(*reorder_lengths(bar, (d / unit, a / unit, b / unit, c / unit))), polar(1.0, theta_1)
+    reordered, u1 = (
+        loop(*reorder_lengths(bar, (d / unit, a / unit, b / unit, c / unit))),
+        polar(1.0, theta_1),
+    )
     meets = is_any(is_zero(reordered.E1) & is_zero(reordered.E2))
     return Path(bar, reordered, theta_1, -u1 if bar == 4 else u1, unit, meets)
 
@@ -165,7 +211,11 @@ def find_singular(position: Position) -> Number:
 
 
 def compute_state(
-    linkage: FourBar, theta_2: Number, branch: Number, omega_2: Number = 1.0, alpha_2: Number = 0.0
+    linkage: FourBar,
+    theta_2: Number,
+    branch: Number,
+    omega_2: Number = 1.0,
+    alpha_2: Number = 0.0,
 ) -> State:
     """Compute positions and motion for a motion of the input; NaN where the loop does not close, or speeds are 0/0.
 
@@ -176,9 +226,20 @@ def compute_state(
         reading = prepare_path(lengths, linkage.ground_angle)
         position = reading.position(theta_2, reading.half_angle(theta_2), branch)
         position, k = reading.motion(
-            position._replace(root=np.where(find_singular(position), np.nan, position.root)), branch
+            position._replace(
+                root=np.where(find_singular(position), np.nan, position.root)
+            ),
+            branch,
         )
-        return State(lengths, linkage.ground_angle, theta_2, position, k, omega_2, rates(k, omega_2, alpha_2))
+        return State(
+            lengths,
+            linkage.ground_angle,
+            theta_2,
+            position,
+            k,
+            omega_2,
+            rates(k, omega_2, alpha_2),
+        )
 
 
 def drive_sine(position: Position, drive_bar: int) -> Number:
@@ -202,8 +263,12 @@ def drive_sine_of_triangle(lengths: Loop, position: Position, drive_bar: int) ->
     ss, _, sk, _, inner = position.half
     along = ((d - a) - 2.0 * d * ss) * position.root
     if drive_bar == 3:
-        return (along + 2.0 * d * sk * (inner - 2.0 * c * (b - c))) / (2.0 * c * position.e2)
-    return (along - 2.0 * d * sk * (inner + 2.0 * b * (b - c))) / (2.0 * b * position.e2)
+        return (along + 2.0 * d * sk * (inner - 2.0 * c * (b - c))) / (
+            2.0 * c * position.e2
+        )
+    return (along - 2.0 * d * sk * (inner + 2.0 * b * (b - c))) / (
+        2.0 * b * position.e2
+    )
 
 
 def find_smooth_branch(lengths: Loop, psi: Number, sign: Number) -> Number:
@@ -220,5 +285,11 @@ def find_smooth_branch(lengths: Loop, psi: Number, sign: Number) -> Number:
 def read_from(bar: int, k: Coefficients) -> Coefficients:
     """Return the coefficients of the loop read from bar 2, 3 or 4, in the usual order of the bars; and back."""
     if bar == 3:
-        return Coefficients(k.h3, k.h2, k.h4, -k.h23, k.h43 - k.h23, k.dh3, k.dh2, k.dh4)
-    return Coefficients(k.h4, k.h3, k.h2, k.h43, k.h23, k.dh4, k.dh3, k.dh2) if bar == 4 else k
+        return Coefficients(
+            k.h3, k.h2, k.h4, -k.h23, k.h43 - k.h23, k.dh3, k.dh2, k.dh4
+        )
+    return (
+        Coefficients(k.h4, k.h3, k.h2, k.h43, k.h23, k.dh4, k.dh3, k.dh2)
+        if bar == 4
+        else k
+    )

@@ -43,7 +43,9 @@ class Wrenches(NamedTuple):
 
     def on(self, bar: int) -> tuple[Number, Number]:
         """Return the force and the moment on bar 2, 3 or 4."""
-        moment = self.M2 if bar == 2 else self.M3 - self.C if bar == 3 else self.M4 + self.C
+        moment = (
+            self.M2 if bar == 2 else self.M3 - self.C if bar == 3 else self.M4 + self.C
+        )
         return self[bar - 2], moment
 
 
@@ -58,10 +60,14 @@ class PinForces(NamedTuple):
 
 def about_first_pin(body: Body) -> Number:
     """Compute I + m r^2, kg m^2."""
-    return body.I + body.m * body.z.real * body.z.real + body.m * body.z.imag * body.z.imag
+    return (
+        body.I + body.m * body.z.real * body.z.real + body.m * body.z.imag * body.z.imag
+    )
 
 
-def inertia_wrenches(a: Number, bodies: Bodies, position: Position, moving: Rates) -> tuple[Wrenches, Number]:
+def inertia_wrenches(
+    a: Number, bodies: Bodies, position: Position, moving: Rates
+) -> tuple[Wrenches, Number]:
     """Compute d'Alembert's -m a_G on each bar, and -(I + m r^2) alpha - m r_G x a_pin about its first pin.
 
     The force -m a_A of the coupler's mass at pin A is no part of R3; it is returned apart, in the frame of bar 2:
@@ -84,19 +90,25 @@ def inertia_wrenches(a: Number, bodies: Bodies, position: Position, moving: Rate
     ), (three.m * a) * of_2
 
 
-def coupler_about_B(lengths: Loop, three: Body, position: Position, moving: Rates, sine: Number) -> Number:
+def coupler_about_B(
+    lengths: Loop, three: Body, position: Position, moving: Rates, sine: Number
+) -> Number:
     """Compute d'Alembert's moment -I alpha_3 - m (G - B) x a_G of the coupler about B, small where G lies near B.
 
     `sine`: of theta_3 - theta_2.
     """
     w2, w3, _, alpha_2, alpha_3, _ = moving
     x, y, cosine = three.z.real - lengths.b, three.z.imag, dot(position.u2, position.u3)
-    of_A = lengths.a * (w2 * w2 * (x * sine + y * cosine) + alpha_2 * (x * cosine - y * sine))
+    of_A = lengths.a * (
+        w2 * w2 * (x * sine + y * cosine) + alpha_2 * (x * cosine - y * sine)
+    )
     of_G = w3 * w3 * (lengths.b * y) + alpha_3 * (x * three.z.real + y * y)
     return -three.m * (of_A + of_G) - three.I * alpha_3
 
 
-def solve_between(M_u: Number, M_v: Number, u: Number, v: Number, sine: Number) -> Number:
+def solve_between(
+    M_u: Number, M_v: Number, u: Number, v: Number, sine: Number
+) -> Number:
     """Solve u x F = M_u and v x F = M_v for F, unit vectors with u x v = sine: F = (M_u v - M_v u)/sine."""
     return (M_u * v - M_v * u) * (1.0 / sine)
 
@@ -140,14 +152,35 @@ def pin_forces(
     d, a, b, c, _, _ = lengths
     R2, R3, R4, M2, M3, M4, C = w
     of_3 = M3 - C
-    along, across = mass_at_A.real, mass_at_A.imag  # bar 2; separate, because a sum of both loses digits
+    along, across = (
+        mass_at_A.real,
+        mass_at_A.imag,
+    )  # bar 2; separate, because a sum of both loses digits
     if drive_bar == 4:
         F32 = solve_between(-M2 / a, moment_of_F32 / b, position.u2, position.u3, sine)
-        F43 = solve_between(-of_3 / b, -M2 / a - cross(position.u2, R3) - across, position.u3, position.u2, -sine)
+        F43 = solve_between(
+            -of_3 / b,
+            -M2 / a - cross(position.u2, R3) - across,
+            position.u3,
+            position.u2,
+            -sine,
+        )
     elif drive_bar == 3:
         of_4 = M4 + C
-        F43 = solve_between(-M2 / a - cross(position.u2, R3) - across, of_4 / c, position.u2, position.u4, sine)
-        F32 = solve_between(-M2 / a - across, of_4 / c + cross(position.u4, R3), position.u2, position.u4, sine)
+        F43 = solve_between(
+            -M2 / a - cross(position.u2, R3) - across,
+            of_4 / c,
+            position.u2,
+            position.u4,
+            sine,
+        )
+        F32 = solve_between(
+            -M2 / a - across,
+            of_4 / c + cross(position.u4, R3),
+            position.u2,
+            position.u4,
+            sine,
+        )
         F32 = (
             dot(position.u2, F32) + along - 1j * (M2 / a)
         ) * position.u2  # the moment on bar 2 gives the component across it
@@ -156,6 +189,15 @@ def pin_forces(
         F43 = (of_3 * k * (1.0 / b)) * position.diagonal - ((M3 + M4) * k) * position.u3
         F32 = R3 + F43 + mass_at_A * position.u2
         short = d < a
-        if is_any(short):  # the bars turn together; the sum loses the small component across bar 2
-            F32 = F32 + select(short, moment_of_F32 / a - cross(position.u2, F32), 0.0) * 1j * position.u2
-    return PinForces(-1.0 * (R2 + F32), F32, F43, F43 - R4)  # NumPy negates complex numbers slowly
+        if is_any(
+            short
+        ):  # the bars turn together; the sum loses the small component across bar 2
+            F32 = (
+                F32
+                + select(short, moment_of_F32 / a - cross(position.u2, F32), 0.0)
+                * 1j
+                * position.u2
+            )
+    return PinForces(
+        -1.0 * (R2 + F32), F32, F43, F43 - R4
+    )  # NumPy negates complex numbers slowly

@@ -12,10 +12,25 @@ from numpy.typing import NDArray
 
 from fourbar.errors import InputError, expect
 from fourbar.formulas.arithmetic import Number, cross, sine
-from fourbar.formulas.mobility import TURN, Array, change_points, circuits, follow_smooth_path, turns_fully
+from fourbar.formulas.mobility import (
+    TURN,
+    Array,
+    change_points,
+    circuits,
+    follow_smooth_path,
+    turns_fully,
+)
 from fourbar.formulas.motion import State
 from fourbar.formulas.path import compute_state
-from fourbar.linkage import A_BRANCH, MOST_STEPS, FourBar, require, require_bar, require_numbers, require_whole
+from fourbar.linkage import (
+    A_BRANCH,
+    MOST_STEPS,
+    FourBar,
+    require,
+    require_bar,
+    require_numbers,
+    require_whole,
+)
 
 
 class PointCoefficients(NamedTuple):
@@ -27,7 +42,9 @@ class PointCoefficients(NamedTuple):
     """m/rad^2."""
 
 
-def point_coefficients(linkage: FourBar, theta_2: Array, branch: Number, bar: int, z: complex) -> PointCoefficients:
+def point_coefficients(
+    linkage: FourBar, theta_2: Array, branch: Number, bar: int, z: complex
+) -> PointCoefficients:
     """Compute d r_P/d theta_2 and d^2 r_P/d theta_2^2 of a point of bar 2, 3 or 4.
 
     Parameters
@@ -60,7 +77,9 @@ class Centre(NamedTuple):
             return self.x / self.w, self.y / self.w
 
 
-def instant_centres(linkage: FourBar, theta_2: Array, branch: Number) -> dict[tuple[int, int], Centre]:
+def instant_centres(
+    linkage: FourBar, theta_2: Array, branch: Number
+) -> dict[tuple[int, int], Centre]:
     """Locate the six instant centres I_ij, keyed by (i, j) with i < j.
 
     I12, I23, I34, I14 are the pins; I13 = line O2 A with line B O4, I24 = line A B with line O2 O4
@@ -75,9 +94,14 @@ def instant_centres(linkage: FourBar, theta_2: Array, branch: Number) -> dict[tu
     """
     here = _compute_state(linkage, theta_2, branch)
     position, one = here.position, np.ones_like(here.theta_2)
-    O4, A, B = linkage.ground * position.u1 + 0.0 * position.u2, here.foot(3), here.point(4, linkage.output.length)
+    O4, A, B = (
+        linkage.ground * position.u1 + 0.0 * position.u2,
+        here.foot(3),
+        here.point(4, linkage.output.length),
+    )
     centres = {
-        bars: Centre(p.real, p.imag, one) for bars, p in {(1, 2): 0.0 * A, (2, 3): A, (3, 4): B, (1, 4): O4}.items()
+        bars: Centre(p.real, p.imag, one)
+        for bars, p in {(1, 2): 0.0 * A, (2, 3): A, (3, 4): B, (1, 4): O4}.items()
     }
     I13, I24 = cross(O4, position.u4) * position.u2, cross(A, position.u3) * position.u1
     centres[1, 3] = Centre(I13.real, I13.imag, sine(position.u2, position.u4))
@@ -97,7 +121,13 @@ class CouplerCurve(NamedTuple):
 
 
 def coupler_curve(
-    linkage: FourBar, r_along: float, r_across: float, circuit: int = 0, *, branch: int = 1, steps: int = 360
+    linkage: FourBar,
+    r_along: float,
+    r_across: float,
+    circuit: int = 0,
+    *,
+    branch: int = 1,
+    steps: int = 360,
 ) -> CouplerCurve:
     """Trace the closed coupler curve of one circuit, run smoothly through limits and change points.
 
@@ -115,9 +145,16 @@ def coupler_curve(
     """
     every = circuits(linkage)
     point = complex(require("r_along", r_along), require("r_across", r_across))
-    circuit = require_whole("circuit", circuit, range(len(every)), f"must be from 0 to {len(every) - 1}")
+    circuit = require_whole(
+        "circuit", circuit, range(len(every)), f"must be from 0 to {len(every) - 1}"
+    )
     branch = require_whole("branch", branch, (1, -1), A_BRANCH)
-    steps = require_whole("steps", steps, range(4, MOST_STEPS + 1, 4), f"must be a multiple of 4 up to {MOST_STEPS}")
+    steps = require_whole(
+        "steps",
+        steps,
+        range(4, MOST_STEPS + 1, 4),
+        f"must be a multiple of 4 up to {MOST_STEPS}",
+    )
     (start, stop), branches = every[circuit]
     branch = branch if branch in branches else branches[0]
     half = np.arange(0.5, steps, dtype=np.float64)
@@ -128,19 +165,29 @@ def coupler_curve(
         theta_2: Array = start + half * (turns * TURN / steps)
         signs = follow_smooth_path(linkage, theta_2, branch)
     else:
-        out = 0.5 * (start + stop) - 0.5 * (stop - start) * np.cos(half[: steps // 2] * (TURN / steps))
+        out = 0.5 * (start + stop) - 0.5 * (stop - start) * np.cos(
+            half[: steps // 2] * (TURN / steps)
+        )
         ahead = follow_smooth_path(linkage, out, branch)
-        theta_2, signs = np.concatenate((out, out[::-1])), np.concatenate((ahead, -ahead[::-1]))
+        theta_2, signs = (
+            np.concatenate((out, out[::-1])),
+            np.concatenate((ahead, -ahead[::-1])),
+        )
     curve = compute_state(linkage, theta_2, signs).point(3, point)
     x, y = curve.real, curve.imag
     theta_2 = np.append(theta_2, theta_2[0] + turns * TURN)
-    return CouplerCurve(theta_2, np.append(signs, signs[0]), np.append(x, x[0]), np.append(y, y[0]))
+    return CouplerCurve(
+        theta_2, np.append(signs, signs[0]), np.append(x, x[0]), np.append(y, y[0])
+    )
 
 
 def _compute_state(linkage: FourBar, theta_2: object, branch: object) -> State:
     """Compute the state at positions given by a user, after checking them."""
     expect("linkage", linkage, FourBar)
-    angles, signs = require_numbers("theta_2", theta_2), require_numbers("branch", branch, A_BRANCH)
+    angles, signs = (
+        require_numbers("theta_2", theta_2),
+        require_numbers("branch", branch, A_BRANCH),
+    )
     if not (np.abs(signs) == 1.0).all() or signs.shape not in ((), angles.shape):
         raise InputError("branch", branch, f"{A_BRANCH}, or one of them for each angle")
     return compute_state(linkage, angles, signs)

@@ -77,7 +77,9 @@ class Position(NamedTuple):
     half: HalfAngle
 
 
-def reorder_lengths(bar: int, lengths: tuple[Number, Number, Number, Number]) -> tuple[Any, Any, Any, Any]:
+def reorder_lengths(
+    bar: int, lengths: tuple[Number, Number, Number, Number]
+) -> tuple[Any, Any, Any, Any]:
     """Return the lengths of ground, the bar itself, coupler and output, as the loop is read from bar 2, 3 or 4."""
     d, a, b, c = lengths
     return (d, b, a, c) if bar == 3 else (d, c, b, a) if bar == 4 else (d, a, b, c)
@@ -109,7 +111,9 @@ def half_angle(lengths: Loop, psi: Number, *, opposite: bool = False) -> HalfAng
     `opposite`: h of psi - pi, from the same tangent: there the ground is read from O4 to O2.
     """
     E = lengths.E1 if opposite else lengths.E2
-    if is_differentiated(psi):  # near 180 deg the tangent is large, and its derivative is a difference
+    if is_differentiated(
+        psi
+    ):  # near 180 deg the tangent is large, and its derivative is a difference
         xp = namespace(psi)
         s, k = xp.sin(0.5 * psi), xp.cos(0.5 * psi)
         if xp is not np:
@@ -122,7 +126,11 @@ def half_angle(lengths: Loop, psi: Number, *, opposite: bool = False) -> HalfAng
         kk = 1.0 / (1.0 + t * t)
         sk = t * kk
         ss = t * sk
-    return compute_factors(lengths, kk, ss, -sk) if opposite else compute_factors(lengths, ss, kk, sk)
+    return (
+        compute_factors(lengths, kk, ss, -sk)
+        if opposite
+        else compute_factors(lengths, ss, kk, sk)
+    )
 
 
 def compute_factors(lengths: Loop, ss: Number, kk: Number, sk: Number) -> HalfAngle:
@@ -130,7 +138,9 @@ def compute_factors(lengths: Loop, ss: Number, kk: Number, sk: Number) -> HalfAn
     four_ad, four_bc = 4.0 * lengths.a * lengths.d, 4.0 * lengths.b * lengths.c
     outer, inner = lengths.E1 + four_ad * kk, lengths.E2 + four_ad * ss
     short = four_ad > four_bc
-    if is_any(short):  # outer + inner = 4 b c: the smaller change over psi keeps the digits
+    if is_any(
+        short
+    ):  # outer + inner = 4 b c: the smaller change over psi keeps the digits
         outer, inner = (
             select(short & (ss < kk), four_bc - inner, outer),
             select(short & (kk <= ss), four_bc - outer, inner),
@@ -141,10 +151,21 @@ def compute_factors(lengths: Loop, ss: Number, kk: Number, sk: Number) -> HalfAn
 def tiny_tangent(t: Number) -> Number:
     """Return TINY_TANGENT with the sign of a tangent."""
     xp = namespace(t)
-    return np.copysign(TINY_TANGENT, t) if xp is np else xp.copysign(0.0 * t + TINY_TANGENT, t)
+    return (
+        np.copysign(TINY_TANGENT, t)
+        if xp is np
+        else xp.copysign(0.0 * t + TINY_TANGENT, t)
+    )
 
 
-def close_loop(lengths: Loop, u1: Number, u2: Number, half: HalfAngle, branch: Number, unit: Number = 1.0) -> Position:
+def close_loop(
+    lengths: Loop,
+    u1: Number,
+    u2: Number,
+    half: HalfAngle,
+    branch: Number,
+    unit: Number = 1.0,
+) -> Position:
     """Compute the directions of coupler and output.
 
         u3 = (O4 - A) ((e^2 + b^2 - c^2) + i root)/(2 b e^2),   e^2 = (d - a)^2 + 4 a d sin^2 h,
@@ -177,7 +198,9 @@ def close_loop(lengths: Loop, u1: Number, u2: Number, half: HalfAngle, branch: N
     return Position(u1, u2, u3, u4, root * (0.5 / (b * c)), diagonal, e2, root, half)
 
 
-def find_parallel_pairs(lengths: Loop, half: HalfAngle, branch: Number) -> tuple[Number, Number]:
+def find_parallel_pairs(
+    lengths: Loop, half: HalfAngle, branch: Number
+) -> tuple[Number, Number]:
     """Mark where two pairs of bars stay parallel: E1 = E2 = 0, and the root is 4 a d sin h cos h or its opposite.
 
     First: the coupler keeps the ground's direction and bars 2, 4 turn together (a = c, b = d).
@@ -193,5 +216,9 @@ def put_parallel_pairs(position: Position, first: Number, second: Number) -> Pos
     xp = namespace(first, position.u2)
     u3 = xp.where(first, position.u1, xp.where(second, -position.u2, position.u3))
     u4 = xp.where(first, position.u2, xp.where(second, -position.u1, position.u4))
-    sine = xp.where(first | second, sign(position.root) * 2.0 * abs(position.half.sk), position.sin_mu)
+    sine = xp.where(
+        first | second,
+        sign(position.root) * 2.0 * abs(position.half.sk),
+        position.sin_mu,
+    )
     return position._replace(u3=u3, u4=u4, sin_mu=sine)

@@ -16,29 +16,43 @@ from fourbar.formulas.pin_forces import Bodies, about_first_pin
 from fourbar.formulas.position import Position
 
 
-def inertia(a: Number, bodies: Bodies, position: Position, k: Coefficients) -> tuple[Number, Number]:
+def inertia(
+    a: Number, bodies: Bodies, position: Position, k: Coefficients
+) -> tuple[Number, Number]:
     """Compute the equivalent inertia J = sum of m |dG/dq|^2 + I h_k^2 of bar 2, and of bars 3 and 4, kg m^2.
 
     `a`: length of the input, m.
     """
     two, three, four = bodies
     G = (a * k.h2) * position.u2 + (three.z * k.h3) * position.u3
-    others = about_first_pin(four) * (k.h4 * k.h4) + three.I * (k.h3 * k.h3) + dot(three.m * G, G)
+    others = (
+        about_first_pin(four) * (k.h4 * k.h4)
+        + three.I * (k.h3 * k.h3)
+        + dot(three.m * G, G)
+    )
     return about_first_pin(two) * (k.h2 * k.h2), others
 
 
-def half_slope(a: Number, bodies: Bodies, position: Position, k: Coefficients) -> Number:
+def half_slope(
+    a: Number, bodies: Bodies, position: Position, k: Coefficients
+) -> Number:
     """Compute J'/2 = sum of m G'.G'' + I h_k h_k', kg m^2/rad; bar 2 has no part of it where q = theta_2.
 
     About the pins O2, O4 of bars 2, 4 that is (I + m r^2) h_k h_k'; of the coupler, with G = A + R,
         G'.G'' = a^2 h2 h2' + r^2 h3 h3' + (h2 h3' + h3 h2') A.R + h2 h3 (h2 - h3) A x R.
     """
     two, three, four = bodies
-    AR = ((a * k.h2 * three.m * three.z) * position.u3) * conjugate(position.u2)  # m h2 (A.R + i A x R)
-    half = about_first_pin(three) * (k.h3 * k.dh3) + about_first_pin(four) * (k.h4 * k.dh4)
+    AR = ((a * k.h2 * three.m * three.z) * position.u3) * conjugate(
+        position.u2
+    )  # m h2 (A.R + i A x R)
+    half = about_first_pin(three) * (k.h3 * k.dh3) + about_first_pin(four) * (
+        k.h4 * k.dh4
+    )
     half = half + k.dh3 * AR.real + (k.h3 * k.h23) * AR.imag
     if is_any(k.dh2 != 0.0):  # q is not theta_2
-        half = half + (k.h3 * k.dh2) * dot((a * three.m) * position.u2, three.z * position.u3)
+        half = half + (k.h3 * k.dh2) * dot(
+            (a * three.m) * position.u2, three.z * position.u3
+        )
         half = half + (about_first_pin(two) + three.m * a * a) * (k.h2 * k.dh2)
     return half
 

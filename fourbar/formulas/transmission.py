@@ -6,7 +6,14 @@ from typing import NamedTuple
 import numpy as np
 
 from fourbar.formulas.arithmetic import dot
-from fourbar.formulas.mobility import TURN, Array, Reach, change_points, limit_positions, reach_of
+from fourbar.formulas.mobility import (
+    TURN,
+    Array,
+    Reach,
+    change_points,
+    limit_positions,
+    reach_of,
+)
 from fourbar.formulas.motion import State
 from fourbar.linkage import FourBar
 
@@ -19,7 +26,12 @@ def transmission_angle(state: State) -> Array:
 
     Source: R. L. Norton, Design of Machinery.
     """
-    return np.asarray(np.arctan2(np.abs(state.position.sin_mu), np.abs(dot(state.position.u3, state.position.u4))))
+    return np.asarray(
+        np.arctan2(
+            np.abs(state.position.sin_mu),
+            np.abs(dot(state.position.u3, state.position.u4)),
+        )
+    )
 
 
 class TransmissionExtremes(NamedTuple):
@@ -58,8 +70,14 @@ def transmission_extremes(linkage: FourBar) -> TransmissionExtremes:
 
 def _angle_at_B(reach: Reach, d: int, a: int) -> float:
     """Compute the angle between the sides b, c of the triangle b, c, e with e = d (ground) + own (input), signed."""
-    opposite = max(reach.sum(d, a, 1, -1), 0.0) ** 0.5 * max(reach.sum(d, a, -1, 1), 0.0) ** 0.5
-    return 2.0 * math.atan2(opposite, max(reach.sum(-d, -a, 1, 1), 0.0) ** 0.5 * reach.sum(d, a, 1, 1) ** 0.5)
+    opposite = (
+        max(reach.sum(d, a, 1, -1), 0.0) ** 0.5
+        * max(reach.sum(d, a, -1, 1), 0.0) ** 0.5
+    )
+    return 2.0 * math.atan2(
+        opposite,
+        max(reach.sum(-d, -a, 1, 1), 0.0) ** 0.5 * reach.sum(d, a, 1, 1) ** 0.5,
+    )
 
 
 def speed_ratio(state: State) -> Array:
@@ -67,7 +85,9 @@ def speed_ratio(state: State) -> Array:
     return np.asarray(state.k.h4)
 
 
-def mechanical_advantage(state: State, radius_in: float = 1.0, radius_out: float = 1.0) -> Array:
+def mechanical_advantage(
+    state: State, radius_in: float = 1.0, radius_out: float = 1.0
+) -> Array:
     """Compute F_out/F_in = (omega_2/omega_4)(r_in/r_out) of a linkage without losses, (n,).
 
     The signed ratio of torques where the radii are equal; +-inf where the output stands still (bars
@@ -84,7 +104,10 @@ def mechanical_advantage(state: State, radius_in: float = 1.0, radius_out: float
 
 
 def distance_to_singular(
-    linkage: FourBar, theta_2: Array, drive_bar: int = 2, branch: int | Array | None = None
+    linkage: FourBar,
+    theta_2: Array,
+    drive_bar: int = 2,
+    branch: int | Array | None = None,
 ) -> Array:
     """Compute the angle of the input to the nearest singular position, rad, in [0, pi], (n,); inf where there is none.
 
@@ -103,7 +126,10 @@ def distance_to_singular(
     points = [(limit.theta_2, 0) for limit in limit_positions(linkage)]
     points += [(point, 0) for point in change_points(linkage)]
     if drive_bar != 2:
-        points += [(limit.theta_2, limit.branch) for limit in limit_positions(linkage, drive_bar)]
+        points += [
+            (limit.theta_2, limit.branch)
+            for limit in limit_positions(linkage, drive_bar)
+        ]
     nearest = np.full(theta_2.shape, np.inf)
     for point, side in points:
         distance = np.abs((theta_2 - point) - TURN * np.rint((theta_2 - point) / TURN))

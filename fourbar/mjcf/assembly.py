@@ -35,7 +35,12 @@ class Assembly(NamedTuple):
 
 
 def assemble(
-    scene: Scene, start: Start | None, form: str, at_pins: Mapping[str, tuple[str, str]], *, without_loads: bool = False
+    scene: Scene,
+    start: Start | None,
+    form: str,
+    at_pins: Mapping[str, tuple[str, str]],
+    *,
+    without_loads: bool = False,
 ) -> Assembly:
     """Evaluate the linkage in the state given, or in that of `find_start`.
 
@@ -50,12 +55,18 @@ def assemble(
     """
     require_input(scene, "the drive of an SDF or a USD")
     if scene.motion.law is not None:
-        raise LimitError(f"a motion law has no counterpart in {form}; apply it in the simulator")
+        raise LimitError(
+            f"a motion law has no counterpart in {form}; apply it in the simulator"
+        )
     if scene.loads and not without_loads:
         on = ", ".join(sorted({f"bar {load.bar}" for load in scene.loads}))
-        raise LimitError(f"loads (here on {on}) have no counterpart in {form}; --without-loads leaves them out")
+        raise LimitError(
+            f"loads (here on {on}) have no counterpart in {form}; --without-loads leaves them out"
+        )
     if scene.drive is not None:
-        raise LimitError(f"a linear drive (drive.from, drive.to) has no counterpart in {form}")
+        raise LimitError(
+            f"a linear drive (drive.from, drive.to) has no counterpart in {form}"
+        )
     linkage = scene.linkage
     require_carriable(linkage)
     inertia = {number: linkage.bar(number).moment_of_inertia for number in MOVING_BARS}
@@ -76,27 +87,48 @@ def assemble(
     theta_3 = theta_2 + of_3_to_2
     foot = {1: 0j, 2: 0j, 3: cmath.rect(linkage.input.length, theta_2)}
     foot[4] = cmath.rect(linkage.ground, linkage.ground_angle)
-    turn, numbers = {1: 0.0, 2: theta_2, 3: theta_3, 4: theta_4}, (theta_2, theta_3, theta_4, *speeds)
+    turn, numbers = (
+        {1: 0.0, 2: theta_2, 3: theta_3, 4: theta_4},
+        (theta_2, theta_3, theta_4, *speeds),
+    )
     return Assembly(turn, foot, numbers, inertia, gravity, dynamics)
 
 
-def write_comment(scene: Scene, form: str, reader: str, assembly: Assembly, at_B: str = "") -> str:
+def write_comment(
+    scene: Scene, form: str, reader: str, assembly: Assembly, at_B: str = ""
+) -> str:
     """Say in what state the file stands, and where its reader's numbers are."""
     notes, bar = NOTES["assembled"], scene.drive_bar
     joint = f", joint {FIRST_PIN[bar]}" if bar != 3 else ""
-    lines = [notes["opens"].strip().format(*map(repr, assembly.numbers), form=form, at_B=at_B)]
-    lines += [notes["drive"].format(bar=bar, joint=joint), *([notes["without_loads"]] if scene.loads else [])]
+    lines = [
+        notes["opens"]
+        .strip()
+        .format(*map(repr, assembly.numbers), form=form, at_B=at_B)
+    ]
+    lines += [
+        notes["drive"].format(bar=bar, joint=joint),
+        *([notes["without_loads"]] if scene.loads else []),
+    ]
     return "\n".join([*lines, notes[reader].strip()])
 
 
 DAMPING = {"viscous": ("damping", "coefficients")}
-AT_JOINTS = {"gazebo": {**DAMPING, "friction": ("friction", "torques")}, "drake": DAMPING}
+AT_JOINTS = {
+    "gazebo": {**DAMPING, "friction": ("friction", "torques")},
+    "drake": DAMPING,
+}
 """Attributes of a joint by effect: its element, and the field of the effect."""
 DRAKE = "http://drake.mit.edu"
 """Namespace of the elements that only Drake reads."""
 
 
-def write_sdf(scene: Scene, reader: str = "gazebo", start: Start | None = None, *, without_loads: bool = False) -> str:
+def write_sdf(
+    scene: Scene,
+    reader: str = "gazebo",
+    start: Start | None = None,
+    *,
+    without_loads: bool = False,
+) -> str:
     """Write the SDF 1.9 text of a scene: a world with gravity, four links, and the pins as joints.
 
     Parameters
@@ -115,12 +147,17 @@ def write_sdf(scene: Scene, reader: str = "gazebo", start: Start | None = None, 
     """
     linkage = scene.linkage
     form = f"SDF for {reader}"
-    assembled = assemble(scene, start, form, AT_JOINTS[reader], without_loads=without_loads)
+    assembled = assemble(
+        scene, start, form, AT_JOINTS[reader], without_loads=without_loads
+    )
     turn, foot, numbers, inertia, gravity, dynamics = assembled
     if reader == "drake" and "B" in dynamics:
         raise LimitError("Drake's ball constraint at pin B has no damping")
     omega_2, at_A, omega_4 = numbers[3:]
-    root = ET.Element("sdf", {"version": "1.9", **({"xmlns:drake": DRAKE} if reader == "drake" else {})})
+    root = ET.Element(
+        "sdf",
+        {"version": "1.9", **({"xmlns:drake": DRAKE} if reader == "drake" else {})},
+    )
     at_B = f", joint B {omega_2 + at_A - omega_4!r} rad/s" if reader == "gazebo" else ""
     for line in write_comment(scene, "SDF", reader, assembled, at_B).splitlines():
         root.append(ET.Comment(f" {line} "))
@@ -131,25 +168,52 @@ def write_sdf(scene: Scene, reader: str = "gazebo", start: Start | None = None, 
     _add_joint(model, "ground_on_world", "fixed", "world", BAR_NAMES[1])
     for number in MOVING_BARS:
         bar = linkage.bar(number)
-        _add_link(model, BAR_NAMES[number], foot[number], turn[number], bar.mass, inertia[number], bar.to_centre)
+        _add_link(
+            model,
+            BAR_NAMES[number],
+            foot[number],
+            turn[number],
+            bar.mass,
+            inertia[number],
+            bar.to_centre,
+        )
         pin = FIRST_PIN[number]
-        _add_joint(model, pin, "revolute", BAR_NAMES[PARENT[number]], BAR_NAMES[number], dynamics.get(pin, {}))
+        _add_joint(
+            model,
+            pin,
+            "revolute",
+            BAR_NAMES[PARENT[number]],
+            BAR_NAMES[number],
+            dynamics.get(pin, {}),
+        )
     length_3, length_4 = linkage.coupler.length, linkage.output.length
     if reader == "gazebo":
-        joint = _add_joint(model, "B", "revolute", BAR_NAMES[4], BAR_NAMES[3], dynamics.get("B", {}))
-        ET.SubElement(joint, "pose").text = join(length_3, 0, 0, 0, 0, 0)  # in the frame of its child
+        joint = _add_joint(
+            model, "B", "revolute", BAR_NAMES[4], BAR_NAMES[3], dynamics.get("B", {})
+        )
+        ET.SubElement(joint, "pose").text = join(
+            length_3, 0, 0, 0, 0, 0
+        )  # in the frame of its child
     else:
         ball = ET.SubElement(model, "drake:ball_constraint")
         for key, value in (("body_A", BAR_NAMES[3]), ("body_B", BAR_NAMES[4])):
             ET.SubElement(ball, f"drake:ball_constraint_{key}").text = value
         for key, length in (("p_AP", length_3), ("p_BQ", length_4)):
-            ET.SubElement(ball, f"drake:ball_constraint_{key}").text = join(length, 0.0, 0.0)
+            ET.SubElement(ball, f"drake:ball_constraint_{key}").text = join(
+                length, 0.0, 0.0
+            )
     ET.indent(root)
     return ET.tostring(root, encoding="unicode") + "\n"
 
 
 def _add_link(
-    model: ET.Element, name: str, foot: complex, turn: float, mass: float, inertia: float, centre: complex
+    model: ET.Element,
+    name: str,
+    foot: complex,
+    turn: float,
+    mass: float,
+    inertia: float,
+    centre: complex,
 ) -> None:
     link = ET.SubElement(model, "link", name=name)
     ET.SubElement(link, "pose").text = join(foot.real, foot.imag, 0, 0, 0, turn)
@@ -157,14 +221,23 @@ def _add_link(
     ET.SubElement(inertial, "pose").text = join(centre.real, centre.imag, 0, 0, 0, 0)
     ET.SubElement(inertial, "mass").text = join(mass)
     tensor = ET.SubElement(inertial, "inertia")
-    for axes in ("ixx", "iyy", "izz"):  # izz alone acts in the plane; three equal ones are a possible body
+    for axes in (
+        "ixx",
+        "iyy",
+        "izz",
+    ):  # izz alone acts in the plane; three equal ones are a possible body
         ET.SubElement(tensor, axes).text = join(inertia)
     for axes in ("ixy", "ixz", "iyz"):
         ET.SubElement(tensor, axes).text = "0"
 
 
 def _add_joint(
-    model: ET.Element, name: str, kind: str, parent: str, child: str, dynamics: dict[str, float] | None = None
+    model: ET.Element,
+    name: str,
+    kind: str,
+    parent: str,
+    child: str,
+    dynamics: dict[str, float] | None = None,
 ) -> ET.Element:
     joint = ET.SubElement(model, "joint", name=name, type=kind)
     ET.SubElement(joint, "parent").text = parent
@@ -179,7 +252,9 @@ def _add_joint(
     return joint
 
 
-def write_usd(scene: Scene, start: Start | None = None, *, without_loads: bool = False) -> str:
+def write_usd(
+    scene: Scene, start: Start | None = None, *, without_loads: bool = False
+) -> str:
     """Write the USD text (.usda) of a scene: three rigid bodies, four revolute joints, the fourth closing the loop.
 
     Parameters and errors as of `write_sdf`; of the effects it has gravity and flywheel.
@@ -210,9 +285,16 @@ def write_usd(scene: Scene, start: Start | None = None, *, without_loads: bool =
         )
     joints = []
     length = {number: linkage.bar(number).length for number in MOVING_BARS}
-    places = {FIRST_PIN[number]: (PARENT[number], number, 0.0) for number in MOVING_BARS} | {"B": (4, 3, length[3])}
+    places = {
+        FIRST_PIN[number]: (PARENT[number], number, 0.0) for number in MOVING_BARS
+    } | {"B": (4, 3, length[3])}
     for pin, (one, follower, along) in places.items():
-        on_one = {"O2": 0j, "A": complex(length[2]), "B": complex(length[4]), "O4": foot[4]}[pin]
+        on_one = {
+            "O2": 0j,
+            "A": complex(length[2]),
+            "B": complex(length[4]),
+            "O4": foot[4],
+        }[pin]
         joints.append(
             f"""    def PhysicsRevoluteJoint "{pin}"
     {{

@@ -31,7 +31,9 @@ from fourbar.scene.motion import Motion
 from fourbar.solution import Array
 from fourbar.solve import solve
 
-NOTES: dict[str, Any] = tomllib.loads(files("fourbar.mjcf").joinpath("notes.toml").read_text(encoding="utf-8"))
+NOTES: dict[str, Any] = tomllib.loads(
+    files("fourbar.mjcf").joinpath("notes.toml").read_text(encoding="utf-8")
+)
 """Comments in the model files: how to start them, and where their numbers stand."""
 AT_REST = 1.0
 """rad/s that flywheel and timestep are laid out for where the scene states no speed."""
@@ -83,7 +85,9 @@ def write_mjcf(
     """
     require_input(scene, "the drive of an MJCF")
     if scene.motion.law is not None:
-        raise LimitError("a motion law has no counterpart in MJCF: its drive keeps omega_2 or alpha_2")
+        raise LimitError(
+            "a motion law has no counterpart in MJCF: its drive keeps omega_2 or alpha_2"
+        )
     require_carriable(scene.linkage)
     cylinder = scene.drive
     if scene.motion.free is not None:
@@ -96,7 +100,9 @@ def write_mjcf(
     elif settings.timestep is not None:
         timestep = settings.timestep * settings.timestep_scale
     else:
-        raise InputError("timestep", None, "is missing: state it, or request a keyframe")
+        raise InputError(
+            "timestep", None, "is missing: state it, or request a keyframe"
+        )
     if settings.pad == "fitted":
         settings = replace(settings, pad=fit_pad(scene))
     model = Model(scene.linkage, settings, timestep)
@@ -110,7 +116,11 @@ def write_mjcf(
     ET.SubElement(root, "compiler", angle="radian", autolimits="true")
     model.add_option(root)
     add_appearance(root, scene.linkage)
-    actuator = make_motor(scene.drive_bar) if drive == "motor" else make_constant_motor(armature * scene.motion.alpha_2)
+    actuator = (
+        make_motor(scene.drive_bar)
+        if drive == "motor"
+        else make_constant_motor(armature * scene.motion.alpha_2)
+    )
     if start is not None:
         start = start._replace(qpos=unwind(scene, start.qpos))
         model.rest = start.qpos
@@ -120,10 +130,14 @@ def write_mjcf(
     model.add_load_sites(root)
     model.add_closure(root)
     model.add_tendons(root)
-    model.add_actuators(root, actuator, cylinder=cylinder is not None and drive != "none")
+    model.add_actuators(
+        root, actuator, cylinder=cylinder is not None and drive != "none"
+    )
     if start is not None:
         frame = ET.SubElement(root, "keyframe")
-        ET.SubElement(frame, "key", name="start", qpos=join(*start.qpos), qvel=join(*start.qvel))
+        ET.SubElement(
+            frame, "key", name="start", qpos=join(*start.qpos), qvel=join(*start.qvel)
+        )
     ET.indent(root)
     return ET.tostring(root, encoding="unicode") + "\n"
 
@@ -136,12 +150,30 @@ def _write_comments(scene: Scene, drive: Drive, reader: str) -> list[str]:
         kinds = ["released"]
     elif drive == "flywheel":
         kinds = ["accelerated" if scene.motion.alpha_2 else "driven"]
-        kinds += [] if _compute_span(scene.linkage) >= FULL_TURN and not change_points(scene.linkage) else ["limits"]
-        kinds += ["cylinder_flywheel"] if scene.drive is not None else ["elsewhere"] if bar != 2 else []
-    lines: list[str] = [notes.get(f"{reader}_{kind}", notes[kind]).format(bar=bar) for kind in ("opens", *kinds)]
+        kinds += (
+            []
+            if _compute_span(scene.linkage) >= FULL_TURN
+            and not change_points(scene.linkage)
+            else ["limits"]
+        )
+        kinds += (
+            ["cylinder_flywheel"]
+            if scene.drive is not None
+            else ["elsewhere"]
+            if bar != 2
+            else []
+        )
+    lines: list[str] = [
+        notes.get(f"{reader}_{kind}", notes[kind]).format(bar=bar)
+        for kind in ("opens", *kinds)
+    ]
     if reader == "genesis" and (names := _list_left_out_by_genesis(scene)):
         lines.append(notes["genesis_without"].format(names=", ".join(names)))
-    lines += numbers["instant"] + (numbers["driven"] if drive == "flywheel" else []) + numbers["pins"]
+    lines += (
+        numbers["instant"]
+        + (numbers["driven"] if drive == "flywheel" else [])
+        + numbers["pins"]
+    )
     lines += [notes["loads"]] if reader == "mujoco" and scene.loads else []
     return [*lines, *numbers["after"]]
 
@@ -150,10 +182,16 @@ def _list_left_out_by_genesis(scene: Scene) -> list[str]:
     """List what Genesis leaves out: loads, springs, effects at B, and the rest angles of torsion springs."""
     names = ["loads"] if scene.loads else []
     for effect in scene.effects:
-        pins = {pin for pin, *_ in effect.rows} if isinstance(effect, PinRows) else set()
+        pins = (
+            {pin for pin, *_ in effect.rows} if isinstance(effect, PinRows) else set()
+        )
         names += ["springs"] if effect.key == "springs" else []
         names += [f"{effect.key} at B"] if "B" in pins else []
-        names += ["rest angles of torsion (it rests as assembled)"] if effect.key == "torsion" and pins - {"B"} else []
+        names += (
+            ["rest angles of torsion (it rests as assembled)"]
+            if effect.key == "torsion" and pins - {"B"}
+            else []
+        )
     return names
 
 
@@ -163,7 +201,9 @@ def size_flywheel(scene: Scene, settings: Settings = RECIPE) -> float:
     L is the longest lever arm, and q the greater of omega_2^2 and |alpha_2|. The work of weights and loads in a
     revolution is then a small part of the flywheel's energy.
     """
-    return float(f"{settings.flywheel * (_sum_inertia(scene.linkage) + _sum_load_inertia(scene)):.3g}")
+    return float(
+        f"{settings.flywheel * (_sum_inertia(scene.linkage) + _sum_load_inertia(scene)):.3g}"
+    )
 
 
 def compute_load_ratio(scene: Scene) -> float:
@@ -176,7 +216,11 @@ def _leave_out_flywheel(scene: Scene, settings: Settings) -> Settings:
     """Choose the timestep by the speed that loads can cause, and a closure that takes little energy out if released."""
     by_loads = compute_load_ratio(scene) * _compute_acceleration_scale(scene)
     speed = math.sqrt((scene.motion.omega_2 or 0.0) ** 2 + by_loads) or AT_REST
-    settings = replace(settings, flywheel=0.0, timestep=settings.timestep or math.tau / (RELEASED_STEPS * speed))
+    settings = replace(
+        settings,
+        flywheel=0.0,
+        timestep=settings.timestep or math.tau / (RELEASED_STEPS * speed),
+    )
     if scene.motion.free is None:
         return settings
     return replace(settings, pad=None, time_constant_steps=RELEASED_CLOSURE)
@@ -190,9 +234,12 @@ def fit_pad(scene: Scene) -> float:
     """
     _, a, b, c = scene.linkage.lengths
     least_sag = SOFT_PAD / math.sqrt(
-        (1.0 + compute_load_ratio(scene)) * max(1.0, compute_mass_ratio(scene.linkage) / LIGHT)
+        (1.0 + compute_load_ratio(scene))
+        * max(1.0, compute_mass_ratio(scene.linkage) / LIGHT)
     )
-    acceleration = _compute_acceleration_scale(scene) * a / max(b, c)  # of bars 3 and 4, by its size
+    acceleration = (
+        _compute_acceleration_scale(scene) * a / max(b, c)
+    )  # of bars 3 and 4, by its size
     return least_sag if acceleration < QUICK else min(STIFF_PAD, least_sag)
 
 
@@ -223,7 +270,10 @@ def _sum_load_inertia(scene: Scene) -> float:
     """Sum the couples of loads and effects on the drive, divided by the acceleration scale, kg m^2."""
     acceleration = _compute_acceleration_scale(scene)
     speed = math.sqrt(acceleration)
-    couples = (find_row(term).couple(term, scene.linkage, speed) for term in (*scene.loads, *scene.effects))
+    couples = (
+        find_row(term).couple(term, scene.linkage, speed)
+        for term in (*scene.loads, *scene.effects)
+    )
     return sum(couples) / acceleration
 
 
@@ -245,25 +295,40 @@ class WindowMotion:
     @property
     def fastest(self) -> float:
         """The greatest |omega_2| in the window, rad/s."""
-        return math.sqrt(max(self.omega**2, self.omega**2 + 2.0 * self.alpha * (self.stop - self.start)))
+        return math.sqrt(
+            max(
+                self.omega**2,
+                self.omega**2 + 2.0 * self.alpha * (self.stop - self.start),
+            )
+        )
 
     def time(self, theta_2: float) -> float:
         """Return the time when the input passes an angle, s; LimitError where alpha_2 stops it before."""
         angle = theta_2 - self.start
         squared = self.omega**2 + 2.0 * self.alpha * angle
         if squared <= 0.0:
-            raise LimitError(f"alpha_2 brings the input to rest before theta_2 = {theta_2:.6g} rad")
-        return 2.0 * angle / (self.omega + math.copysign(math.sqrt(squared), self.omega))
+            raise LimitError(
+                f"alpha_2 brings the input to rest before theta_2 = {theta_2:.6g} rad"
+            )
+        return (
+            2.0 * angle / (self.omega + math.copysign(math.sqrt(squared), self.omega))
+        )
 
     def timestep(self, settings: Settings = RECIPE, at_least: int = 0) -> float:
         """Choose a timestep that divides the turn: at least so many steps per revolution, per window and in all, s."""
         if settings.timestep is not None:
             return settings.timestep * settings.timestep_scale
         duration = self.time(self.stop)
-        per_revolution = duration * self.fastest / (2.0 * math.pi) * settings.steps_per_revolution
+        per_revolution = (
+            duration * self.fastest / (2.0 * math.pi) * settings.steps_per_revolution
+        )
         # at the greatest speed throughout: an input that speeds up covers the end of its window in few steps
         width = abs(self.stop - self.start)
-        window = settings.steps_per_window * duration * self.fastest / width if 0.0 < width < FULL_TURN else 1.0
+        window = (
+            settings.steps_per_window * duration * self.fastest / width
+            if 0.0 < width < FULL_TURN
+            else 1.0
+        )
         # a window of 628 steps per revolution must not become one more by a rounding
         steps = max(math.ceil(max(per_revolution, window) * (1.0 - 1e-9)), at_least)
         return duration / steps * settings.timestep_scale
@@ -280,7 +345,11 @@ class Start(NamedTuple):
 def choose_run(theta_2: Array, omega: float, alpha: float) -> WindowMotion:
     """Choose the motion through positions: counter-clockwise from the least, or clockwise from the greatest."""
     least, most = float(np.min(theta_2)), float(np.max(theta_2))
-    return WindowMotion(least, most, omega, alpha) if omega > 0.0 else WindowMotion(most, least, omega, alpha)
+    return (
+        WindowMotion(least, most, omega, alpha)
+        if omega > 0.0
+        else WindowMotion(most, least, omega, alpha)
+    )
 
 
 def find_start(scene: Scene) -> Start:
@@ -288,14 +357,22 @@ def find_start(scene: Scene) -> Start:
     commanded = command(scene)
     alpha = scene.motion.alpha_2
     speed = scene.motion.omega_2 or 0.0
-    solution = solve(scene, "velocity", at=Command(commanded.theta_2, commanded.branch, speed, alpha))
+    solution = solve(
+        scene, "velocity", at=Command(commanded.theta_2, commanded.branch, speed, alpha)
+    )
     usable = np.flatnonzero(solution.status_code == OK)
     if not len(usable):
-        raise NotAssembledError("the linkage closes at none of the scene's positions: there is no keyframe to write")
+        raise NotAssembledError(
+            "the linkage closes at none of the scene's positions: there is no keyframe to write"
+        )
     theta_2 = commanded.theta_2[usable]
     first = int(usable[np.argmin(theta_2) if speed >= 0.0 else np.argmax(theta_2)])
     assert solution.omega_3 is not None and solution.omega_4 is not None
-    theta = (float(commanded.theta_2[first]), float(solution.theta_3[first]), float(solution.theta_4[first]))
+    theta = (
+        float(commanded.theta_2[first]),
+        float(solution.theta_3[first]),
+        float(solution.theta_4[first]),
+    )
     omega = (speed, float(solution.omega_3[first]), float(solution.omega_4[first]))
     if np.ptp(theta_2) == 0.0:
         theta_2 = theta[0] + np.array([0.0, _compute_span(scene.linkage)])
@@ -317,23 +394,37 @@ SINGLE = replace(RECIPE, flywheel=1e3, pad=None)
 """Settings for single precision, where a flywheel of 1e8 and fitted pads lose the closing force entirely."""
 FAST = replace(RECIPE, time_constant_steps=2.0)
 """Settings for a `connect` without (dJ/dt) v: with a short time constant the position error soon makes up for it."""
-SIMULATORS = {"mujoco": RECIPE, "warp": SINGLE, "mjx": FAST, "genesis": RECIPE, "newton": SINGLE}
+SIMULATORS = {
+    "mujoco": RECIPE,
+    "warp": SINGLE,
+    "mjx": FAST,
+    "genesis": RECIPE,
+    "newton": SINGLE,
+}
 """Who reads the file, and the settings that carry the loop best there."""
 OWN_MOTORS = ("genesis", "newton")
 """Who puts couples on joints itself, and takes none from the controls of a file; Genesis takes no actuator at all."""
 
 
-def write_mjcf_for(scene: Scene, simulator: str = "mujoco", drive: Drive = "flywheel") -> str:
+def write_mjcf_for(
+    scene: Scene, simulator: str = "mujoco", drive: Drive = "flywheel"
+) -> str:
     """Write the MJCF text of a scene for one simulator, its comments naming where torque and pin force are read.
 
     Raises InputError for no such simulator, or a motor for one that does not take it, and as `write_mjcf` does.
     """
     if simulator not in SIMULATORS:
-        raise InputError("simulator", simulator, f"must be one of {', '.join(SIMULATORS)}")
+        raise InputError(
+            "simulator", simulator, f"must be one of {', '.join(SIMULATORS)}"
+        )
     if drive not in get_args(Drive):
         raise InputError("drive", drive, f"must be one of {', '.join(get_args(Drive))}")
     if drive == "motor" and simulator in OWN_MOTORS:
-        raise InputError("drive", drive, f"only mujoco, warp and mjx read it; leave it out for {simulator}")
+        raise InputError(
+            "drive",
+            drive,
+            f"only mujoco, warp and mjx read it; leave it out for {simulator}",
+        )
     return write_mjcf(scene, SIMULATORS[simulator], simulator, drive=drive)
 
 
@@ -343,7 +434,9 @@ OMEGA = 1.0
 """rad/s of the input."""
 
 
-def make_scene(ground: float, input: float, coupler: float, output: float, omega: float = OMEGA) -> Scene:
+def make_scene(
+    ground: float, input: float, coupler: float, output: float, omega: float = OMEGA
+) -> Scene:
     """Make a scene of uniform slender bars of 1 kg/m, the input at omega (rad/s) from mid-range; lengths in m."""
     linkage = uniform(ground, input, coupler, output, per_metre=PER_METRE)
     title = f"four-bar {ground!r} {input!r} {coupler!r} {output!r}"
@@ -359,7 +452,10 @@ def list_defaults(scene: Scene) -> list[str]:
     assert isinstance(theta_2, float)
     return [
         "lengths in m: "
-        + ", ".join(f"{n} {x!r}" for n, x in zip(BAR_NAMES.values(), scene.linkage.lengths, strict=True)),
+        + ", ".join(
+            f"{n} {x!r}"
+            for n, x in zip(BAR_NAMES.values(), scene.linkage.lengths, strict=True)
+        ),
         f"bars: uniform and slender, {PER_METRE:g} kg/m",
         "branch: open",
         f"omega_2: {scene.motion.omega_2!r} rad/s, alpha_2: 0",

@@ -10,7 +10,15 @@ from fourbar.mjcf.model import Model
 from fourbar.scene import Scene
 
 if TYPE_CHECKING:
-    from fourbar.effects import Effect, Flywheel, Friction, Gravity, Load, Torsion, Viscous
+    from fourbar.effects import (
+        Effect,
+        Flywheel,
+        Friction,
+        Gravity,
+        Load,
+        Torsion,
+        Viscous,
+    )
 
 Joints = tuple[float, float, float]
 
@@ -47,7 +55,9 @@ def _add_torsion(effect: "Torsion", model: Model) -> None:
         turned = model.linkage.ground_angle if pin in ("O2", "O4") else 0.0
         model.pin[pin]["stiffness"] = k
         # a tendon's rest is a length
-        model.pin[pin]["springlength" if pin == "B" else "springref"] = rest + turned - preload / k
+        model.pin[pin]["springlength" if pin == "B" else "springref"] = (
+            rest + turned - preload / k
+        )
 
 
 def _unwind_torsion(effect: "Torsion", linkage: FourBar, q: Joints) -> Joints:
@@ -55,17 +65,27 @@ def _unwind_torsion(effect: "Torsion", linkage: FourBar, q: Joints) -> Joints:
     rests = {pin: rest for pin, _, rest, _ in effect.springs}
 
     def turns(pin: str, angle: float, line: float) -> float:
-        return 0.0 if pin not in rests else math.tau * round((rests[pin] + line - angle) / math.tau)
+        return (
+            0.0
+            if pin not in rests
+            else math.tau * round((rests[pin] + line - angle) / math.tau)
+        )
 
     theta_1 = linkage.ground_angle
-    q2, q3, q4 = q[0] + turns("O2", q[0], theta_1), q[1] + turns("A", q[1], 0.0), q[2] + turns("O4", q[2], theta_1)
+    q2, q3, q4 = (
+        q[0] + turns("O2", q[0], theta_1),
+        q[1] + turns("A", q[1], 0.0),
+        q[2] + turns("O4", q[2], theta_1),
+    )
     at_B = turns("B", q4 - q2 - q3, 0.0)
     if at_B and "O4" not in rests:
         q4 += at_B
     elif at_B and "A" not in rests:
         q3 -= at_B
     elif at_B:
-        raise LimitError("the springs at A, B and O4 count turns that MuJoCo's joints cannot have at once")
+        raise LimitError(
+            "the springs at A, B and O4 count turns that MuJoCo's joints cannot have at once"
+        )
     return q2, q3, q4
 
 
@@ -77,7 +97,9 @@ def _add_flywheel(effect: "Flywheel", model: Model) -> None:
 def _add_load(effect: "Load", model: Model) -> None:
     """Add a constant actuator on a site (force) or on the bar (couple)."""
     if effect.table is not None:
-        raise LimitError("a load that is a table over theta_2 has no counterpart in MJCF")
+        raise LimitError(
+            "a load that is a table over theta_2 has no counterpart in MJCF"
+        )
     model.loads.append(effect)
 
 
@@ -95,16 +117,34 @@ class MjcfForm(NamedTuple):
 MJCF_OF: dict[str, MjcfForm] = {
     "gravity": MjcfForm(_add_gravity, _sum_weights),
     "viscous": MjcfForm(
-        _add_viscous, lambda effect, linkage, speed: sum((k for _, k in effect.coefficients), 0.0) * speed
+        _add_viscous,
+        lambda effect, linkage, speed: (
+            sum((k for _, k in effect.coefficients), 0.0) * speed
+        ),
     ),
-    "friction": MjcfForm(_add_friction, lambda effect, linkage, speed: sum((f for _, f in effect.torques), 0.0)),
-    "torsion": MjcfForm(_add_torsion, lambda effect, linkage, speed: effect.greatest_couple, _unwind_torsion),
+    "friction": MjcfForm(
+        _add_friction,
+        lambda effect, linkage, speed: sum((f for _, f in effect.torques), 0.0),
+    ),
+    "torsion": MjcfForm(
+        _add_torsion,
+        lambda effect, linkage, speed: effect.greatest_couple,
+        _unwind_torsion,
+    ),
     "springs": MjcfForm(  # spatial tendons
         lambda effect, model: model.springs.extend(effect.springs),
-        lambda effect, linkage, speed: sum(s.greatest_tension(linkage) for s in effect.springs) * max(linkage.lengths),
+        lambda effect, linkage, speed: (
+            sum(s.greatest_tension(linkage) for s in effect.springs)
+            * max(linkage.lengths)
+        ),
     ),
     "flywheel": MjcfForm(_add_flywheel),
-    "load": MjcfForm(_add_load, lambda effect, linkage, speed: effect.greatest_force(linkage) * max(linkage.lengths)),
+    "load": MjcfForm(
+        _add_load,
+        lambda effect, linkage, speed: (
+            effect.greatest_force(linkage) * max(linkage.lengths)
+        ),
+    ),
 }
 """MJCF forms of the effects by key."""
 NO_MJCF = {"pin_friction"}

@@ -93,14 +93,40 @@ def compute_frame(linkage: FourBar) -> CameraView:
 def add_appearance(root: ET.Element, linkage: FourBar) -> None:
     """Add the extent and free camera of the viewer, light and background."""
     seen = compute_frame(linkage)
-    ET.SubElement(root, "statistic", extent=write_rounded(seen.distance / 1.5), center=write_rounded(seen.x, seen.y, 0))
+    ET.SubElement(
+        root,
+        "statistic",
+        extent=write_rounded(seen.distance / 1.5),
+        center=write_rounded(seen.x, seen.y, 0),
+    )
     visual = ET.SubElement(root, "visual")
     # the viewer's free camera starts at 1.5 extents from the centre; -90 deg looks straight down on the plane
-    ET.SubElement(visual, "global", azimuth="90", elevation="-90", fovy=f"{FOVY:g}", offwidth="1280", offheight="960")
-    ET.SubElement(visual, "headlight", ambient=".45 .45 .45", diffuse=".35 .35 .35", specular=".1 .1 .1")
+    ET.SubElement(
+        visual,
+        "global",
+        azimuth="90",
+        elevation="-90",
+        fovy=f"{FOVY:g}",
+        offwidth="1280",
+        offheight="960",
+    )
+    ET.SubElement(
+        visual,
+        "headlight",
+        ambient=".45 .45 .45",
+        diffuse=".35 .35 .35",
+        specular=".1 .1 .1",
+    )
     ET.SubElement(visual, "rgba", haze="1 1 1 1")
-    sky: dict[str, Any] = {"rgb1": ".95 .96 .98", "rgb2": ".95 .96 .98", "width": "32", "height": "192"}
-    ET.SubElement(ET.SubElement(root, "asset"), "texture", type="skybox", builtin="flat", **sky)
+    sky: dict[str, Any] = {
+        "rgb1": ".95 .96 .98",
+        "rgb2": ".95 .96 .98",
+        "width": "32",
+        "height": "192",
+    }
+    ET.SubElement(
+        ET.SubElement(root, "asset"), "texture", type="skybox", builtin="flat", **sky
+    )
 
 
 def add_camera(world: ET.Element, linkage: FourBar) -> None:
@@ -117,7 +143,12 @@ CYLINDER = "cylinder"
 """Name of the tendon of a linear drive, and of the actuator on it."""
 FLOOR = 1e-15
 """mjMINVAL: MuJoCo refuses a moving body of less mass (kg) or inertia (kg m^2)."""
-COLOURS = {1: "0.45 0.45 0.48 1", 2: "0.12 0.47 0.71 1", 3: "1 0.5 0.05 1", 4: "0.17 0.63 0.17 1"}
+COLOURS = {
+    1: "0.45 0.45 0.48 1",
+    2: "0.12 0.47 0.71 1",
+    3: "1 0.5 0.05 1",
+    4: "0.17 0.63 0.17 1",
+}
 SLIP_DAMPING = 1e6
 """Damping of dry friction, per timestep: the greater, the slower the slip that it still softens. The drive prescribes
 the slip itself, so it makes nothing stiff; measured, a reversal is then as exact as any other position."""
@@ -145,7 +176,11 @@ UNCONTROLLED = {"gaintype": "fixed", "gainprm": "0", "biastype": "affine"}
 
 def make_constant_motor(force: float) -> dict[str, str]:
     """Make the drive a motor on pin O2 that ignores its control; none where the force is 0."""
-    return {**UNCONTROLLED, "joint": "O2", "biasprm": join(force, 0.0, 0.0)} if force else {}
+    return (
+        {**UNCONTROLLED, "joint": "O2", "biasprm": join(force, 0.0, 0.0)}
+        if force
+        else {}
+    )
 
 
 def make_servo(gain: float, omega: float) -> dict[str, str]:
@@ -157,7 +192,9 @@ def make_motor(bar: int | None) -> dict[str, str]:
     """Make the drive a motor whose control is the couple of ground on a bar, N m; a cylinder has one of its own."""
     if bar is None:
         return {}
-    return {"joint": FIRST_PIN[bar]} if bar != 3 else {"site": "B3", "gear": "0 0 0 0 0 1"}
+    return (
+        {"joint": FIRST_PIN[bar]} if bar != 3 else {"site": "B3", "gear": "0 0 0 0 0 1"}
+    )
 
 
 A_MILLIONTH = 1e-6
@@ -170,14 +207,19 @@ def require_carriable(linkage: FourBar) -> None:
     """Raise an InputError where a bar is lighter than MuJoCo carries; it says which mass does instead."""
     heaviest = max(linkage.bar(number).mass for number in MOVING_BARS)
     enough = max(A_MILLIONTH * heaviest, 2.0 * FLOOR) if heaviest else ALONE
-    part = "a millionth of the heaviest bar's" if heaviest else "which all bars can have where loads alone act"
+    part = (
+        "a millionth of the heaviest bar's"
+        if heaviest
+        else "which all bars can have where loads alone act"
+    )
     for number in MOVING_BARS:
         bar = linkage.bar(number)
         for key, value in (("mass", bar.mass), ("inertia", bar.moment_of_inertia)):
             if value < FLOOR:
                 instead = f'mass = "{enough:.2g} kg" ({part}) and no inertia stated'
                 allowed = (
-                    f"MuJoCo cannot carry a massless bar; with {instead} the simulation holds, and hardly a force moves"
+                    "MuJoCo cannot carry a massless bar; "
+                    f"with {instead} the simulation holds, and hardly a force moves"
                 )
                 raise InputError(f"bars.{BAR_NAMES[number]}.{key}", value, allowed)
 
@@ -189,7 +231,9 @@ class Model:
         self.linkage, self.settings = linkage, settings
         self.option: dict[str, Iterable[float]] = {"gravity": (0.0, 0.0, 0.0)}
         self.timestep = timestep
-        self.pin: dict[str, dict[str, float | tuple[float, ...]]] = {pin: {} for pin in PINS}
+        self.pin: dict[str, dict[str, float | tuple[float, ...]]] = {
+            pin: {} for pin in PINS
+        }
         self.loads: list[Load] = []
         self.springs: list[Spring] = []
         self.cylinder: LinearDrive | None = None
@@ -248,13 +292,17 @@ class Model:
         ground = ET.SubElement(world, "body", name="ground")
         ET.SubElement(ground, "inertial", pos="0 0 0", mass="1", diaginertia="1 1 1")
         self._add_capsule(ground, 1, self.linkage.ground, -2.0 * self.radius)
-        ET.SubElement(ground, "site", name="O2", pos="0 0 0", size=write_rounded(self.radius))
+        ET.SubElement(
+            ground, "site", name="O2", pos="0 0 0", size=write_rounded(self.radius)
+        )
         self._add_site(ground, "O4", *self.O4)
         crank = self._add_bar(ground, 2, (0.0, 0.0), armature=flywheel)
         self._add_bar(crank, 3, (self.linkage.input.length, 0.0))
         self._add_bar(ground, 4, self.O4)
 
-    def _add_bar(self, parent: ET.Element, number: int, at: tuple[float, float], **drive: float) -> ET.Element:
+    def _add_bar(
+        self, parent: ET.Element, number: int, at: tuple[float, float], **drive: float
+    ) -> ET.Element:
         """Add a bar turning about its first pin; bars 3 and 4 end in the sites that the loop's closure joins."""
         bar, pin = self.linkage.bar(number), FIRST_PIN[number]
         body = ET.SubElement(parent, "body", name=BAR_NAMES[number], pos=join(*at, 0.0))
@@ -272,8 +320,12 @@ class Model:
         )
         numbers = {**drive, **self.pin[pin]}
         joint = {key: join(*np.atleast_1d(value)) for key, value in numbers.items()}
-        ET.SubElement(body, "joint", {"name": pin, "type": "hinge", "axis": "0 0 1", **joint})
-        self._add_capsule(body, number, bar.length, self.radius if number == 3 else -self.radius)
+        ET.SubElement(
+            body, "joint", {"name": pin, "type": "hinge", "axis": "0 0 1", **joint}
+        )
+        self._add_capsule(
+            body, number, bar.length, self.radius if number == 3 else -self.radius
+        )
         if number == 2:
             self._add_site(body, "A", bar.length)
             return body
@@ -288,9 +340,17 @@ class Model:
         return body
 
     def _add_site(self, body: ET.Element, name: str, x: float, y: float = 0.0) -> None:
-        ET.SubElement(body, "site", name=name, pos=join(x, y, 0.0), size=write_rounded(self.radius))
+        ET.SubElement(
+            body,
+            "site",
+            name=name,
+            pos=join(x, y, 0.0),
+            size=write_rounded(self.radius),
+        )
 
-    def _add_capsule(self, body: ET.Element, number: int, length: float, z: float) -> None:
+    def _add_capsule(
+        self, body: ET.Element, number: int, length: float, z: float
+    ) -> None:
         """Add a bar's shape: for the eye only, without mass and without contact."""
         theta = self.linkage.ground_angle if number == 1 else 0.0
         cos, sin = math.cos(theta), math.sin(theta)
@@ -309,7 +369,13 @@ class Model:
         s, pair = self.settings, {"name": "B", "site1": "B3", "site2": "B4"}
         solref = join(s.time_constant_steps * self.timestep, 1.0)
         solimp = join(s.impedance, s.impedance, 0.001, 0.5, 2.0)
-        ET.SubElement(ET.SubElement(root, "equality"), "connect", pair, solref=solref, solimp=solimp)
+        ET.SubElement(
+            ET.SubElement(root, "equality"),
+            "connect",
+            pair,
+            solref=solref,
+            solimp=solimp,
+        )
 
     def add_tendons(self, root: ET.Element) -> None:
         """Add a tendon theta_4 - theta_3 for what acts at the cut pin B, and one between two sites for each spring."""
@@ -317,20 +383,31 @@ class Model:
             return
         tendons = ET.SubElement(root, "tendon")
         if self.pin["B"]:
-            attributes = {key: join(*np.atleast_1d(value)) for key, value in self.pin["B"].items()}
+            attributes = {
+                key: join(*np.atleast_1d(value)) for key, value in self.pin["B"].items()
+            }
             fixed = ET.SubElement(tendons, "fixed", {"name": "B", **attributes})
             for joint, coefficient in (("O2", -1), ("A", -1), ("O4", 1)):
                 ET.SubElement(fixed, "joint", joint=joint, coef=str(coefficient))
         for index, spring in enumerate(self.springs, 1):
-            tendon = self._add_line(root, tendons, f"spring_{index}", spring.start, spring.end)
+            tendon = self._add_line(
+                root, tendons, f"spring_{index}", spring.start, spring.end
+            )
             if _is_slack_somewhere(spring):
                 tendon.set("stiffness", join(spring.stiffness))
                 tendon.set("springlength", join(-spring.slack / spring.stiffness))
         if self.cylinder is not None:
-            self._add_line(root, tendons, CYLINDER, self.cylinder.start, self.cylinder.end)
+            self._add_line(
+                root, tendons, CYLINDER, self.cylinder.start, self.cylinder.end
+            )
 
     def _add_line(
-        self, root: ET.Element, tendons: ET.Element, name: str, start: "SpringEnd", end: "SpringEnd"
+        self,
+        root: ET.Element,
+        tendons: ET.Element,
+        name: str,
+        start: "SpringEnd",
+        end: "SpringEnd",
     ) -> ET.Element:
         """Add a tendon between two points of bars, with a site at each."""
         tendon = ET.SubElement(tendons, "spatial", name=name)
@@ -338,7 +415,10 @@ class Model:
             ET.SubElement(tendon, "site", site=f"{name}_{which}")
             x, y = point.in_bar.real, point.in_bar.imag
             if point.bar == 1:  # the ground's body keeps world axes
-                cos, sin = math.cos(self.linkage.ground_angle), math.sin(self.linkage.ground_angle)
+                cos, sin = (
+                    math.cos(self.linkage.ground_angle),
+                    math.sin(self.linkage.ground_angle),
+                )
                 x, y = cos * x - sin * y, sin * x + cos * y
             self._add_site(_find_body(root, point.bar), f"{name}_{which}", x, y)
         return tendon
@@ -353,9 +433,15 @@ class Model:
                 y += load.at[0] * math.sin(load.at[1])
             self._add_site(_find_body(root, load.bar), f"load_{index}", x, y)
 
-    def add_actuators(self, root: ET.Element, drive: dict[str, str], *, cylinder: bool) -> None:
+    def add_actuators(
+        self, root: ET.Element, drive: dict[str, str], *, cylinder: bool
+    ) -> None:
         """Add actuators: the drive, if it has attributes; loads and some springs, uncontrolled."""
-        springs = {f"spring_{i}": s for i, s in enumerate(self.springs, 1) if not _is_slack_somewhere(s)}
+        springs = {
+            f"spring_{i}": s
+            for i, s in enumerate(self.springs, 1)
+            if not _is_slack_somewhere(s)
+        }
         if not drive and not cylinder and not self.loads and not springs:
             return
         actuators = ET.SubElement(root, "actuator")
@@ -365,19 +451,39 @@ class Model:
             ET.SubElement(actuators, "general", name=CYLINDER, tendon=CYLINDER)
         for name, spring in springs.items():
             tension = join(-spring.slack, 0.0 - spring.stiffness, 0.0)
-            ET.SubElement(actuators, "general", UNCONTROLLED, name=name, tendon=name, biasprm=tension)
+            ET.SubElement(
+                actuators,
+                "general",
+                UNCONTROLLED,
+                name=name,
+                tendon=name,
+                biasprm=tension,
+            )
         for index, load in enumerate(self.loads, 1):
             fx = fy = 0.0
             couple = load.moment
             if load.force is not None:
-                fx, fy = load.force[0] * math.cos(load.force[1]), load.force[0] * math.sin(load.force[1])
-                if load.frame == "world":  # force and arm both keep their direction: so does the couple
-                    couple += load.at[0] * (math.cos(load.at[1]) * fy - math.sin(load.at[1]) * fx)
+                fx, fy = (
+                    load.force[0] * math.cos(load.force[1]),
+                    load.force[0] * math.sin(load.force[1]),
+                )
+                if (
+                    load.frame == "world"
+                ):  # force and arm both keep their direction: so does the couple
+                    couple += load.at[0] * (
+                        math.cos(load.at[1]) * fy - math.sin(load.at[1]) * fx
+                    )
             placed = {"name": f"load_{index}", "site": f"load_{index}"}
             if load.frame == "world":
                 placed["refsite"] = "O2"
             gear = join(fx, fy, 0.0, 0.0, 0.0, couple)
-            ET.SubElement(actuators, "general", {**UNCONTROLLED, **placed}, gear=gear, biasprm="1 0 0")
+            ET.SubElement(
+                actuators,
+                "general",
+                {**UNCONTROLLED, **placed},
+                gear=gear,
+                biasprm="1 0 0",
+            )
 
 
 def _is_slack_somewhere(spring: "Spring") -> bool:

@@ -45,52 +45,109 @@ class Quantities:
     theta_2: Array = _scalar("rad", None, "angle of the input")
     theta_3: Array = _scalar("rad", "position", "angle of the coupler", "unknown")
     theta_4: Array = _scalar("rad", "position", "angle of the output", "unknown")
-    sin_mu: Array = _scalar("1", "position", "sin(theta_4 - theta_3), signed like the branch")
-    condition: Array = _scalar("1", "position", "motion condition |sin_mu|, in (0, 1]; 1 is best")
+    sin_mu: Array = _scalar(
+        "1", "position", "sin(theta_4 - theta_3), signed like the branch"
+    )
+    condition: Array = _scalar(
+        "1", "position", "motion condition |sin_mu|, in (0, 1]; 1 is best"
+    )
     A: Array = _vector("m", "position", "pin of input and coupler")
     B: Array = _vector("m", "position", "pin of coupler and output")
     G2: Array = _vector("m", "position", "mass centre of the input")
     G3: Array = _vector("m", "position", "mass centre of the coupler")
     G4: Array = _vector("m", "position", "mass centre of the output")
-    stroke: Array | None = _scalar("m", "position", "distance of the linear drive's ends", "linear drive")
-    drive_line: Array | None = _vector("1", "position", "unit vector from its one end to the other", "linear drive")
-    omega_2: Array | None = _scalar("rad/s", "velocity", "angular velocity of the input")
-    omega_3: Array | None = _scalar("rad/s", "velocity", "angular velocity of the coupler", "unknown")
-    omega_4: Array | None = _scalar("rad/s", "velocity", "angular velocity of the output", "unknown")
+    stroke: Array | None = _scalar(
+        "m", "position", "distance of the linear drive's ends", "linear drive"
+    )
+    drive_line: Array | None = _vector(
+        "1", "position", "unit vector from its one end to the other", "linear drive"
+    )
+    omega_2: Array | None = _scalar(
+        "rad/s", "velocity", "angular velocity of the input"
+    )
+    omega_3: Array | None = _scalar(
+        "rad/s", "velocity", "angular velocity of the coupler", "unknown"
+    )
+    omega_4: Array | None = _scalar(
+        "rad/s", "velocity", "angular velocity of the output", "unknown"
+    )
     v_A: Array | None = _vector("m/s", "velocity", "velocity of A")
     v_B: Array | None = _vector("m/s", "velocity", "velocity of B")
     v_G2: Array | None = _vector("m/s", "velocity", "velocity of G2")
     v_G3: Array | None = _vector("m/s", "velocity", "velocity of G3")
     v_G4: Array | None = _vector("m/s", "velocity", "velocity of G4")
-    stroke_speed: Array | None = _scalar("m/s", "velocity", "speed at which the stroke grows", "linear drive")
-    alpha_2: Array | None = _scalar("rad/s^2", "acceleration", "angular acceleration of the input")
-    alpha_3: Array | None = _scalar("rad/s^2", "acceleration", "angular acceleration of the coupler", "unknown")
-    alpha_4: Array | None = _scalar("rad/s^2", "acceleration", "angular acceleration of the output", "unknown")
+    stroke_speed: Array | None = _scalar(
+        "m/s", "velocity", "speed at which the stroke grows", "linear drive"
+    )
+    alpha_2: Array | None = _scalar(
+        "rad/s^2", "acceleration", "angular acceleration of the input"
+    )
+    alpha_3: Array | None = _scalar(
+        "rad/s^2", "acceleration", "angular acceleration of the coupler", "unknown"
+    )
+    alpha_4: Array | None = _scalar(
+        "rad/s^2", "acceleration", "angular acceleration of the output", "unknown"
+    )
     a_A: Array | None = _vector("m/s^2", "acceleration", "acceleration of A")
     a_B: Array | None = _vector("m/s^2", "acceleration", "acceleration of B")
     a_G2: Array | None = _vector("m/s^2", "acceleration", "acceleration of G2")
     a_G3: Array | None = _vector("m/s^2", "acceleration", "acceleration of G3")
     a_G4: Array | None = _vector("m/s^2", "acceleration", "acceleration of G4")
-    F12: Array | None = _vector("N", "force", "force of ground on the input, at O2", "unknown")
-    F32: Array | None = _vector("N", "force", "force of the coupler on the input, at A", "unknown")
-    F43: Array | None = _vector("N", "force", "force of the output on the coupler, at B", "unknown")
-    F14: Array | None = _vector("N", "force", "force of ground on the output, at O4", "unknown")
-    torque: Array | None = _scalar("N m", "force", "couple of ground on the driven bar", "unknown")
-    drive_force: Array | None = _scalar("N", "force", "force of the drive, pushing its ends apart", "linear drive")
+    F12: Array | None = _vector(
+        "N", "force", "force of ground on the input, at O2", "unknown"
+    )
+    F32: Array | None = _vector(
+        "N", "force", "force of the coupler on the input, at A", "unknown"
+    )
+    F43: Array | None = _vector(
+        "N", "force", "force of the output on the coupler, at B", "unknown"
+    )
+    F14: Array | None = _vector(
+        "N", "force", "force of ground on the output, at O4", "unknown"
+    )
+    torque: Array | None = _scalar(
+        "N m", "force", "couple of ground on the driven bar", "unknown"
+    )
+    drive_force: Array | None = _scalar(
+        "N", "force", "force of the drive, pushing its ends apart", "linear drive"
+    )
     power: Array | None = _scalar("W", "force", "power of the drive")
-    drive_condition: Array | None = _scalar("1", "force", "leverage of the drive, in (0, 1]; 1 is best")
-    torque_error: Array | None = _scalar("N m", "error", "error bar of the torque: what rounding makes it scatter by")
-    drive_force_error: Array | None = _scalar("N", "error", "error bar of the drive's force", "linear drive")
-    force_error: Array | None = _scalar("N", "error", "error bar of the pin forces, of the worst of the four")
-    torque_low: Array | None = _scalar("N m", "force", "least torque while dry friction holds a pin", "dry friction")
-    torque_high: Array | None = _scalar("N m", "force", "greatest then; otherwise both are torque", "dry friction")
-    drive_force_low: Array | None = _scalar("N", "force", "least force of the linear drive then", "dry friction")
-    drive_force_high: Array | None = _scalar("N", "force", "greatest then", "dry friction")
-    friction_residual: Array | None = _scalar("N m", "force", "largest remaining |mu r |F| - couple|", "pin loads")
-    time: Array | None = _scalar("s", None, "of a motion law or a free motion, which ends at a limit position")
+    drive_condition: Array | None = _scalar(
+        "1", "force", "leverage of the drive, in (0, 1]; 1 is best"
+    )
+    torque_error: Array | None = _scalar(
+        "N m", "error", "error bar of the torque: what rounding makes it scatter by"
+    )
+    drive_force_error: Array | None = _scalar(
+        "N", "error", "error bar of the drive's force", "linear drive"
+    )
+    force_error: Array | None = _scalar(
+        "N", "error", "error bar of the pin forces, of the worst of the four"
+    )
+    torque_low: Array | None = _scalar(
+        "N m", "force", "least torque while dry friction holds a pin", "dry friction"
+    )
+    torque_high: Array | None = _scalar(
+        "N m", "force", "greatest then; otherwise both are torque", "dry friction"
+    )
+    drive_force_low: Array | None = _scalar(
+        "N", "force", "least force of the linear drive then", "dry friction"
+    )
+    drive_force_high: Array | None = _scalar(
+        "N", "force", "greatest then", "dry friction"
+    )
+    friction_residual: Array | None = _scalar(
+        "N m", "force", "largest remaining |mu r |F| - couple|", "pin loads"
+    )
+    time: Array | None = _scalar(
+        "s", None, "of a motion law or a free motion, which ends at a limit position"
+    )
 
 
-QUANTITIES = tuple(Quantity(declared.name, *declared.metadata["line"]) for declared in fields(Quantities))
+QUANTITIES = tuple(
+    Quantity(declared.name, *declared.metadata["line"])
+    for declared in fields(Quantities)
+)
 UNITS = {q.name: q.unit for q in QUANTITIES}
 STAGE_OF = {q.name: q.stage for q in QUANTITIES if q.stage is not None}
 """Every evaluated quantity and the stage that computes it."""
@@ -115,9 +172,13 @@ class DriveNames(NamedTuple):
 
 COUPLE = DriveNames("torque", "torque_error", "torque_low", "torque_high")
 """Names for a drive that turns a bar."""
-LINE = DriveNames("drive_force", "drive_force_error", "drive_force_low", "drive_force_high")
+LINE = DriveNames(
+    "drive_force", "drive_force_error", "drive_force_low", "drive_force_high"
+)
 """Names for a drive that pushes along a line."""
-LINE_QUANTITIES = (*dict.fromkeys((*(q.name for q in QUANTITIES if q.group == "linear drive"), *LINE)),)
+LINE_QUANTITIES = (
+    *dict.fromkeys((*(q.name for q in QUANTITIES if q.group == "linear drive"), *LINE)),
+)
 """Every quantity that exists only where the drive is linear."""
 FORCES = (*PIN_FORCES, COUPLE.value, LINE.value, "power")
 DRY_FRICTION_QUANTITIES = tuple(q.name for q in QUANTITIES if q.group == "dry friction")
@@ -127,6 +188,16 @@ STATUS_NAMES = (
     *("no_torque", "overflow", "invalid", "no_lever"),
 )
 """Status names by code; `Solution.status_code` explains each."""
-OK, NOT_ASSEMBLED, SINGULAR, JAMMED, SEVERAL, NO_DIRECTION, WOUND, NO_TORQUE, OVERFLOW, INVALID, NO_LEVER = range(
-    len(STATUS_NAMES)
-)
+(
+    OK,
+    NOT_ASSEMBLED,
+    SINGULAR,
+    JAMMED,
+    SEVERAL,
+    NO_DIRECTION,
+    WOUND,
+    NO_TORQUE,
+    OVERFLOW,
+    INVALID,
+    NO_LEVER,
+) = range(len(STATUS_NAMES))

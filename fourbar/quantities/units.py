@@ -21,22 +21,45 @@ DEFINITIONS: str = tomllib.loads(FILE.read_text(encoding="utf-8"))["definitions"
 JOINED = re.compile(r"(?<=[A-Za-z])[.-](?=[A-Za-z])")
 """N.mm, lbf-in: a product."""
 SWAPS = (
-    {"lb": "lbf", "pound": "lbf", "oz": "ozf", "kg": "kgf", "Hz": "rev/s", "hz": "rev/s"},
+    {
+        "lb": "lbf",
+        "pound": "lbf",
+        "oz": "ozf",
+        "kg": "kgf",
+        "Hz": "rev/s",
+        "hz": "rev/s",
+    },
     {"lbf": "lb", "ozf": "oz", "kgf": "kg"},
 )
 """Names that stand for each other in ordinary speech; here a pound is a mass, and the angle is a dimension."""
 SIGNS = str.maketrans(
-    {"⋅": "·", "×": "·", "•": "·", "″": " in", "”": " in", '"': " in", "′": " ft", "’": " ft", "'": " ft"}
+    {
+        "⋅": "·",
+        "×": "·",
+        "•": "·",
+        "″": " in",
+        "”": " in",
+        '"': " in",
+        "′": " ft",
+        "’": " ft",
+        "'": " ft",
+    }
 )
 """Other signs of a product, and marks of inches and feet."""
 RAISED = re.compile("[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+")
 DIGITS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
-FRACTION = re.compile(r"(?:([0-9]{1,6})[ -])?([0-9]{1,6})/([1-9][0-9]{0,5})(?=[ A-Za-z'\"′″])")
+FRACTION = re.compile(
+    r"(?:([0-9]{1,6})[ -])?([0-9]{1,6})/([1-9][0-9]{0,5})(?=[ A-Za-z'\"′″])"
+)
 """1/2 or 12 1/2, as inches are written."""
 FEET = re.compile(r"([0-9]{1,6}) ?['′’][ -]?(?=[0-9.][^'′’]*[\"″”]$)")
 """The feet of 1'6", 1' 6 1/2" or 1'-6.5"."""
-NUMBER = re.compile(r"[+-]?(?:[0-9]{1,100}(?:\.[0-9]{0,100})?|\.[0-9]{1,100})(?:[eE][+-]?[0-9]{1,3})?(?![0-9.])")
-UNIT = re.compile(r"(?:[A-Za-zµμ°_]+(?:_?0(?![0-9]))?(?:(?:\^|\*\*)-?[1-9](?![0-9])|[²³])?|[·*/()]|\s)+")
+NUMBER = re.compile(
+    r"[+-]?(?:[0-9]{1,100}(?:\.[0-9]{0,100})?|\.[0-9]{1,100})(?:[eE][+-]?[0-9]{1,3})?(?![0-9.])"
+)
+UNIT = re.compile(
+    r"(?:[A-Za-zµμ°_]+(?:_?0(?![0-9]))?(?:(?:\^|\*\*)-?[1-9](?![0-9])|[²³])?|[·*/()]|\s)+"
+)
 """Names, each with at most one small exponent, and operators: nothing else reaches the parser, no tower of powers."""
 LONGEST_UNIT = 60
 
@@ -58,10 +81,15 @@ def to_si(text: str, unit: str) -> float:
     if number_text is None:
         raise UnitError("there is no finite number")
     name = RAISED.sub(
-        lambda power: f"^{power[0].translate(DIGITS)}", text[number_text.end() :].translate(SIGNS)
+        lambda power: f"^{power[0].translate(DIGITS)}",
+        text[number_text.end() :].translate(SIGNS),
     ).strip()
     if name.startswith(","):
-        hint = f'; did you mean "{number_text[0]}.{name[1:]}"?' if not re.match(r",[0-9]{3}(?![0-9])", name) else ""
+        hint = (
+            f'; did you mean "{number_text[0]}.{name[1:]}"?'
+            if not re.match(r",[0-9]{3}(?![0-9])", name)
+            else ""
+        )
         raise UnitError(f"a comma is no part of a number{hint}")
     if not name:
         raise UnitError("the unit is missing")
@@ -71,12 +99,15 @@ def to_si(text: str, unit: str) -> float:
     except UnitError as error:
         raise UnitError(f"{error}{_suggest(number_text[0], name, unit)}") from None
     if dimension != wanted_dimension:
-        raise UnitError(f'"{name}" does not convert to {unit}{_suggest(number_text[0], name, unit)}')
+        raise UnitError(
+            f'"{name}" does not convert to {unit}{_suggest(number_text[0], name, unit)}'
+        )
     try:
         number = (
             Fraction(number_text[0])
             if number_text.re is NUMBER
-            else int(number_text[1] or 0) + Fraction(f"{number_text[2]}/{number_text[3]}")
+            else int(number_text[1] or 0)
+            + Fraction(f"{number_text[2]}/{number_text[3]}")
         )
         number += 12 * int(feet[1]) if feet else 0
         value = float(number * factor / wanted)
@@ -112,25 +143,40 @@ def _suggest(number: str, name: str, unit: str) -> str:
     """Suggest what may have been meant by a unit that is unknown or of another dimension than `unit`."""
     if len(name) > LONGEST_UNIT:
         return ""
-    names = {word.casefold(): word for line in DEFINITIONS.split("\n") for word in re.split(r" = |-? = ", line) if word}
+    names = {
+        word.casefold(): word
+        for line in DEFINITIONS.split("\n")
+        for word in re.split(r" = |-? = ", line)
+        if word
+    }
 
     def nearest(word: str) -> str:
         close = difflib.get_close_matches(word.casefold(), names, 1, 0.7)
         return names[close[0]] if close else word
 
     words = re.compile(r"[A-Za-zµμ°_]+")
-    swapped = [{word: swap.get(word.removesuffix("s"), word) for word in words.findall(name)} for swap in SWAPS]
-    swapped.append({word: word.removesuffix("s").casefold() for word in words.findall(name)})
+    swapped = [
+        {word: swap.get(word.removesuffix("s"), word) for word in words.findall(name)}
+        for swap in SWAPS
+    ]
+    swapped.append(
+        {word: word.removesuffix("s").casefold() for word in words.findall(name)}
+    )
     swapped.append({word: nearest(word) for word in words.findall(name)})
     candidates = [words.sub(lambda match, by=by: by[match[0]], name) for by in swapped]  # type: ignore[misc]
     candidates += [
         f"{name}/rad",
-        f"rev{name.removeprefix('1')}" if name.endswith("min") else f"rad{name.removeprefix('1')}",
+        f"rev{name.removeprefix('1')}"
+        if name.endswith("min")
+        else f"rad{name.removeprefix('1')}",
         re.sub(r"(?<=[A-Za-z])([23])(?![0-9])", r"^\1", name),
     ]
     for candidate in candidates:
         try:
-            if candidate != name and _find_factor(candidate)[1] == _find_factor(unit)[1]:
+            if (
+                candidate != name
+                and _find_factor(candidate)[1] == _find_factor(unit)[1]
+            ):
                 return f'; did you mean "{number} {candidate}"?'
         except UnitError:
             continue
@@ -155,6 +201,8 @@ def _find_factor(name: str) -> tuple[Fraction, dict[str, Fraction]]:
     registry = _load_registry()
     try:
         one = registry.Quantity(Fraction(1), registry.parse_units(name)).to_root_units()
-    except Exception:  # the parser of the library raises whatever its tokenizer and evaluator do
+    except (
+        Exception
+    ):  # the parser of the library raises whatever its tokenizer and evaluator do
         raise UnitError(f'the unit "{name}" is not known') from None
     return Fraction(one.magnitude), dict(one.dimensionality)

@@ -26,7 +26,9 @@ OPEN, CROSSED = 1, -1
 BRANCH_NAMES = {OPEN: "open", CROSSED: "crossed"}
 FASTEST = math.sqrt(sys.float_info.max)
 """rad/s. The square of any greater speed is beyond the range of a double, and with it every acceleration."""
-COMMANDS = {bar: (f"theta_{bar}", f"omega_{bar}", f"alpha_{bar}") for bar in MOVING_BARS}
+COMMANDS = {
+    bar: (f"theta_{bar}", f"omega_{bar}", f"alpha_{bar}") for bar in MOVING_BARS
+}
 """Names of the commanded angle, speed and acceleration by bar."""
 STROKE_COMMAND = ("stroke", "stroke_speed", "stroke_acceleration")
 """Names of the commanded stroke, speed and acceleration of a cylinder."""
@@ -56,8 +58,14 @@ class Sweep:
         set_field(self, "start", require("motion.theta_2.from", self.start, "rad"))
         set_field(self, "stop", require("motion.theta_2.to", self.stop, "rad"))
         if not math.isfinite(self.stop - self.start):
-            raise InputError("motion.theta_2.to", self.stop, f"must be within the range of doubles from {self.start!r}")
-        set_field(self, "steps", require_whole("motion.theta_2.steps", self.steps, *STEPS))
+            raise InputError(
+                "motion.theta_2.to",
+                self.stop,
+                f"must be within the range of doubles from {self.start!r}",
+            )
+        set_field(
+            self, "steps", require_whole("motion.theta_2.steps", self.steps, *STEPS)
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,9 +76,14 @@ class FromLimit:
     offset: float = 0.0
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "offset", require("motion.theta_2.offset", self.offset, "rad"))
+        object.__setattr__(
+            self, "offset", require("motion.theta_2.offset", self.offset, "rad")
+        )
         limit = require_whole(
-            "motion.theta_2.limit", self.limit, range(1, sys.maxsize), "must be a whole number, 1 or more"
+            "motion.theta_2.limit",
+            self.limit,
+            range(1, sys.maxsize),
+            "must be a whole number, 1 or more",
         )
         object.__setattr__(self, "limit", limit)
 
@@ -83,8 +96,14 @@ class Free:
     steps: int
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "duration", require("motion.free.duration", self.duration, "s", POSITIVE))
-        object.__setattr__(self, "steps", require_whole("motion.free.steps", self.steps, *STEPS))
+        object.__setattr__(
+            self,
+            "duration",
+            require("motion.free.duration", self.duration, "s", POSITIVE),
+        )
+        object.__setattr__(
+            self, "steps", require_whole("motion.free.steps", self.steps, *STEPS)
+        )
 
 
 def find_bar(key: str, numbers: Mapping[int, tuple[Any, ...]]) -> int | None:
@@ -92,11 +111,20 @@ def find_bar(key: str, numbers: Mapping[int, tuple[Any, ...]]) -> int | None:
     stated = [
         bar
         for bar, (angle, speed, acceleration) in numbers.items()
-        if not (angle is None and speed is None and type(acceleration) is float and acceleration == 0.0)
+        if not (
+            angle is None
+            and speed is None
+            and type(acceleration) is float
+            and acceleration == 0.0
+        )
     ]
     if len(stated) > 1:
         bars = " and ".join(f"of bar {bar}" for bar in stated)
-        raise InputError(key, bars, "is the command of one bar: theta, omega and alpha of bar 2, 3 or 4")
+        raise InputError(
+            key,
+            bars,
+            "is the command of one bar: theta, omega and alpha of bar 2, 3 or 4",
+        )
     return stated[0] if stated else None
 
 
@@ -124,18 +152,29 @@ class Law:
         key = "motion.law"
         expect(f"{key}.ends", self.ends, str)
         if self.ends not in SPLINES:
-            raise InputError(f"{key}.ends", self.ends, "must be one of " + ", ".join(SPLINES))
+            raise InputError(
+                f"{key}.ends", self.ends, "must be one of " + ", ".join(SPLINES)
+            )
         theta = f"theta_{self.bar}"
         time, angles = (
-            tuple(require_numbers(f"{key}.{name}", getattr(self, name), unit=unit).ravel().tolist())
+            tuple(
+                require_numbers(f"{key}.{name}", getattr(self, name), unit=unit)
+                .ravel()
+                .tolist()
+            )
             for name, unit in (("time", "s"), (theta, "rad"))
         )
-        if len(time) != len(angles) or not FEWEST_POINTS[self.ends] <= len(time) <= MOST_POINTS:
+        if (
+            len(time) != len(angles)
+            or not FEWEST_POINTS[self.ends] <= len(time) <= MOST_POINTS
+        ):
             allowed = f"needs {FEWEST_POINTS[self.ends]} to {MOST_POINTS} times and as many angles"
             raise InputError(key, (len(time), len(angles)), allowed)
         if any(b <= a for a, b in pairwise(time)):
             raise InputError(f"{key}.time", time, "must rise")
-        object.__setattr__(self, "steps", require_whole(f"{key}.steps", self.steps, *STEPS))
+        object.__setattr__(
+            self, "steps", require_whole(f"{key}.steps", self.steps, *STEPS)
+        )
         object.__setattr__(self, "time", time)
         object.__setattr__(self, theta, angles)
 
@@ -143,7 +182,12 @@ class Law:
     def bar(self) -> int:
         """Number of the bar whose angle the law gives: 2, 3 or 4."""
         angles = {2: self.theta_2, 3: self.theta_3, 4: self.theta_4}
-        return find_bar("motion.law", {bar: (angle, None, 0.0) for bar, angle in angles.items()}) or 2
+        return (
+            find_bar(
+                "motion.law", {bar: (angle, None, 0.0) for bar, angle in angles.items()}
+            )
+            or 2
+        )
 
     @property
     def angle(self) -> tuple[float, ...]:
@@ -163,7 +207,9 @@ class Law:
         try:
             from scipy.interpolate import CubicSpline
         except ModuleNotFoundError:
-            raise DependencyError(f"SciPy is needed for a motion law: {say_install('studies')}") from None
+            raise DependencyError(
+                f"SciPy is needed for a motion law: {say_install('studies')}"
+            ) from None
         time = require_numbers("time", time)
         t, angle = np.array(self.time), np.array(self.angle)
         mean = 0.0
@@ -179,12 +225,17 @@ class Law:
 
 def _read_number(name: str, place: int) -> Any:
     """Make the property that reads a number of the command by its name; None (an acceleration: 0) if it has another."""
-    field, otherwise = ("angle", "speed", "acceleration")[place], 0.0 if place == 2 else None
+    field, otherwise = (
+        ("angle", "speed", "acceleration")[place],
+        0.0 if place == 2 else None,
+    )
 
     def read(motion: "Motion") -> Any:
         return getattr(motion, field) if name == motion.names[place] else otherwise
 
-    return property(read, doc=f"The {field} if {name} is commanded, otherwise {otherwise}.")
+    return property(
+        read, doc=f"The {field} if {name} is commanded, otherwise {otherwise}."
+    )
 
 
 @dataclass(frozen=True, slots=True, init=False, eq=False)
@@ -231,7 +282,9 @@ class Motion:
         for names in commands
         for name, per in zip(names, ("", "/s", "/s^2"), strict=True)
     }
-    theta_2, theta_3, theta_4, stroke = (_read_number(names[0], 0) for names in (*COMMANDS.values(), STROKE_COMMAND))
+    theta_2, theta_3, theta_4, stroke = (
+        _read_number(names[0], 0) for names in (*COMMANDS.values(), STROKE_COMMAND)
+    )
     omega_2, omega_3, omega_4, stroke_speed = (
         _read_number(names[1], 1) for names in (*COMMANDS.values(), STROKE_COMMAND)
     )
@@ -260,20 +313,46 @@ class Motion:
         side: str | None = None,
     ) -> None:
         expect("motion.law", law, Law, type(None))
-        angles = {2: (theta_2, omega_2, alpha_2), 3: (theta_3, omega_3, alpha_3), 4: (theta_4, omega_4, alpha_4)}
+        angles = {
+            2: (theta_2, omega_2, alpha_2),
+            3: (theta_3, omega_3, alpha_3),
+            4: (theta_4, omega_4, alpha_4),
+        }
         stated = find_bar("motion", angles)
         bar = (stated or 2) if law is None else law.bar
         names, numbers = COMMANDS[bar], angles[bar]
         if stroke is not None or side is not None or stroke_speed is not None:
-            if stroke is None or stated is not None or law is not None or free is not None:
-                raise InputError("motion.stroke", stroke, "is commanded alone: no angle, law or release besides")
-            names, numbers = STROKE_COMMAND, (_require_strokes(stroke), stroke_speed, stroke_acceleration)
+            if (
+                stroke is None
+                or stated is not None
+                or law is not None
+                or free is not None
+            ):
+                raise InputError(
+                    "motion.stroke",
+                    stroke,
+                    "is commanded alone: no angle, law or release besides",
+                )
+            names, numbers = (
+                STROKE_COMMAND,
+                (_require_strokes(stroke), stroke_speed, stroke_acceleration),
+            )
             if side not in SIDES:
-                raise InputError("motion.side", side, 'must be "left" or "right", as a stroke has two angles')
+                raise InputError(
+                    "motion.side",
+                    side,
+                    'must be "left" or "right", as a stroke has two angles',
+                )
         if law is not None and (stated is not None or free is not None):
-            raise InputError("motion.law", law.ends, f"stands alone: it gives {', '.join(names[:2])} and {names[2]}")
+            raise InputError(
+                "motion.law",
+                law.ends,
+                f"stands alone: it gives {', '.join(names[:2])} and {names[2]}",
+            )
         if isinstance(branch, str):
-            branch = {name: number for number, name in BRANCH_NAMES.items()}.get(branch, branch)
+            branch = {name: number for number, name in BRANCH_NAMES.items()}.get(
+                branch, branch
+            )
         checked = _require_command(names, *numbers)
         expect("motion.branch", branch, int, np.integer, str)
         expect("motion.through", through, str)
@@ -282,26 +361,47 @@ class Motion:
             raise InputError("motion.branch", branch, A_BRANCH)
         if through not in ("sign", "follow"):
             raise InputError("motion.through", through, 'must be "sign" or "follow"')
-        fields = zip(self.__slots__, (names[0], bar, *checked, branch, through, free, law, side), strict=True)
+        fields = zip(
+            self.__slots__,
+            (names[0], bar, *checked, branch, through, free, law, side),
+            strict=True,
+        )
         for name, value in fields:
-            object.__setattr__(self, name, value)  # the class is frozen; this is its constructor
+            object.__setattr__(
+                self, name, value
+            )  # the class is frozen; this is its constructor
 
     def replace(self, **changes: Any) -> "Motion":
         """Return a copy with other values of fields: angle, speed, acceleration, branch, through, free, law, side.
 
         angle, speed and acceleration are those of what this motion commands, a bar or a stroke.
         """
-        keywords = dict(zip(("angle", "speed", "acceleration"), self.names, strict=True))
-        keywords |= {name: name for name in ("branch", "through", "free", "law", "side")}
+        keywords = dict(
+            zip(("angle", "speed", "acceleration"), self.names, strict=True)
+        )
+        keywords |= {
+            name: name for name in ("branch", "through", "free", "law", "side")
+        }
         if foreign := changes.keys() - keywords:
-            raise TypeError(f"a motion has no field {min(foreign)!r} to replace; it has {', '.join(keywords)}")
-        return Motion(**{key: changes.get(name, getattr(self, name)) for name, key in keywords.items()})
+            raise TypeError(
+                f"a motion has no field {min(foreign)!r} to replace; it has {', '.join(keywords)}"
+            )
+        return Motion(
+            **{
+                key: changes.get(name, getattr(self, name))
+                for name, key in keywords.items()
+            }
+        )
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Motion):
             return NotImplemented
         angles = self.angle, other.angle
-        same = np.array_equal(*angles) if any(isinstance(x, np.ndarray) for x in angles) else angles[0] == angles[1]  # type: ignore[arg-type]
+        same = (
+            np.array_equal(*angles)  # type: ignore[arg-type]
+            if any(isinstance(x, np.ndarray) for x in angles)
+            else angles[0] == angles[1]
+        )
         return bool(same) and self._list_without_angle() == other._list_without_angle()
 
     def __hash__(self) -> int:
@@ -309,7 +409,16 @@ class Motion:
 
     def _list_without_angle(self) -> tuple[object, ...]:
         """List what a hash can be made of: everything but the angle; the bar of a stroke is the scene's."""
-        return (self.names, self.side, self.speed, self.acceleration, self.branch, self.through, self.free, self.law)
+        return (
+            self.names,
+            self.side,
+            self.speed,
+            self.acceleration,
+            self.branch,
+            self.through,
+            self.free,
+            self.law,
+        )
 
     @property
     def names(self) -> tuple[str, str, str]:
@@ -327,11 +436,17 @@ def _require_strokes(stroke: Any) -> Any:
     return stroke
 
 
-def _require_command(names: tuple[str, str, str], angle: Any, speed: Any, acceleration: Any) -> tuple[Any, Any, float]:
+def _require_command(
+    names: tuple[str, str, str], angle: Any, speed: Any, acceleration: Any
+) -> tuple[Any, Any, float]:
     """Return angle, speed and acceleration of the command of these names, checked."""
-    (theta, unit), (omega, per_second), (alpha, growth) = ((name, Motion.numbers[name].unit) for name in names)
+    (theta, unit), (omega, per_second), (alpha, growth) = (
+        (name, Motion.numbers[name].unit) for name in names
+    )
     if angle is not None and not isinstance(angle, (Sweep, FromLimit)):
-        angles = require_numbers(f"motion.{theta}", angle, "must be finite angles", unit)
+        angles = require_numbers(
+            f"motion.{theta}", angle, "must be finite angles", unit
+        )
         if angles.size == 0:
             raise InputError(f"motion.{theta}", angle, "must be one angle or more")
         angles.flags.writeable = False
@@ -339,13 +454,24 @@ def _require_command(names: tuple[str, str, str], angle: Any, speed: Any, accele
     if speed is not None:
         speed = require(f"motion.{omega}", speed, per_second)
         if not math.isfinite(speed * speed):
-            allowed = f"must be below {FASTEST:.4g} rad/s: every acceleration has its square"
+            allowed = (
+                f"must be below {FASTEST:.4g} rad/s: every acceleration has its square"
+            )
             raise InputError(f"motion.{omega}", speed, allowed)
     return angle, speed, require(f"motion.{alpha}", acceleration, growth)
 
 
 def require_steps(motion: Motion, most: int, place: str, file: str) -> None:
     """Raise InputError for as many steps or more: of a sweep, a law or a release each is a position in the memory."""
-    for name, stated in ((motion.commanded, motion.angle), ("law", motion.law), ("free", motion.free)):
+    for name, stated in (
+        (motion.commanded, motion.angle),
+        ("law", motion.law),
+        ("free", motion.free),
+    ):
         if isinstance(stated, (Sweep, Law, Free)) and stated.steps >= most:
-            raise InputError(f"motion.{name}.steps", stated.steps, f"must be below {most} {place}", file)
+            raise InputError(
+                f"motion.{name}.steps",
+                stated.steps,
+                f"must be below {most} {place}",
+                file,
+            )

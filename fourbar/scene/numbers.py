@@ -42,13 +42,25 @@ class Point:
     numbers: ClassVar[dict[str, Declared]] = {"from_pin": Declared("m", pair=True)}
 
     def __post_init__(self) -> None:
-        plain = isinstance(self.name, str) and self.name.isascii() and self.name.isidentifier()
-        if not plain or self.name.startswith(("v_", "a_")) or len(self.name) > LONGEST_NAME:
+        plain = (
+            isinstance(self.name, str)
+            and self.name.isascii()
+            and self.name.isidentifier()
+        )
+        if (
+            not plain
+            or self.name.startswith(("v_", "a_"))
+            or len(self.name) > LONGEST_NAME
+        ):
             allowed = "must be a word of letters, digits and _, not beginning with a digit, v_ or a_"
             raise InputError("points", self.name, allowed)
         if {self.name, f"{self.name}_x", f"{self.name}_y"} & COLUMNS:
-            raise InputError(self.key, self.name, "is the name of a quantity; a point needs another")
-        bar = require_whole(f"{self.key}.bar", self.bar, BAR_NAMES, "must be 1, 2, 3 or 4")
+            raise InputError(
+                self.key, self.name, "is the name of a quantity; a point needs another"
+            )
+        bar = require_whole(
+            f"{self.key}.bar", self.bar, BAR_NAMES, "must be 1, 2, 3 or 4"
+        )
         object.__setattr__(self, "bar", bar)
         check_numbers(self, self.key)
 
@@ -59,20 +71,40 @@ class Point:
 
 
 COLUMNS = frozenset(
-    (*UNITS, "status", "branch", "drive_bar", "member", "title", "schema", "angle_unit", "assembled", "O2", "O4")
+    (
+        *UNITS,
+        "status",
+        "branch",
+        "drive_bar",
+        "member",
+        "title",
+        "schema",
+        "angle_unit",
+        "assembled",
+        "O2",
+        "O4",
+    )
 )
 """Names that a table or a JSON object has already, and the pins."""
 
 
 THREE_SIGMA = 3.0
 """Half width of a normal distribution in a worst case, in standard deviations."""
-LENGTHS = {**FourBar.numbers, **{BAR_NAMES[bar]: Bar.numbers["length"] for bar in MOVING_BARS}}
+LENGTHS = {
+    **FourBar.numbers,
+    **{BAR_NAMES[bar]: Bar.numbers["length"] for bar in MOVING_BARS},
+}
 
 
 def find_unit(key: str) -> str | None:
     """Return the unit of the number that a key of a scene file names; None where no scene has such a number."""
     table, *names = key.split(".")
-    tables = {"lengths": LENGTHS, "bars": Bar.numbers, "motion": Motion.numbers, "points": Point.numbers}
+    tables = {
+        "lengths": LENGTHS,
+        "bars": Bar.numbers,
+        "motion": Motion.numbers,
+        "points": Point.numbers,
+    }
     numbers = tables.get(table, {})
     if table == "loads":
         numbers = effects.Load.numbers
@@ -106,7 +138,11 @@ class Tolerance:
         unit = find_unit(self.key)
         if unit is None and isinstance(self.width, str):
             raise InputError(f"tolerances.{self.key}", self.width, "unknown key")
-        object.__setattr__(self, "width", require(f"tolerances.{self.key}", self.width, unit or "1", POSITIVE))
+        object.__setattr__(
+            self,
+            "width",
+            require(f"tolerances.{self.key}", self.width, unit or "1", POSITIVE),
+        )
         expect(f"tolerances.{self.key}", self.sigma, bool)
 
     @property

@@ -42,8 +42,16 @@ class Picture:
         object.__setattr__(self, "bar", require_bar("picture.bar", self.bar))
         expect("picture.folder", self.folder, str, Path)
         parts = self.name.split("/") if isinstance(self.name, str) else []
-        plain = all(part not in ("", ".", "..") and not set(part) & set('\\:*?"<>|') for part in parts)
-        if not parts or not plain or not self.name.isprintable() or len(self.name) > LONGEST_NAME:
+        plain = all(
+            part not in ("", ".", "..") and not set(part) & set('\\:*?"<>|')
+            for part in parts
+        )
+        if (
+            not parts
+            or not plain
+            or not self.name.isprintable()
+            or len(self.name) > LONGEST_NAME
+        ):
             raise InputError(self.key, self.name, ALLOWED)
 
     @property
@@ -59,7 +67,9 @@ class Picture:
         folder = Path(self.folder).resolve()
         file = (folder / self.name).resolve()
         if not file.is_relative_to(folder):
-            raise InputError(self.key, self.name, f"leads out of the scene's folder; {ALLOWED}")
+            raise InputError(
+                self.key, self.name, f"leads out of the scene's folder; {ALLOWED}"
+            )
         return encode_picture(self.key, file, self.name)
 
     def moved(self, folder: Path) -> "Picture":
@@ -69,8 +79,16 @@ class Picture:
         """
         file, target = Path(self.folder).resolve() / self.name, folder.resolve()
         if not file.is_relative_to(target):
-            raise InputError(self.key, os.fspath(file), f"does not lie in {os.fspath(target)}: copy it there first")
-        return Picture(self.bar, PurePosixPath(file.relative_to(target)).as_posix(), os.fspath(folder))
+            raise InputError(
+                self.key,
+                os.fspath(file),
+                f"does not lie in {os.fspath(target)}: copy it there first",
+            )
+        return Picture(
+            self.bar,
+            PurePosixPath(file.relative_to(target)).as_posix(),
+            os.fspath(folder),
+        )
 
 
 def encode_picture(key: str, path: str | Path, shown: str | None = None) -> str:
@@ -80,7 +98,9 @@ def encode_picture(key: str, path: str | Path, shown: str | None = None) -> str:
     """
     name = str(path) if shown is None else shown
     content = read_bytes(path, key, LARGEST, shown=name)
-    kind = next((kind for magic, kind in RASTER.items() if content.startswith(magic)), None)
+    kind = next(
+        (kind for magic, kind in RASTER.items() if content.startswith(magic)), None
+    )
     if kind is None:
         raise InputError(key, name, "must be a PNG or JPEG picture")
     return f"data:{kind};base64,{base64.b64encode(content).decode('ascii')}"

@@ -10,12 +10,34 @@ from numpy.typing import NDArray
 
 from fourbar.effects.effect import Effect
 from fourbar.errors import InputError, LimitError, expect
-from fourbar.formulas.arithmetic import PI_LOW, Number, angle, divisor, exact_difference, namespace, polar, select
+from fourbar.formulas.arithmetic import (
+    PI_LOW,
+    Number,
+    angle,
+    divisor,
+    exact_difference,
+    namespace,
+    polar,
+    select,
+)
 from fourbar.formulas.longer import change_numbers, lengthen, shorten
-from fourbar.formulas.mobility import MARGIN, choose_range, find_limit_angles, follow_smooth_path
+from fourbar.formulas.mobility import (
+    MARGIN,
+    choose_range,
+    find_limit_angles,
+    follow_smooth_path,
+)
 from fourbar.linkage import BAR_NAMES, FourBar, require_bar
 from fourbar.quantities import Array
-from fourbar.scene.motion import COMMANDS, DEFAULT_STEPS, SIDES, STROKE_COMMAND, FromLimit, Motion, Sweep
+from fourbar.scene.motion import (
+    COMMANDS,
+    DEFAULT_STEPS,
+    SIDES,
+    STROKE_COMMAND,
+    FromLimit,
+    Motion,
+    Sweep,
+)
 from fourbar.scene.numbers import Point, Tolerance
 from fourbar.scene.pictures import Picture
 
@@ -59,21 +81,35 @@ class Scene:
     points: tuple[Point, ...] = ()
     tolerances: tuple[Tolerance, ...] = ()
     drive: "LinearDrive | None" = None
-    coordinates: tuple[tuple[str, tuple[float, float]], ...] = field(default=(), repr=False, compare=False)
+    coordinates: tuple[tuple[str, tuple[float, float]], ...] = field(
+        default=(), repr=False, compare=False
+    )
 
     def __post_init__(self) -> None:
         one = {"linkage": FourBar, "motion": Motion, "title": str, "source": str}
         for name, kind in one.items():
             expect(name, getattr(self, name), kind)
         if self.drive is None:
-            bar = 2 if self.drive_bar is None else require_bar("drive.bar", self.drive_bar)
+            bar = (
+                2
+                if self.drive_bar is None
+                else require_bar("drive.bar", self.drive_bar)
+            )
             object.__setattr__(self, "drive_bar", bar)
         else:
             self._require_linear(self.drive)
         if self.motion.stroke is not None:
             object.__setattr__(self, "motion", copy(self.motion))
-            object.__setattr__(self.motion, "bar", find_triangle(self.linkage, self.drive).bar)
-        many = {"loads": Effect, "effects": Effect, "pictures": Picture, "points": Point, "tolerances": Tolerance}
+            object.__setattr__(
+                self.motion, "bar", find_triangle(self.linkage, self.drive).bar
+            )
+        many = {
+            "loads": Effect,
+            "effects": Effect,
+            "pictures": Picture,
+            "points": Point,
+            "tolerances": Tolerance,
+        }
         for name, each_kind in many.items():
             expect(name, getattr(self, name), tuple, list)
             object.__setattr__(self, name, tuple(getattr(self, name)))
@@ -83,7 +119,11 @@ class Scene:
         if len(set(names)) < len(names):
             raise InputError("points", names, "each point has a name of its own")
         if len({picture.bar for picture in self.pictures}) < len(self.pictures):
-            raise InputError("pictures", [picture.bar for picture in self.pictures], "a bar has one picture")
+            raise InputError(
+                "pictures",
+                [picture.bar for picture in self.pictures],
+                "a bar has one picture",
+            )
 
     def plot(
         self,
@@ -114,7 +154,12 @@ class Scene:
         """
         options = {} if units is None else {"units": units}
         return load_show("plot").draw_figure(
-            self, figure, position=position, branches=branches, dimensions=dimensions, **options
+            self,
+            figure,
+            position=position,
+            branches=branches,
+            dimensions=dimensions,
+            **options,
         )
 
     def _repr_html_(self) -> Any:
@@ -126,7 +171,11 @@ class Scene:
 
         expect("drive", drive, LinearDrive)
         if self.drive_bar is not None:
-            raise InputError("drive.bar", self.drive_bar, "a drive acts on a bar or along a line: bar, or from and to")
+            raise InputError(
+                "drive.bar",
+                self.drive_bar,
+                "a drive acts on a bar or along a line: bar, or from and to",
+            )
         assert isinstance(drive, LinearDrive)
         drive.require_stroke(self.linkage)
 
@@ -196,11 +245,16 @@ class Command(NamedTuple):
 
     def part(self, index: Any) -> "Command":
         """Take some of the positions."""
-        rows: Any = (value[index] if isinstance(value, np.ndarray) and value.ndim else value for value in self)
+        rows: Any = (
+            value[index] if isinstance(value, np.ndarray) and value.ndim else value
+            for value in self
+        )
         part = Command(*rows)
         if self.independent is None:
             return part
-        return part._replace(independent=Independent(*(value[index] for value in self.independent)))
+        return part._replace(
+            independent=Independent(*(value[index] for value in self.independent))
+        )
 
     @property
     def theta_2(self) -> Array:
@@ -228,7 +282,9 @@ class Command(NamedTuple):
 def require_input(scene: Scene, what: str) -> None:
     """Raise a LimitError where what is asked for takes a command of the input alone, and another bar has it."""
     if scene.motion.commanded != "theta_2":
-        raise LimitError(f"motion.{scene.motion.commanded}: {what} takes a command of theta_2 alone")
+        raise LimitError(
+            f"motion.{scene.motion.commanded}: {what} takes a command of theta_2 alone"
+        )
 
 
 class Triangle(NamedTuple):
@@ -246,7 +302,9 @@ class Triangle(NamedTuple):
     angle: Number
     """theta of the bar where both ends are in one direction from the pivot, rad."""
 
-    def turn_bar(self, stroke: Any, speed: Any, acceleration: Any, side: str | None) -> tuple[Any, Any, Any, Any]:
+    def turn_bar(
+        self, stroke: Any, speed: Any, acceleration: Any, side: str | None
+    ) -> tuple[Any, Any, Any, Any]:
         """Compute angle, speed and acceleration of the bar, and the condition: the lever over the longer of l and r.
 
         NaN where the cylinder cannot have the stroke; in libraries other than NumPy the condition alone says so, by 0.
@@ -255,7 +313,9 @@ class Triangle(NamedTuple):
         assert side is not None
         length, reach, zero = self.length, self.reach, 0.0 * self.length
         sign, xp = SIDES[side], namespace(stroke, length, reach)
-        near = exact_difference(stroke, reach, length, zero) * exact_difference(stroke, length, reach, zero)
+        near = exact_difference(stroke, reach, length, zero) * exact_difference(
+            stroke, length, reach, zero
+        )
         far = exact_difference(length, reach, stroke, zero) * (length + reach + stroke)
         inside = xp is np or (near > 0.0) & (far > 0.0)
         near, far, stroke = (divisor(x, inside) for x in (near, far, stroke))
@@ -264,11 +324,18 @@ class Triangle(NamedTuple):
             beta = 2.0 * xp.atan2(near, far)
             lever = near * far / (2.0 * stroke)
             longer = 0.5 * (length + reach + abs(length - reach))
-            theta, condition = self.angle + sign * beta, select(inside, lever / longer, 0.0)
+            theta, condition = (
+                self.angle + sign * beta,
+                select(inside, lever / longer, 0.0),
+            )
             if speed is None:
                 return theta, None, np.zeros(np.shape(theta)), condition
             rate = speed / lever
-            growth = speed * speed + stroke * acceleration - length * reach * xp.cos(beta) * rate * rate
+            growth = (
+                speed * speed
+                + stroke * acceleration
+                - length * reach * xp.cos(beta) * rate * rate
+            )
             growth = growth / (lever * stroke)
         return theta, sign * rate, sign * growth, condition
 
@@ -276,16 +343,34 @@ class Triangle(NamedTuple):
 def find_triangle(linkage: FourBar, drive: "LinearDrive | None") -> Triangle:
     """Return the triangle of a cylinder between the ground and bar 2 or 4; InputError for any other drive."""
     if drive is None or {drive.start.bar, drive.end.bar} not in ({1, 2}, {1, 4}):
-        drives = "no cylinder" if drive is None else f"one from bar {drive.start.bar} to bar {drive.end.bar}"
-        raise InputError("motion.stroke", drives, "is of a cylinder ([drive]) between the ground and bar 2 or 4")
-    moving, fixed = (drive.end, drive.start) if drive.start.bar == 1 else (drive.start, drive.end)
+        drives = (
+            "no cylinder"
+            if drive is None
+            else f"one from bar {drive.start.bar} to bar {drive.end.bar}"
+        )
+        raise InputError(
+            "motion.stroke",
+            drives,
+            "is of a cylinder ([drive]) between the ground and bar 2 or 4",
+        )
+    moving, fixed = (
+        (drive.end, drive.start) if drive.start.bar == 1 else (drive.start, drive.end)
+    )
     if moving.bar == 2:  # points of the ground are polar about O2
-        reach, towards = abs(fixed.distance), fixed.angle + linkage.ground_angle + _reverse(fixed)
+        reach, towards = (
+            abs(fixed.distance),
+            fixed.angle + linkage.ground_angle + _reverse(fixed),
+        )
     else:
         end = polar(fixed.distance, fixed.angle + linkage.ground_angle)
         across = end - polar(linkage.ground, linkage.ground_angle)
         reach, towards = abs(across), angle(across)
-    return Triangle(moving.bar, abs(moving.distance), reach, towards - moving.angle - _reverse(moving))
+    return Triangle(
+        moving.bar,
+        abs(moving.distance),
+        reach,
+        towards - moving.angle - _reverse(moving),
+    )
 
 
 def _reverse(point: "SpringEnd") -> Any:
@@ -297,15 +382,22 @@ def _reverse(point: "SpringEnd") -> Any:
 def default_places(scene: Scene, holding: float | None = None) -> Array:
     """List the angles (of the range that holds one), or strokes, that are swept where a scene names none, (n,)."""
     if scene.motion.stroke is not None:
-        triangle, half = find_triangle(scene.linkage, scene.drive), 0.5 * np.array([MARGIN, np.pi - MARGIN])
+        triangle, half = (
+            find_triangle(scene.linkage, scene.drive),
+            0.5 * np.array([MARGIN, np.pi - MARGIN]),
+        )
         twice_mean = 2.0 * np.sqrt(triangle.length * triangle.reach)
-        first, last = np.hypot(triangle.length - triangle.reach, twice_mean * np.sin(half)).tolist()
+        first, last = np.hypot(
+            triangle.length - triangle.reach, twice_mean * np.sin(half)
+        ).tolist()
     else:
         first, last = choose_range(scene.linkage, scene.motion.bar, holding)
     return np.linspace(first, last, DEFAULT_STEPS + 1)
 
 
-def turn_bar(scene: Scene, place: Any, speed: Any, acceleration: Any) -> tuple[Any, Any, Any, Any]:
+def turn_bar(
+    scene: Scene, place: Any, speed: Any, acceleration: Any
+) -> tuple[Any, Any, Any, Any]:
     """Compute angle, speed and acceleration of the commanded bar, and the condition of the command (None: 1).
 
     A stroke and its rates become those of the bar here, angles stay. All may be arrays of any library, and numbers that
@@ -313,24 +405,52 @@ def turn_bar(scene: Scene, place: Any, speed: Any, acceleration: Any) -> tuple[A
     """
     if scene.motion.stroke is None:
         return place, speed, acceleration, None
-    return find_triangle(scene.linkage, scene.drive).turn_bar(place, speed, acceleration, scene.motion.side)
+    return find_triangle(scene.linkage, scene.drive).turn_bar(
+        place, speed, acceleration, scene.motion.side
+    )
 
 
-def command_stroke(scene: Scene, stroke: Array, speed: Any, acceleration: Any) -> Command:
+def command_stroke(
+    scene: Scene, stroke: Array, speed: Any, acceleration: Any
+) -> Command:
     """Command the bar that a cylinder turns, from strokes and their rates; the branch is that of the motion."""
     angle, omega, alpha, condition = turn_bar(scene, stroke, speed, acceleration)
     lost = None
     if speed is not None:  # what angle, speed and acceleration leave out as doubles
         with np.errstate(all="ignore"):
-            longer = find_triangle(*change_numbers((scene.linkage, scene.drive), lengthen))
-            *turned, _ = longer.turn_bar(lengthen(stroke), lengthen(speed), lengthen(acceleration), scene.motion.side)
-            gaps = [shorten(after - before) for before, after in zip((angle, omega, alpha), turned, strict=True)]
+            longer = find_triangle(
+                *change_numbers((scene.linkage, scene.drive), lengthen)
+            )
+            *turned, _ = longer.turn_bar(
+                lengthen(stroke),
+                lengthen(speed),
+                lengthen(acceleration),
+                scene.motion.side,
+            )
+            gaps = [
+                shorten(after - before)
+                for before, after in zip((angle, omega, alpha), turned, strict=True)
+            ]
         lost = np.stack(np.broadcast_arrays(*gaps), axis=-1)
     branch = np.full(np.shape(angle), scene.motion.branch, dtype=np.int8)
-    return Command(angle, branch, omega, alpha, None, None, scene.motion.bar, condition, stroke, speed, lost)
+    return Command(
+        angle,
+        branch,
+        omega,
+        alpha,
+        None,
+        None,
+        scene.motion.bar,
+        condition,
+        stroke,
+        speed,
+        lost,
+    )
 
 
-def command_at(scene: Scene, places: Array, branch: NDArray[np.int8] | None = None) -> Command:
+def command_at(
+    scene: Scene, places: Array, branch: NDArray[np.int8] | None = None
+) -> Command:
     """Command what the scene's motion commands at other places: angles, strokes, or of a law times.
 
     `branch`: at each of them; left out: the scene's, which may follow its smooth path.
@@ -338,19 +458,31 @@ def command_at(scene: Scene, places: Array, branch: NDArray[np.int8] | None = No
     motion, bar = scene.motion, scene.motion.bar
     if motion.stroke is not None:
         triangle = find_triangle(scene.linkage, scene.drive)
-        least, most = abs(triangle.length - triangle.reach), triangle.length + triangle.reach
+        least, most = (
+            abs(triangle.length - triangle.reach),
+            triangle.length + triangle.reach,
+        )
         inside = (places >= least) & (places <= most)
         if not inside.all():
             stroke = float(places[np.argmin(inside)])
-            raise InputError("motion.stroke", stroke, f"this cylinder can have {least:.6g} to {most:.6g} m")
+            raise InputError(
+                "motion.stroke",
+                stroke,
+                f"this cylinder can have {least:.6g} to {most:.6g} m",
+            )
         commanded = command_stroke(scene, places, motion.speed, motion.acceleration)
     else:
         commanded = Command(
-            places, np.full(places.shape, motion.branch, dtype=np.int8), motion.speed, motion.acceleration
+            places,
+            np.full(places.shape, motion.branch, dtype=np.int8),
+            motion.speed,
+            motion.acceleration,
         )
         if motion.law is not None:
             angle, speed, acceleration = motion.law.at(places)
-            commanded = commanded._replace(angle=angle, speed=speed, acceleration=acceleration, time=places)
+            commanded = commanded._replace(
+                angle=angle, speed=speed, acceleration=acceleration, time=places
+            )
         commanded = commanded._replace(bar=bar)
     if branch is None and motion.through == "follow":
         branch = follow_smooth_path(scene.linkage, commanded.angle, motion.branch, bar)
@@ -371,14 +503,20 @@ def command(scene: Scene) -> Command:
     elif isinstance(stated, FromLimit):
         key, limits = f"motion.theta_{bar}.limit", find_limit_angles(linkage, bar)
         if not limits:
-            raise InputError(key, stated.limit, f"the {BAR_NAMES[bar]} of this linkage has no limit positions")
+            raise InputError(
+                key,
+                stated.limit,
+                f"the {BAR_NAMES[bar]} of this linkage has no limit positions",
+            )
         if stated.limit > len(limits):
             raise InputError(key, stated.limit, f"must be from 1 to {len(limits)}")
         from fourbar.formulas.many_digits import limit_remainder
 
         limit = limits[stated.limit - 1]
         places = np.array([limit + stated.offset])
-        remainder = limit_remainder(linkage, limit, float(places[0]), stated.offset, bar)
+        remainder = limit_remainder(
+            linkage, limit, float(places[0]), stated.offset, bar
+        )
     else:
         places = np.array(stated, dtype=float, ndmin=1)
     commanded = command_at(scene, places)

@@ -56,7 +56,11 @@ SCALARS = (
 
 
 def collect_page_data(
-    scene: Scene, pictures: Mapping[str, str | Path], units: Conversion = SI, *, midway: bool = False
+    scene: Scene,
+    pictures: Mapping[str, str | Path],
+    units: Conversion = SI,
+    *,
+    midway: bool = False,
 ) -> dict[str, Any]:
     """Collect everything the page's script needs: SI units, radians, null where there is no value.
 
@@ -64,9 +68,20 @@ def collect_page_data(
     """
     data = collect_live_data(scene, units, signs=(1, -1), midway=midway)
     for columns in data["branches"].values():
-        columns |= {name: null_nan(column) for name, column in columns.items() if isinstance(column, np.ndarray)}
-    encoded = {str(number): picture for number, picture in _encode_pictures(scene, pictures).items()}
-    spreads = collect_tolerances(scene, data["over"]["values"] or data["theta_2"]) if scene.tolerances else None
+        columns |= {
+            name: null_nan(column)
+            for name, column in columns.items()
+            if isinstance(column, np.ndarray)
+        }
+    encoded = {
+        str(number): picture
+        for number, picture in _encode_pictures(scene, pictures).items()
+    }
+    spreads = (
+        collect_tolerances(scene, data["over"]["values"] or data["theta_2"])
+        if scene.tolerances
+        else None
+    )
     try:
         text = dump(scene)
     except InputError:  # a file has no form of what acts
@@ -94,7 +109,9 @@ def collect_live_data(
     )
     closes = np.isfinite(shown["branches"][str(motion.branch)]["theta_3"])
     if not closes.any():
-        raise NotAssembledError("nothing to show: the linkage assembles at none of the scene's positions")
+        raise NotAssembledError(
+            "nothing to show: the linkage assembles at none of the scene's positions"
+        )
     if shown["start"] is None:
         rows = np.flatnonzero(closes)
         shown["start"] = int(rows[len(rows) // 2 if midway else 0])
@@ -106,16 +123,24 @@ def collect_live_data(
         "unit": {"factor": factor, "name": unit},
         "units": {unit: list(entry) for unit, entry in units.items()},
         "centres": {
-            str(number): [(z := linkage.bar(number).to_centre).real, z.imag] if linkage.bar(number).mass > 0.0 else None
+            str(number): [(z := linkage.bar(number).to_centre).real, z.imag]
+            if linkage.bar(number).mass > 0.0
+            else None
             for number in MOVING_BARS
         },
         "drive_bar": scene.drive_bar,
         "branch": motion.branch,
         "points": [
-            {"name": p.name, "bar": p.bar, "at": [p.from_pin[0] * f(p.from_pin[1]) for f in (math.cos, math.sin)]}
+            {
+                "name": p.name,
+                "bar": p.bar,
+                "at": [p.from_pin[0] * f(p.from_pin[1]) for f in (math.cos, math.sin)],
+            }
             for p in scene.points
         ],
-        "acting": [_write_symbol(symbol, shown["theta_2"]) for symbol in list_acting(scene)],
+        "acting": [
+            _write_symbol(symbol, shown["theta_2"]) for symbol in list_acting(scene)
+        ],
         "followed": motion.through == "follow",
         **shown,
     }
@@ -126,13 +151,19 @@ def _write_symbol(symbol: Symbol, theta_2: list[float]) -> dict[str, Any]:
     entry: dict[str, Any] = symbol._asdict()
     for name in ("at", "beyond", "vector"):
         entry[name] = [entry[name].real, entry[name].imag]
-    entry["end"] = None if symbol.end is None else [symbol.end[0], [symbol.end[1].real, symbol.end[1].imag]]
+    entry["end"] = (
+        None
+        if symbol.end is None
+        else [symbol.end[0], [symbol.end[1].real, symbol.end[1].imag]]
+    )
     table = entry.pop("table")
     entry["factor"] = None if table is None else np.asarray(table.at(theta_2)).tolist()
     return entry
 
 
-def _collect_sweep(scene: Scene, signs: tuple[int, ...], stage: str | None) -> dict[str, Any]:
+def _collect_sweep(
+    scene: Scene, signs: tuple[int, ...], stage: str | None
+) -> dict[str, Any]:
     """Collect both branches over theta_2, or those of another command over the commanded quantity."""
     motion = scene.motion
     swept, commanded = list_sweep(scene), command(scene)
@@ -146,8 +177,16 @@ def _collect_sweep(scene: Scene, signs: tuple[int, ...], stage: str | None) -> d
         start = int(np.argmin(np.abs(away)))
     theta_2, branches = thinned.angle, {}
     for sign in signs if name == "theta_2" else (motion.branch,):
-        branch = None if motion.through == "follow" else np.full(thinned.angle.shape, sign, dtype=np.int8)
-        solution = solve(one := set_branch(scene, sign), stage, at=command_at(one, thinned.places, branch))
+        branch = (
+            None
+            if motion.through == "follow"
+            else np.full(thinned.angle.shape, sign, dtype=np.int8)
+        )
+        solution = solve(
+            one := set_branch(scene, sign),
+            stage,
+            at=command_at(one, thinned.places, branch),
+        )
         branches[str(sign)], theta_2 = _collect_columns(solution), solution.theta_2
     if name != "theta_2":
         branches[str(motion.branch)]["theta_2"] = theta_2
@@ -163,7 +202,9 @@ def _collect_sweep(scene: Scene, signs: tuple[int, ...], stage: str | None) -> d
     }
 
 
-def _over(name: str, commanded: str, values: Array, speed: float | None = None) -> dict[str, Any]:
+def _over(
+    name: str, commanded: str, values: Array, speed: float | None = None
+) -> dict[str, Any]:
     """Say what curves and slider run over, "time" or what is commanded, with its numbers where it is not theta_2."""
     shown = None if name == "theta_2" else values.tolist()
     return {"name": name, "commanded": commanded, "values": shown, "speed": speed}
@@ -172,14 +213,24 @@ def _over(name: str, commanded: str, values: Array, speed: float | None = None) 
 def _collect_motion(scene: Scene, stage: str | None) -> dict[str, Any]:
     """Collect the one motion that the scene makes: released, or by a law."""
     motion = solve(scene)
-    assert motion.time is not None and motion.omega_2 is not None and motion.alpha_2 is not None
+    assert (
+        motion.time is not None
+        and motion.omega_2 is not None
+        and motion.alpha_2 is not None
+    )
     thinned = thin_out(motion.at)
     assert thinned.time is not None
     solution = solve(scene, stage, at=thinned)
     columns = _collect_columns(solution)
     columns["theta_2"] = solution.theta_2.tolist()
     if scene.motion.free is not None:
-        for name in ("torque", "torque_error", "power", "drive_force", "drive_force_error"):
+        for name in (
+            "torque",
+            "torque_error",
+            "power",
+            "drive_force",
+            "drive_force_error",
+        ):
             columns.pop(name, None)
         columns["energy"] = compute_energies(scene, solution).kinetic
     duration = float(thinned.time[-1] - thinned.time[0])
@@ -199,7 +250,11 @@ def _collect_motion(scene: Scene, stage: str | None) -> dict[str, Any]:
 def thin_out(positions: Command) -> Command:
     """Take at most `MAX_ROWS` of the positions, evenly, both ends included."""
     n = len(positions.angle)
-    return positions if n <= MAX_ROWS else positions.part(np.round(np.linspace(0, n - 1, MAX_ROWS)).astype(int))
+    return (
+        positions
+        if n <= MAX_ROWS
+        else positions.part(np.round(np.linspace(0, n - 1, MAX_ROWS)).astype(int))
+    )
 
 
 def _choose_rate(duration: float) -> float:
@@ -209,14 +264,20 @@ def _choose_rate(duration: float) -> float:
     shortest, longest = WATCHED
     if duration < shortest:
         return float(10.0 ** math.floor(math.log10(duration / shortest)))
-    return float(10.0 ** math.ceil(math.log10(duration / longest))) if duration > longest else 1.0
+    return (
+        float(10.0 ** math.ceil(math.log10(duration / longest)))
+        if duration > longest
+        else 1.0
+    )
 
 
 def _describe_pace(motion: Solution, rate: float, shown: int) -> str:
     """Say what speed 1 means, when the linkage stops before its time, and whether instants were left out."""
     words = "At speed 1× it moves in real time"
     if rate < 1.0:
-        words = f"At speed 1× it moves {1.0 / rate:.0f} times slower than it really does"
+        words = (
+            f"At speed 1× it moves {1.0 / rate:.0f} times slower than it really does"
+        )
     elif rate > 1.0:
         words = f"At speed 1× it moves {rate:.0f} times faster than it really does"
     if motion.stopped_at is not None:
@@ -239,19 +300,30 @@ def _collect_columns(solution: Solution) -> dict[str, Any]:
     return columns
 
 
-def _encode_pictures(scene: Scene, pictures: Mapping[str, str | Path]) -> dict[int, str]:
+def _encode_pictures(
+    scene: Scene, pictures: Mapping[str, str | Path]
+) -> dict[int, str]:
     """Encode the pictures of the bars as data URIs: those of the scene, and those given in their place."""
     encoded = {}
     for name, path in pictures.items():
         if name not in BARS:
             raise InputError("picture", name, "must name one of " + ", ".join(BARS))
         encoded[BARS[name]] = encode_picture(f"picture.{name}", path)
-    by_bar = {picture.bar: picture for picture in scene.pictures if picture.bar not in encoded}
+    by_bar = {
+        picture.bar: picture for picture in scene.pictures if picture.bar not in encoded
+    }
     return encoded | {bar: picture.data_uri() for bar, picture in by_bar.items()}
 
 
 FORMATS = ("html", "gif", "mp4")
-SCRIPTS = ("numbers.js", "picture.js", "acting.js", "chart.js", "tolerances.js", "page.js")
+SCRIPTS = (
+    "numbers.js",
+    "picture.js",
+    "acting.js",
+    "chart.js",
+    "tolerances.js",
+    "page.js",
+)
 LIVE_SCRIPTS = ("fields.js", "drag.js", "edit.js")
 """Additional scripts of the workbench."""
 
@@ -288,7 +360,9 @@ def write(
         write_text(target, write_page(scene, pictures or {}, units, vectors))
         return
     if pictures:
-        raise InputError("picture", sorted(pictures), "pictures are shown in an .html page only")
+        raise InputError(
+            "picture", sorted(pictures), "pictures are shown in an .html page only"
+        )
     write_film(scene, target, kind, seconds, units, moving=vectors)
 
 
@@ -304,7 +378,9 @@ def write_page(
 
     def asset(*names: str) -> str:
         folder = files("fourbar.show").joinpath("page")
-        return "".join(folder.joinpath(name).read_text(encoding="utf-8") for name in names)
+        return "".join(
+            folder.joinpath(name).read_text(encoding="utf-8") for name in names
+        )
 
     style, script = asset("page.css"), asset(*SCRIPTS)
     if live:
@@ -322,7 +398,10 @@ def write_page(
         results=asset("bench.html") if live else "",
         data=embed_json(
             collect_page_data(
-                replace(scene, tolerances=()) if live else scene, pictures or {}, units, midway=bool(live)
+                replace(scene, tolerances=()) if live else scene,
+                pictures or {},
+                units,
+                midway=bool(live),
             )
             | {"vectors": vectors, "live": live}
         ),
@@ -331,7 +410,9 @@ def write_page(
 
 def _hash_content(text: str) -> str:
     """Hash an inline script or style: by this name the page's own security policy allows it."""
-    return "sha256-" + base64.b64encode(hashlib.sha256(text.encode("utf-8")).digest()).decode("ascii")
+    return "sha256-" + base64.b64encode(
+        hashlib.sha256(text.encode("utf-8")).digest()
+    ).decode("ascii")
 
 
 def embed_json(value: object) -> str:

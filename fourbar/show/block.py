@@ -35,7 +35,11 @@ LOST = {2: "3 and 4", 3: "2 and 4", 4: "2 and 3"}
 
 
 def write_block(
-    scene: Scene, solution: Solution, units: Conversion = COMMON, *, pressure: float | None = None
+    scene: Scene,
+    solution: Solution,
+    units: Conversion = COMMON,
+    *,
+    pressure: float | None = None,
 ) -> list[str]:
     """Write the summary of a solved scene, line by line.
 
@@ -61,11 +65,20 @@ class _Block:
 
     def write(self, pressure: float | None) -> list[str]:
         """Write all paragraphs; a blank line parts the motion from the loads."""
-        loads = [*self._write_drive(pressure), *self._write_pins(), *self._write_bending(), *self._write_remarks()]
+        loads = [
+            *self._write_drive(pressure),
+            *self._write_pins(),
+            *self._write_bending(),
+            *self._write_remarks(),
+        ]
         lines: list[str] = []
         for line in [*self._write_motion(), *([""] if loads else []), *loads]:
             aligned = len(line) <= WIDTH
-            lines += [line] if aligned else wrap(line, WIDTH, subsequent_indent="    ", break_on_hyphens=False)
+            lines += (
+                [line]
+                if aligned
+                else wrap(line, WIDTH, subsequent_indent="    ", break_on_hyphens=False)
+            )
         return [line.replace(TIED, " ") for line in lines]
 
     def _value(self, value: float, unit: str, largest: float | None = None) -> str:
@@ -74,7 +87,9 @@ class _Block:
 
     def _place(self, place: float, *, named: bool = True) -> str:
         """Write a place as "theta_2 = 22.8 deg", or without its name."""
-        text = self._value(place, self.unit, {"m": self.longest, "s": 1.0}.get(self.unit))
+        text = self._value(
+            place, self.unit, {"m": self.longest, "s": 1.0}.get(self.unit)
+        )
         return f"{self.symbol}{TIED}={TIED}{text}" if named else text
 
     def _angle(self, angle: float) -> str:
@@ -85,10 +100,14 @@ class _Block:
         facts, scene = self.facts, self.facts.scene
         factor, unit = choose_unit(self.longest, "m", self.units)
         bars = zip(BAR_NAMES.values(), scene.linkage.lengths, strict=True)
-        lengths = ", ".join(f"{name} {write_digits(factor * length)}" for name, length in bars)
+        lengths = ", ".join(
+            f"{name} {write_digits(factor * length)}" for name, length in bars
+        )
         name = classify(scene.linkage).name
         title = f' "{clean_line(scene.title)}"' if scene.title else ""
-        of_bar = "" if scene.motion.bar == 2 else f" of the command {scene.motion.commanded}"
+        of_bar = (
+            "" if scene.motion.bar == 2 else f" of the command {scene.motion.commanded}"
+        )
         head = f"{name[0].upper()}{name[1:]}{title}, {BRANCH_NAMES[scene.motion.branch]} branch{of_bar}:"
         lines = [f"{head} {lengths} {unit}"]
         if len(lines[0]) > WIDTH:
@@ -96,22 +115,44 @@ class _Block:
         if facts.kind == "position":
             one = facts.solution
             angles = ", ".join(
-                f"theta_{bar} = {self._angle(float(getattr(one, f'theta_{bar}')[0]))}" for bar in (2, 3, 4)
+                f"theta_{bar} = {self._angle(float(getattr(one, f'theta_{bar}')[0]))}"
+                for bar in (2, 3, 4)
             )
-            stroke = "" if one.stroke is None else f"stroke {self._value(float(one.stroke[0]), 'm')}: "
-            lines += [stroke + angles, f"transmission angle {self._angle(facts.transmission.value)}"]
+            stroke = (
+                ""
+                if one.stroke is None
+                else f"stroke {self._value(float(one.stroke[0]), 'm')}: "
+            )
+            lines += [
+                stroke + angles,
+                f"transmission angle {self._angle(facts.transmission.value)}",
+            ]
         else:
             lines += [self._write_ranges()]
             least = facts.transmission
-            lines += [f"transmission angle: at least {self._angle(least.value)}, at {self._place(least.place)}"]
+            lines += [
+                f"transmission angle: at least {self._angle(least.value)}, at {self._place(least.place)}"
+            ]
         bad = {name: count for name, count in facts.counts.items() if name != "ok"}
         if bad:
-            counts = ", ".join(f"{count} {name.replace('_', ' ')}" for name, count in facts.counts.items())
-            lines.append(f"{len(facts.solution)} position{'s' if len(facts.solution) > 1 else ''}: {counts}")
+            counts = ", ".join(
+                f"{count} {name.replace('_', ' ')}"
+                for name, count in facts.counts.items()
+            )
+            lines.append(
+                f"{len(facts.solution)} position{'s' if len(facts.solution) > 1 else ''}: {counts}"
+            )
         lines += self._write_stretches()
-        acted_on = scene.loads or scene.effects or any(bar.mass > 0.0 for bar in scene.linkage.moving)
+        acted_on = (
+            scene.loads
+            or scene.effects
+            or any(bar.mass > 0.0 for bar in scene.linkage.moving)
+        )
         if facts.solution.F12 is None and acted_on:
-            lines += [f"positions only, since {scene.motion.names[1]} is left out:", f"    {explain_static(scene)}"]
+            lines += [
+                f"positions only, since {scene.motion.names[1]} is left out:",
+                f"    {explain_static(scene)}",
+            ]
         return lines
 
     def _write_ranges(self) -> str:
@@ -130,7 +171,15 @@ class _Block:
             name = "stroke" if self.unit == "m" else BAR_NAMES[bar]
             begin = f"{name} from {self._place(first, named=False)} to {self._place(last, named=False)}"
         following = [2, 4] if facts.kind == "released" else [4 if bar != 4 else 2]
-        return "; ".join([begin, *(f"{BAR_NAMES[number]} {self._write_swing(number)}" for number in following)])
+        return "; ".join(
+            [
+                begin,
+                *(
+                    f"{BAR_NAMES[number]} {self._write_swing(number)}"
+                    for number in following
+                ),
+            ]
+        )
 
     def _write_swing(self, bar: int) -> str:
         low, high = self.facts.angles[bar]
@@ -141,7 +190,10 @@ class _Block:
         places = [self._place(end.place, named=False) for end in (low, high)]
         if self.unit == "rad":  # the unit stands next to it
             places = [place.split(TIED)[0] for place in places]
-        width, start, stop = (self._angle(angle) for angle in (high.value - low.value, low.value, high.value))
+        width, start, stop = (
+            self._angle(angle)
+            for angle in (high.value - low.value, low.value, high.value)
+        )
         return f"swings {width}, from {start} ({self.symbol}{TIED}={TIED}{places[0]}) to {stop} ({places[1]})"
 
     def _write_release(self) -> str:
@@ -150,7 +202,9 @@ class _Block:
         if solution.stopped_at is None:
             return f"released for {write_digits(free.duration)} s, without a drive"
         stop = f"stops at a limit position at t = {write_digits(solution.stopped_at)} s, where bars 3 and 4 are in line"
-        return f"released for {write_digits(free.duration)} s, without a drive: it {stop}"
+        return (
+            f"released for {write_digits(free.duration)} s, without a drive: it {stop}"
+        )
 
     def _write_stretches(self) -> list[str]:
         """Write where the assembly ends, and what grows without bound there."""
@@ -159,8 +213,16 @@ class _Block:
             return []
         parts = []
         for low, high in facts.stretches:
-            start = "" if low is None else f"from {self._place(low, named=self.unit != 'm')}"
-            stop = "" if high is None else f"up to {self._place(high, named=self.unit != 'm')}"
+            start = (
+                ""
+                if low is None
+                else f"from {self._place(low, named=self.unit != 'm')}"
+            )
+            stop = (
+                ""
+                if high is None
+                else f"up to {self._place(high, named=self.unit != 'm')}"
+            )
             parts.append(f"{start} {stop}".strip())
         grows = ""
         if facts.drive is not None and facts.drive.keys.value in facts.between.growing:
@@ -184,8 +246,15 @@ class _Block:
             row = f"peak {row} at {self._place(facts.peak.place)}{beyond}, RMS {self._value(rms or 0.0, drive.unit)}"
         lines.append(self._row(word, row))
         if facts.held is not None:
-            low, high = (self._value(value, drive.unit, max(map(abs, facts.held))) for value in facts.held)
-            holds = "dry friction holds it between them" if facts.duty is None else "the range where dry friction holds"
+            low, high = (
+                self._value(value, drive.unit, max(map(abs, facts.held)))
+                for value in facts.held
+            )
+            holds = (
+                "dry friction holds it between them"
+                if facts.duty is None
+                else "the range where dry friction holds"
+            )
             lines.append(self._row("at rest", f"{low} to {high}: {holds}"))
         if facts.stroke_range is not None:
             lines += self._write_stroke()
@@ -204,18 +273,33 @@ class _Block:
             return []
         peak = self._value(duty.peak_power, "W")
         row = f"peak {peak}"
-        if facts.kind != "list" and duty.energy_in is not None and duty.energy_out is not None:
+        if (
+            facts.kind != "list"
+            and duty.energy_in is not None
+            and duty.energy_out is not None
+        ):
             over = "over the motion" if facts.kind == "law" else "over the sweep"
             if facts.kind == "turn":
-                turns = round(abs(facts.commanded[1] - facts.commanded[0]) / (2.0 * math.pi))
+                turns = round(
+                    abs(facts.commanded[1] - facts.commanded[0]) / (2.0 * math.pi)
+                )
                 over = "per turn" if turns == 1 else f"in {turns} turns"
             most = max(duty.energy_in, duty.energy_out)
-            forward, back = (self._value(energy, "J", most) for energy in (duty.energy_in, duty.energy_out))
+            forward, back = (
+                self._value(energy, "J", most)
+                for energy in (duty.energy_in, duty.energy_out)
+            )
             row += f"; {forward} {over} given, {back} taken back"
         lines = [self._row("power", row)]
         if not facts.linear:
-            numbers = ((duty.peak_torque, "N m"), (duty.peak_speed, "rad/s"), (duty.rms_torque, "N m"))
-            torque, speed, mean = (self._value(number or 0.0, unit) for number, unit in numbers)
+            numbers = (
+                (duty.peak_torque, "N m"),
+                (duty.peak_speed, "rad/s"),
+                (duty.rms_torque, "N m"),
+            )
+            torque, speed, mean = (
+                self._value(number or 0.0, unit) for number, unit in numbers
+            )
             lines.append(f"motor: at least {torque} at {speed} (RMS {mean}), {peak}")
         return lines
 
@@ -227,42 +311,59 @@ class _Block:
         if motion.speed is None:
             return head if motion.law is None else f"{head}, by a law over time"
         si = "rad/s" if motion.stroke is None else "m/s"
-        drives = motion.stroke is not None or (scene.drive is None and scene.drive_bar == motion.bar)
+        drives = motion.stroke is not None or (
+            scene.drive is None and scene.drive_bar == motion.bar
+        )
         speed = "at rest" if motion.speed == 0.0 else self._value(motion.speed, si)
         if not drives:
             speed = f"the {BAR_NAMES[motion.bar]} {'' if motion.speed == 0.0 else 'at '}{speed}"
         if motion.acceleration:
-            speed += f", {motion.names[2]} = {self._value(motion.acceleration, f'{si}^2')}"
+            speed += (
+                f", {motion.names[2]} = {self._value(motion.acceleration, f'{si}^2')}"
+            )
         return f"{head}, {speed}"
 
     def _write_stroke(self) -> list[str]:
         """Write the stroke, over what it assembles, and its speed."""
         facts, lines = self.facts, list[str]()
         assert facts.stroke_range is not None
-        low, high = (self._value(x.value, "m", self.longest) for x in facts.stroke_range)
+        low, high = (
+            self._value(x.value, "m", self.longest) for x in facts.stroke_range
+        )
         row = low if facts.kind == "position" else f"{low} to {high}"
         if facts.stroke_limits is not None:
             ends = (self._value(x, "m", self.longest) for x in facts.stroke_limits)
             row += "; assembles from {} to {}".format(*ends)
         lines.append(self._row("stroke", row))
         speed = facts.solution.stroke_speed
-        if speed is not None and facts.scene.motion.stroke is None and np.nanmax(np.abs(speed)) > 0.0:
+        if (
+            speed is not None
+            and facts.scene.motion.stroke is None
+            and np.nanmax(np.abs(speed)) > 0.0
+        ):
             peak = self._value(float(np.nanmax(np.abs(speed))), "m/s")
-            lines.append(self._row("speed", peak if facts.kind == "position" else f"peak {peak}"))
+            lines.append(
+                self._row("speed", peak if facts.kind == "position" else f"peak {peak}")
+            )
         return lines
 
     def _write_bore(self, pressure: float) -> list[str]:
         """Write the bore that pushes, and the area that pulls, at a pressure."""
         values = self.facts.between.solution.drive_force
         assert values is not None
-        push, pull = max(0.0, float(np.nanmax(values))), max(0.0, -float(np.nanmin(values)))
+        push, pull = (
+            max(0.0, float(np.nanmax(values))),
+            max(0.0, -float(np.nanmin(values))),
+        )
         parts = []
         if push:
             bore = math.sqrt(4.0 * push / (math.pi * pressure))
             parts.append(f"{self._value(bore, 'm')} to push {self._value(push, 'N')}")
         if pull:
             bore = math.sqrt(4.0 * pull / (math.pi * pressure))
-            parts.append(f"{self._value(bore, 'm')}, and the rod's area besides, to pull {self._value(pull, 'N')}")
+            parts.append(
+                f"{self._value(bore, 'm')}, and the rod's area besides, to pull {self._value(pull, 'N')}"
+            )
         return [self._row("bore", f"at least {'; '.join(parts)}")] if parts else []
 
     def _write_pins(self) -> list[str]:
@@ -275,8 +376,19 @@ class _Block:
             return _align([("pins", list(facts.pins)), ("  force", peaks)])
         places = [self._place(load.peak.place, named=False) for load in loads]
         means = self._cells([load.rms for load in loads], "N")
-        lines = _align([("pins", list(facts.pins)), ("  peak", peaks), ("  at", places), ("  RMS", means)])
-        return [*lines, "  peak and RMS are those of these positions"] if facts.kind == "list" else lines
+        lines = _align(
+            [
+                ("pins", list(facts.pins)),
+                ("  peak", peaks),
+                ("  at", places),
+                ("  RMS", means),
+            ]
+        )
+        return (
+            [*lines, "  peak and RMS are those of these positions"]
+            if facts.kind == "list"
+            else lines
+        )
 
     def _write_bending(self) -> list[str]:
         """Write the largest bending moment of each bar, where along the bar, and where in the motion."""
@@ -286,49 +398,91 @@ class _Block:
         places = [self._value(bar.x, "m", self.longest) for bar in bending]
         if facts.kind != "position":
             positions = [self._place(bar.peak.place, named=False) for bar in bending]
-            places = [f"{x}, {place}" for x, place in zip(places, positions, strict=True)]
+            places = [
+                f"{x}, {place}" for x, place in zip(places, positions, strict=True)
+            ]
         moments = self._cells([bar.peak.value for bar in bending], "N m")
-        return _align([("bending", [f"bar {bar}" for bar in facts.bending]), ("  moment", moments), ("  at x", places)])
+        return _align(
+            [
+                ("bending", [f"bar {bar}" for bar in facts.bending]),
+                ("  moment", moments),
+                ("  at x", places),
+            ]
+        )
 
     def _cells(self, values: list[float], unit: str) -> list[str]:
         """Write quantities of one kind with the prefix of the largest; each with its own if they lie far apart."""
         sizes = [abs(value) for value in values if value]
         largest = max(sizes, default=0.0)
         alike = min(sizes, default=0.0) >= ALIKE * largest
-        return [self._value(value, unit, largest if alike or not value else None) for value in values]
+        return [
+            self._value(value, unit, largest if alike or not value else None)
+            for value in values
+        ]
 
     def _is_rough(self, name: str) -> bool:
         """Tell whether a peak is that of the positions alone: between them it grows, or nothing was looked for."""
-        return self.facts.kind not in ("position", "released") and name in self.facts.between.growing
+        return (
+            self.facts.kind not in ("position", "released")
+            and name in self.facts.between.growing
+        )
 
     def _write_remarks(self) -> list[str]:
         """Write what grows between the positions, where pin forces jump, and what rounding does."""
         facts, lines = self.facts, list[str]()
-        pins = [pin for pin, name in zip(facts.pins, PIN_FORCES, strict=False) if self._is_rough(name)]
-        bars = [f"bar {bar}" for bar, bending in facts.bending.items() if bending.grows and bending.peak.value]
+        pins = [
+            pin
+            for pin, name in zip(facts.pins, PIN_FORCES, strict=False)
+            if self._is_rough(name)
+        ]
+        bars = [
+            f"bar {bar}"
+            for bar, bending in facts.bending.items()
+            if bending.grows and bending.peak.value
+        ]
         if facts.kind not in ("position", "list", "released") and (pins or bars):
             parts = [("the loads of ", pins), ("the bending of ", bars)]
-            grow = " and ".join(head + ", ".join(names) for head, names in parts if names)
+            grow = " and ".join(
+                head + ", ".join(names) for head, names in parts if names
+            )
             lines.append(f"growing without bound between these positions: {grow}")
         if facts.between.reversals:
-            places = ", ".join(f"{self._place(place, named=False)} ({pin})" for place, pin in facts.between.reversals)
+            places = ", ".join(
+                f"{self._place(place, named=False)} ({pin})"
+                for place, pin in facts.between.reversals
+            )
             name = facts.solution.commanded
-            lines.append(f"dry friction reverses, and the pin forces jump, at {name} = {places}")
+            lines.append(
+                f"dry friction reverses, and the pin forces jump, at {name} = {places}"
+            )
         lines += self._warn()
         if facts.error is not None:
-            below = f"below 1e{math.ceil(math.log10(facts.error)):+03d}" if facts.error else "zero"
+            below = (
+                f"below 1e{math.ceil(math.log10(facts.error)):+03d}"
+                if facts.error
+                else "zero"
+            )
             changed = "none of these" if facts.error < FOUR_DIGITS else "some"
-            lines.append(f"rounding changes {changed} digits (worst error bar {below} of the value)")
+            lines.append(
+                f"rounding changes {changed} digits (worst error bar {below} of the value)"
+            )
         return lines
 
     def _warn(self) -> list[str]:
         """Write where the drive's torque or force has few digits left, and the bars in line that cost them."""
         solution, drive = self.facts.solution, self.facts.drive
-        if drive is None or drive.error is None or solution.drive_condition is None or drive.values is None:
+        if (
+            drive is None
+            or drive.error is None
+            or solution.drive_condition is None
+            or drive.values is None
+        ):
             return []
         # of those that matter: one that passes through zero has no digits, and needs none
         with np.errstate(invalid="ignore"):
-            share = drive.error / np.maximum(np.abs(drive.values), np.nanmedian(np.abs(drive.values)))
+            share = drive.error / np.maximum(
+                np.abs(drive.values), np.nanmedian(np.abs(drive.values))
+            )
         if not np.nanmax(share, initial=0.0) > FEW_DIGITS:
             return []
         worst = int(np.nanargmax(share))
@@ -339,7 +493,9 @@ class _Block:
         sines = {commanded: solution.condition[worst]}
         if solution.drive is not None:
             lever, sine = solution.drive_condition[worst], sines[commanded]
-            return [f"{start}: of its lever {lever:.2g}, of the sine of bars {commanded} {sine:.2g} is left"]
+            return [
+                f"{start}: of its lever {lever:.2g}, of the sine of bars {commanded} {sine:.2g} is left"
+            ]
         sines[LOST[solution.drive_bar]] = solution.drive_condition[worst]
         bars = min(sines, key=lambda pair: sines[pair])
         gap = math.asin(min(sines[bars], 1.0))
@@ -353,16 +509,25 @@ class _Block:
 def _align(rows: list[tuple[str, list[str]]]) -> list[str]:
     """Write rows of a label and cells that stand below each other."""
     width = max(COLUMN, 2 + max(len(cell) for _, cells in rows for cell in cells))
-    return [f"{label:<{LABEL}}{''.join(f'{cell:<{width}}' for cell in cells)}".rstrip() for label, cells in rows]
+    return [
+        f"{label:<{LABEL}}{''.join(f'{cell:<{width}}' for cell in cells)}".rstrip()
+        for label, cells in rows
+    ]
 
 
 def explain_static(scene: Scene) -> str:
     """Say what asks for forces where a scene states positions alone."""
-    unit, what = ("rad/s", "torque") if scene.motion.stroke is None else ("m/s", "force")
-    return f'{scene.motion.names[1]} = "0 {unit}" gives the static {what} and pin forces'
+    unit, what = (
+        ("rad/s", "torque") if scene.motion.stroke is None else ("m/s", "force")
+    )
+    return (
+        f'{scene.motion.names[1]} = "0 {unit}" gives the static {what} and pin forces'
+    )
 
 
-def write_motor(scene: Scene, solution: Solution, units: Conversion) -> dict[str, Any] | None:
+def write_motor(
+    scene: Scene, solution: Solution, units: Conversion
+) -> dict[str, Any] | None:
     """Write the duty and the loads of the pins as the JSON has them, in the units of the output; as `motor_duty`."""
     between = locate_between(scene, solution)
     duty = motor_duty(solution, between.drive)
@@ -373,13 +538,21 @@ def write_motor(scene: Scene, solution: Solution, units: Conversion) -> dict[str
     numbers = {name: getattr(duty, name) for name in si}
     force, angle = find_unit_in("N", units)[1], find_unit_in("rad", units)[1]
     loads = {
-        pin: (bearing_load(between.bounded(name), pin), bearing_load(solution, pin)) for pin, name in PIN_FORCE.items()
+        pin: (bearing_load(between.bounded(name), pin), bearing_load(solution, pin))
+        for pin, name in PIN_FORCE.items()
     }
     return {
         "closed": duty.closed,
-        **{name: None if number is None else number * shown[name][1] for name, number in numbers.items()},
+        **{
+            name: None if number is None else number * shown[name][1]
+            for name, number in numbers.items()
+        },
         "pins": {
-            pin: {"peak": peak.largest * force, "rms": load.rms * force, "theta_2": peak.where * angle}
+            pin: {
+                "peak": peak.largest * force,
+                "rms": load.rms * force,
+                "theta_2": peak.where * angle,
+            }
             for pin, (peak, load) in loads.items()
         },
         "units": {name: unit for name, (unit, _) in shown.items()},

@@ -54,7 +54,13 @@ class MotorDuty(NamedTuple):
 
 
 DUTY_UNITS = {
-    **{"peak_torque": "N m", "rms_torque": "N m", "peak_speed": "rad/s", "peak_power": "W", "rms_power": "W"},
+    **{
+        "peak_torque": "N m",
+        "rms_torque": "N m",
+        "peak_speed": "rad/s",
+        "peak_power": "W",
+        "rms_power": "W",
+    },
     **{"energy_in": "J", "energy_out": "J", "peak_force": "N", "rms_force": "N"},
 }
 """SI unit of each number of `MotorDuty`; the speed of a linear drive is in m/s."""
@@ -65,7 +71,9 @@ def shaking_force(solution: Solution) -> Array:
 
     A linear drive with an end on the ground adds its own; a spring pulls there besides.
     """
-    return -(_require(solution, "F12") + _require(solution, "F14")) + _find_push(solution)
+    return -(_require(solution, "F12") + _require(solution, "F14")) + _find_push(
+        solution
+    )
 
 
 def shaking_moment(solution: Solution) -> Array:
@@ -78,13 +86,17 @@ def shaking_moment(solution: Solution) -> Array:
     """
 
     def moment(distance: Any, angle: Any, force: Array) -> Array:
-        return np.asarray(distance * (np.cos(angle) * force[..., 1] - np.sin(angle) * force[..., 0]))
+        return np.asarray(
+            distance * (np.cos(angle) * force[..., 1] - np.sin(angle) * force[..., 0])
+        )
 
     F14, drive = _require(solution, "F14"), solution.drive
     assert solution.ground is not None
     length, angle = solution.ground
     of_drive = -_require(solution, "torque") if drive is None else np.zeros(())
-    for point in [] if drive is None else [point for _, point in drive.ends if point.bar == 1]:
+    for point in (
+        [] if drive is None else [point for _, point in drive.ends if point.bar == 1]
+    ):
         of_drive = moment(point.distance, point.angle + angle, _find_push(solution))
     return np.asarray(of_drive - moment(length, angle, F14))
 
@@ -95,7 +107,11 @@ def _find_push(solution: Solution) -> Array:
     sense = sum(sense for sense, point in ends if point.bar == 1)
     if not sense:
         return np.zeros((*solution.theta_2.shape, 2))
-    return np.asarray(sense * _require(solution, "drive_force")[..., None] * _require(solution, "drive_line"))
+    return np.asarray(
+        sense
+        * _require(solution, "drive_force")[..., None]
+        * _require(solution, "drive_line")
+    )
 
 
 def bearing_load(solution: Solution, pin: str) -> BearingLoad:
@@ -132,8 +148,15 @@ def motor_duty(solution: Solution, located: Solution | None = None) -> MotorDuty
     drive, located = read_drive(solution), solution if located is None else located
     if drive.values is None or not np.isfinite(drive.values).any():
         return None
-    power, closed, linear = _require(solution, "power"), is_once_round(solution), solution.drive is not None
-    peak, rms = _find_peak(_require(located, drive.keys.value)), _find_rms(solution, drive.values)
+    power, closed, linear = (
+        _require(solution, "power"),
+        is_once_round(solution),
+        solution.drive is not None,
+    )
+    peak, rms = (
+        _find_peak(_require(located, drive.keys.value)),
+        _find_rms(solution, drive.values),
+    )
     energy_in, energy_out = _integrate_power(solution, power)
     return MotorDuty(
         peak_torque=None if linear else peak,
@@ -162,26 +185,44 @@ def _require(solution: Solution, name: str) -> Array:
     expect("solution", solution, Solution)
     values: Array | None = getattr(solution, name)
     if values is None:
-        raise InputError("solution", name, "was not evaluated: solve up to the stage 'force'")
+        raise InputError(
+            "solution", name, "was not evaluated: solve up to the stage 'force'"
+        )
     return values
 
 
-def _integrate_power(solution: Solution, power: Array) -> tuple[float | None, float | None]:
+def _integrate_power(
+    solution: Solution, power: Array
+) -> tuple[float | None, float | None]:
     """Integrate the positive and the negative part of the power, each over time."""
     stroke, bar = solution.at.stroke, solution.at.bar
     if solution.time is not None:
         spans = np.diff(solution.time)
     else:
-        speed = getattr(solution, f"omega_{bar}") if stroke is None else solution.stroke_speed
-        steps, speed = np.diff(solution.at.places), np.broadcast_to(np.asarray(speed), power.shape)[..., :-1]
-        spans = np.abs(np.divide(steps, speed, out=np.full(speed.shape, np.nan), where=speed != 0.0))
+        speed = (
+            getattr(solution, f"omega_{bar}")
+            if stroke is None
+            else solution.stroke_speed
+        )
+        steps, speed = (
+            np.diff(solution.at.places),
+            np.broadcast_to(np.asarray(speed), power.shape)[..., :-1],
+        )
+        spans = np.abs(
+            np.divide(
+                steps, speed, out=np.full(speed.shape, np.nan), where=speed != 0.0
+            )
+        )
     parts = [
-        0.5 * spans * (part[..., :-1] + part[..., 1:]) for part in (np.maximum(power, 0.0), np.maximum(-power, 0.0))
+        0.5 * spans * (part[..., :-1] + part[..., 1:])
+        for part in (np.maximum(power, 0.0), np.maximum(-power, 0.0))
     ]
     moves = np.isfinite(parts[0]).any(axis=-1)
     if not moves.any():
         return None, None
-    energy_in, energy_out = (_make_plain(np.where(moves, np.nansum(part, axis=-1), np.nan)) for part in parts)
+    energy_in, energy_out = (
+        _make_plain(np.where(moves, np.nansum(part, axis=-1), np.nan)) for part in parts
+    )
     return energy_in, energy_out
 
 
@@ -225,7 +266,12 @@ class Driving(NamedTuple):
 
 def read_drive(solution: Solution) -> Driving:
     """Return torque or force of the drive, with its error bar."""
-    names, symbol, word, speed = COUPLE, f"T{solution.drive_bar}", "torque", f"omega_{solution.drive_bar}"
+    names, symbol, word, speed = (
+        COUPLE,
+        f"T{solution.drive_bar}",
+        "torque",
+        f"omega_{solution.drive_bar}",
+    )
     if solution.drive is not None:
         names, symbol, word, speed = LINE, "F", "drive force", "stroke_speed"
     values, error = (getattr(solution, name) for name in names[:2])
@@ -259,19 +305,34 @@ def compute_energies(scene: Scene, motion: Solution) -> Energies:
     try:
         from scipy.interpolate import CubicSpline
     except ModuleNotFoundError:
-        raise DependencyError(f"SciPy is needed for free motion: {say_install('studies')}") from None
+        raise DependencyError(
+            f"SciPy is needed for free motion: {say_install('studies')}"
+        ) from None
     assert motion.time is not None and motion.omega_2 is not None
-    state = compute_state(scene, Command(motion.theta_2, motion.branch, motion.omega_2, 0.0))
-    groups = {"loads": scene.loads, **{effect.key: (effect,) for effect in scene.effects}}
+    state = compute_state(
+        scene, Command(motion.theta_2, motion.branch, motion.omega_2, 0.0)
+    )
+    groups = {
+        "loads": scene.loads,
+        **{effect.key: (effect,) for effect in scene.effects},
+    }
     work = {}
     for name, terms in groups.items():
         actions = Actions(state, list_bodies(scene.linkage)).add(terms)
         power = np.zeros(len(motion)) + actions.work()[0] * motion.omega_2
         finite = np.isfinite(power)  # bars 3 and 4 in line: the velocities are 0/0
         if np.count_nonzero(finite) > 1 and np.any(power[finite]):
-            work[name] = CubicSpline(motion.time[finite], power[finite]).antiderivative()(motion.time)
+            work[name] = CubicSpline(
+                motion.time[finite], power[finite]
+            ).antiderivative()(motion.time)
     kinetic = np.zeros(len(motion))
-    for number, body in zip(MOVING_BARS, list_bodies(scene.linkage, scene.effects), strict=True):
+    for number, body in zip(
+        MOVING_BARS, list_bodies(scene.linkage, scene.effects), strict=True
+    ):
         v = state.velocity(number, body.z)
-        kinetic = kinetic + 0.5 * body.m * dot(v, v) + 0.5 * body.I * np.square(state.omega(number))
+        kinetic = (
+            kinetic
+            + 0.5 * body.m * dot(v, v)
+            + 0.5 * body.I * np.square(state.omega(number))
+        )
     return Energies(kinetic, work)

@@ -22,7 +22,9 @@ SHOWN = 5
 def show_scene(scene: Scene, units: Conversion = SI) -> str:
     """Draw the linkage as `scene.plot("linkage")` does, next to what the scene states."""
     try:
-        drawn = b64encode(draw_figure(scene, "linkage", units=units)._repr_svg_().encode()).decode()
+        drawn = b64encode(
+            draw_figure(scene, "linkage", units=units)._repr_svg_().encode()
+        ).decode()
         picture = f'<img alt="The linkage" style="width:100%" src="data:image/svg+xml;base64,{drawn}">'
     except FourBarError as error:  # a notebook shows the reason, not a traceback
         picture = f"<p>{escape(str(error))}</p>"
@@ -41,13 +43,26 @@ def _list_facts(scene: Scene, units: Conversion) -> list[tuple[str, str]]:
     motion = scene.motion
     facts = [("type", classify(scene.linkage).name)]
     masses = (0.0, *(bar.mass for bar in scene.linkage.moving))
-    for name, length, mass in zip(BAR_NAMES.values(), scene.linkage.lengths, masses, strict=True):
-        facts.append((name, write_value(length, "m", units) + (f", {write_value(mass, 'kg', units)}" if mass else "")))
+    for name, length, mass in zip(
+        BAR_NAMES.values(), scene.linkage.lengths, masses, strict=True
+    ):
+        facts.append(
+            (
+                name,
+                write_value(length, "m", units)
+                + (f", {write_value(mass, 'kg', units)}" if mass else ""),
+            )
+        )
     speed = "positions only"
     if motion.speed is not None:
-        omega, alpha = write_value(motion.speed, "rad/s", units), write_value(motion.acceleration, "rad/s^2", units)
+        omega, alpha = (
+            write_value(motion.speed, "rad/s", units),
+            write_value(motion.acceleration, "rad/s^2", units),
+        )
         speed = f"ω{motion.bar} = {omega}, α{motion.bar} = {alpha}"
-    acting = [f"load on bar {load.bar}" for load in scene.loads] + [effect.key for effect in scene.effects]
+    acting = [f"load on bar {load.bar}" for load in scene.loads] + [
+        effect.key for effect in scene.effects
+    ]
     return [
         *facts,
         ("motion", f"{speed}; {BRANCH_NAMES[motion.branch]} branch"),
@@ -62,17 +77,31 @@ def show_solution(solution: Solution, units: Conversion = DEGREES) -> str:
         return f"<div><b>{escape(solution.title or 'Study')}</b>: {describe_extent(solution.theta_2)}</div>"
     cells = list_columns(solution, units)
     count = len(solution)
-    places = list(range(count)) if count <= 2 * SHOWN else [*range(SHOWN), *range(count - SHOWN, count)]
-    head = "".join(f"<th>{escape(name.strip()).replace(chr(10), '<br>')}</th>" for name in cells)
+    places = (
+        list(range(count))
+        if count <= 2 * SHOWN
+        else [*range(SHOWN), *range(count - SHOWN, count)]
+    )
+    head = "".join(
+        f"<th>{escape(name.strip()).replace(chr(10), '<br>')}</th>" for name in cells
+    )
     lines = []
     for place in places:
         if count > 2 * SHOWN and place == count - SHOWN:
             more = f"… {count - 2 * SHOWN} more …"
-            lines.append(f'<tr><td colspan="{len(cells)}" style="text-align:center">{more}</td></tr>')
-        lines.append("<tr>" + "".join(f"<td>{escape(column[place])}</td>" for column in cells.values()) + "</tr>")
+            lines.append(
+                f'<tr><td colspan="{len(cells)}" style="text-align:center">{more}</td></tr>'
+            )
+        lines.append(
+            "<tr>"
+            + "".join(f"<td>{escape(column[place])}</td>" for column in cells.values())
+            + "</tr>"
+        )
     title = escape(solution.title or "Solution")
     positions = f"{count} position{'s' if count != 1 else ''}"
-    table = f"<table><thead><tr>{head}</tr></thead><tbody>{''.join(lines)}</tbody></table>"
+    table = (
+        f"<table><thead><tr>{head}</tr></thead><tbody>{''.join(lines)}</tbody></table>"
+    )
     return f"<div><b>{title}</b>: {positions}{table}</div>"
 
 

@@ -22,7 +22,13 @@ from fourbar.quantities import COUPLE, LINE, NOT_ASSEMBLED, PIN_FORCES, SINGULAR
 from fourbar.scene import Scene
 from fourbar.scene.motion import BRANCH_NAMES
 from fourbar.show.duty import read_drive
-from fourbar.show.tables import MOST_ROWS, make_plain_table, write_cells, write_table, write_value
+from fourbar.show.tables import (
+    MOST_ROWS,
+    make_plain_table,
+    write_cells,
+    write_table,
+    write_value,
+)
 from fourbar.show.units import COMMON, choose_unit
 from fourbar.solution import Conversion, find_unit, find_unit_in
 from fourbar.studies.circuit_curve import RestPosition
@@ -32,7 +38,9 @@ from fourbar.studies.equilibrium import Equilibria, Equilibrium
 from fourbar.writing import write_object
 
 
-def write_type(linkage: FourBar, units: Conversion | None = COMMON, *, everything: bool = False) -> Iterator[str]:
+def write_type(
+    linkage: FourBar, units: Conversion | None = COMMON, *, everything: bool = False
+) -> Iterator[str]:
     """Write the type of a linkage, the condition that decides it, what turns, how far, and between which limits.
 
     `units`: of the lengths; None where they are ratios. `everything`: the limits of all bars, not of the output alone.
@@ -40,14 +48,18 @@ def write_type(linkage: FourBar, units: Conversion | None = COMMON, *, everythin
     mobility = classify(linkage)
     relation = "<" if mobility.surplus > 0.0 else ">" if mobility.surplus < 0.0 else "="
     outer = min(linkage.lengths) + max(linkage.lengths)
-    factor, unit = (1.0, "") if units is None else choose_unit(max(linkage.lengths), "m", units)
+    factor, unit = (
+        (1.0, "") if units is None else choose_unit(max(linkage.lengths), "m", units)
+    )
 
     def write(length: float) -> str:
         return f"{factor * length:.6g} {unit}".rstrip()
 
     yield mobility.name
     yield f"s + l = {write(outer)} {relation} p + q = {write(sum(linkage.lengths) - outer)}"
-    yield "bars that turn fully: " + (", ".join(BAR_NAMES[number] for number in mobility.turning) or "none")
+    yield "bars that turn fully: " + (
+        ", ".join(BAR_NAMES[number] for number in mobility.turning) or "none"
+    )
     if mobility.barker is not None:  # a structure does not move
         yield from _write_mobility(linkage, write, everything)
 
@@ -59,29 +71,43 @@ def write_type_json(linkage: FourBar) -> str:
         transmission = transmission_extremes(linkage)
         more = {
             "swing": {BAR_NAMES[bar]: swing(linkage, bar) for bar in MOVING_BARS},
-            "limit_positions": {BAR_NAMES[bar]: limit_positions(linkage, bar) for bar in MOVING_BARS},
+            "limit_positions": {
+                BAR_NAMES[bar]: limit_positions(linkage, bar) for bar in MOVING_BARS
+            },
             "change_points": change_points(linkage),
             "circuits": circuits(linkage),
             "transmission": {**transmission._asdict(), "worst": transmission.worst},
             "time_ratio": time_ratio(linkage),
         }
     lengths = dict(zip(BAR_NAMES.values(), linkage.lengths, strict=True))
-    return write_object("fourbar-classify/1", lengths=lengths, **mobility._asdict(), **more)
+    return write_object(
+        "fourbar-classify/1", lengths=lengths, **mobility._asdict(), **more
+    )
 
 
-def _write_mobility(linkage: FourBar, write: Callable[[float], str], everything: bool) -> Iterator[str]:
+def _write_mobility(
+    linkage: FourBar, write: Callable[[float], str], everything: bool
+) -> Iterator[str]:
     """Write what swings and turns, and between which limits; angles in deg, digits as far as a drawing needs them."""
     swings = [
-        f"{BAR_NAMES[bar]} {_write_angle(swing(linkage, bar))}" for bar in MOVING_BARS if not turns_fully(linkage, bar)
+        f"{BAR_NAMES[bar]} {_write_angle(swing(linkage, bar))}"
+        for bar in MOVING_BARS
+        if not turns_fully(linkage, bar)
     ]
     if swings:
         yield f"bars that swing: {', '.join(swings)}"
-    limits = [(bar, limit) for bar in (MOVING_BARS if everything else (4,)) for limit in limit_positions(linkage, bar)]
+    limits = [
+        (bar, limit)
+        for bar in (MOVING_BARS if everything else (4,))
+        for limit in limit_positions(linkage, bar)
+    ]
     if limits:
         names = "".join(f"{name:>10}" for name in ("theta_2", "theta_3", "theta_4"))
         yield f"{'limit positions (deg)':<34}{names}  branch"
     for bar, limit in limits:
-        in_line = ", ".join(BAR_NAMES[number] for number in MOVING_BARS if number != bar)
+        in_line = ", ".join(
+            BAR_NAMES[number] for number in MOVING_BARS if number != bar
+        )
         what = f"  {BAR_NAMES[bar]}: {in_line} {'stretched' if limit.stretched else 'folded'}"
         angles = "".join(f"{math.degrees(angle):10.4f}" for angle in limit[:3])
         yield f"{what:<34}{angles}  {BRANCH_NAMES.get(limit.branch, 'both')}"
@@ -102,11 +128,18 @@ def _write_mobility(linkage: FourBar, write: Callable[[float], str], everything:
         yield f"time ratio of the output strokes at constant omega_2: {ratio:.4f}"
 
 
-def _explain_turning(linkage: FourBar, bar: int, write: Callable[[float], str]) -> Iterator[str]:
+def _explain_turning(
+    linkage: FourBar, bar: int, write: Callable[[float], str]
+) -> Iterator[str]:
     """Say why a bar has no limits: the two others would have to be in line, stretched or folded."""
     reach, d, length = reach_of(linkage, bar), linkage.ground, linkage.lengths[bar - 1]
-    (one, x), (two, y) = ((BAR_NAMES[k], linkage.lengths[k - 1]) for k in MOVING_BARS if k != bar)
-    name, touches = BAR_NAMES[bar], reach.beyond_stretched == 0.0 or reach.beyond_folded == 0.0
+    (one, x), (two, y) = (
+        (BAR_NAMES[k], linkage.lengths[k - 1]) for k in MOVING_BARS if k != bar
+    )
+    name, touches = (
+        BAR_NAMES[bar],
+        reach.beyond_stretched == 0.0 or reach.beyond_folded == 0.0,
+    )
     when = "are in line at change points alone" if touches else "are never in line"
     yield f"{name}: no limits, {one} and {two} {when}:"
     relation = "=" if reach.beyond_stretched == 0.0 else "<"
@@ -144,20 +177,38 @@ def write_sensitivity(derivatives: Sensitivity) -> str:
         "largest change over the positions by 1 % of a number, of an angle by 1 deg; pin forces by their magnitude"
     ]
     for name in names:
-        angles = [row for row in influences[name] if derivatives.keys[row.key].unit == "rad"]
-        most = [rows[0] for rows in ([row for row in influences[name] if row not in angles], angles) if rows]
+        angles = [
+            row for row in influences[name] if derivatives.keys[row.key].unit == "rad"
+        ]
+        most = [
+            rows[0]
+            for rows in ([row for row in influences[name] if row not in angles], angles)
+            if rows
+        ]
         if most:
-            parts = [f"{row.key} (at theta_2 = {math.degrees(row.theta_2):.6g} deg)" for row in most]
+            parts = [
+                f"{row.key} (at theta_2 = {math.degrees(row.theta_2):.6g} deg)"
+                for row in most
+            ]
             lines.append(f"{name} depends most on " + ", of the angles on ".join(parts))
     without = [status for status in derivatives.status if status != "ok"]
     if without:
-        counts = ", ".join(f"{without.count(word)} {word.replace('_', ' ')}" for word in dict.fromkeys(without))
+        counts = ", ".join(
+            f"{without.count(word)} {word.replace('_', ' ')}"
+            for word in dict.fromkeys(without)
+        )
         lines.append(f"positions without all derivatives: {counts}")
-    changes = {name: {row.key: row.change for row in influences[name]} for name in names}
-    rows = [["largest value", *(f"{find_largest(derivatives, name):.4g}" for name in names)]]
+    changes = {
+        name: {row.key: row.change for row in influences[name]} for name in names
+    }
+    rows = [
+        ["largest value", *(f"{find_largest(derivatives, name):.4g}" for name in names)]
+    ]
     for key in rank_numbers(derivatives, names):
         rows.append([key, *(f"{changes[name].get(key, 0.0):.3g}" for name in names)])
-    table = make_plain_table(["", *(f"{name}\n{find_unit(name)}" for name in names)], rows, left=("",))
+    table = make_plain_table(
+        ["", *(f"{name}\n{find_unit(name)}" for name in names)], rows, left=("",)
+    )
     return write_table(derivatives.solution.title, lines, table)
 
 
@@ -167,7 +218,9 @@ def rank_numbers(derivatives: Sensitivity, names: list[str]) -> list[str]:
     for name in names:
         size = find_largest(derivatives, name)
         for row in derivatives.influences(name):
-            share[row.key] = max(share.get(row.key, 0.0), abs(row.change) / size if size > 0.0 else 0.0)
+            share[row.key] = max(
+                share.get(row.key, 0.0), abs(row.change) / size if size > 0.0 else 0.0
+            )
     return sorted(share, key=lambda key: -share[key])
 
 
@@ -181,9 +234,14 @@ def write_sensitivity_json(derivatives: Sensitivity) -> str:
         theta_2=derivatives.solution.theta_2,
         keys={
             key: {"value": number, "unit": entry.unit}
-            for (key, entry), number in zip(derivatives.keys.items(), derivatives.numbers.tolist(), strict=True)
+            for (key, entry), number in zip(
+                derivatives.keys.items(), derivatives.numbers.tolist(), strict=True
+            )
         },
-        by={name: dict(zip(derivatives.keys, rows, strict=True)) for name, rows in derivatives.by.items()},
+        by={
+            name: dict(zip(derivatives.keys, rows, strict=True))
+            for name, rows in derivatives.by.items()
+        },
     )
 
 
@@ -193,8 +251,12 @@ EXTREMES_SCHEMA = "fourbar-extremes/1"
 def write_extremes(scene: Scene, proof: Extremes, units: Conversion) -> str:
     """Write each enclosure with its angle, below what it holds over."""
     angle_unit, of_angle = find_unit_in("rad", units)
-    parts = " and ".join(f"{low * of_angle:.6g} to {high * of_angle:.6g}" for low, high in proof.parts)
-    lines = [f"guaranteed over theta_2 = {parts} {angle_unit}, by interval arithmetic in {proof.boxes} pieces of it"]
+    parts = " and ".join(
+        f"{low * of_angle:.6g} to {high * of_angle:.6g}" for low, high in proof.parts
+    )
+    lines = [
+        f"guaranteed over theta_2 = {parts} {angle_unit}, by interval arithmetic in {proof.boxes} pieces of it"
+    ]
     if proof.distance:
         lines.append(
             f"left out: theta_2 within {write_value(proof.distance, 'rad', units)} "
@@ -213,22 +275,42 @@ def write_extremes(scene: Scene, proof: Extremes, units: Conversion) -> str:
         )
     rows = []
     for name in proof.least:
-        unit, factor = find_unit_in("rad" if name == "transmission" else find_unit(name.strip("|")), units)
-        for word, sign, extreme in (("least", -1, proof.least[name]), ("greatest", 1, proof.greatest[name])):
+        unit, factor = find_unit_in(
+            "rad" if name == "transmission" else find_unit(name.strip("|")), units
+        )
+        for word, sign, extreme in (
+            ("least", -1, proof.least[name]),
+            ("greatest", 1, proof.greatest[name]),
+        ):
             ends = (f"{factor * extreme.low:.11g}", f"{factor * extreme.high:.11g}")
             rows.append([name, unit, word, *ends, f"{of_angle * extreme.theta_2:.6f}"])
             if proof.nominal is not None:
                 over = proof.over_estimate(name, sign)
                 rows[-1].append("-" if over is None else f"{over:.3g} times")
-    heads = ("", "unit", "", "from", "to", f"theta_2 ({angle_unit})", *(["over-estimate"] if proof.nominal else []))
-    return write_table(scene.title, lines, make_plain_table(heads, rows, left=("", "unit", "over-estimate")))
+    heads = (
+        "",
+        "unit",
+        "",
+        "from",
+        "to",
+        f"theta_2 ({angle_unit})",
+        *(["over-estimate"] if proof.nominal else []),
+    )
+    return write_table(
+        scene.title,
+        lines,
+        make_plain_table(heads, rows, left=("", "unit", "over-estimate")),
+    )
 
 
 def write_extremes_json(scene: Scene, proof: Extremes) -> str:
     """Write one object, SI and rad."""
 
     def rows(bounds: Extremes) -> dict[str, Any]:
-        return {name: {"least": bounds.least[name], "greatest": bounds.greatest[name]} for name in bounds.least}
+        return {
+            name: {"least": bounds.least[name], "greatest": bounds.greatest[name]}
+            for name in bounds.least
+        }
 
     return write_object(
         EXTREMES_SCHEMA,
@@ -239,7 +321,10 @@ def write_extremes_json(scene: Scene, proof: Extremes) -> str:
         extremes=rows(proof),
         nominal=None if proof.nominal is None else rows(proof.nominal),
         over_estimate={
-            name: {word: proof.over_estimate(name, sign) for word, sign in (("least", -1), ("greatest", 1))}
+            name: {
+                word: proof.over_estimate(name, sign)
+                for word, sign in (("least", -1), ("greatest", 1))
+            }
             for name in proof.least
         },
     )
@@ -252,9 +337,22 @@ MOVES = {0: "stays", 1: "theta_2 grows", -1: "theta_2 falls"}
 def write_equilibria(title: str, rest: Equilibria) -> str:
     """Write both tables as text."""
     friction = bool(rest.held)
-    heads = ["theta_2 (deg)", "theta_4 (deg)", "branch", "", "by", "dQ/dq (N m/rad)", "J (kg m^2)", "frequency (Hz)"]
+    heads = [
+        "theta_2 (deg)",
+        "theta_4 (deg)",
+        "branch",
+        "",
+        "by",
+        "dQ/dq (N m/rad)",
+        "J (kg m^2)",
+        "frequency (Hz)",
+    ]
     rows = [_write_equilibrium(position, friction=friction) for position in rest.found]
-    table = make_plain_table([*heads, *(["friction holds (deg)"] if friction else [])], rows, left=("branch", "", "by"))
+    table = make_plain_table(
+        [*heads, *(["friction holds (deg)"] if friction else [])],
+        rows,
+        left=("branch", "", "by"),
+    )
     text = (
         write_table(title, _count_equilibria(rest), table)
         if rows
@@ -265,12 +363,23 @@ def write_equilibria(title: str, rest: Equilibria) -> str:
 
 def _count_equilibria(rest: Equilibria) -> list[str]:
     count = len(rest.found)
-    how = "proven to be all" if rest.proven else "of those found, by changes of sign: there may be others"
+    how = (
+        "proven to be all"
+        if rest.proven
+        else "of those found, by changes of sign: there may be others"
+    )
     lines = [f"{count} equilibri{'um' if count == 1 else 'a'} without friction, {how}"]
     if rest.not_decided:
-        angles = " and ".join(f"theta_2 = {_write_degrees(place.theta_2)}" for place in rest.not_decided)
-        lines.append(f"at the change point {angles} deg nothing is decided: there the linkage has two ways to move")
-    lines += [f"indifferent (Q = 0 throughout): {_write_range(ends)}" for ends in rest.indifferent]
+        angles = " and ".join(
+            f"theta_2 = {_write_degrees(place.theta_2)}" for place in rest.not_decided
+        )
+        lines.append(
+            f"at the change point {angles} deg nothing is decided: there the linkage has two ways to move"
+        )
+    lines += [
+        f"indifferent (Q = 0 throughout): {_write_range(ends)}"
+        for ends in rest.indifferent
+    ]
     lines += [
         f"friction alone holds, without an equilibrium: {_write_range(ends)}"
         for ends in rest.held
@@ -283,16 +392,29 @@ def _write_holding(rest: Equilibria) -> tuple[list[str], Any]:
     """Write what holds the scene's positions, thinned out to what can be read."""
     positions = rest.positions
     drive = read_drive(positions)
-    values, low, high = drive.values, getattr(positions, drive.keys.low), getattr(positions, drive.keys.high)
+    values, low, high = (
+        drive.values,
+        getattr(positions, drive.keys.low),
+        getattr(positions, drive.keys.high),
+    )
     assert values is not None
-    heads, columns = ["theta_2 (deg)", f"{drive.name} ({drive.unit})"], [np.degrees(positions.theta_2), values]
+    heads, columns = (
+        ["theta_2 (deg)", f"{drive.name} ({drive.unit})"],
+        [np.degrees(positions.theta_2), values],
+    )
     if low is not None and high is not None:
-        heads, columns = [heads[0], f"from ({drive.unit})", f"to ({drive.unit})"], [columns[0], low, high]
+        heads, columns = (
+            [heads[0], f"from ({drive.unit})", f"to ({drive.unit})"],
+            [columns[0], low, high],
+        )
     still = np.isin(positions.status_code, (NOT_ASSEMBLED, SINGULAR))
     released = [
-        status if no else MOVES[move] for status, no, move in zip(positions.status, still, rest.moves, strict=True)
+        status if no else MOVES[move]
+        for status, no, move in zip(positions.status, still, rest.moves, strict=True)
     ]
-    rows = list(zip(*map(write_cells, columns), released, strict=True))[:: -(-len(positions) // MOST_ROWS)]
+    rows = list(zip(*map(write_cells, columns), released, strict=True))[
+        :: -(-len(positions) // MOST_ROWS)
+    ]
     on = "" if positions.drive is not None else f" on bar {positions.drive_bar}"
     lines = [f"{drive.name}{on} that holds it at rest, and how it moves when released"]
     if np.isfinite(values).any():
@@ -305,15 +427,27 @@ def _write_holding(rest: Equilibria) -> tuple[list[str], Any]:
 
 
 def _write_equilibrium(equilibrium: Equilibrium, *, friction: bool) -> list[str]:
-    place, frequency = equilibrium.place, "-" if equilibrium.frequency is None else f"{equilibrium.frequency:.10g}"
+    place, frequency = (
+        equilibrium.place,
+        "-" if equilibrium.frequency is None else f"{equilibrium.frequency:.10g}",
+    )
     row = [
         _write_degrees(place.theta_2),
         _write_degrees(place.theta_4),
         BRANCH_NAMES.get(place.branch, "limit"),
         equilibrium.stability,
     ]
-    row += [equilibrium.angle, f"{equilibrium.slope:.6g}", f"{equilibrium.inertia:.6g}", frequency]
-    return row + ([_write_range(equilibrium.held) if equilibrium.held else "-"] if friction else [])
+    row += [
+        equilibrium.angle,
+        f"{equilibrium.slope:.6g}",
+        f"{equilibrium.inertia:.6g}",
+        frequency,
+    ]
+    return row + (
+        [_write_range(equilibrium.held) if equilibrium.held else "-"]
+        if friction
+        else []
+    )
 
 
 def _write_range(ends: tuple[RestPosition, RestPosition]) -> str:
@@ -341,7 +475,10 @@ def write_equilibria_json(title: str, rest: Equilibria) -> str:
             "drive_bar": positions.drive_bar,
             "status": positions.status,
             "branch": positions.branch,
-            **{name: getattr(positions, name) for name in ("theta_2", keys.value, keys.low, keys.high)},
+            **{
+                name: getattr(positions, name)
+                for name in ("theta_2", keys.value, keys.low, keys.high)
+            },
             "moves": rest.moves,
         },
     )

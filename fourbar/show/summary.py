@@ -18,7 +18,14 @@ from fourbar.linkage import MOVING_BARS, PIN_FORCE, PINS
 from fourbar.quantities import COUPLE, LINE, OK, PIN_FORCES, STATUS_NAMES
 from fourbar.scene import Scene, command_at
 from fourbar.scene.motion import Motion
-from fourbar.show.duty import Driving, MotorDuty, bearing_load, is_once_round, motor_duty, read_drive
+from fourbar.show.duty import (
+    Driving,
+    MotorDuty,
+    bearing_load,
+    is_once_round,
+    motor_duty,
+    read_drive,
+)
 from fourbar.solution import Array, Solution
 from fourbar.solve import solve
 from fourbar.studies.internal_forces import Bending, internal_forces
@@ -94,9 +101,16 @@ class Between(NamedTuple):
 def list_sizes(solution: Solution) -> dict[str, Array]:
     """List the magnitudes whose largest values are located: torque, power and speed of the drive, and pin forces."""
     drive = read_drive(solution)
-    keys = {drive.keys.value: drive.keys.value, "power": "power", "speed": drive.speed_key}
+    keys = {
+        drive.keys.value: drive.keys.value,
+        "power": "power",
+        "speed": drive.speed_key,
+    }
     forces = {name: np.hypot(*getattr(solution, name).T) for name in PIN_FORCES}
-    return {**{name: np.abs(getattr(solution, key)) for name, key in keys.items()}, **forces}
+    return {
+        **{name: np.abs(getattr(solution, key)) for name, key in keys.items()},
+        **forces,
+    }
 
 
 def locate_between(scene: Scene, solution: Solution) -> Between:
@@ -111,12 +125,21 @@ def locate_between(scene: Scene, solution: Solution) -> Between:
     pins, low, high, branch = _find_reversing(scene, solution)
     for _ in range(ROUNDS if pins else 0):
         places = _cut(low, high)
-        inside = _solve_at(scene, places.ravel(), np.repeat(branch, CUTS + 1), "velocity")
-        slips = np.array([_compute_slip(inside, pin).reshape(places.shape)[row] for row, pin in enumerate(pins)])
+        inside = _solve_at(
+            scene, places.ravel(), np.repeat(branch, CUTS + 1), "velocity"
+        )
+        slips = np.array(
+            [
+                _compute_slip(inside, pin).reshape(places.shape)[row]
+                for row, pin in enumerate(pins)
+            ]
+        )
         turned = np.argmax(slips * slips[:, :1] <= 0.0, axis=1)
         rows = np.arange(len(pins))
         low, high = places[rows, turned - 1], places[rows, turned]
-    merged = _merge(scene, solution, np.concatenate([low, high]), np.concatenate([branch, branch]))
+    merged = _merge(
+        scene, solution, np.concatenate([low, high]), np.concatenate([branch, branch])
+    )
     angles = low if scene.motion.law is None else scene.motion.law.at(low)[0]
     peaks, branch, growing = _find_largest(scene, merged, list_sizes)
     reversals = sorted(zip(angles.tolist(), pins, strict=True))
@@ -133,23 +156,33 @@ def locate_bending(scene: Scene, between: Between) -> dict[int, BarBending]:
         return {}
 
     def find(solution: Solution) -> dict[str, Bending]:
-        return {str(bar): internal_forces(scene, solution, bar, np.zeros(1)).largest for bar in MOVING_BARS}
+        return {
+            str(bar): internal_forces(scene, solution, bar, np.zeros(1)).largest
+            for bar in MOVING_BARS
+        }
 
     def list_moments(solution: Solution) -> dict[str, Array]:
         return {bar: np.abs(bending.moment) for bar, bending in find(solution).items()}
 
     growing, searched = {str(bar) for bar in MOVING_BARS}, [(solution, find(solution))]
     if _has_between(scene, solution):
-        places, branch, growing = _find_largest(scene, solution, list_moments, BENDING_PEAKS, BENDING_ROUNDS)
+        places, branch, growing = _find_largest(
+            scene, solution, list_moments, BENDING_PEAKS, BENDING_ROUNDS
+        )
         if len(places):
             peaks = _solve_at(scene, places, branch)
             searched.append((peaks, find(peaks)))
     bending = dict[int, BarBending]()
     for bar in MOVING_BARS:
         grows = str(bar) in growing
-        for solution, largest in searched[:1] if grows else searched:  # the peak of another bar may stand beside a pole
+        for solution, largest in (
+            searched[:1] if grows else searched
+        ):  # the peak of another bar may stand beside a pole
             moment, x = largest[str(bar)]
-            peak, row = _find_peak(solution, np.abs(moment)), int(np.argmax(np.nan_to_num(np.abs(moment), nan=-1.0)))
+            peak, row = (
+                _find_peak(solution, np.abs(moment)),
+                int(np.argmax(np.nan_to_num(np.abs(moment), nan=-1.0))),
+            )
             if bar not in bending or peak.value > bending[bar].peak.value:
                 bending[bar] = BarBending(peak, float(x[row]), solution, row, grows)
     return bending
@@ -157,10 +190,17 @@ def locate_bending(scene: Scene, between: Between) -> dict[int, BarBending]:
 
 def _has_between(scene: Scene, solution: Solution) -> bool:
     listed = isinstance(scene.motion.angle, np.ndarray)
-    return scene.motion.free is None and not listed and solution.F12 is not None and len(solution) > 1
+    return (
+        scene.motion.free is None
+        and not listed
+        and solution.F12 is not None
+        and len(solution) > 1
+    )
 
 
-def _solve_at(scene: Scene, places: Array, branch: Branch, stage: str = "force") -> Solution:
+def _solve_at(
+    scene: Scene, places: Array, branch: Branch, stage: str = "force"
+) -> Solution:
     """Solve at commanded angles or strokes, or at the times of a motion law, each with its branch."""
     return solve(scene, stage, at=command_at(scene, places, branch))
 
@@ -174,64 +214,116 @@ def _merge(scene: Scene, solution: Solution, places: Array, branch: Branch) -> S
     if not len(places):
         return solution
     merged = np.concatenate([solution.at.places, places])
-    order = np.unique(merged, return_index=True)[1][:: 1 if merged[0] < merged[1] else -1]
-    return _solve_at(scene, merged[order], np.concatenate([solution.at.branch, branch])[order])
+    order = np.unique(merged, return_index=True)[1][
+        :: 1 if merged[0] < merged[1] else -1
+    ]
+    return _solve_at(
+        scene, merged[order], np.concatenate([solution.at.branch, branch])[order]
+    )
 
 
 def _compute_slip(solution: Solution, pin: str) -> Array:
     """Compute omega_j - omega_i of the bars that meet at a pin."""
-    first, second = (0.0 if bar == 1 else getattr(solution, f"omega_{bar}") for bar in PINS[pin])
+    first, second = (
+        0.0 if bar == 1 else getattr(solution, f"omega_{bar}") for bar in PINS[pin]
+    )
     return np.asarray(second - first)
 
 
-def _find_reversing(scene: Scene, solution: Solution) -> tuple[list[str], Array, Array, Branch]:
+def _find_reversing(
+    scene: Scene, solution: Solution
+) -> tuple[list[str], Array, Array, Branch]:
     """List the steps in which the slip of a pin with dry friction changes sign: pin, ends, branch."""
-    places, branch, steps = solution.at.places, solution.at.branch, list[tuple[str, int, int]]()
+    places, branch, steps = (
+        solution.at.places,
+        solution.at.branch,
+        list[tuple[str, int, int]](),
+    )
     for pin in sorted({pin for effect in scene.effects for pin in effect.dry_pins}):
         slip = np.nan_to_num(_compute_slip(solution, pin))
         moving = np.flatnonzero(np.abs(slip) > AT_REST * np.abs(slip).max())
         steps += [
             (pin, i, j)
             for i, j in pairwise(moving.tolist())
-            if slip[i] * slip[j] < 0.0 and branch[i] == branch[j] and solution.assembled[i:j].all()
+            if slip[i] * slip[j] < 0.0
+            and branch[i] == branch[j]
+            and solution.assembled[i:j].all()
         ]
     first, last = (np.array([step[end] for step in steps], dtype=int) for end in (1, 2))
     return [pin for pin, *_ in steps], places[first], places[last], branch[first]
 
 
 def _find_largest(
-    scene: Scene, solution: Solution, sizes: Sizes, most: int = MOST_PEAKS, rounds: int = ROUNDS
+    scene: Scene,
+    solution: Solution,
+    sizes: Sizes,
+    most: int = MOST_PEAKS,
+    rounds: int = ROUNDS,
 ) -> tuple[Array, Branch, set[str]]:
     """Find the places and branches of the local maxima of each magnitude, and the names of those that grow."""
-    places, branch, peaks = solution.at.places, solution.at.branch, list[tuple[str, int, int, int]]()
+    places, branch, peaks = (
+        solution.at.places,
+        solution.at.branch,
+        list[tuple[str, int, int, int]](),
+    )
     present = sizes(solution)
     for name, size in present.items():
-        padded = np.concatenate([[-1.0], np.nan_to_num(size, nan=-1.0, posinf=-1.0), [-1.0]])
+        padded = np.concatenate(
+            [[-1.0], np.nan_to_num(size, nan=-1.0, posinf=-1.0), [-1.0]]
+        )
         before, here, after = padded[:-2], padded[1:-1], padded[2:]
-        tops = np.flatnonzero((here >= before) & (here >= after) & (here > np.minimum(before, after)) & (here > 0.0))
+        tops = np.flatnonzero(
+            (here >= before)
+            & (here >= after)
+            & (here > np.minimum(before, after))
+            & (here > 0.0)
+        )
         for i in tops[np.argsort(-here[tops], kind="stable")][:most]:
             start = i - (before[i] >= 0.0 and branch[i - 1] == branch[i])
-            stop = i + (after[i] >= 0.0 and branch[min(i + 1, len(branch) - 1)] == branch[i])
+            stop = i + (
+                after[i] >= 0.0 and branch[min(i + 1, len(branch) - 1)] == branch[i]
+            )
             peaks.append((name, i, start, stop))
-        for i, j in pairwise(range(len(branch))):  # towards a gap a magnitude may grow without a local maximum
+        for i, j in pairwise(
+            range(len(branch))
+        ):  # towards a gap a magnitude may grow without a local maximum
             if padded[i + 1] * padded[j + 1] < 0.0 and branch[i] == branch[j]:
                 peaks.append((name, i if padded[j + 1] < 0.0 else j, i, j))
     rows, names = np.arange(len(peaks)), [name for name, *_ in peaks]
-    top, start, stop = (np.array([peak[k] for peak in peaks], dtype=int) for k in (1, 2, 3))
+    top, start, stop = (
+        np.array([peak[k] for peak in peaks], dtype=int) for k in (1, 2, 3)
+    )
     opens = ~(solution.assembled[start] & solution.assembled[stop])
     low, high, peak_places = places[start], places[stop], places[top]
     reached = [np.array([present[name][i] for name, i, *_ in peaks])]
     for _ in range(rounds if len(peaks) else 0):
         cut = _cut(low, high)
         inside = sizes(_solve_at(scene, cut.ravel(), np.repeat(branch[top], CUTS + 1)))
-        values = np.array([np.nan_to_num(inside[n].reshape(cut.shape)[k], nan=-1.0) for k, n in enumerate(names)])
-        inwards = np.abs(np.arange(CUTS + 1) - np.where(solution.assembled[start], 0, CUTS)[:, None])
-        best = np.argmax(np.where(opens[:, None] & (values >= 0.0), inwards, values), axis=1)
-        peak_places, low, high = (cut[rows, np.clip(best + step, 0, CUTS)] for step in (0, -1, 1))
+        values = np.array(
+            [
+                np.nan_to_num(inside[n].reshape(cut.shape)[k], nan=-1.0)
+                for k, n in enumerate(names)
+            ]
+        )
+        inwards = np.abs(
+            np.arange(CUTS + 1) - np.where(solution.assembled[start], 0, CUTS)[:, None]
+        )
+        best = np.argmax(
+            np.where(opens[:, None] & (values >= 0.0), inwards, values), axis=1
+        )
+        peak_places, low, high = (
+            cut[rows, np.clip(best + step, 0, CUTS)] for step in (0, -1, 1)
+        )
         reached.append(values[rows, best])
     growing = reached[-1] > (1.0 + GROWING) * reached[-3] if len(peaks) else rows > 0
-    kept = ~growing & (reached[-1] > reached[0]) & ~opens  # beside a gap other magnitudes grow
-    return peak_places[kept], branch[top][kept], {name for name, grows in zip(names, growing, strict=True) if grows}
+    kept = (
+        ~growing & (reached[-1] > reached[0]) & ~opens
+    )  # beside a gap other magnitudes grow
+    return (
+        peak_places[kept],
+        branch[top][kept],
+        {name for name, grows in zip(names, growing, strict=True) if grows},
+    )
 
 
 class PinLoad(NamedTuple):
@@ -289,13 +381,22 @@ def summarize(scene: Scene, solution: Solution) -> Facts:
     places, codes = _list_places(solution), solution.status_code
     fine, stretches = solution, list[tuple[float | None, float | None]]()
     if smooth := kind in ("sweep", "turn", "law"):
-        fine = _solve_positions(scene, np.linspace(places[0], places[-1], FINE + 1), solution)
+        fine = _solve_positions(
+            scene, np.linspace(places[0], places[-1], FINE + 1), solution
+        )
         stretches = _list_stretches(scene, fine)
-        ends = np.array([end for stretch in stretches for end in stretch if end is not None])
-        fine = _solve_positions(scene, np.sort(np.concatenate([fine.at.places, ends])), solution)
+        ends = np.array(
+            [end for stretch in stretches for end in stretch if end is not None]
+        )
+        fine = _solve_positions(
+            scene, np.sort(np.concatenate([fine.at.places, ends])), solution
+        )
 
     def find_range(values: Array) -> tuple[Peak, Peak]:
-        low, high = (_find_extreme(sign * values, _list_places(fine), sign, smooth) for sign in (-1, 1))
+        low, high = (
+            _find_extreme(sign * values, _list_places(fine), sign, smooth)
+            for sign in (-1, 1)
+        )
         return low, high
 
     least, _ = find_range(np.square(fine.sin_mu))
@@ -308,19 +409,25 @@ def summarize(scene: Scene, solution: Solution) -> Facts:
         scene=scene,
         solution=solution,
         kind=kind,
-        counts={STATUS_NAMES[code]: int(np.sum(codes == code)) for code in np.unique(codes)},
+        counts={
+            STATUS_NAMES[code]: int(np.sum(codes == code)) for code in np.unique(codes)
+        },
         commanded=(float(places[0]), float(places[-1])),
         angles={bar: find_range(getattr(fine, f"theta_{bar}")) for bar in (2, 3, 4)},
         transmission=Peak(mu if mu > IN_LINE else 0.0, least.place),
         stretches=stretches,
         drive=drive if peak is not None else None,
         peak=peak,
-        duty=motor_duty(solution, between.drive) if peak is not None and kind != "position" else None,
+        duty=motor_duty(solution, between.drive)
+        if peak is not None and kind != "position"
+        else None,
         held=None if drive is None else _find_held(solution, drive),
         pins=_list_pin_loads(solution, between),
         bending=locate_bending(scene, between),
         stroke_range=None if fine.stroke is None else find_range(fine.stroke),
-        stroke_limits=None if solution.stroke is None else _find_stroke_limits(scene, solution),
+        stroke_limits=None
+        if solution.stroke is None
+        else _find_stroke_limits(scene, solution),
         between=between,
         error=_find_error(solution, drive),
     )
@@ -336,7 +443,11 @@ def _find_kind(scene: Scene, solution: Solution) -> str:
         return "position"
     if isinstance(motion.angle, np.ndarray):
         return "list"
-    once_round = solution.at.stroke is None and is_once_round(solution) and solution.assembled.all()
+    once_round = (
+        solution.at.stroke is None
+        and is_once_round(solution)
+        and solution.assembled.all()
+    )
     return "turn" if once_round else "sweep"
 
 
@@ -359,15 +470,25 @@ def _find_extreme(values: Array, places: Array, sign: int, smooth: bool) -> Peak
     i = int(np.nanargmax(values))
     value, place = float(values[i]), float(places[i])
     beside, inside = slice(i - 1, i + 2), 0 < i < len(values) - 1
-    if smooth and inside and np.isfinite(values[beside]).all() and np.isclose(*np.diff(places[beside])):
-        rise, bend = values[i + 1] - values[i - 1], values[i + 1] - 2.0 * values[i] + values[i - 1]
+    if (
+        smooth
+        and inside
+        and np.isfinite(values[beside]).all()
+        and np.isclose(*np.diff(places[beside]))
+    ):
+        rise, bend = (
+            values[i + 1] - values[i - 1],
+            values[i + 1] - 2.0 * values[i] + values[i - 1],
+        )
         if bend < 0.0:
             value -= float(rise * rise / (8.0 * bend))
             place -= float(0.5 * rise / bend * 0.5 * (places[i + 1] - places[i - 1]))
     return Peak(sign * value, place)
 
 
-def _list_stretches(scene: Scene, fine: Solution) -> list[tuple[float | None, float | None]]:
+def _list_stretches(
+    scene: Scene, fine: Solution
+) -> list[tuple[float | None, float | None]]:
     """List where the linkage assembles within a sweep, with ends that the position formula locates."""
     closes, places = fine.assembled, fine.at.places
     if closes.all():
@@ -379,7 +500,9 @@ def _list_stretches(scene: Scene, fine: Solution) -> list[tuple[float | None, fl
         low, high = places[i], places[i + 1]
         for _ in range(END_ROUNDS):
             cut = np.linspace(low, high, CUTS + 1)
-            first = int(np.argmax(_solve_positions(scene, cut, fine).assembled != closes[i]))
+            first = int(
+                np.argmax(_solve_positions(scene, cut, fine).assembled != closes[i])
+            )
             low, high = cut[max(first - 1, 0)], cut[first]
         ends.append(float(low if closes[i] else high))
     ends += [None] if closes[-1] else []
@@ -388,7 +511,10 @@ def _list_stretches(scene: Scene, fine: Solution) -> list[tuple[float | None, fl
 
 def _find_held(solution: Solution, drive: Driving) -> tuple[float, float] | None:
     low, high = (getattr(solution, name) for name in (drive.keys.low, drive.keys.high))
-    if low is None or not (held := np.isfinite(low) & np.isfinite(high) & (low < high)).any():
+    if (
+        low is None
+        or not (held := np.isfinite(low) & np.isfinite(high) & (low < high)).any()
+    ):
         return None
     return float(low[held].min()), float(high[held].max())
 
@@ -417,11 +543,16 @@ def _find_stroke_limits(scene: Scene, solution: Solution) -> tuple[float, float]
     positions, first = solution.at, int(np.argmax(solution.assembled))
     here = float(positions.angle[first])
     intervals = find_intervals(scene.linkage, positions.bar)
-    low, high = min(intervals, key=lambda ends: (here - ends[0]) % TURN - (ends[1] - ends[0]))
+    low, high = min(
+        intervals, key=lambda ends: (here - ends[0]) % TURN - (ends[1] - ends[0])
+    )
     width = high - low
     low = here - ((here - low) % TURN if width < TURN else 0.5 * TURN)
     angles = np.linspace(low + INSET * width, low + (1.0 - INSET) * width, FINE + 1)
-    motion = Motion(**{f"theta_{positions.bar}": angles}, branch=int(positions.branch[first]))  # type: ignore[arg-type]
+    motion = Motion(
+        **{f"theta_{positions.bar}": angles},
+        branch=int(positions.branch[first]),  # type: ignore[arg-type]
+    )
     stroke = solve(replace(scene, motion=motion, tolerances=()), "position").stroke
     assert stroke is not None
     if positions.stroke is not None:  # its side ends where the stroke turns back
@@ -438,7 +569,9 @@ def _find_error(solution: Solution, drive: Driving | None) -> float | None:
     """Find the largest error bar as a part of its value, or of the median where the value passes through zero."""
     if solution.force_error is None:
         return None
-    loads = np.max([np.hypot(*getattr(solution, name).T) for name in PIN_FORCE.values()], axis=0)
+    loads = np.max(
+        [np.hypot(*getattr(solution, name).T) for name in PIN_FORCE.values()], axis=0
+    )
     pairs = [(solution.force_error, loads)]
     if drive is not None and drive.error is not None and drive.values is not None:
         pairs.append((drive.error, np.abs(drive.values)))
@@ -446,5 +579,12 @@ def _find_error(solution: Solution, drive: Driving | None) -> float | None:
     for error, size in pairs:
         solved = np.isfinite(error) & np.isfinite(size) & (solution.status_code == OK)
         if solved.any() and size[solved].max() > 0.0:
-            shares.append(float((error[solved] / np.maximum(size[solved], np.median(size[solved]))).max()))
+            shares.append(
+                float(
+                    (
+                        error[solved]
+                        / np.maximum(size[solved], np.median(size[solved]))
+                    ).max()
+                )
+            )
     return max(shares, default=None)

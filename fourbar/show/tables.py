@@ -11,7 +11,14 @@ import numpy as np
 from fourbar.errors import clean_line
 from fourbar.quantities import ANGLES, OK, PIN_FORCES, UNITS
 from fourbar.show.duty import read_drive
-from fourbar.solution import DEGREES, Array, Conversion, Solution, find_unit, find_unit_in
+from fourbar.solution import (
+    DEGREES,
+    Array,
+    Conversion,
+    Solution,
+    find_unit,
+    find_unit_in,
+)
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -28,7 +35,11 @@ STEPS = (1, 2, 5, 10, 15, 20, 30, 45, 60, 90)
 
 
 def write_table(
-    title: str, lines: list[str], shown: "Table", after: Sequence[str] = (), width: int | None = None
+    title: str,
+    lines: list[str],
+    shown: "Table",
+    after: Sequence[str] = (),
+    width: int | None = None,
 ) -> str:
     """Write a table with its title and what stands above it and below, as text; `width` is that of a terminal."""
     from rich.console import Console
@@ -42,23 +53,34 @@ def write_table(
 
 
 def make_plain_table(
-    heads: Iterable[str], rows: Iterable[Iterable[str]], left: Iterable[str] = (), gap: int = 1
+    heads: Iterable[str],
+    rows: Iterable[Iterable[str]],
+    left: Iterable[str] = (),
+    gap: int = 1,
 ) -> "Table":
     """Make a table whose columns stand to the right, but for those headed by one of `left`."""
     from rich import box
     from rich.table import Table
     from rich.text import Text
 
-    shown = Table(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=(0, gap, 0, 0))
+    shown = Table(
+        box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=(0, gap, 0, 0)
+    )
     for head in heads:
-        shown.add_column(Text(head), justify="left" if head in left else "right", no_wrap=True)
+        shown.add_column(
+            Text(head), justify="left" if head in left else "right", no_wrap=True
+        )
     for row in rows:
         shown.add_row(*map(Text, row))
     return shown
 
 
 def print_positions(
-    solution: Solution, width: int | None, units: Conversion = DEGREES, *, every: int | None = None
+    solution: Solution,
+    width: int | None,
+    units: Conversion = DEGREES,
+    *,
+    every: int | None = None,
 ) -> str:
     """Write the table of positions as text.
 
@@ -72,16 +94,23 @@ def print_positions(
     notes = []
     if step > 1:
         more = "; --all shows each" if every is None else ""
-        notes.append(f"shown: every {step}{_write_ordinal(step)} of the {len(solution)} positions{more}")
+        notes.append(
+            f"shown: every {step}{_write_ordinal(step)} of the {len(solution)} positions{more}"
+        )
     if left_out:
-        notes.append(f"not shown: {', '.join(left_out)} (a wider terminal, --csv or --json has them)")
+        notes.append(
+            f"not shown: {', '.join(left_out)} (a wider terminal, --csv or --json has them)"
+        )
     return write_table(solution.title, [], shown, notes, width)
 
 
 def _choose_step(count: int) -> int:
     """Show every so many of the positions, so that no more than MOST_ROWS are."""
     wanted = math.ceil((count - 1) / (MOST_ROWS - 1))
-    return next((step for step in STEPS if step >= wanted), STEPS[-1] * math.ceil(wanted / STEPS[-1]))
+    return next(
+        (step for step in STEPS if step >= wanted),
+        STEPS[-1] * math.ceil(wanted / STEPS[-1]),
+    )
 
 
 def _write_ordinal(number: int) -> str:
@@ -96,7 +125,9 @@ def write_value(number: float, unit: str, units: Conversion) -> str:
     return f"{number * factor:.6g} {name}"
 
 
-def list_columns(solution: Solution, units: Conversion = DEGREES) -> dict[str, list[str]]:
+def list_columns(
+    solution: Solution, units: Conversion = DEGREES
+) -> dict[str, list[str]]:
     """List the columns of the table, most wanted first, a status only if one is not ok: heading with unit -> cells."""
     shown: dict[str, list[str]] = {}
     if (solution.status_code != OK).any():
@@ -105,7 +136,9 @@ def list_columns(solution: Solution, units: Conversion = DEGREES) -> dict[str, l
     def add(name: str, unit: str, values: Array | None) -> None:
         assert values is not None
         label, factor = find_unit_in(unit, units)
-        shown[f"{name}\n{label}"] = write_cells(values * factor, ".4f" if unit == "rad" else ".6g")
+        shown[f"{name}\n{label}"] = write_cells(
+            values * factor, ".4f" if unit == "rad" else ".6g"
+        )
 
     if solution.time is not None:
         add("time", "s", solution.time)
@@ -118,23 +151,37 @@ def list_columns(solution: Solution, units: Conversion = DEGREES) -> dict[str, l
         for name in PIN_FORCES:
             add(f"|{name}|", "N", np.hypot(*getattr(solution, name).T))
     moving = {"": solution.points, "v_": solution.velocity, "a_": solution.acceleration}
-    for name, vector in ((start + name, v) for start, arrays in moving.items() for name, v in arrays.items()):
+    for name, vector in (
+        (start + name, v)
+        for start, arrays in moving.items()
+        for name, v in arrays.items()
+    ):
         add(f"{name}_x", find_unit(name), vector[:, 0])
         add(f"{name}_y", find_unit(name), vector[:, 1])
     for name in ANGLES:
         add(name, "rad", getattr(solution, name))
     sought = [bar for bar in "234" if bar != solution.commanded[-1]]
-    for name in ("stroke", "stroke_speed", *(f"{kind}_{bar}" for kind in ("omega", "alpha") for bar in sought)):
+    for name in (
+        "stroke",
+        "stroke_speed",
+        *(f"{kind}_{bar}" for kind in ("omega", "alpha") for bar in sought),
+    ):
         if getattr(solution, name) is not None:
             add(name, UNITS[name], getattr(solution, name))
     shown["sin mu\n"] = write_cells(solution.sin_mu)
     if solution.time is None and drive.values is not None and drive.error is not None:
-        shown[f"digits\nof {drive.symbol[0]}"] = _count_digits(drive.values, drive.error)
+        shown[f"digits\nof {drive.symbol[0]}"] = _count_digits(
+            drive.values, drive.error
+        )
     return shown
 
 
 def make_table(
-    solution: Solution, width: int | None, units: Conversion = DEGREES, *, every: int = 1
+    solution: Solution,
+    width: int | None,
+    units: Conversion = DEGREES,
+    *,
+    every: int = 1,
 ) -> "tuple[Table, list[str]]":
     """Make the table for a terminal of the given width (None: as wide as it needs), and name the columns left out.
 
@@ -156,7 +203,10 @@ def make_table(
 
 def write_cells(values: Array, form: str = ".6g") -> list[str]:
     """Write six digits, or another form; a dash where there is no value."""
-    return [format(value, form) if math.isfinite(value) else "-" for value in values.tolist()]
+    return [
+        format(value, form) if math.isfinite(value) else "-"
+        for value in values.tolist()
+    ]
 
 
 def _count_digits(torque: Array, error: Array) -> list[str]:
@@ -164,7 +214,9 @@ def _count_digits(torque: Array, error: Array) -> list[str]:
     with np.errstate(all="ignore"):
         digits = np.clip(np.floor(np.log10(np.abs(torque) / error)), 0, MOST_DIGITS)
     finite = np.isfinite(torque) & np.isfinite(error)
-    return write_cells(np.where(finite, np.where(error == 0.0, MOST_DIGITS, digits), np.nan))
+    return write_cells(
+        np.where(finite, np.where(error == 0.0, MOST_DIGITS, digits), np.nan)
+    )
 
 
 @contextmanager
@@ -180,4 +232,6 @@ def show_running(text: str) -> Iterator[Callable[[float], None] | None]:
         yield None
         return
     with console.status(f"{text}; Ctrl-C stops it") as line:
-        yield lambda share: line.update(f"{text}, {100.0 * share:.0f} % done; Ctrl-C stops it")
+        yield lambda share: line.update(
+            f"{text}, {100.0 * share:.0f} % done; Ctrl-C stops it"
+        )

@@ -25,9 +25,18 @@ SCHEMA = "fourbar-tolerance/1"
 
 def list_shown_parts(spreads: Tolerances) -> list[str]:
     """List torque and magnitudes of pin forces, or where the scene states no speed the angles; and its own points."""
-    points = [f"{point.name}_{letter}" for point in spreads.scene.points for letter in "xy"]
+    points = [
+        f"{point.name}_{letter}" for point in spreads.scene.points for letter in "xy"
+    ]
     drive = [name for name in (COUPLE.value, LINE.value) if name in spreads.spreads]
-    return [*([*drive, *(f"|{name}|" for name in PIN_FORCES)] if drive else ["theta_3", "theta_4"]), *points]
+    return [
+        *(
+            [*drive, *(f"|{name}|" for name in PIN_FORCES)]
+            if drive
+            else ["theta_3", "theta_4"]
+        ),
+        *points,
+    ]
 
 
 def find_part_unit(part: str) -> str:
@@ -51,29 +60,56 @@ def write_text(spreads: Tolerances, units: Conversion = DEGREES) -> str:
         worst = int(np.nanargmax(spread.worst))
         if most := _name_largest(spreads, spread, worst):
             lines.append(f"  {part}: {most}")
-        columns = (spread.nominal, spread.deviation, spread.low, spread.high, spread.least, spread.greatest)
+        columns = (
+            spread.nominal,
+            spread.deviation,
+            spread.low,
+            spread.high,
+            spread.least,
+            spread.greatest,
+        )
         unit, factor = find_unit_in(find_part_unit(part), units)
         numbers = [f"{factor * column[worst]:.6g}" for column in columns]
         numbers[1] = f"{factor * spread.deviation[worst]:.3g}"
         angle = f"{of_angle * spreads.theta_2[worst]:.6g}"
-        rows.append([part, unit, angle, *numbers, f"{factor * spread.worst[worst]:.3g}"])
-    heads = ("", "\nunit", f"theta_2\n{angle_unit}", "\nnominal", "\nsigma", f"\n{BAND[0]:g} %", f"\n{BAND[1]:g} %")
-    table = make_plain_table((*heads, "\nleast", "\ngreatest", "worst\n+-"), rows, left=("",), gap=0)
+        rows.append(
+            [part, unit, angle, *numbers, f"{factor * spread.worst[worst]:.3g}"]
+        )
+    heads = (
+        "",
+        "\nunit",
+        f"theta_2\n{angle_unit}",
+        "\nnominal",
+        "\nsigma",
+        f"\n{BAND[0]:g} %",
+        f"\n{BAND[1]:g} %",
+    )
+    table = make_plain_table(
+        (*heads, "\nleast", "\ngreatest", "worst\n+-"), rows, left=("",), gap=0
+    )
     return write_table(spreads.scene.title, lines, table)
 
 
 def describe_counts(spreads: Tolerances, units: Conversion = DEGREES) -> list[str]:
     """Say what was tried, what of it has no answer, and where first order and samples part."""
     n = len(spreads.theta_2)
-    count = f"{len(spreads.scene.tolerances)} tolerance" + ("s" if len(spreads.scene.tolerances) > 1 else "")
+    count = f"{len(spreads.scene.tolerances)} tolerance" + (
+        "s" if len(spreads.scene.tolerances) > 1 else ""
+    )
     lines = [f"{count}, {spreads.samples} samples (seed {spreads.seed}), {n} positions"]
     if spreads.invalid:
-        lines.append(f"{_write_share(spreads.invalid, spreads)} have an impossible dimension, such as a length below 0")
+        lines.append(
+            f"{_write_share(spreads.invalid, spreads)} have an impossible dimension, such as a length below 0"
+        )
     if spreads.apart:
         lines.append(
             f"{_write_share(spreads.apart, spreads)} do not assemble at some position at which the nominal linkage does"
         )
-    lines += [line for part in list_shown_parts(spreads) if (line := describe_parted(spreads, part, units))]
+    lines += [
+        line
+        for part in list_shown_parts(spreads)
+        if (line := describe_parted(spreads, part, units))
+    ]
     return lines
 
 
@@ -89,7 +125,13 @@ def describe_parted(spreads: Tolerances, part: str, units: Conversion = DEGREES)
         return ""
     unit, factor = find_unit_in("rad", units)
     runs = np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1)
-    ends = [" to ".join(f"{factor * spreads.theta_2[i]:.6g}" for i in dict.fromkeys((run[0], run[-1]))) for run in runs]
+    ends = [
+        " to ".join(
+            f"{factor * spreads.theta_2[i]:.6g}"
+            for i in dict.fromkeys((run[0], run[-1]))
+        )
+        for run in runs
+    ]
     places = ", ".join(ends[:MOST_RUNS]) + (", ..." if len(ends) > MOST_RUNS else "")
     return (
         f"{part}: the samples spread by more than {100.0 * PARTED:g} % more or less than first order says at "
@@ -103,7 +145,10 @@ def _name_largest(spreads: Tolerances, spread: Spread, worst: int) -> str:
     if not total > 0.0:
         return ""
     order = [i for i in np.argsort(-shares)[:2] if shares[i] > 0.0]
-    return ", ".join(f"{100.0 * shares[i] / total:.0f} % {spreads.scene.tolerances[i].key}" for i in order)
+    return ", ".join(
+        f"{100.0 * shares[i] / total:.0f} % {spreads.scene.tolerances[i].key}"
+        for i in order
+    )
 
 
 def collect_tolerances(
@@ -114,23 +159,39 @@ def collect_tolerances(
     A scene that has none of this (a free motion, SciPy not installed) gives the sentence that says so. `progress` is
     that of `tolerances`; left out, a line in the terminal.
     """
-    positions = scene if scene.motion.law else replace(scene, motion=scene.motion.replace(angle=np.array(places)))
+    positions = (
+        scene
+        if scene.motion.law
+        else replace(scene, motion=scene.motion.replace(angle=np.array(places)))
+    )
     quiet = progress is not None or scene.motion.free is not None
-    shown = nullcontext(progress) if quiet else show_running("the samples of the tolerances are solved")
+    shown = (
+        nullcontext(progress)
+        if quiet
+        else show_running("the samples of the tolerances are solved")
+    )
     try:
         with shown as report:
             spreads = tolerances(positions, PAGE_SAMPLES, progress=report)
     except (InputError, DependencyError) as error:
         return {"lines": [str(error)], "parts": {}}
-    rows = np.linspace(0, len(spreads.theta_2) - 1, len(places)).round().astype(int)  # a law is thinned as in `animate`
+    rows = (
+        np.linspace(0, len(spreads.theta_2) - 1, len(places)).round().astype(int)
+    )  # a law is thinned as in `animate`
 
     def short(values: Array, digits: int) -> list[float | None]:
-        return [float(f"{x:.{digits}g}") if math.isfinite(x) else None for x in values[rows].tolist()]
+        return [
+            float(f"{x:.{digits}g}") if math.isfinite(x) else None
+            for x in values[rows].tolist()
+        ]
 
     parts: dict[str, Any] = {}
     for part in list_shown_parts(spreads):
         spread = spreads.spreads[part]
-        ends = {name: getattr(spread, name) - spread.nominal for name in ("low", "high", "least", "greatest")}
+        ends = {
+            name: getattr(spread, name) - spread.nominal
+            for name in ("low", "high", "least", "greatest")
+        }
         away = {**ends, "worst": spread.worst, "deviation": spread.deviation}
         with np.errstate(all="ignore"):
             shares = spread.shares / spread.shares.sum(axis=0)
@@ -157,7 +218,10 @@ def write_json(spreads: Tolerances) -> str:
         samples=spreads.samples,
         seed=spreads.seed,
         tolerances={
-            tolerance.key: {"width": tolerance.width, "distribution": "normal" if tolerance.sigma else "uniform"}
+            tolerance.key: {
+                "width": tolerance.width,
+                "distribution": "normal" if tolerance.sigma else "uniform",
+            }
             for tolerance in stated
         },
         apart=spreads.apart,
@@ -166,7 +230,11 @@ def write_json(spreads: Tolerances) -> str:
         without_value=spreads.without,
         quantities={
             part: {
-                **{name: array for name, array in spread._asdict().items() if name != "shares"},
+                **{
+                    name: array
+                    for name, array in spread._asdict().items()
+                    if name != "shares"
+                },
                 "first_order": spread.first_order,
                 "shares": dict(zip(keys, spread.shares, strict=True)),
                 "parted": spread.parted,

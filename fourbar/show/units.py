@@ -16,7 +16,15 @@ IMPERIAL = ("in", "inch", "inches", "ft", "foot", "feet")
 """Units of lengths.ground with which a scene is shown in imperial units."""
 COMMON: Conversion = {**DEGREES, "rad/s": ("rpm", 30.0 / math.pi)}
 """Units of a summary where nobody asks for others: what is left out has the SI unit with a prefix."""
-PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
+PREFIXES = (
+    (1e9, "G"),
+    (1e6, "M"),
+    (1e3, "k"),
+    (1.0, ""),
+    (1e-3, "m"),
+    (1e-6, "µ"),
+    (1e-9, "n"),
+)
 
 
 def units(text: str) -> Conversion:
@@ -36,14 +44,27 @@ def units(text: str) -> Conversion:
         why = {unit: _explain_refusal(name, unit) for unit in STATED}
         unit = next((unit for unit in STATED if not why[unit]), None)
         if unit is None or unit in stated:
-            hint = next((f"; {word}" for reason in why.values() if (word := reason.partition("; ")[2])), "")
-            reason = f"is no unit of a result{hint}" if unit is None else f"is the second unit for {unit}"
+            hint = next(
+                (
+                    f"; {word}"
+                    for reason in why.values()
+                    if (word := reason.partition("; ")[2])
+                ),
+                "",
+            )
+            reason = (
+                f"is no unit of a result{hint}"
+                if unit is None
+                else f"is the second unit for {unit}"
+            )
             raise InputError("units", name, f"{reason}; {ALLOWED}")
         stated[unit] = name.replace(".", " ")
     for unit, (base, form) in DERIVED.items():
         if base in stated and unit not in stated:
             stated[unit] = form.format(stated[base])
-    return {unit: (name, to_si(f"1 {unit}", name)) for unit, name in stated.items()} or SI
+    return {
+        unit: (name, to_si(f"1 {unit}", name)) for unit, name in stated.items()
+    } or SI
 
 
 def _explain_refusal(name: str, unit: str) -> str:
@@ -61,14 +82,18 @@ def suit_units(length: str) -> Conversion:
     """Return the units that suit a length as it was typed: imperial for inches and feet, otherwise `COMMON`."""
     from fourbar.quantities.units import find_unit
 
-    return units("imperial") if find_unit(length, "m").casefold() in IMPERIAL else COMMON
+    return (
+        units("imperial") if find_unit(length, "m").casefold() in IMPERIAL else COMMON
+    )
 
 
 def units_of_file(path: Path) -> Conversion:
     """Return the units that suit a scene file, by the unit of its lengths.ground."""
     import tomllib
 
-    return suit_units(str(tomllib.loads(path.read_text(encoding="utf-8"))["lengths"]["ground"]))
+    return suit_units(
+        str(tomllib.loads(path.read_text(encoding="utf-8"))["lengths"]["ground"])
+    )
 
 
 def choose_unit(largest: float, unit: str, units: Conversion = SI) -> tuple[float, str]:
@@ -87,7 +112,9 @@ def write_digits(value: float) -> str:
     return f"{float(f'{value:.4g}'):.6g}"
 
 
-def write_short(value: float, unit: str, units: Conversion, largest: float | None = None) -> str:
+def write_short(
+    value: float, unit: str, units: Conversion, largest: float | None = None
+) -> str:
     """Write a quantity with four significant digits and a unit that suits it, or the largest of its kind."""
     factor, name = choose_unit(abs(value) if largest is None else largest, unit, units)
     return f"{write_digits(factor * value)} {name}"

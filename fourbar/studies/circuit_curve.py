@@ -17,7 +17,13 @@ from fourbar.effects.effect import Actions, list_bodies
 from fourbar.errors import NotAssembledError
 from fourbar.evaluation.case import Case
 from fourbar.formulas.arithmetic import Number, polar, sine
-from fourbar.formulas.mobility import TURN, change_points, circuits, find_circuit, turns_fully
+from fourbar.formulas.mobility import (
+    TURN,
+    change_points,
+    circuits,
+    find_circuit,
+    turns_fully,
+)
 from fourbar.formulas.motion import Coefficients, State, rates
 from fourbar.formulas.position import Loop, Position, half_angle, loop
 from fourbar.scene import Command, Scene, command
@@ -44,7 +50,9 @@ class RestPosition(NamedTuple):
     """+1 or -1; 0 at a limit of theta_2, where the two meet."""
 
 
-def compute_generalised_force(scene: Scene, terms: tuple[Any, ...], state: State) -> Any:
+def compute_generalised_force(
+    scene: Scene, terms: tuple[Any, ...], state: State
+) -> Any:
     """Compute Q of loads and effects, by the parameter that the state's coefficients belong to."""
     return Actions(state, list_bodies(scene.linkage, terms)).add(terms).work()[0]
 
@@ -57,7 +65,9 @@ class _Sizes(Actions):
         self.size: Any = 0.0
         self.fastest = np.max(np.abs([state.k.h2, state.k.h3, state.k.h4]), axis=0)
 
-    def force(self, bar: int, force: Any, point: Any = 0.0j, beyond: Any = None) -> None:
+    def force(
+        self, bar: int, force: Any, point: Any = 0.0j, beyond: Any = None
+    ) -> None:
         super().force(bar, force, point, beyond)
         if bar == 3:
             self.size = self.size + np.abs(force) * self.state.lengths.a * self.fastest
@@ -77,7 +87,12 @@ def of_input(scene: Scene) -> Command:
     if commanded.commanded == "theta_2":
         return commanded
     solution = solve(scene, "position", at=commanded)
-    return Command(solution.theta_2[solution.assembled], solution.branch[solution.assembled], None, 0.0)
+    return Command(
+        solution.theta_2[solution.assembled],
+        solution.branch[solution.assembled],
+        None,
+        0.0,
+    )
 
 
 class CircuitCurve:
@@ -103,17 +118,29 @@ class CircuitCurve:
         self.full = turns_fully(linkage)
         self.low, self.high = (end - self.theta_1 for end in self.circuit.theta_2)
         stated = isinstance(scene.motion.angle, Sweep) or scene.motion.law is not None
-        self.sweep = (float(commanded.theta_2.min()), float(commanded.theta_2.max())) if stated else None
+        self.sweep = (
+            (float(commanded.theta_2.min()), float(commanded.theta_2.max()))
+            if stated
+            else None
+        )
         self.singular = [
-            (point - self.theta_1, 0.0 if point == self.theta_1 else math.pi) for point in change_points(linkage)
+            (point - self.theta_1, 0.0 if point == self.theta_1 else math.pi)
+            for point in change_points(linkage)
         ]
-        self.singular = [place for place in self.singular if self.inside(np.array([place[0]]), np.zeros(1))[0]]
+        self.singular = [
+            place
+            for place in self.singular
+            if self.inside(np.array([place[0]]), np.zeros(1))[0]
+        ]
 
     def inside(self, psi: Array, radius: Array) -> NDArray[np.bool_]:
         """Mark where psi, within a radius, lies in the sweep, if one is stated."""
         if self.sweep is None or self.sweep[1] - self.sweep[0] >= TURN:
             return np.ones(psi.shape, dtype=bool)
-        middle, half = 0.5 * (self.sweep[0] + self.sweep[1]) - self.theta_1, 0.5 * (self.sweep[1] - self.sweep[0])
+        middle, half = (
+            0.5 * (self.sweep[0] + self.sweep[1]) - self.theta_1,
+            0.5 * (self.sweep[1] - self.sweep[0]),
+        )
         away = psi - middle - TURN * np.rint((psi - middle) / TURN)
         return np.asarray(np.abs(away) <= half + radius + AT_END)
 
@@ -123,7 +150,9 @@ class CircuitCurve:
         if self.full:
             psi, sign = self.low + tau, np.full(tau.shape, float(branch))
         else:
-            psi = 0.5 * (self.low + self.high) - 0.5 * (self.high - self.low) * np.cos(tau)
+            psi = 0.5 * (self.low + self.high) - 0.5 * (self.high - self.low) * np.cos(
+                tau
+            )
             sign = np.where(tau <= math.pi, 1.0, -1.0)
         return np.stack([psi, sign * transmission(self.ratios, psi)], axis=1)
 
@@ -132,8 +161,14 @@ class CircuitCurve:
         psi = self.low + np.remainder(points[:, 0] - self.low, TURN)
         sign = np.where(np.sin(points[:, 1]) >= 0.0, 1, -1)
         if self.full:
-            return psi - self.low, np.array([self.rows.index(branch) for branch in sign], dtype=np.intp)
-        part = np.clip((0.5 * (self.low + self.high) - psi) / (0.5 * (self.high - self.low)), -1.0, 1.0)
+            return psi - self.low, np.array(
+                [self.rows.index(branch) for branch in sign], dtype=np.intp
+            )
+        part = np.clip(
+            (0.5 * (self.low + self.high) - psi) / (0.5 * (self.high - self.low)),
+            -1.0,
+            1.0,
+        )
         tau = np.where(sign > 0, np.arccos(part), TURN - np.arccos(part))
         return tau, np.zeros(len(points), dtype=np.intp)
 
@@ -160,14 +195,25 @@ class CircuitCurve:
 
     def force(self, points: Array) -> Array:
         """Compute Q of all but dry friction, by the curve's parameter."""
-        return np.broadcast_to(compute_generalised_force(self.scene, self.case.terms, self.state(points)), len(points))
+        return np.broadcast_to(
+            compute_generalised_force(self.scene, self.case.terms, self.state(points)),
+            len(points),
+        )
 
     def slope(self, points: Array) -> Array:
         """Compute dQ/ds."""
         k = self.state(points).k
-        psi, mu = (Sloped(x, h[None]) for x, h in zip(points.T, (k.h2, k.h43), strict=True))
-        Q = compute_generalised_force(self.scene, self.case.terms, on_curve(self.lengths, self.theta_1, psi, mu))
-        return np.broadcast_to(Q.slopes[0], len(points)) if isinstance(Q, Sloped) else np.zeros(len(points))
+        psi, mu = (
+            Sloped(x, h[None]) for x, h in zip(points.T, (k.h2, k.h43), strict=True)
+        )
+        Q = compute_generalised_force(
+            self.scene, self.case.terms, on_curve(self.lengths, self.theta_1, psi, mu)
+        )
+        return (
+            np.broadcast_to(Q.slopes[0], len(points))
+            if isinstance(Q, Sloped)
+            else np.zeros(len(points))
+        )
 
     def size(self, points: Array) -> Array:
         """Sum of the absolute terms of Q."""
@@ -191,18 +237,28 @@ class CircuitCurve:
             self.state(point[None]).position,
             self.low if self.sweep is None else self.sweep[0] - self.theta_1 - AT_END,
         )
-        theta_2 = self.theta_1 + from_ + math.remainder(point[0] - from_ - math.pi, TURN) + math.pi
+        theta_2 = (
+            self.theta_1
+            + from_
+            + math.remainder(point[0] - from_ - math.pi, TURN)
+            + math.pi
+        )
         theta_3, theta_4 = (float(np.angle(u)[0]) for u in (position.u3, position.u4))
         sine = math.sin(point[1])
         return RestPosition(
-            float(theta_2), theta_3, theta_4, 0 if abs(sine) < AT_END else int(math.copysign(1.0, sine))
+            float(theta_2),
+            theta_3,
+            theta_4,
+            0 if abs(sine) < AT_END else int(math.copysign(1.0, sine)),
         )
 
 
 def closure(lengths: Loop, psi: Number, mu: Number) -> Number:
     """Compute a d cos psi - b c cos mu - (a^2 + d^2 - b^2 - c^2)/2: zero where the loop closes, m^2."""
     d, a, b, c = lengths[:4]
-    return a * d * np.cos(psi) - b * c * np.cos(mu) - 0.5 * (a * a + d * d - b * b - c * c)
+    return (
+        a * d * np.cos(psi) - b * c * np.cos(mu) - 0.5 * (a * a + d * d - b * b - c * c)
+    )
 
 
 def on_curve(lengths: Loop, theta_1: Number, psi: Number, mu: Number) -> State:
@@ -225,7 +281,9 @@ def on_curve(lengths: Loop, theta_1: Number, psi: Number, mu: Number) -> State:
     u3 = diagonal / _less_turned(b, c, mu)
     u4, h2 = u3 * polar(1.0, mu), np.sin(mu)
     h3, h4 = (a / b) * sine(u4, u2), (a / c) * sine(u3, u2)
-    k = Coefficients(h2, h3, h4, h2 - h3, (a / b) * (d / c) * np.sin(psi), 0.0, 0.0, 0.0)
+    k = Coefficients(
+        h2, h3, h4, h2 - h3, (a / b) * (d / c) * np.sin(psi), 0.0, 0.0, 0.0
+    )
     position = Position(u1, u2, u3, u4, h2, diagonal, None, None, None)  # type: ignore[arg-type]  # what nothing here asks for
     return State(lengths, theta_1, theta_1 + psi, position, k, 0.0, rates(k, 0.0, 0.0))
 
@@ -242,4 +300,6 @@ def transmission(lengths: Loop, psi: Number) -> Number:
     tan^2(mu/2) = (e^2 - (b - c)^2)/((b + c)^2 - e^2), the factors of Heron's formula.
     """
     half = half_angle(lengths, psi)
-    return 2.0 * np.arctan2(np.sqrt(np.maximum(half.inner, 0.0)), np.sqrt(np.maximum(half.outer, 0.0)))
+    return 2.0 * np.arctan2(
+        np.sqrt(np.maximum(half.inner, 0.0)), np.sqrt(np.maximum(half.outer, 0.0))
+    )

@@ -14,14 +14,29 @@ from fourbar.errors import InputError, expect
 from fourbar.evaluation.case import Case
 from fourbar.evaluation.evaluate import list_kinematics
 from fourbar.formulas.arithmetic import polar
-from fourbar.quantities import FORCES, NOT_ASSEMBLED, OK, PIN_FORCES, SINGULAR, STAGE_OF, STAGES, STATUS_NAMES
+from fourbar.quantities import (
+    FORCES,
+    NOT_ASSEMBLED,
+    OK,
+    PIN_FORCES,
+    SINGULAR,
+    STAGE_OF,
+    STAGES,
+    STATUS_NAMES,
+)
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import FromLimit
 from fourbar.scene.numbers import POINT_STAGES
 from fourbar.scene.scene import turn_bar
 from fourbar.solution import Array, Solution, find_values, split_parts
 from fourbar.solve import solve
-from fourbar.studies.keys import SceneNumber, command_key, list_entries, read_place, replace_place
+from fourbar.studies.keys import (
+    SceneNumber,
+    command_key,
+    list_entries,
+    read_place,
+    replace_place,
+)
 from fourbar.studies.sloped import Sloped, take_slopes, take_values
 from fourbar.writing import list_names, make_data_frame, make_html, write_between
 
@@ -70,7 +85,9 @@ class Sensitivity:
         """
         name = self._find_whole(quantity)
         if not isinstance(key, str) or key not in self.keys:
-            raise InputError("sensitivity", key, "is not known here; known: " + ", ".join(self.keys))
+            raise InputError(
+                "sensitivity", key, "is not known here; known: " + ", ".join(self.keys)
+            )
         slopes: Array = self.by[name][list(self.keys).index(key)]
         if quantity == name:
             return slopes
@@ -92,9 +109,13 @@ class Sensitivity:
         Raises DependencyError where pandas is not installed.
         """
         n = len(self.status)
-        every = (part for name in self.by for part in split_parts(name, self.value(name)))
+        every = (
+            part for name in self.by for part in split_parts(name, self.value(name))
+        )
         parts = sorted(every, key=lambda part: part[0] == "|")  # magnitudes last
-        columns = {part: np.ravel([self.of(part, key) for key in self.keys]) for part in parts}
+        columns = {
+            part: np.ravel([self.of(part, key) for key in self.keys]) for part in parts
+        }
         first = {"key": np.repeat(list(self.keys), n), "theta_2": np.tile(self.solution.theta_2, len(self.keys)),
                  "status": self.status * len(self.keys)}  # fmt: skip
         return make_data_frame(first | columns)
@@ -103,15 +124,23 @@ class Sensitivity:
         """Return the quantity of which one is asked, or a component or the magnitude; InputError for any other."""
         if isinstance(quantity, str):
             for name in (quantity, quantity.strip("|"), quantity[:-2]):
-                if name in self.by and (name == quantity or quantity in split_parts(name, self.by[name])):
+                if name in self.by and (
+                    name == quantity or quantity in split_parts(name, self.by[name])
+                ):
                     return name
-        raise InputError("sensitivity", quantity, "is not known here; known: " + ", ".join(self.by))
+        raise InputError(
+            "sensitivity", quantity, "is not known here; known: " + ", ".join(self.by)
+        )
 
     def influences(self, quantity: str) -> list[Influence]:
         """List what the numbers change a quantity by, a pin force in its magnitude, the largest first."""
         value, rows = self.value(quantity), []
-        for (key, entry), number in zip(self.keys.items(), self.numbers.tolist(), strict=True):
-            change = (DEGREE if entry.unit == "rad" else HUNDREDTH * abs(number)) * self.of(quantity, key)
+        for (key, entry), number in zip(
+            self.keys.items(), self.numbers.tolist(), strict=True
+        ):
+            change = (
+                DEGREE if entry.unit == "rad" else HUNDREDTH * abs(number)
+            ) * self.of(quantity, key)
             if quantity in PIN_FORCES:
                 with np.errstate(all="ignore"):
                     change = np.sum(value * change, axis=-1) / np.hypot(*value.T)
@@ -119,25 +148,44 @@ class Sensitivity:
                 change = np.hypot(*change.T)
             if np.isfinite(change).any():
                 worst = int(np.nanargmax(np.abs(change)))
-                rows.append(Influence(key, float(change[worst]), float(self.solution.theta_2[worst])))
-        return sorted((row for row in rows if row.change != 0.0), key=lambda row: -abs(row.change))
+                rows.append(
+                    Influence(
+                        key, float(change[worst]), float(self.solution.theta_2[worst])
+                    )
+                )
+        return sorted(
+            (row for row in rows if row.change != 0.0), key=lambda row: -abs(row.change)
+        )
 
     def _list_rows(self) -> list[tuple[str, str, str]]:
         """List for each quantity its values and the numbers that change it most."""
         rows = []
-        for name in (name for name in ("torque", "theta_3", "theta_4", *PIN_FORCES) if name in self.by):
+        for name in (
+            name
+            for name in ("torque", "theta_3", "theta_4", *PIN_FORCES)
+            if name in self.by
+        ):
             part = f"|{name}|" if name in PIN_FORCES else name
-            most = ", ".join(f"{row.key} {abs(row.change):.3g}" for row in self.influences(name)[:3])
+            most = ", ".join(
+                f"{row.key} {abs(row.change):.3g}" for row in self.influences(name)[:3]
+            )
             rows.append((part, write_between(self.value(part)), most))
         return rows
 
     def _title(self) -> str:
-        counts = ", ".join(f"{self.status.count(word)} {word}" for word in dict.fromkeys(self.status))
-        return f"Sensitivity {self.scene.title!r}: by {len(self.keys)} numbers at {counts}"
+        counts = ", ".join(
+            f"{self.status.count(word)} {word}" for word in dict.fromkeys(self.status)
+        )
+        return (
+            f"Sensitivity {self.scene.title!r}: by {len(self.keys)} numbers at {counts}"
+        )
 
     def __repr__(self) -> str:
         """Say in ten lines what it holds."""
-        rows = [f"{part}, {value}: changes most with {most or 'nothing'}" for part, value, most in self._list_rows()]
+        rows = [
+            f"{part}, {value}: changes most with {most or 'nothing'}"
+            for part, value, most in self._list_rows()
+        ]
         return "\n".join([self._title(), *rows, list_names("quantities", self.by)])
 
     def _repr_html_(self) -> str:
@@ -163,19 +211,40 @@ def sensitivity(scene: Scene) -> Sensitivity:
     """
     expect("scene", scene, Scene)
     if scene.motion.free is not None:
-        raise InputError("motion.free", "a free motion", "has no sensitivities: they are those of a prescribed theta_2")
+        raise InputError(
+            "motion.free",
+            "a free motion",
+            "has no sensitivities: they are those of a prescribed theta_2",
+        )
     theta = command_key(scene)
     if isinstance(scene.motion.angle, FromLimit):
-        raise InputError(theta, scene.motion.angle, "has no sensitivities: the limit moves with the lengths")
+        raise InputError(
+            theta,
+            scene.motion.angle,
+            "has no sensitivities: the limit moves with the lengths",
+        )
     commanded, solution, entries = command(scene), solve(scene), list_entries(scene)
     moving = commanded.speed is not None
     if not moving:  # positions depend on these alone
         of_positions = ("lengths", "points", "drive")
-        entries = {key: n for key, n in entries.items() if key.startswith(of_positions) or ".centre." in key}
-    keys = {theta: SceneNumber((), scene.motion.numbers[scene.motion.commanded].unit)} | entries
+        entries = {
+            key: n
+            for key, n in entries.items()
+            if key.startswith(of_positions) or ".centre." in key
+        }
+    keys = {
+        theta: SceneNumber((), scene.motion.numbers[scene.motion.commanded].unit)
+    } | entries
     most = np.nan if commanded.stroke is None else float(commanded.stroke.max())
-    numbers = [most if key == theta else read_place(scene, entry.place) for key, entry in keys.items()]
-    forces = FORCES if any(effect.loaded_pins for effect in scene.effects) else (*FORCES, "drive_condition")
+    numbers = [
+        most if key == theta else read_place(scene, entry.place)
+        for key, entry in keys.items()
+    ]
+    forces = (
+        FORCES
+        if any(effect.loaded_pins for effect in scene.effects)
+        else (*FORCES, "drive_condition")
+    )
     names = [
         name
         for name in solution.evaluated()
@@ -183,32 +252,51 @@ def sensitivity(scene: Scene) -> Sensitivity:
         or (moving and name in forces)
         or (name == "theta_2" and scene.motion.commanded != name)
     ]
-    names += [f"{start}{p.name}" for p in scene.points for start in (POINT_STAGES if moving else ("",))]
+    names += [
+        f"{start}{p.name}"
+        for p in scene.points
+        for start in (POINT_STAGES if moving else ("",))
+    ]
     p = len(keys)
-    by = {name: np.full((p, *find_values(solution, name).shape), np.nan) for name in names}
+    by = {
+        name: np.full((p, *find_values(solution, name).shape), np.nan) for name in names
+    }
     status = np.array(STATUS_NAMES, dtype="<U16")[solution.status_code]
     with np.errstate(all="ignore"):
         _, decided = Case.of(scene, commanded.bar).half_angle(commanded.angle, None)
-        status[decided] = STATUS_NAMES[SINGULAR]  # doubles cannot tell the factors from zero
-        regular = np.flatnonzero(~np.isin(status, [STATUS_NAMES[code] for code in (NOT_ASSEMBLED, SINGULAR)]))
+        status[decided] = STATUS_NAMES[
+            SINGULAR
+        ]  # doubles cannot tell the factors from zero
+        regular = np.flatnonzero(
+            ~np.isin(status, [STATUS_NAMES[code] for code in (NOT_ASSEMBLED, SINGULAR)])
+        )
         seeded = make_differentiable(scene)
         for number, (key, entry) in enumerate(keys.items()):
-            if not key.startswith("motion."):  # what is left out carries the slope of its length too
+            if not key.startswith(
+                "motion."
+            ):  # what is left out carries the slope of its length too
                 sloped = read_place(seeded, entry.place) + make_unit_slope(number, p)
                 seeded = replace_place(seeded, entry.place, sloped)
         for start in range(0, len(regular), AT_ONCE):
             index = regular[start : start + AT_ONCE]
-            derived, held = _compute_derivatives(seeded, keys, commanded, index, by.keys(), moving)
+            derived, held = _compute_derivatives(
+                seeded, keys, commanded, index, by.keys(), moving
+            )
             status[index[held & (solution.status_code[index] == OK)]] = AT_REST
             for name, number in derived.items():
                 slopes = np.broadcast_to(take_slopes(number), (p, len(index)))
                 if by[name].ndim == 3:
-                    by[name][:, index, 0], by[name][:, index, 1] = slopes.real, slopes.imag
+                    by[name][:, index, 0], by[name][:, index, 1] = (
+                        slopes.real,
+                        slopes.imag,
+                    )
                 else:
                     by[name][:, index] = slopes.real
     for name in set(forces) & set(names):
         by[name][:, status != STATUS_NAMES[OK]] = np.nan
-    return Sensitivity(scene, solution, keys, np.array(numbers, dtype=float), status.tolist(), by)
+    return Sensitivity(
+        scene, solution, keys, np.array(numbers, dtype=float), status.tolist(), by
+    )
 
 
 class _Directed(Gravity):
@@ -225,7 +313,10 @@ class _Directed(Gravity):
 def make_differentiable(scene: Scene) -> Scene:
     """Replace the scene's effects by some that compute their derivatives too."""
     effects = (
-        _Directed(effect.magnitude, effect.angle) if isinstance(effect, Gravity) else effect for effect in scene.effects
+        _Directed(effect.magnitude, effect.angle)
+        if isinstance(effect, Gravity)
+        else effect
+        for effect in scene.effects
     )
     return replace(scene, effects=tuple(effects))
 
@@ -247,19 +338,29 @@ def _compute_derivatives(
     place = {key: number for number, key in enumerate(keys)}
 
     def seeded(key: str, number: Any) -> Any:
-        number = np.broadcast_to(np.asarray(0.0 if number is None else number, dtype=float), stated.angle.shape)[index]
+        number = np.broadcast_to(
+            np.asarray(0.0 if number is None else number, dtype=float),
+            stated.angle.shape,
+        )[index]
         if key in place:
             return number + make_unit_slope(place[key], len(keys))
         return Sloped(number, np.zeros((len(keys), 1)))
 
     rates = scene.motion if scene.motion.law is None else stated
-    numbers = (stated.angle if stated.stroke is None else stated.stroke, rates.speed, rates.acceleration)
+    numbers = (
+        stated.angle if stated.stroke is None else stated.stroke,
+        rates.speed,
+        rates.acceleration,
+    )
     commanded = {
-        name: seeded(f"motion.{name}", number) for name, number in zip(scene.motion.names, numbers, strict=True)
+        name: seeded(f"motion.{name}", number)
+        for name, number in zip(scene.motion.names, numbers, strict=True)
     }
     q, speed, acceleration, condition = turn_bar(scene, *commanded.values())
     case, branch = Case.of(scene, stated.bar), stated.branch[index].astype(float)
-    state = case.assemble(q, case.path.half_angle(q), branch, speed, acceleration, moving=moving)
+    state = case.assemble(
+        q, case.path.half_angle(q), branch, speed, acceleration, moving=moving
+    )
     quantities = {**list_kinematics(case, state, names), **commanded}
     if condition is not None:
         quantities["condition"] = quantities["condition"] * condition
@@ -267,7 +368,9 @@ def _compute_derivatives(
     if moving:
         actions = Actions(state, case.bodies)
         for pin in {pin for term in case.terms for pin in term.dry_pins}:
-            held |= ~np.broadcast_to(actions.turning(pin), held.shape) | (take_values(speed) == 0.0)
+            held |= ~np.broadcast_to(actions.turning(pin), held.shape) | (
+                take_values(speed) == 0.0
+            )
         dynamics = case.dynamics(state, acceleration)
         quantities |= {**dynamics.pins._asdict(), case.names.value: dynamics.drive}
         quantities["power"] = dynamics.work * speed

@@ -18,7 +18,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.errors import expect
-from fourbar.formulas.mobility import MARGIN, TURN, Circuit, choose_range, circuits, turns_fully
+from fourbar.formulas.mobility import (
+    MARGIN,
+    TURN,
+    Circuit,
+    choose_range,
+    circuits,
+    turns_fully,
+)
 from fourbar.formulas.position import Loop
 from fourbar.formulas.torque import inertia
 from fourbar.quantities import JAMMED, NOT_ASSEMBLED, SINGULAR
@@ -116,13 +123,21 @@ def equilibrium(scene: Scene) -> Equilibria:
     expect("scene", scene, Scene)
     with np.errstate(all="ignore"):
         curve = CircuitCurve(scene)
-        level = [part for part in _list_ranges(curve, curve.level, np.empty((0, 2))) if part.samples > A_RANGE]
+        level = [
+            part
+            for part in _list_ranges(curve, curve.level, np.empty((0, 2)))
+            if part.samples > A_RANGE
+        ]
         samples = curve.samples()
         idle = curve.level(samples)
         zeros = Zeros(np.empty((0, 2)), np.empty((0, 2)), True)
         if not idle.all():
             proof = _prove_zeros(curve, samples[idle])
-            zeros = proof if proof is not None and proof.complete else _find_sign_changes(curve, samples)
+            zeros = (
+                proof
+                if proof is not None and proof.complete
+                else _find_sign_changes(curve, samples)
+            )
         points = curve.sorted(np.concatenate([zeros.found, zeros.undecided]))
         held: list[_CircuitRange] = []
         if any(term.dry_pins for term in curve.case.terms):
@@ -130,51 +145,96 @@ def equilibrium(scene: Scene) -> Equilibria:
         equilibria = []
         for point in points:
             undecided = any(np.array_equal(point, part) for part in zeros.undecided)
-            around = next((part.ends for part in held if _is_inside(curve, point, part)), None)
+            around = next(
+                (part.ends for part in held if _is_inside(curve, point, part)), None
+            )
             equilibria.append(_describe(curve, point, around, undecided=undecided))
         singular = tuple(curve.place(np.array(point)) for point in curve.singular)
         positions = _solve_at_rest(scene, curve.circuit)
         psi = positions.theta_2 - curve.theta_1
-        sense = _moves(curve, np.stack([psi, positions.branch * transmission(curve.ratios, psi)], axis=1))
+        sense = _moves(
+            curve,
+            np.stack([psi, positions.branch * transmission(curve.ratios, psi)], axis=1),
+        )
         sense[np.isin(positions.status_code, (NOT_ASSEMBLED, SINGULAR))] = 0
         flat, ends = (tuple(part.ends for part in ranges) for ranges in (level, held))
-        return Equilibria(tuple(equilibria), flat, zeros.complete, singular, ends, positions, sense)
+        return Equilibria(
+            tuple(equilibria), flat, zeros.complete, singular, ends, positions, sense
+        )
 
 
 def _solve_at_rest(scene: Scene, circuit: Circuit) -> Solution:
     """Solve the scene's positions at rest; of a single one, or a released linkage, those of the circuit."""
     commanded = of_input(scene)
     if len(commanded.theta_2) == 1:
-        low, high = choose_range(scene.linkage) if turns_fully(scene.linkage) else circuit.theta_2
+        low, high = (
+            choose_range(scene.linkage)
+            if turns_fully(scene.linkage)
+            else circuit.theta_2
+        )
         margin = 0.0 if turns_fully(scene.linkage) else min(MARGIN, 0.25 * (high - low))
         theta_2 = np.linspace(low + margin, high - margin, DEFAULT_STEPS + 1)
-        commanded = Command(theta_2, np.full(theta_2.shape, commanded.branch[0], dtype=np.int8), 0.0, 0.0)
-    return solve(scene, "force", at=Command(commanded.theta_2, commanded.branch, 0.0, 0.0, commanded.remainder))
+        commanded = Command(
+            theta_2,
+            np.full(theta_2.shape, commanded.branch[0], dtype=np.int8),
+            0.0,
+            0.0,
+        )
+    return solve(
+        scene,
+        "force",
+        at=Command(commanded.theta_2, commanded.branch, 0.0, 0.0, commanded.remainder),
+    )
 
 
 def _describe(
-    curve: CircuitCurve, point: Array, held: tuple[RestPosition, RestPosition] | None, *, undecided: bool
+    curve: CircuitCurve,
+    point: Array,
+    held: tuple[RestPosition, RestPosition] | None,
+    *,
+    undecided: bool,
 ) -> Equilibrium:
     """Describe an equilibrium by theta_2, at a limit by theta_4."""
     state = curve.state(point[None])
     bar = 4 if abs(state.k.h2[0]) < STILL * abs(state.k.h4[0]) else 2
     square = float(state.k[bar - 2][0]) ** 2
     slope = float(curve.slope(point[None])[0]) / square
-    J = float(np.sum(inertia(curve.lengths.a, curve.case.bodies, state.position, state.k))) / square
+    J = (
+        float(
+            np.sum(inertia(curve.lengths.a, curve.case.bodies, state.position, state.k))
+        )
+        / square
+    )
     stable = "undecided" if undecided else "stable" if slope < 0.0 else "unstable"
     frequency = math.sqrt(-slope / J) / TURN if stable == "stable" and J > 0.0 else None
-    return Equilibrium(curve.place(point), stable, f"theta_{bar}", slope, J, frequency, held)
+    return Equilibrium(
+        curve.place(point), stable, f"theta_{bar}", slope, J, frequency, held
+    )
 
 
 def _find_sign_changes(curve: CircuitCurve, points: Array) -> Zeros:
     """Find the zeros between samples at which Q changes its sign."""
     idle = curve.level(points)
-    points = points[~idle | np.roll(idle, 1) | np.roll(idle, -1)]  # a zero may fall on a sample
+    points = points[
+        ~idle | np.roll(idle, 1) | np.roll(idle, -1)
+    ]  # a zero may fall on a sample
     tau, row = curve.tau(points)
-    Q, size, one, idle = curve.force(points), curve.size(points), np.arange(len(points)), curve.level(points)
-    following = np.concatenate([np.roll(one[row == number], -1) for number in range(len(curve.rows))])
+    Q, size, one, idle = (
+        curve.force(points),
+        curve.size(points),
+        np.arange(len(points)),
+        curve.level(points),
+    )
+    following = np.concatenate(
+        [np.roll(one[row == number], -1) for number in range(len(curve.rows))]
+    )
     gap = np.remainder(tau[following] - tau, TURN)
-    between = np.flatnonzero((Q * Q[following] < 0.0) & (gap < 2.5 * TURN / SAMPLES) & ~idle & ~idle[following])
+    between = np.flatnonzero(
+        (Q * Q[following] < 0.0)
+        & (gap < 2.5 * TURN / SAMPLES)
+        & ~idle
+        & ~idle[following]
+    )
     start, branch = Q[between], np.array(curve.rows)[row[between]]
 
     def has_sign_of_start(tau: Array) -> NDArray[np.bool_]:
@@ -204,15 +264,26 @@ def _prove_zeros(curve: CircuitCurve, idle: Array) -> Zeros | None:
         force = _enclose_force(curve.scene)
         if force is None:
             return None
-        return find_zeros(curve.ratios, force, _bound_circuit(curve), _choose_boxes(curve, idle), curve.singular)
+        return find_zeros(
+            curve.ratios,
+            force,
+            _bound_circuit(curve),
+            _choose_boxes(curve, idle),
+            curve.singular,
+        )
     finally:
         ctx.prec = before
 
 
 def _enclose_force(scene: Scene) -> Callable[[Any, Any], Sloped] | None:
     """Make Q of psi and mu in ball arithmetic, with its slopes by both; None if an effect has no form in it."""
-    acting = tuple(term for term in scene.effects if not term.dry_pins)  # dry friction does no work at rest
-    if any(term.key not in PROVABLE or getattr(term, "table", None) for term in (*scene.loads, *acting)):
+    acting = tuple(
+        term for term in scene.effects if not term.dry_pins
+    )  # dry friction does no work at rest
+    if any(
+        term.key not in PROVABLE or getattr(term, "table", None)
+        for term in (*scene.loads, *acting)
+    ):
         return None
     scene = make_differentiable(replace(scene, effects=acting))
     still = np.zeros((2, 1), dtype=object)
@@ -222,18 +293,27 @@ def _enclose_force(scene: Scene) -> Callable[[Any, Any], Sloped] | None:
         if not key.startswith("motion.")
     }
     exact = replace_numbers(scene, numbers)
-    lengths, theta_1 = Loop(*exact.linkage.lengths, 0.0, 0.0), exact.linkage.ground_angle
-    by_psi, by_mu = (np.array(column, dtype=object) for column in ([[1], [0]], [[0], [1]]))
+    lengths, theta_1 = (
+        Loop(*exact.linkage.lengths, 0.0, 0.0),
+        exact.linkage.ground_angle,
+    )
+    by_psi, by_mu = (
+        np.array(column, dtype=object) for column in ([[1], [0]], [[0], [1]])
+    )
 
     def force(psi: Any, mu: Any) -> Sloped:
         state = on_curve(lengths, theta_1, Sloped(psi, by_psi), Sloped(mu, by_mu))
-        Q: Sloped = compute_generalised_force(exact, (*exact.loads, *exact.effects), state)
+        Q: Sloped = compute_generalised_force(
+            exact, (*exact.loads, *exact.effects), state
+        )
         return Q
 
     return force
 
 
-def _bound_circuit(curve: CircuitCurve) -> tuple[tuple[float, float], tuple[float, float]]:
+def _bound_circuit(
+    curve: CircuitCurve,
+) -> tuple[tuple[float, float], tuple[float, float]]:
     """Return ranges of psi and mu that hold the circuit: half a turn of one of them where there is another circuit."""
     turn, ahead, back = (-math.pi, math.pi), (0.0, math.pi), (-math.pi, 0.0)
     if len(circuits(curve.scene.linkage)) == 1:
@@ -243,7 +323,9 @@ def _bound_circuit(curve: CircuitCurve) -> tuple[tuple[float, float], tuple[floa
     return ahead if 0.0 <= curve.low < math.pi else back, turn
 
 
-def _choose_boxes(curve: CircuitCurve, idle: Array) -> Callable[[Array, Array], NDArray[np.bool_]]:
+def _choose_boxes(
+    curve: CircuitCurve, idle: Array
+) -> Callable[[Array, Array], NDArray[np.bool_]]:
     """Make the choice of the boxes in which a zero is looked for: those within the sweep where Q may be something.
 
     Between two change points, where signs of psi and mu tell the ways of moving apart, Q may be zero throughout: a load
@@ -269,20 +351,28 @@ def _choose_boxes(curve: CircuitCurve, idle: Array) -> Callable[[Array, Array], 
 def _add_friction(curve: CircuitCurve, points: Array, side: int) -> Array:
     """Compute Q with the friction that opposes impending motion to one side; infinite where friction jams."""
     state, force = curve.state(points), np.empty(len(points))
-    along = np.abs(state.k.h2) >= np.abs(state.k.h4)  # the torque that balances Q, on the bar that turns faster
+    along = np.abs(state.k.h2) >= np.abs(
+        state.k.h4
+    )  # the torque that balances Q, on the bar that turns faster
     for bar, chosen in ((2, along), (4, ~along)):
         if chosen.any():
             part = curve.state(points[chosen])
             case = curve.case._replace(drive_bar=bar, drive=None)
             dynamics = case.dynamics(part, 0.0, side)
             Q = -dynamics.drive * part.k[bar - 2]
-            force[chosen] = Q if dynamics.status is None else np.where(dynamics.status == JAMMED, -side * np.inf, Q)
+            force[chosen] = (
+                Q
+                if dynamics.status is None
+                else np.where(dynamics.status == JAMMED, -side * np.inf, Q)
+            )
     return force
 
 
 def _holds(curve: CircuitCurve, points: Array) -> NDArray[np.bool_]:
     """Mark the points where friction holds."""
-    return (_add_friction(curve, points, 1) <= 0.0) & (_add_friction(curve, points, -1) >= 0.0)
+    return (_add_friction(curve, points, 1) <= 0.0) & (
+        _add_friction(curve, points, -1) >= 0.0
+    )
 
 
 def _moves(curve: CircuitCurve, points: Array) -> NDArray[np.int8]:
@@ -306,24 +396,47 @@ def _list_ranges(
             points = curve.point(tau, branch)
             return curve.inside(points[:, 0], np.zeros(1)) & holds(points)
 
-        tau = np.concatenate([(np.arange(SAMPLES) + 0.5) * (TURN / SAMPLES), own_tau[own_row == row]])
+        tau = np.concatenate(
+            [(np.arange(SAMPLES) + 0.5) * (TURN / SAMPLES), own_tau[own_row == row]]
+        )
         order = np.argsort(tau)
         tau, inside = tau[order], (there(tau) | (np.arange(len(tau)) >= SAMPLES))[order]
         if inside.all():
-            first, last = curve.point(np.array([0.0, math.nextafter(TURN, 0.0)]), branch)
-            ranges.append(_CircuitRange((curve.place(first), curve.place(last)), row, 0.0, TURN, SAMPLES))
+            first, last = curve.point(
+                np.array([0.0, math.nextafter(TURN, 0.0)]), branch
+            )
+            ranges.append(
+                _CircuitRange(
+                    (curve.place(first), curve.place(last)), row, 0.0, TURN, SAMPLES
+                )
+            )
             continue
-        starts, stops = (np.flatnonzero(inside & ~np.roll(inside, by)) for by in (1, -1))
+        starts, stops = (
+            np.flatnonzero(inside & ~np.roll(inside, by)) for by in (1, -1)
+        )
         if len(starts) and stops[0] < starts[0]:
             stops = np.roll(stops, -1)
         following = tau[(stops + 1) % len(tau)]
-        begin = _find_edge(there, tau[starts], np.remainder(tau[starts] - tau[starts - 1], TURN), -1.0)
-        end = _find_edge(there, tau[stops], np.remainder(following - tau[stops], TURN), 1.0)
-        for low, high, count in zip(begin, end, (stops - starts) % len(tau) + 1, strict=True):
-            one, stop = (curve.place(point) for point in curve.point(np.array([low, high]), branch))
+        begin = _find_edge(
+            there, tau[starts], np.remainder(tau[starts] - tau[starts - 1], TURN), -1.0
+        )
+        end = _find_edge(
+            there, tau[stops], np.remainder(following - tau[stops], TURN), 1.0
+        )
+        for low, high, count in zip(
+            begin, end, (stops - starts) % len(tau) + 1, strict=True
+        ):
+            one, stop = (
+                curve.place(point)
+                for point in curve.point(np.array([low, high]), branch)
+            )
             if curve.full and stop.theta_2 < one.theta_2:
                 stop = stop._replace(theta_2=stop.theta_2 + TURN)
-            ends = (stop, one) if not curve.full and one.branch == stop.branch == -1 else (one, stop)
+            ends = (
+                (stop, one)
+                if not curve.full and one.branch == stop.branch == -1
+                else (one, stop)
+            )
             width = float(np.remainder(high - low, TURN))
             ranges.append(_CircuitRange(ends, row, low, width, int(count)))
     return ranges
@@ -332,16 +445,22 @@ def _list_ranges(
 def _is_inside(curve: CircuitCurve, point: Array, part: _CircuitRange) -> bool:
     """Return True if a point lies in a range."""
     tau, row = curve.tau(point[None])
-    return bool(row[0] == part.row and np.remainder(tau[0] - part.low, TURN) <= part.width)
+    return bool(
+        row[0] == part.row and np.remainder(tau[0] - part.low, TURN) <= part.width
+    )
 
 
-def _find_edge(held: Callable[[Array], NDArray[np.bool_]], tau: Array, gap: Array, sense: float) -> Array:
+def _find_edge(
+    held: Callable[[Array], NDArray[np.bool_]], tau: Array, gap: Array, sense: float
+) -> Array:
     """Find where a range ends, between a place that is held and the next one, which is not."""
     inside, _ = _bisect(lambda away: held(tau + sense * away), np.zeros(tau.shape), gap)
     return np.asarray(np.remainder(tau + sense * inside, TURN))
 
 
-def _bisect(holds: Callable[[Array], NDArray[np.bool_]], low: Array, high: Array) -> tuple[Array, Array]:
+def _bisect(
+    holds: Callable[[Array], NDArray[np.bool_]], low: Array, high: Array
+) -> tuple[Array, Array]:
     """Narrow each interval, at whose lower end alone something holds, to the two neighbours between which it ends."""
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)

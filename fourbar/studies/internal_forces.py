@@ -55,7 +55,9 @@ class InternalForces(NamedTuple):
     """Largest |M| of all x, on both sides of every foot and where V = 0."""
 
 
-def internal_forces(scene: Scene, solution: Solution, bar: int, stations: Array | None = None) -> InternalForces:
+def internal_forces(
+    scene: Scene, solution: Solution, bar: int, stations: Array | None = None
+) -> InternalForces:
     """Compute the internal forces of a moving bar.
 
     A bar counts as uniform where its inertia and centre are left out; the weight and inertia of any other act at G,
@@ -72,13 +74,17 @@ def internal_forces(scene: Scene, solution: Solution, bar: int, stations: Array 
     expect("solution", solution, Solution)
     bar = require_bar("bar", bar)
     if solution.F12 is None:
-        raise InputError("solution", "F12", "was not evaluated: solve up to the stage 'force'")
+        raise InputError(
+            "solution", "F12", "was not evaluated: solve up to the stage 'force'"
+        )
     if solution.theta_2.ndim != 1:
         raise InputError("solution", "a study", "must be of one scene: take one member")
     described = scene.linkage.bar(bar)
     x = np.linspace(0.0, described.length, STATIONS)
     if stations is not None:
-        x = np.atleast_1d(require_numbers("stations", stations, "must be finite lengths", "m"))
+        x = np.atleast_1d(
+            require_numbers("stations", stations, "must be finite lengths", "m")
+        )
     beam = _collect(scene, solution, bar)
     rows = np.broadcast_to(x, (len(solution), len(x)))
     return InternalForces(x, *beam.at(rows), beam.uniform, beam.find_largest())
@@ -104,18 +110,25 @@ class _Beam(NamedTuple):
         """Compute N, V, M at x, (n, k); with what acts at x itself, or just `before` it."""
         N, V, M = (np.zeros(x.shape) for _ in range(3))
         end = x + (-SAME if before else SAME) * self.length
-        for foot, force, couple in zip(self.foot.T, self.force.T, self.couple.T, strict=True):
+        for foot, force, couple in zip(
+            self.foot.T, self.force.T, self.couple.T, strict=True
+        ):
             acts = foot[:, None] < end
             N -= np.where(acts, force.real[:, None], 0.0)
             V += np.where(acts, force.imag[:, None], 0.0)
-            M += np.where(acts, force.imag[:, None] * (x - foot[:, None]) - couple[:, None], 0.0)
+            M += np.where(
+                acts, force.imag[:, None] * (x - foot[:, None]) - couple[:, None], 0.0
+            )
         s, rest = np.clip(x, 0.0, self.length), np.maximum(x - self.length, 0.0)
         along, across = self.pull.real[:, None], self.pull.imag[:, None]
         omega, alpha = self.omega[:, None], self.alpha[:, None]
         sheared = -self.density * s * (across + 0.5 * alpha * s)
         N += self.density * s * (along - 0.5 * np.square(omega) * s)
         V += sheared
-        M += -self.density * np.square(s) * (0.5 * across + alpha * s / 6.0) + sheared * rest
+        M += (
+            -self.density * np.square(s) * (0.5 * across + alpha * s / 6.0)
+            + sheared * rest
+        )
         return N, V, M
 
     def find_largest(self) -> Bending:
@@ -123,20 +136,32 @@ class _Beam(NamedTuple):
         n = len(self.foot)
         ends = np.broadcast_to([0.0, self.length], (n, 2))
         feet = np.sort(np.concatenate([self.foot, ends], axis=1), axis=1)
-        places, moments = [feet, feet], [self.at(feet)[2], self.at(feet, before=True)[2]]
+        places, moments = (
+            [feet, feet],
+            [self.at(feet)[2], self.at(feet, before=True)[2]],
+        )
         if self.density > 0.0:
             across, bend = self.pull.imag[:, None], 0.5 * self.alpha[:, None]
-            single = self.at(feet)[1] / self.density + feet * (across + bend * feet)  # forces at feet only
+            single = self.at(feet)[1] / self.density + feet * (
+                across + bend * feet
+            )  # forces at feet only
             roots = _solve_quadratic(bend, across, -single)
             after = np.concatenate([feet[:, 1:], feet[:, -1:]], axis=1)
             for root in roots:
-                inside = (root > feet) & (root < after) & (root > 0.0) & (root < self.length)
+                inside = (
+                    (root > feet) & (root < after) & (root > 0.0) & (root < self.length)
+                )
                 places.append(np.where(inside, root, feet))
                 moments.append(np.where(inside, self.at(places[-1])[2], 0.0))
         x, M = np.concatenate(places, axis=1), np.concatenate(moments, axis=1)
         worst = np.argmax(np.nan_to_num(np.abs(M), nan=-1.0), axis=1)[:, None]
         finite = np.isfinite(M).all(axis=1)
-        return Bending(*(np.where(finite, np.take_along_axis(rows, worst, axis=1)[:, 0], np.nan) for rows in (M, x)))
+        return Bending(
+            *(
+                np.where(finite, np.take_along_axis(rows, worst, axis=1)[:, 0], np.nan)
+                for rows in (M, x)
+            )
+        )
 
 
 def _solve_quadratic(a: Array, b: Array, c: Array) -> tuple[Array, Array]:
@@ -157,7 +182,9 @@ class _Recorder(Actions):
         self.place: Any = 0.0j
         """Point in the bar's axes where a pure couple acts."""
 
-    def force(self, bar: int, force: Any, point: Any = 0.0j, beyond: Any = None) -> None:
+    def force(
+        self, bar: int, force: Any, point: Any = 0.0j, beyond: Any = None
+    ) -> None:
         """Record a force on the bar, world axes."""
         if bar == self.bar:
             back = np.conj(self.state.direction(bar))
@@ -173,7 +200,13 @@ class _Recorder(Actions):
         """Record a couple between two bars at their pin."""
         for bar, sign in zip(PINS[pin], (-1.0, 1.0), strict=True):
             if bar == self.bar:
-                self.items.append((0.0j if pin == ENDS[bar][0] else self.length + 0.0j, 0.0j, sign * couple))
+                self.items.append(
+                    (
+                        0.0j if pin == ENDS[bar][0] else self.length + 0.0j,
+                        0.0j,
+                        sign * couple,
+                    )
+                )
 
     def pull(self, start: Any, end: Any, force: Any) -> None:
         """Record both forces where they act, between bars that meet too: inside a bar it matters."""
@@ -198,34 +231,82 @@ def _collect(scene: Scene, solution: Solution, bar: int) -> _Beam:
                 continue
             if term.key == "load" and term.bar == bar:
                 arm = polar(*term.at)
-                recorder.place = described.to_centre + (arm if term.frame == "bar" else arm * back)
+                recorder.place = described.to_centre + (
+                    arm if term.frame == "bar" else arm * back
+                )
             term.act(recorder, state)
             recorder.place = 0.0j
-            term.act_known(recorder, {name: getattr(solution, name) for name in PIN_FORCE.values()})
+            term.act_known(
+                recorder, {name: getattr(solution, name) for name in PIN_FORCE.values()}
+            )
         a_A = solution.a_A
         assert a_A is not None
-        pin_acceleration = (a_A[:, 0] + 1j * a_A[:, 1] if bar == 3 else np.zeros(n)) - gravity
-        omega, alpha = (np.zeros(n) + getattr(solution, f"{letter}_{bar}") for letter in ("omega", "alpha"))
+        pin_acceleration = (
+            a_A[:, 0] + 1j * a_A[:, 1] if bar == 3 else np.zeros(n)
+        ) - gravity
+        omega, alpha = (
+            np.zeros(n) + getattr(solution, f"{letter}_{bar}")
+            for letter in ("omega", "alpha")
+        )
         if not uniform:
             a_G = getattr(solution, f"a_G{bar}")
-            recorder.items.append((described.to_centre, -described.mass * (a_G[:, 0] + 1j * a_G[:, 1]) * back, 0.0))
-            recorder.items.append((described.to_centre, 0.0j, -described.moment_of_inertia * alpha))
+            recorder.items.append(
+                (
+                    described.to_centre,
+                    -described.mass * (a_G[:, 0] + 1j * a_G[:, 1]) * back,
+                    0.0,
+                )
+            )
+            recorder.items.append(
+                (described.to_centre, 0.0j, -described.moment_of_inertia * alpha)
+            )
         for term in terms:  # a flywheel turns about the bar's ground pin
-            recorder.items += [(0.0j, 0.0j, -inertia * alpha) for on, inertia in term.carried.items() if on == bar]
-        foot, force, couple = _sum_by_foot(recorder.items, np.zeros(n), SAME * described.length)
+            recorder.items += [
+                (0.0j, 0.0j, -inertia * alpha)
+                for on, inertia in term.carried.items()
+                if on == bar
+            ]
+        foot, force, couple = _sum_by_foot(
+            recorder.items, np.zeros(n), SAME * described.length
+        )
         density = described.mass / described.length if uniform else 0.0
-        return _Beam(described.length, foot, force, couple, uniform, density, pin_acceleration * back, omega, alpha)
+        return _Beam(
+            described.length,
+            foot,
+            force,
+            couple,
+            uniform,
+            density,
+            pin_acceleration * back,
+            omega,
+            alpha,
+        )
 
 
-def _sum_by_foot(items: list[tuple[Any, Any, Any]], zero: Array, same: float) -> tuple[Array, Complex, Array]:
+def _sum_by_foot(
+    items: list[tuple[Any, Any, Any]], zero: Array, same: float
+) -> tuple[Array, Complex, Array]:
     """Sum what acts at the same foot at every position: feet, forces and couples, each (n, f)."""
     feet, forces, couples = list[Array](), list[Any](), list[Array]()
     for place, force, couple in items:
         foot = zero + np.real(place)
-        beside = couple + cross(-force, 1j * np.imag(place))  # the couple of a force beside the line
-        k = next((k for k, stated in enumerate(feet) if (np.abs(stated - foot) <= same).all()), len(feet))
+        beside = couple + cross(
+            -force, 1j * np.imag(place)
+        )  # the couple of a force beside the line
+        k = next(
+            (
+                k
+                for k, stated in enumerate(feet)
+                if (np.abs(stated - foot) <= same).all()
+            ),
+            len(feet),
+        )
         if k == len(feet):
-            feet, forces, couples = [*feet, foot], [*forces, 0.0j * zero], [*couples, zero]
+            feet, forces, couples = (
+                [*feet, foot],
+                [*forces, 0.0j * zero],
+                [*couples, zero],
+            )
         forces[k], couples[k] = forces[k] + force, couples[k] + beside
     return np.stack(feet, axis=1), np.stack(forces, axis=1), np.stack(couples, axis=1)
 
@@ -238,7 +319,9 @@ def _record_pins(recorder: _Recorder, solution: Solution) -> None:
         sign = 1.0 if name[2] == str(recorder.bar) else -1.0
         back = np.conj(recorder.state.direction(recorder.bar))
         place = 0.0 if pin == ENDS[recorder.bar][0] else recorder.length
-        recorder.items.append((place, sign * (force[:, 0] + 1j * force[:, 1]) * back, 0.0))
+        recorder.items.append(
+            (place, sign * (force[:, 0] + 1j * force[:, 1]) * back, 0.0)
+        )
 
 
 def _record_drive(recorder: _Recorder, scene: Scene, solution: Solution) -> None:

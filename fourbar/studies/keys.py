@@ -14,13 +14,33 @@ from fourbar.effects.effect import PinRows
 from fourbar.effects.spring import END_POSITION
 from fourbar.errors import InputError, expect
 from fourbar.formulas.arithmetic import namespace, polar
-from fourbar.linkage import ANY, AT_LEAST_ZERO, BAR_NAMES, MOVING_BARS, POSITIVE, Bar, FourBar
+from fourbar.linkage import (
+    ANY,
+    AT_LEAST_ZERO,
+    BAR_NAMES,
+    MOVING_BARS,
+    POSITIVE,
+    Bar,
+    FourBar,
+)
 from fourbar.scene import Scene
 
 COMMAND_KEYS = ("motion.theta_2", "motion.theta_3", "motion.theta_4", "motion.stroke")
 """Keys of the commanded angle or stroke."""
 SAME_FOR_ALL = (
-    *("title", "source", "drive", "bar", "branch", "through", "free", "law", "frame", "table", "picture"),
+    *(
+        "title",
+        "source",
+        "drive",
+        "bar",
+        "branch",
+        "through",
+        "free",
+        "law",
+        "frame",
+        "table",
+        "picture",
+    ),
     *("from", "to", "steps", "limit", "offset"),
 )
 """Parts of keys that name a word, a whole number, or what has another form in a study."""
@@ -37,7 +57,9 @@ class SceneNumber(NamedTuple):
 
     def holds(self, values: Any) -> Any:
         """Mark the numbers that a scene would accept."""
-        low = {ANY: True, AT_LEAST_ZERO: values >= 0.0, POSITIVE: values > 0.0}[self.bound]
+        low = {ANY: True, AT_LEAST_ZERO: values >= 0.0, POSITIVE: values > 0.0}[
+            self.bound
+        ]
         return namespace(values).isfinite(values) & low
 
 
@@ -56,13 +78,18 @@ def _make_pair(
     key: str, place: Place, unit: str, names: tuple[str | int, str | int] = (0, 1)
 ) -> dict[str, SceneNumber]:
     """Make the two entries of a magnitude with its angle."""
-    return {f"{key}.0": SceneNumber((*place, names[0]), unit), f"{key}.1": SceneNumber((*place, names[1]), "rad")}
+    return {
+        f"{key}.0": SceneNumber((*place, names[0]), unit),
+        f"{key}.1": SceneNumber((*place, names[1]), "rad"),
+    }
 
 
 def _list_effect(effect: Any, key: str, place: Place) -> dict[str, SceneNumber]:
     """List the entries of an effect under its key, at its place."""
     if isinstance(effect, Gravity):
-        return _make_pair(key, place, effect.numbers["magnitude"].unit, ("magnitude", "angle"))
+        return _make_pair(
+            key, place, effect.numbers["magnitude"].unit, ("magnitude", "angle")
+        )
     if isinstance(effect, PinRows):
         return {
             f"{key}.{row[0]}.{name}".removesuffix("."): SceneNumber(
@@ -76,14 +103,18 @@ def _list_effect(effect: Any, key: str, place: Place) -> dict[str, SceneNumber]:
     entries = dict[str, SceneNumber]()
     for index, spring in enumerate(effect.springs):
         spring_place = (*place, "springs", index)
-        entries |= _list_numbers(spring, f"{key}.{index}", spring_place) | _list_ends(f"{key}.{index}", spring_place)
+        entries |= _list_numbers(spring, f"{key}.{index}", spring_place) | _list_ends(
+            f"{key}.{index}", spring_place
+        )
     return entries
 
 
 def _list_ends(key: str, place: Place) -> dict[str, SceneNumber]:
     """List the entries of both ends of a line between two bars."""
     of_start, of_end = (
-        _make_pair(f"{key}.{name}.at", (*place, end), END_POSITION.unit, ("distance", "angle"))
+        _make_pair(
+            f"{key}.{name}.at", (*place, end), END_POSITION.unit, ("distance", "angle")
+        )
         for name, end in (("from", "start"), ("to", "end"))
     )
     return of_start | of_end
@@ -92,19 +123,34 @@ def _list_ends(key: str, place: Place) -> dict[str, SceneNumber]:
 def list_entries(scene: Scene) -> dict[str, SceneNumber]:
     """List the numbers of a scene that a study varies, lengths first, by key; what is commanded is not among them."""
     of_ground = _list_numbers(FourBar, "lengths", ("linkage",))
-    bars = {BAR_NAMES[bar]: _list_numbers(Bar, "", ("linkage", BAR_NAMES[bar])) for bar in MOVING_BARS}
-    lengths = {f"lengths.{name}": numbers.pop(".length") for name, numbers in bars.items()}
+    bars = {
+        BAR_NAMES[bar]: _list_numbers(Bar, "", ("linkage", BAR_NAMES[bar]))
+        for bar in MOVING_BARS
+    }
+    lengths = {
+        f"lengths.{name}": numbers.pop(".length") for name, numbers in bars.items()
+    }
     entries = {"lengths.ground": of_ground["lengths.ground"], **lengths, **of_ground}
-    entries |= {f"bars.{name}{key}": number for name, numbers in bars.items() for key, number in numbers.items()}
+    entries |= {
+        f"bars.{name}{key}": number
+        for name, numbers in bars.items()
+        for key, number in numbers.items()
+    }
     if scene.motion.law is None:
-        for field, name in zip(("speed", "acceleration"), scene.motion.names[1:], strict=True):
-            entries[f"motion.{name}"] = SceneNumber(("motion", field), scene.motion.numbers[name].unit)
+        for field, name in zip(
+            ("speed", "acceleration"), scene.motion.names[1:], strict=True
+        ):
+            entries[f"motion.{name}"] = SceneNumber(
+                ("motion", field), scene.motion.numbers[name].unit
+            )
     if scene.drive is not None:
         entries |= _list_ends("drive", ("drive",))
     for index, load in enumerate(scene.loads):
         numbers = _list_numbers(load, f"loads.{index}", ("loads", index))
         entries |= {
-            key: entry for key, entry in numbers.items() if load.force is not None or entry.place[2] == "moment"
+            key: entry
+            for key, entry in numbers.items()
+            if load.force is not None or entry.place[2] == "moment"
         }
     for index, point in enumerate(scene.points):
         entries |= _list_numbers(point, point.key, ("points", index))
@@ -123,9 +169,15 @@ def refuse_key(key: str, value: object, keys: list[str]) -> InputError:
     expect("key", key, str)
     inner = [name for name in keys if name.startswith(f"{key}.")]
     if inner:
-        return InputError(key, value, "is more than one number; vary " + ", ".join(inner))
+        return InputError(
+            key, value, "is more than one number; vary " + ", ".join(inner)
+        )
     if any(part in SAME_FOR_ALL for part in key.split(".")):
-        return InputError(key, value, "is the same for every member of a study: only numbers vary, theta_2 as angles")
+        return InputError(
+            key,
+            value,
+            "is the same for every member of a study: only numbers vary, theta_2 as angles",
+        )
     close = get_close_matches(key, keys, 1, 0.0)
     return InputError(key, value, f'unknown key; did you mean "{close[0]}"?')
 
@@ -139,18 +191,24 @@ class ManyBars(Bar):
     def to_centre(self) -> Any:
         """Vector to G as a single bar has it: cosine and sine are those of the C library, not of NumPy."""
         r, phi = self.mass_centre
-        if isinstance(phi, NDArrayOperatorsMixin) or namespace(r, phi) is not np:  # with its derivatives, or traced
+        if (
+            isinstance(phi, NDArrayOperatorsMixin) or namespace(r, phi) is not np
+        ):  # with its derivatives, or traced
             return polar(r, phi)
         if np.ndim(phi) and np.asarray(phi).dtype == np.longdouble:
             return super().to_centre
         if np.ndim(phi):
             angles = np.asarray(phi).tolist()
             cosine: Any = np.array([math.cos(angle) for angle in angles])
-            return r * cosine + 1j * (r * np.array([math.sin(angle) for angle in angles]))
+            return r * cosine + 1j * (
+                r * np.array([math.sin(angle) for angle in angles])
+            )
         return r * math.cos(phi) + 1j * (r * math.sin(phi)) if phi else r + 0j
 
 
-LEFT_OUT = "is left out of the scene and follows the length; state it to give it a tolerance"
+LEFT_OUT = (
+    "is left out of the scene and follows the length; state it to give it a tolerance"
+)
 
 
 def is_left_out(scene: Scene, entry: SceneNumber) -> bool:
@@ -167,7 +225,9 @@ def read_place(value: Any, place: Place) -> Any:
         if isinstance(name, int):
             value = value[name]
         elif isinstance(value, Bar) and getattr(value, name) is None:
-            value = {"inertia": value.moment_of_inertia, "centre": value.mass_centre}[name]
+            value = {"inertia": value.moment_of_inertia, "centre": value.mass_centre}[
+                name
+            ]
         else:
             value = getattr(value, name)
     return value
@@ -196,16 +256,25 @@ def replace_place(holder: Any, place: Place, values: Any) -> Any:
         return values
     name, *rest = place
     if isinstance(name, int):
-        parts = [replace_place(part, tuple(rest), values) if i == name else part for i, part in enumerate(holder)]
+        parts = [
+            replace_place(part, tuple(rest), values) if i == name else part
+            for i, part in enumerate(holder)
+        ]
         return tuple(parts)
     if isinstance(holder, tuple):  # a named tuple
         tuple_of_names: Any = holder
-        return tuple_of_names._replace(**{name: replace_place(getattr(tuple_of_names, name), tuple(rest), values)})
+        return tuple_of_names._replace(
+            **{name: replace_place(getattr(tuple_of_names, name), tuple(rest), values)}
+        )
     old = getattr(holder, name)
     if isinstance(holder, Bar) and name == "centre" and old is None:
         old = holder.mass_centre
     new = object.__new__(ManyBars if isinstance(holder, Bar) else type(holder))
     for field in fields(holder):
-        value = replace_place(old, tuple(rest), values) if field.name == name else getattr(holder, field.name)
+        value = (
+            replace_place(old, tuple(rest), values)
+            if field.name == name
+            else getattr(holder, field.name)
+        )
         object.__setattr__(new, field.name, value)
     return new

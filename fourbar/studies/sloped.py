@@ -28,7 +28,9 @@ RULES: dict[Any, Rule] = {
     np.sin: lambda z, x: (np.cos(x),),
     np.cos: lambda z, x: (-np.sin(x),),
     np.arctan2: lambda z, y, x: (x / (x * x + y * y), -y / (x * x + y * y)),
-    **dict.fromkeys((np.remainder, np.fmod), lambda z, x, y: (1.0, 0.0)),  # by a constant
+    **dict.fromkeys(
+        (np.remainder, np.fmod), lambda z, x, y: (1.0, 0.0)
+    ),  # by a constant
 }
 COMPLEMENT = {
     np.less: np.greater_equal,
@@ -36,7 +38,16 @@ COMPLEMENT = {
     np.greater: np.less_equal,
     np.greater_equal: np.less,
 }
-PIECEWISE = (np.sign, np.copysign, np.floor, np.rint, np.frexp, np.isnan, np.isfinite, *COMPLEMENT)
+PIECEWISE = (
+    np.sign,
+    np.copysign,
+    np.floor,
+    np.rint,
+    np.frexp,
+    np.isnan,
+    np.isfinite,
+    *COMPLEMENT,
+)
 """Functions of the values alone; of balls the comparisons, each decided where all that the balls hold agrees."""
 
 
@@ -52,7 +63,11 @@ class Undecided:
         self.holds, self.fails = holds, fails
 
     def __and__(self, other: Any) -> "Undecided":
-        holds, fails = (other.holds, other.fails) if isinstance(other, Undecided) else (other, np.logical_not(other))
+        holds, fails = (
+            (other.holds, other.fails)
+            if isinstance(other, Undecided)
+            else (other, np.logical_not(other))
+        )
         return Undecided(self.holds & holds, self.fails | fails)
 
     __rand__ = __and__
@@ -74,9 +89,16 @@ class Undecided:
             (take_values(x), take_values(y), _hull(take_values(x), take_values(y))),
             (take_slopes(x), take_slopes(y), unknown),
         )
-        return Sloped(*(np.where(self.holds, one, np.where(self.fails, other, both)) for one, other, both in pairs))
+        return Sloped(
+            *(
+                np.where(self.holds, one, np.where(self.fails, other, both))
+                for one, other, both in pairs
+            )
+        )
 
-    def __array_function__(self, function: Any, types: Any, args: Sequence[Any], options: Any) -> Any:
+    def __array_function__(
+        self, function: Any, types: Any, args: Sequence[Any], options: Any
+    ) -> Any:
         return _find_by_name(function, args, options)
 
 
@@ -119,17 +141,28 @@ class Sloped(NDArrayOperatorsMixin):
         gap = self - other
         same = np.asarray(gap.values == 0.0) & np.asarray(gap.slopes == 0.0).all(axis=0)
         unlike = np.asarray(gap.values != 0.0) if self.values.dtype == object else ~same
-        return decided(*((unlike, same) if function is np.not_equal else (same, unlike)))
+        return decided(
+            *((unlike, same) if function is np.not_equal else (same, unlike))
+        )
 
     def __bool__(self) -> bool:
         raise TypeError("numbers with derivatives are no truth value")
 
-    def __array_ufunc__(self, function: Any, method: str, *inputs: Any, **options: Any) -> Any:
+    def __array_ufunc__(
+        self, function: Any, method: str, *inputs: Any, **options: Any
+    ) -> Any:
         if method != "__call__" or options:
             return NotImplemented
-        operands = [x.item() if isinstance(x, np.ndarray) and x.dtype == object and not x.ndim else x for x in inputs]
+        operands = [
+            x.item()
+            if isinstance(x, np.ndarray) and x.dtype == object and not x.ndim
+            else x
+            for x in inputs
+        ]
         if function in (np.equal, np.not_equal):
-            sloped, constant = operands if isinstance(operands[0], Sloped) else operands[::-1]
+            sloped, constant = (
+                operands if isinstance(operands[0], Sloped) else operands[::-1]
+            )
             return sloped._compared(constant, function)
         if function is np.conjugate:
             return self.conjugate()
@@ -144,7 +177,9 @@ class Sloped(NDArrayOperatorsMixin):
             return Sloped(size, real(along * self.slopes))
         if self.values.dtype == object and function in COMPLEMENT:
             return decided(function(*plain), COMPLEMENT[function](*plain))
-        if function not in RULES and (function not in PIECEWISE or self.values.dtype == object):
+        if function not in RULES and (
+            function not in PIECEWISE or self.values.dtype == object
+        ):
             return NotImplemented
         values = function(*plain)
         if function in PIECEWISE:
@@ -153,11 +188,15 @@ class Sloped(NDArrayOperatorsMixin):
         slopes = None
         for by, x in zip(partial, operands, strict=True):
             if isinstance(x, Sloped):
-                term = x.slopes if isinstance(by, float) and by == 1.0 else by * x.slopes
+                term = (
+                    x.slopes if isinstance(by, float) and by == 1.0 else by * x.slopes
+                )
                 slopes = term if slopes is None else slopes + term
         return Sloped(values, slopes)
 
-    def __array_function__(self, function: Any, types: Any, args: Sequence[Any], options: Any) -> Any:
+    def __array_function__(
+        self, function: Any, types: Any, args: Sequence[Any], options: Any
+    ) -> Any:
         return _find_by_name(function, args, options)
 
 
@@ -169,7 +208,11 @@ def make_balls(centre: Any, radius: Any = 0.0) -> NDArray[Any]:
 
 
 def _find_by_name(function: Any, args: Sequence[Any], options: Any) -> Any:
-    return NotImplemented if function not in FUNCTIONS or options else FUNCTIONS[function](*args)
+    return (
+        NotImplemented
+        if function not in FUNCTIONS or options
+        else FUNCTIONS[function](*args)
+    )
 
 
 def take_values(number: Any) -> Any:
@@ -206,7 +249,10 @@ _hull = np.frompyfunc(_unite, 2, 1)
 def _choose_where(mask: Any, x: Any, y: Any) -> Sloped:
     if isinstance(mask, Undecided):  # the function may jump
         return mask._choose(x, y, math.nan)
-    return Sloped(np.where(mask, take_values(x), take_values(y)), np.where(mask, take_slopes(x), take_slopes(y)))
+    return Sloped(
+        np.where(mask, take_values(x), take_values(y)),
+        np.where(mask, take_slopes(x), take_slopes(y)),
+    )
 
 
 FUNCTIONS: dict[Any, Callable[..., Any]] = {

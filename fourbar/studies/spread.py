@@ -13,9 +13,21 @@ from fourbar.scene import Command, Scene, command
 from fourbar.solution import Array, find_values, split_parts
 from fourbar.solve import solve
 from fourbar.studies.derivatives import Sensitivity, sensitivity
-from fourbar.studies.keys import LEFT_OUT, command_key, list_entries, read_numbers, refuse_key
+from fourbar.studies.keys import (
+    LEFT_OUT,
+    command_key,
+    list_entries,
+    read_numbers,
+    refuse_key,
+)
 from fourbar.studies.study import Study, vary
-from fourbar.writing import describe_extent, list_names, make_data_frame, make_html, write_between
+from fourbar.writing import (
+    describe_extent,
+    list_names,
+    make_data_frame,
+    make_html,
+    write_between,
+)
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -59,7 +71,9 @@ class Spread(NamedTuple):
         """Mark where first order and samples differ by more than `PARTED`, or only samples have a value."""
         larger = np.fmax(self.deviation, self.first_order)
         size = np.nanmax(np.abs(self.nominal), initial=0.0)
-        differ = ~(np.abs(self.deviation - self.first_order) <= PARTED * larger) & np.isfinite(self.deviation)
+        differ = ~(
+            np.abs(self.deviation - self.first_order) <= PARTED * larger
+        ) & np.isfinite(self.deviation)
         return np.asarray(differ & (larger > NEGLIGIBLE * size))
 
 
@@ -89,14 +103,19 @@ class Tolerances:
         first = {"quantity": np.repeat(list(self.spreads), len(self.theta_2)),
                  "theta_2": np.tile(self.theta_2, len(self.spreads))}  # fmt: skip
         names = [name for name in Spread._fields if name != "shares"]
-        columns = {name: np.ravel([getattr(spread, name) for spread in self.spreads.values()]) for name in names}
+        columns = {
+            name: np.ravel([getattr(spread, name) for spread in self.spreads.values()])
+            for name in names
+        }
         shares = {f"share of {tolerance.key}": np.ravel([spread.shares[k] for spread in self.spreads.values()])
                   for k, tolerance in enumerate(self.scene.tolerances)}  # fmt: skip
         return make_data_frame(first | columns | shares)
 
     def _title(self) -> str:
         tried = f"{self.samples} samples (seed {self.seed}), {self.apart} of them do not assemble somewhere"
-        return f"Tolerances {self.scene.title!r}: {describe_extent(self.theta_2)}, {tried}"
+        return (
+            f"Tolerances {self.scene.title!r}: {describe_extent(self.theta_2)}, {tried}"
+        )
 
     def _list_rows(self) -> list[tuple[str, str, str, str]]:
         """List for each quantity its nominal values, and the largest standard deviation and worst case."""
@@ -105,8 +124,13 @@ class Tolerances:
         rows = []
         for name in shown:
             spread = self.spreads[name]
-            largest = (np.max(x[np.isfinite(x)], initial=0.0) for x in (spread.deviation, spread.worst))
-            rows.append((name, write_between(spread.nominal), *(f"{x:.3g}" for x in largest)))
+            largest = (
+                np.max(x[np.isfinite(x)], initial=0.0)
+                for x in (spread.deviation, spread.worst)
+            )
+            rows.append(
+                (name, write_between(spread.nominal), *(f"{x:.3g}" for x in largest))
+            )
         return rows  # type: ignore[return-value]
 
     def __repr__(self) -> str:
@@ -118,11 +142,19 @@ class Tolerances:
         return "\n".join([self._title(), *rows, list_names("quantities", self.spreads)])
 
     def _repr_html_(self) -> str:
-        return make_html(self._title(), ("", "nominal", "largest sigma", "largest worst case"), self._list_rows())
+        return make_html(
+            self._title(),
+            ("", "nominal", "largest sigma", "largest worst case"),
+            self._list_rows(),
+        )
 
 
 def tolerances(
-    scene: Scene, samples: int = SAMPLES, seed: int = 0, *, progress: Callable[[float], None] | None = None
+    scene: Scene,
+    samples: int = SAMPLES,
+    seed: int = 0,
+    *,
+    progress: Callable[[float], None] | None = None,
 ) -> Tolerances:
     """Compute the spread of every quantity at each position, from quasi-random samples of the toleranced numbers.
 
@@ -142,23 +174,40 @@ def tolerances(
     Source: I. M. Sobol', USSR Comput. Math. Math. Phys. 7 (1967) 86; error propagation: JCGM 100:2008, 5.1.2.
     """
     expect("scene", scene, Scene)
-    if isinstance(samples, bool) or not isinstance(samples, int) or not 2 <= samples <= MOST_SAMPLES:
-        raise InputError("samples", samples, f"must be a whole number from 2 to {MOST_SAMPLES}")
+    if (
+        isinstance(samples, bool)
+        or not isinstance(samples, int)
+        or not 2 <= samples <= MOST_SAMPLES
+    ):
+        raise InputError(
+            "samples", samples, f"must be a whole number from 2 to {MOST_SAMPLES}"
+        )
     if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
         raise InputError("seed", seed, "must be a whole number, 0 or more")
     if not scene.tolerances:
-        raise InputError("tolerances", None, 'the scene states none; like [tolerances] "lengths.input" = "0.05 mm"')
+        raise InputError(
+            "tolerances",
+            None,
+            'the scene states none; like [tolerances] "lengths.input" = "0.05 mm"',
+        )
     if progress is not None:
         progress(0.0)
     slopes, study = sensitivity(scene), _make_members(scene, samples, seed)
     n = len(slopes.solution)
     names = list(slopes.by)
     values = {name: split_parts(name, slopes.value(name)) for name in names}
-    spreads = {part: _compute_first_order(slopes, part) for name, parts in values.items() for part in parts}
+    spreads = {
+        part: _compute_first_order(slopes, part)
+        for name, parts in values.items()
+        for part in parts
+    }
     without, gone = np.zeros(n, dtype=np.intp), np.zeros(len(study), dtype=bool)
     nominal_closes = slopes.solution.status_code != NOT_ASSEMBLED
     for columns, extra in _list_blocks(study, scene, samples, nominal_closes):
-        pieces: Any = (x[:, extra] if isinstance(x, np.ndarray) and x.size > len(x) else x for x in study.at)
+        pieces: Any = (
+            x[:, extra] if isinstance(x, np.ndarray) and x.size > len(x) else x
+            for x in study.at
+        )
         parts = replace(study, at=Command(*pieces))
         width = columns.stop - columns.start
         solution = solve(parts)
@@ -167,7 +216,9 @@ def tolerances(
         gone |= ((code == NOT_ASSEMBLED) & nominal_closes[columns]).any(axis=1)
         for name in names:
             number = find_values(solution, name)[:, -width:]
-            if name.startswith("theta_"):  # each member counts its turns from its own first position
+            if name.startswith(
+                "theta_"
+            ):  # each member counts its turns from its own first position
                 turns = np.rint((number - values[name][name][columns]) / (2 * np.pi))
                 number = number - 2 * np.pi * turns
             for part, sampled in split_parts(name, number).items():
@@ -175,7 +226,16 @@ def tolerances(
         if progress is not None:
             progress(columns.stop / n)
     invalid = int(np.count_nonzero(study.invalid))
-    return Tolerances(scene, samples, seed, slopes.solution.theta_2, spreads, without, int(gone.sum()), invalid)
+    return Tolerances(
+        scene,
+        samples,
+        seed,
+        slopes.solution.theta_2,
+        spreads,
+        without,
+        int(gone.sum()),
+        invalid,
+    )
 
 
 def _make_members(scene: Scene, samples: int, seed: int) -> Study:
@@ -183,9 +243,17 @@ def _make_members(scene: Scene, samples: int, seed: int) -> Study:
     try:
         from scipy.stats import norm, qmc
     except ImportError:
-        raise DependencyError(f"SciPy is needed for tolerances: {say_install('studies')}") from None
-    entries, stated, numbers = list_entries(scene), read_numbers(scene), dict[str, Any]()
-    drawn = qmc.Sobol(len(scene.tolerances), seed=seed).random_base2(max(1, (samples - 1).bit_length()))[:samples]
+        raise DependencyError(
+            f"SciPy is needed for tolerances: {say_install('studies')}"
+        ) from None
+    entries, stated, numbers = (
+        list_entries(scene),
+        read_numbers(scene),
+        dict[str, Any](),
+    )
+    drawn = qmc.Sobol(len(scene.tolerances), seed=seed).random_base2(
+        max(1, (samples - 1).bit_length())
+    )[:samples]
     for tolerance, column in zip(scene.tolerances, drawn.T, strict=True):
         if tolerance.key not in entries:
             raise refuse_key(tolerance.key, tolerance.width, list(entries))
@@ -214,25 +282,45 @@ def _list_blocks(
 def _compute_first_order(slopes_of: Sensitivity, part: str) -> Spread:
     """Compute the nominal and the first-order figures of a part of a quantity; the samples' are still to come."""
     scene, nominal = slopes_of.scene, slopes_of.value(part)
-    slopes = np.array([slopes_of.of(part, tolerance.key) for tolerance in scene.tolerances])
+    slopes = np.array(
+        [slopes_of.of(part, tolerance.key) for tolerance in scene.tolerances]
+    )
     deviations, reaches = (
         np.array([getattr(tolerance, width) for tolerance in scene.tolerances])[:, None]
         for width in ("deviation", "reach")
     )
-    deviation, low, high, least, greatest = (np.full(nominal.shape, np.nan) for _ in range(5))
+    deviation, low, high, least, greatest = (
+        np.full(nominal.shape, np.nan) for _ in range(5)
+    )
     worst = np.asarray(np.abs(slopes * reaches).sum(axis=0))
-    return Spread(nominal, deviation, low, high, least, greatest, worst, (slopes * deviations) ** 2)
+    return Spread(
+        nominal,
+        deviation,
+        low,
+        high,
+        least,
+        greatest,
+        worst,
+        (slopes * deviations) ** 2,
+    )
 
 
 def _fill(spread: Spread, columns: slice, sampled: Array) -> None:
     """Fill in the samples' figures at some positions; where not all members have a value, those of the others."""
     if np.isfinite(sampled).all():
         # standard deviation of differences: a mean of equal numbers is rounded
-        spread.deviation[columns] = (sampled - np.nan_to_num(spread.nominal[columns])).std(axis=0)
+        spread.deviation[columns] = (
+            sampled - np.nan_to_num(spread.nominal[columns])
+        ).std(axis=0)
         spread.low[columns], spread.high[columns] = np.percentile(sampled, BAND, axis=0)
-        spread.least[columns], spread.greatest[columns] = sampled.min(axis=0), sampled.max(axis=0)
+        spread.least[columns], spread.greatest[columns] = (
+            sampled.min(axis=0),
+            sampled.max(axis=0),
+        )
         return
-    for column, values in zip(range(columns.start, columns.stop), sampled.T, strict=True):
+    for column, values in zip(
+        range(columns.start, columns.stop), sampled.T, strict=True
+    ):
         finite = values[np.isfinite(values)]
         if finite.size > 1:
             _fill(spread, slice(column, column + 1), finite[:, None])

@@ -20,10 +20,20 @@ from fourbar.scene.numbers import find_unit
 from fourbar.scene.scene import command_stroke
 from fourbar.solution import Array
 from fourbar.solve import take_members
-from fourbar.studies.keys import COMMAND_KEYS, command_key, list_entries, refuse_key, replace_numbers, replace_place
+from fourbar.studies.keys import (
+    COMMAND_KEYS,
+    command_key,
+    list_entries,
+    refuse_key,
+    replace_numbers,
+    replace_place,
+)
 from fourbar.writing import describe_extent, list_names
 
-LENGTHS = tuple(f"lengths.{name}" for name in ("ground", "input", "coupler", "output", "ground_angle"))
+LENGTHS = tuple(
+    f"lengths.{name}"
+    for name in ("ground", "input", "coupler", "output", "ground_angle")
+)
 NEAR_A_CHANGE_POINT = 1e-12
 """Relative to the sum of the lengths, squared: who is not so near has no change point, whatever rounding does."""
 
@@ -46,19 +56,34 @@ class Study:
 
     def __repr__(self) -> str:
         """Say what varies."""
-        return f"Study {self.scene.title!r}: {describe_extent(self.at.angle)}\n" + list_names("varied", self.values)
+        return (
+            f"Study {self.scene.title!r}: {describe_extent(self.at.angle)}\n"
+            + list_names("varied", self.values)
+        )
 
-    def members(self, rows: slice | None, count: int, begins: Scene | None = None) -> Scene:
+    def members(
+        self, rows: slice | None, count: int, begins: Scene | None = None
+    ) -> Scene:
         """Make the scene of some members whose numbers are arrays, each repeated for `count` positions.
 
         `rows`: None: of all, as columns (m, 1). `begins`: the scene with effects that know where the motion begins.
         """
         if rows is None:
-            return replace_numbers(self.scene, {key: values[:, None] for key, values in self.values.items()})
+            return replace_numbers(
+                self.scene,
+                {key: values[:, None] for key, values in self.values.items()},
+            )
         scene = self.scene if begins is None else begins
-        scene = replace_numbers(scene, {key: _repeat(values[rows], count) for key, values in self.values.items()})
+        scene = replace_numbers(
+            scene,
+            {key: _repeat(values[rows], count) for key, values in self.values.items()},
+        )
         for index, turns in _find_turns(scene.effects).items():
-            scene = replace_place(scene, ("effects", index, "turns"), tuple(_repeat(turn, count) for turn in turns))
+            scene = replace_place(
+                scene,
+                ("effects", index, "turns"),
+                tuple(_repeat(turn, count) for turn in turns),
+            )
         return scene
 
     def begin(self, rows: slice) -> Scene:
@@ -74,7 +99,11 @@ class Study:
         begins = assembled.any(axis=1) & (np.ptp(commanded.branch[rows], axis=1) == 0)
         angle = np.where(begins, commanded.angle[rows][np.arange(count), first], np.nan)
         start = Command(angle, commanded.branch[rows, 0], 0.0, 0.0, bar=commanded.bar)
-        counted = Case.of(self.members(rows, 1), commanded.bar).started(start).terms[len(scene.loads) :]
+        counted = (
+            Case.of(self.members(rows, 1), commanded.bar)
+            .started(start)
+            .terms[len(scene.loads) :]
+        )
         for index, turns in _find_turns(counted).items():
             scene = replace_place(scene, ("effects", index, "turns"), turns)
         return scene
@@ -89,7 +118,9 @@ class Study:
 
 def _find_turns(effects: Iterable[Effect]) -> dict[int, Any]:
     """Find the whole turns of each pin for the effects that depend on where the motion begins, by their index."""
-    turns_of = {index: getattr(effect, "turns", None) for index, effect in enumerate(effects)}
+    turns_of = {
+        index: getattr(effect, "turns", None) for index, effect in enumerate(effects)
+    }
     return {index: turns for index, turns in turns_of.items() if turns is not None}
 
 
@@ -122,62 +153,102 @@ def vary(scene: Scene, values: Mapping[str, Any]) -> Study:
     expect("scene", scene, Scene)
     expect("values", values, Mapping)
     if scene.motion.free is not None:
-        raise InputError("motion.free", "a free motion", "is integrated for one linkage; a study prescribes theta_2")
+        raise InputError(
+            "motion.free",
+            "a free motion",
+            "is integrated for one linkage; a study prescribes theta_2",
+        )
     entries, theta = list_entries(scene), command_key(scene)
-    arrays = {key: _read_numbers(key, value, [*entries, theta]) for key, value in values.items()}
+    arrays = {
+        key: _read_numbers(key, value, [*entries, theta])
+        for key, value in values.items()
+    }
     angles = _read_angles(scene, arrays, theta)
-    sizes = {key: array.size for key, array in arrays.items() if key != theta and array.size != 1}
+    sizes = {
+        key: array.size
+        for key, array in arrays.items()
+        if key != theta and array.size != 1
+    }
     if angles.shape[0] != 1:
         sizes[theta] = angles.shape[0]
     m = next(iter(sizes.values()), 1)
     for key, size in sizes.items():
         if size != m:
             first = next(iter(sizes))
-            raise InputError(key, f"{size} members", f"must have one length: {first} has {m}")
-    numbers = {key: np.broadcast_to(arrays[key].ravel(), (m,)) for key in entries if key in arrays}
+            raise InputError(
+                key, f"{size} members", f"must have one length: {first} has {m}"
+            )
+    numbers = {
+        key: np.broadcast_to(arrays[key].ravel(), (m,))
+        for key in entries
+        if key in arrays
+    }
     invalid = ~np.broadcast_to(np.isfinite(angles).all(axis=1), (m,))
     for key, array in numbers.items():
         invalid = invalid | ~entries[key].holds(array)
     numbers = {key: np.where(invalid, np.nan, array) for key, array in numbers.items()}
     commanded = _list_commands(scene, numbers, angles, m)
     rates = {f"motion.{name}" for name in scene.motion.names[1:]}
-    return Study(scene, {key: array for key, array in numbers.items() if key not in rates}, invalid, commanded)
+    return Study(
+        scene,
+        {key: array for key, array in numbers.items() if key not in rates},
+        invalid,
+        commanded,
+    )
 
 
-def _list_commands(scene: Scene, numbers: Mapping[str, Array], angles: Array, m: int) -> Command:
+def _list_commands(
+    scene: Scene, numbers: Mapping[str, Array], angles: Array, m: int
+) -> Command:
     """Return the command of each member, (m, n), from the angles or strokes and the numbers that vary."""
     motion: Any = scene.motion if scene.motion.law is None else command(scene)
     angle = np.broadcast_to(angles, (m, angles.shape[1]))
     speed, acceleration = (
         numbers[f"motion.{name}"][:, None] if f"motion.{name}" in numbers else number
-        for name, number in zip(scene.motion.names[1:], (motion.speed, motion.acceleration), strict=True)
+        for name, number in zip(
+            scene.motion.names[1:], (motion.speed, motion.acceleration), strict=True
+        )
     )
     if scene.motion.law is not None:
-        speed, acceleration = (np.broadcast_to(value, angle.shape) for value in (speed, acceleration))
+        speed, acceleration = (
+            np.broadcast_to(value, angle.shape) for value in (speed, acceleration)
+        )
     if scene.motion.stroke is None:
         branch = _find_branches(scene, numbers, angles, m)
         return Command(angle, branch, speed, acceleration, bar=scene.motion.bar)
-    varied = replace_numbers(scene, {key: array[:, None] for key, array in numbers.items()})
+    varied = replace_numbers(
+        scene, {key: array[:, None] for key, array in numbers.items()}
+    )
     commanded = command_stroke(varied, angle, speed, acceleration)
     return commanded._replace(branch=_find_branches(scene, numbers, commanded.angle, m))
 
 
-def _find_branches(scene: Scene, numbers: Mapping[str, Array], angles: Array, m: int) -> NDArray[np.int8]:
+def _find_branches(
+    scene: Scene, numbers: Mapping[str, Array], angles: Array, m: int
+) -> NDArray[np.int8]:
     """Return the branch of each position, (m, n); only a member with a change point can follow a path through it."""
     motion, shape = scene.motion, (m, angles.shape[1])
     lengths_given = {key: array for key, array in numbers.items() if key in LENGTHS}
     if motion.through == "follow" and not lengths_given and len(angles) == 1:
-        return np.broadcast_to(follow_smooth_path(scene.linkage, angles[0], motion.branch, motion.bar), shape)
+        return np.broadcast_to(
+            follow_smooth_path(scene.linkage, angles[0], motion.branch, motion.bar),
+            shape,
+        )
     branch = np.full(shape, motion.branch, dtype=np.int8)
     if motion.through == "follow":
         lengths = replace_numbers(scene, lengths_given).linkage.lengths
         _, _, _, _, E1, E2 = loop(*reorder_lengths(motion.bar, lengths))
         size = NEAR_A_CHANGE_POINT * sum(lengths) ** 2
-        for member in np.flatnonzero(np.broadcast_to((np.abs(E1) <= size) | (np.abs(E2) <= size), (m,))):
+        for member in np.flatnonzero(
+            np.broadcast_to((np.abs(E1) <= size) | (np.abs(E2) <= size), (m,))
+        ):
             linkage = replace_numbers(
-                scene, {key: float(array[member]) for key, array in lengths_given.items()}
+                scene,
+                {key: float(array[member]) for key, array in lengths_given.items()},
             ).linkage
-            branch[member] = follow_smooth_path(linkage, angles[member % len(angles)], motion.branch, motion.bar)
+            branch[member] = follow_smooth_path(
+                linkage, angles[member % len(angles)], motion.branch, motion.bar
+            )
     return branch
 
 
@@ -190,17 +261,27 @@ def _read_numbers(key: str, value: Any, keys: list[str]) -> Array:
     except ValueError:  # rows of different lengths
         raise InputError(key, "a ragged list", "must be an array of numbers") from None
     if array.dtype.kind not in "iuf" or array.size == 0:
-        raise InputError(key, _shorten(value), "must be an array of numbers, at least one")
+        raise InputError(
+            key, _shorten(value), "must be an array of numbers, at least one"
+        )
     most = 2 if key in COMMAND_KEYS else 1
     if array.ndim > most:
-        allowed = "must have the shape (n,) or (m, n)" if most == 2 else "must have the shape (m,)"
+        allowed = (
+            "must have the shape (n,) or (m, n)"
+            if most == 2
+            else "must have the shape (m,)"
+        )
         raise InputError(key, f"shape {array.shape}", allowed)
     return array.astype(float)
 
 
 def _shorten(value: Any) -> object:
     """Shorten a value to what one line shows."""
-    return f"{type(value).__name__} of shape {value.shape}" if isinstance(value, np.ndarray) else value
+    return (
+        f"{type(value).__name__} of shape {value.shape}"
+        if isinstance(value, np.ndarray)
+        else value
+    )
 
 
 def _read_angles(scene: Scene, arrays: Mapping[str, Array], key: str) -> Array:
@@ -210,7 +291,13 @@ def _read_angles(scene: Scene, arrays: Mapping[str, Array], key: str) -> Array:
         if motion.law is not None:
             raise InputError(key, "angles", "are those of the scene's motion law")
         return np.atleast_2d(arrays[key])
-    if motion.law is None and (motion.angle is None or isinstance(motion.angle, FromLimit)):
-        raise InputError(key, motion.angle, "depends on the linkage; a study states it: (n,) or (m, n) angles")
+    if motion.law is None and (
+        motion.angle is None or isinstance(motion.angle, FromLimit)
+    ):
+        raise InputError(
+            key,
+            motion.angle,
+            "depends on the linkage; a study states it: (n,) or (m, n) angles",
+        )
     commanded = command(scene)
     return (commanded.angle if commanded.stroke is None else commanded.stroke)[None, :]

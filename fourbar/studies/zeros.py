@@ -74,31 +74,48 @@ def find_zeros(
     ends = [np.linspace(low - SLACK, high + SLACK, FIRST + 1) for low, high in domain]
     grid = np.meshgrid(*(0.5 * (x[1:] + x[:-1]) for x in ends), indexing="ij")
     centres = np.stack([x.ravel() for x in grid], axis=1)
-    radii = np.broadcast_to([0.5 * (x[1] - x[0]) * (1.0 + MARGIN) for x in ends], centres.shape)
-    solved: list[tuple[Array, Array, Array]] = []  # zero, and centre and radius of the box in which it is the only one
+    radii = np.broadcast_to(
+        [0.5 * (x[1] - x[0]) * (1.0 + MARGIN) for x in ends], centres.shape
+    )
+    solved: list[
+        tuple[Array, Array, Array]
+    ] = []  # zero, and centre and radius of the box in which it is the only one
     undecided: list[Array] = []
     evaluated = 0
     while len(centres):
         kept = _may_close(lengths, centres, radii) & inside(centres, radii)
         for point in change_points:
-            kept &= ~(np.abs(_wrap(centres - point)) + radii < AT_CHANGE_POINT).all(axis=1)
+            kept &= ~(np.abs(_wrap(centres - point)) + radii < AT_CHANGE_POINT).all(
+                axis=1
+            )
         centres, radii = centres[kept], radii[kept]
         evaluated += len(centres)
         if evaluated > MANY:
-            return Zeros(np.array([proven[0] for proven in solved]).reshape(-1, 2), np.empty((0, 2)), False)
+            return Zeros(
+                np.array([proven[0] for proven in solved]).reshape(-1, 2),
+                np.empty((0, 2)),
+                False,
+            )
         split = np.zeros(len(centres), dtype=bool)
         newton = _Newton(exact, function, centres, 2.0 * radii)
         for i, (box, r) in enumerate(zip(centres, radii, strict=True)):
-            if newton.without_zero(i, r) or any(_is_inside(box, r, *proven[1:]) for proven in solved):
+            if newton.without_zero(i, r) or any(
+                _is_inside(box, r, *proven[1:]) for proven in solved
+            ):
                 continue
             step = newton.step(i)
             if step is not None and any(
-                abs(float(z.mid()) - x) > w + z.rad() for z, x, w in zip(step, box, r, strict=True)
+                abs(float(z.mid()) - x) > w + z.rad()
+                for z, x, w in zip(step, box, r, strict=True)
             ):
                 continue
-            if step is not None and all(_holds(x, 2.0 * w, z) for z, x, w in zip(step, box, r, strict=True)):
+            if step is not None and all(
+                _holds(x, 2.0 * w, z) for z, x, w in zip(step, box, r, strict=True)
+            ):
                 zero = _polish(exact, function, step)
-                if not any(_is_inside(zero, np.zeros(2), *proven[1:]) for proven in solved):
+                if not any(
+                    _is_inside(zero, np.zeros(2), *proven[1:]) for proven in solved
+                ):
                     solved.append((zero, box, 2.0 * r))
             elif r.max() < FINEST:
                 undecided.append(box)
@@ -124,7 +141,13 @@ def _may_close(lengths: Loop, centres: Array, radii: Array) -> NDArray[np.bool_]
 class _Newton:
     """Closure and function at the centres of boxes, with their derivatives over them."""
 
-    def __init__(self, lengths: Loop, function: Callable[[Any, Any], Sloped], centres: Array, radii: Array) -> None:
+    def __init__(
+        self,
+        lengths: Loop,
+        function: Callable[[Any, Any], Sloped],
+        centres: Array,
+        radii: Array,
+    ) -> None:
         from flint import arb
 
         self.arb = arb
@@ -140,20 +163,35 @@ class _Newton:
 
     def without_zero(self, i: int, radius: Array) -> bool:
         """Return True if F vanishes nowhere in a box, by its values or from the centre by its slopes."""
-        moved = self.F[i] + self.F_psi[i] * self.arb(0, radius[0]) + self.F_mu[i] * self.arb(0, radius[1])
-        return any(value.is_finite() and not value.contains(0) for value in (moved, self.over[i]))
+        moved = (
+            self.F[i]
+            + self.F_psi[i] * self.arb(0, radius[0])
+            + self.F_mu[i] * self.arb(0, radius[1])
+        )
+        return any(
+            value.is_finite() and not value.contains(0)
+            for value in (moved, self.over[i])
+        )
 
     def step(self, i: int) -> tuple[Any, Any] | None:
         """Return Newton's step from the centre; None where the determinant may vanish."""
         det = self.det[i]
         if not det.is_finite() or det.contains(0):
             return None
-        psi = self.points[0][i] - (self.F_mu[i] * self.g[i] - self.g_mu[i] * self.F[i]) / det
-        mu = self.points[1][i] - (self.g_psi[i] * self.F[i] - self.F_psi[i] * self.g[i]) / det
+        psi = (
+            self.points[0][i]
+            - (self.F_mu[i] * self.g[i] - self.g_mu[i] * self.F[i]) / det
+        )
+        mu = (
+            self.points[1][i]
+            - (self.g_psi[i] * self.F[i] - self.F_psi[i] * self.g[i]) / det
+        )
         return psi, mu
 
 
-def _polish(lengths: Loop, function: Callable[[Any, Any], Sloped], step: tuple[Any, Any]) -> Array:
+def _polish(
+    lengths: Loop, function: Callable[[Any, Any], Sloped], step: tuple[Any, Any]
+) -> Array:
     """Return the zero in a step that holds it."""
     zero = np.array([[float(z.mid()) for z in step]])
     for _ in range(STEPS):
@@ -182,6 +220,12 @@ def _separate(points: Array) -> Array:
     """Return the middle of each group of neighbouring points."""
     groups: list[list[Array]] = []
     for point in points:
-        near = [g for g in groups if any((np.abs(_wrap(point - member)) < 8.0 * FINEST).all() for member in g)]
-        groups = [g for g in groups if all(g is not one for one in near)] + [[point, *(p for g in near for p in g)]]
+        near = [
+            g
+            for g in groups
+            if any((np.abs(_wrap(point - member)) < 8.0 * FINEST).all() for member in g)
+        ]
+        groups = [g for g in groups if all(g is not one for one in near)] + [
+            [point, *(p for g in near for p in g)]
+        ]
     return np.array([np.mean(group, axis=0) for group in groups]).reshape(-1, 2)

@@ -18,7 +18,11 @@ from fourbar.scene.motion import Motion, Sweep
 from fourbar_validation.advise.advise import MOST_STEPS, advise
 from fourbar_validation.advise.matters import judge_trial
 from fourbar_validation.cost.study import time_in_turns
-from fourbar_validation.engines.mujoco.trial import FEWEST_STEPS, TrialSetup, make_settings
+from fourbar_validation.engines.mujoco.trial import (
+    FEWEST_STEPS,
+    TrialSetup,
+    make_settings,
+)
 from fourbar_validation.report.machine import name_code
 from fourbar_validation.run.store import Store
 from fourbar_validation.scenes.random import DrawnType, draw_random_scene
@@ -47,8 +51,13 @@ NEEDED_MET, NEEDED_CHEAP, CHEAP = 0.95, 0.80, 3.0
 def time_relative_costs(setup: TrialSetup) -> dict[tuple[str, bool], float]:
     """Time a step by integrator and pads, relative to RK4 with pads: medians of interleaved rounds."""
     kinds = [("RK4", True), ("RK4", False), *((name, False) for name in FIRST_ORDER)]
-    clocks = {kind: setup.seconds_per_step(change_kind(kind, make_settings(628.0, 20.0))) for kind in kinds}
-    times = time_in_turns({kind: partial(clock, STEPS) for kind, clock in clocks.items()}, ROUNDS)
+    clocks = {
+        kind: setup.seconds_per_step(change_kind(kind, make_settings(628.0, 20.0)))
+        for kind in kinds
+    }
+    times = time_in_turns(
+        {kind: partial(clock, STEPS) for kind, clock in clocks.items()}, ROUNDS
+    )
     reference = median(times["RK4", True])
     return {kind: median(values) / reference for kind, values in times.items()}
 
@@ -59,7 +68,9 @@ def change_kind(kind: tuple[str, bool], settings: Settings) -> Settings:
     return replace(settings, integrator=integrator, pad=settings.pad if pads else None)
 
 
-def find_cheapest(setup: TrialSetup, error: float, costs: Mapping[tuple[str, bool], float]) -> float | None:
+def find_cheapest(
+    setup: TrialSetup, error: float, costs: Mapping[tuple[str, bool], float]
+) -> float | None:
     """Try every integrator, with and without pads, over time constants and steps: the least cost of a run that serves.
 
     In recommended RK4 steps; None where nothing serves.
@@ -69,7 +80,11 @@ def find_cheapest(setup: TrialSetup, error: float, costs: Mapping[tuple[str, boo
         fourth_order = kind[0] == "RK4"
         for tc in TIME_CONSTANTS if fourth_order else FIRST_ORDER_TIME_CONSTANTS:
             most = MOST_STEPS if best is None else best / ratio
-            if not fourth_order and best is not None and not _serves(setup, kind, tc, most / FINE, error):
+            if (
+                not fourth_order
+                and best is not None
+                and not _serves(setup, kind, tc, most / FINE, error)
+            ):
                 continue  # not even with as many steps as the best costs
             steps = _find_least_steps(setup, kind, tc, most, error)
             if steps is not None and (best is None or steps * ratio < best):
@@ -77,18 +92,26 @@ def find_cheapest(setup: TrialSetup, error: float, costs: Mapping[tuple[str, boo
     return best
 
 
-def _find_least_steps(setup: TrialSetup, kind: tuple[str, bool], tc: float, most: float, error: float) -> int | None:
+def _find_least_steps(
+    setup: TrialSetup, kind: tuple[str, bool], tc: float, most: float, error: float
+) -> int | None:
     """Find the least steps of the ladder, fewer than `most`, that serve."""
     n = FEWEST_STEPS
     while n < most:
         if _serves(setup, kind, tc, n, error):
-            finer = (steps for steps in (n / FINE**2, n / FINE) if _serves(setup, kind, tc, steps, error))
+            finer = (
+                steps
+                for steps in (n / FINE**2, n / FINE)
+                if _serves(setup, kind, tc, steps, error)
+            )
             return int(next(finer, n) + 0.5)
         n *= COARSE
     return None
 
 
-def _serves(setup: TrialSetup, kind: tuple[str, bool], tc: float, steps: float, error: float) -> bool:
+def _serves(
+    setup: TrialSetup, kind: tuple[str, bool], tc: float, steps: float, error: float
+) -> bool:
     per_run = setup.steps(make_settings(1000.0, tc)) / 1000.0
     trial = setup.try_out(change_kind(kind, make_settings(steps / per_run, tc)))
     return judge_trial(setup.scene, trial).worst <= error
@@ -143,25 +166,41 @@ def make_denser(scene: Scene, times: int) -> Scene:
     """Divide the same motion into more positions."""
     sweep = scene.motion.theta_2
     assert isinstance(sweep, Sweep)
-    return replace(scene, motion=scene.motion.replace(angle=replace(sweep, steps=sweep.steps * times)))
+    return replace(
+        scene,
+        motion=scene.motion.replace(angle=replace(sweep, steps=sweep.steps * times)),
+    )
 
 
-def measure_case(seed: int, index: int, costs: dict[tuple[str, bool], float]) -> AdviceCase:
+def measure_case(
+    seed: int, index: int, costs: dict[tuple[str, bool], float]
+) -> AdviceCase:
     """Ask for advice, judge it at denser positions, and search exhaustively."""
     scene, required = draw_scene(seed, index)
     advice = advise(scene, required)
     dense, searched = make_denser(scene, DENSER), make_denser(scene, SEARCHED)
-    error = judge_trial(dense, TrialSetup(dense, command(dense)).try_out(advice.best.settings)).worst
+    error = judge_trial(
+        dense, TrialSetup(dense, command(dense)).try_out(advice.best.settings)
+    ).worst
     cheapest = find_cheapest(TrialSetup(searched, command(searched)), required, costs)
     cost = float(advice.best.steps)
-    return AdviceCase(index, required, advice.reached, error, cost, math.nan if cheapest is None else cheapest)
+    return AdviceCase(
+        index,
+        required,
+        advice.reached,
+        error,
+        cost,
+        math.nan if cheapest is None else cheapest,
+    )
 
 
 def compute_wilson(successes: int, n: int) -> float:
     """Compute the lower bound of the Wilson score interval of a proportion, at 95 %."""
     from scipy.stats import binomtest
 
-    return float(binomtest(successes, n).proportion_ci(0.95, "wilson").low) if n else 0.0
+    return (
+        float(binomtest(successes, n).proportion_ci(0.95, "wilson").low) if n else 0.0
+    )
 
 
 def find_enough(missed: int) -> int:
@@ -183,14 +222,27 @@ def measure(seed: int, count: int, out: Path) -> Iterator[AdviceCase]:
                 try:
                     store.put(index, [asdict(measure_case(seed, index, costs))])
                 except LimitError as error:
-                    raise LimitError(f"linkage {index} of seed {seed}: {error}") from None
+                    raise LimitError(
+                        f"linkage {index} of seed {seed}: {error}"
+                    ) from None
             yield AdviceCase(**store.read(index)[0])
 
 
 @click.command()
-@click.option("--count", type=click.IntRange(min=1), default=400, show_default=True, help="Random linkages.")
+@click.option(
+    "--count",
+    type=click.IntRange(min=1),
+    default=400,
+    show_default=True,
+    help="Random linkages.",
+)
 @click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True)
-@click.option("-o", "--out", type=click.Path(path_type=Path, file_okay=False), default=Path("results/advise-study"))
+@click.option(
+    "-o",
+    "--out",
+    type=click.Path(path_type=Path, file_okay=False),
+    default=Path("results/advise-study"),
+)
 def study(count: int, seed: int, out: Path) -> int:
     """Measure the advice on random linkages; exit 1 where it is not met or not cheap often enough.
 
@@ -200,19 +252,40 @@ def study(count: int, seed: int, out: Path) -> int:
     from rich.console import Console
     from rich.progress import track
 
-    cases = list(track(measure(seed, count, out), "advising", total=count, console=Console(stderr=True)))
+    cases = list(
+        track(
+            measure(seed, count, out),
+            "advising",
+            total=count,
+            console=Console(stderr=True),
+        )
+    )
     met, cheap = sum(case.met for case in cases), sum(case.cheap for case in cases)
     unreachable = sum(not case.reached for case in cases)
-    ratios = sorted(case.cost / case.cheapest for case in cases if case.reached and case.cheapest == case.cheapest)
+    ratios = sorted(
+        case.cost / case.cheapest
+        for case in cases
+        if case.reached and case.cheapest == case.cheapest
+    )
     bound = compute_wilson(met, len(cases))
-    click.echo(f"met: {met} of {len(cases)}, lower Wilson bound {bound:.3f} (needed {NEEDED_MET})")
+    click.echo(
+        f"met: {met} of {len(cases)}, lower Wilson bound {bound:.3f} (needed {NEEDED_MET})"
+    )
     if bound < NEEDED_MET and (more := find_enough(len(cases) - met)) > len(cases):
-        click.echo(f"undecided: with {len(cases) - met} not met the bound is reached from --count {more} on")
+        click.echo(
+            f"undecided: with {len(cases) - met} not met the bound is reached from --count {more} on"
+        )
     wrongly = sum(not case.met for case in cases if not case.reached)
-    click.echo(f"called unreachable: {unreachable}, of which the search reached {wrongly}")
+    click.echo(
+        f"called unreachable: {unreachable}, of which the search reached {wrongly}"
+    )
     share = cheap / len(cases)
-    click.echo(f"within {CHEAP:g} times the cheapest: {cheap} of {len(cases)}, {share:.3f} (needed {NEEDED_CHEAP})")
+    click.echo(
+        f"within {CHEAP:g} times the cheapest: {cheap} of {len(cases)}, {share:.3f} (needed {NEEDED_CHEAP})"
+    )
     if ratios:
         median, high = ratios[len(ratios) // 2], ratios[int(0.95 * (len(ratios) - 1))]
-        click.echo(f"cost over the cheapest: median {median:.2f}, 95 % below {high:.2f}, most {ratios[-1]:.2f}")
+        click.echo(
+            f"cost over the cheapest: median {median:.2f}, 95 % below {high:.2f}, most {ratios[-1]:.2f}"
+        )
     return 0 if bound >= NEEDED_MET and share >= NEEDED_CHEAP else 1

@@ -51,7 +51,9 @@ WITH_LIMITS = FourBar(0.3, Bar(0.25, 0.2), Bar(0.1, 0.5), Bar(0.22, 0.4))
 """Linkage whose input swings between limit positions, so that each of its positions has to be examined."""
 THIRTEEN_BATCH = 20_000
 """Positions per batch of the 13x13 system: larger batches are slower per position (27 MB of matrices each)."""
-OVER_POSITIONS = "all unknowns of a position, over the number of positions (1e6 at once at most)"
+OVER_POSITIONS = (
+    "all unknowns of a position, over the number of positions (1e6 at once at most)"
+)
 OVER_LINKAGES = "all forces of a linkage at one position, over the number of linkages"
 SOLVED = 100_000
 """Positions where every array is allocated, and for the error bars, whose numbers take ten times as long."""
@@ -61,7 +63,11 @@ PER_SCENE = 50_000
 """Positions in whose stead one random scene is judged: twenty of them by default."""
 ALL, ANGLES_ALONE = "formulas, all 11 unknowns", "positions only"
 SYSTEM, FLOOR = "13x13 assembled and solved", "floor: tangent, root, two arctan"
-FORCES, BARS, ONE = "solve to forces, points too", "solve with error bars", "one position to forces"
+FORCES, BARS, ONE = (
+    "solve to forces, points too",
+    "solve with error bars",
+    "one position to forces",
+)
 JUDGED = "a scene judged by the exact engines"
 
 
@@ -82,19 +88,39 @@ class SpeedLimit(NamedTuple):
 
 LIMITS = {
     "13x13 / formulas": SpeedLimit(
-        ">=", 5.0, "closed formulas are worth several times the system that they eliminate", SYSTEM, ALL
+        ">=",
+        5.0,
+        "closed formulas are worth several times the system that they eliminate",
+        SYSTEM,
+        ALL,
     ),
     "formulas / positions only": SpeedLimit(
-        ">=", 3.0, "who asks for two angles does not pay for nine more unknowns", ALL, ANGLES_ALONE
+        ">=",
+        3.0,
+        "who asks for two angles does not pay for nine more unknowns",
+        ALL,
+        ANGLES_ALONE,
     ),
     "positions only / floor": SpeedLimit(
-        "<=", 6.0, "the rest of two angles is arithmetic on arrays of a block", ANGLES_ALONE, FLOOR
+        "<=",
+        6.0,
+        "the rest of two angles is arithmetic on arrays of a block",
+        ANGLES_ALONE,
+        FLOOR,
     ),
     "solve to forces / formulas": SpeedLimit(
-        "<=", 2.0, "new arrays and the points come on top, no second evaluation", FORCES, ALL
+        "<=",
+        2.0,
+        "new arrays and the points come on top, no second evaluation",
+        FORCES,
+        ALL,
     ),
     "solve with error bars / to forces": SpeedLimit(
-        "<=", 10.0, "the same formulas once more, in longer numbers, which the processor takes one by one", BARS, FORCES
+        "<=",
+        10.0,
+        "the same formulas once more, in longer numbers, which the processor takes one by one",
+        BARS,
+        FORCES,
     ),
     "one position / its 13x13": SpeedLimit(
         "<=",
@@ -104,15 +130,31 @@ LIMITS = {
         "13x13 of one position",
     ),
     "one position with error bars / to forces": SpeedLimit(
-        "<=", 4.5, "the same formulas once more, in numbers of NumPy's own", "one position with error bars", ONE
+        "<=",
+        4.5,
+        "the same formulas once more, in numbers of NumPy's own",
+        "one position with error bars",
+        ONE,
     ),
-    "study of linkages / positions": SpeedLimit("<=", 2.0, "a member is a column of the same arrays as a position"),
-    "growth from 1000 positions on": SpeedLimit("<=", 1.3, "the work is linear in the positions: blocks fit the cache"),
-    "memory beyond the result, MB": SpeedLimit("<=", 50.0, "work space is that of a block, not of the sweep"),
+    "study of linkages / positions": SpeedLimit(
+        "<=", 2.0, "a member is a column of the same arrays as a position"
+    ),
+    "growth from 1000 positions on": SpeedLimit(
+        "<=", 1.3, "the work is linear in the positions: blocks fit the cache"
+    ),
+    "memory beyond the result, MB": SpeedLimit(
+        "<=", 50.0, "work space is that of a block, not of the sweep"
+    ),
     "a judged scene / one position": SpeedLimit(
-        "<=", 650.0, "65 ms where a position takes 0.1 ms: a million scenes a night on 20 cores", JUDGED, ONE
+        "<=",
+        650.0,
+        "65 ms where a position takes 0.1 ms: a million scenes a night on 20 cores",
+        JUDGED,
+        ONE,
     ),
-    "import fourbar / import numpy": SpeedLimit("<=", 1.0, "it loads numpy alone, and less than that of its own"),
+    "import fourbar / import numpy": SpeedLimit(
+        "<=", 1.0, "it loads numpy alone, and less than that of its own"
+    ),
 }
 """Limits by the name of the row."""
 
@@ -130,9 +172,19 @@ def import_cost() -> float:
     """Compare the CPU time that `import fourbar` adds with that of `import numpy`: median over fresh interpreters."""
     clock = "time.process_time()"
     code = f"import time; a = {clock}; import numpy; b = {clock}; import fourbar; print(({clock} - b) / (b - a))"
-    kept = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+    kept = {
+        name: value
+        for name, value in os.environ.items()
+        if name != "PYTHONDONTWRITEBYTECODE"
+    }
     runs = [  # the first one compiles what is not compiled yet, which is no cost of importing
-        subprocess.run([sys.executable, "-c", code], capture_output=True, encoding="utf-8", check=True, env=kept)
+        subprocess.run(
+            [sys.executable, "-c", code],
+            capture_output=True,
+            encoding="utf-8",
+            check=True,
+            env=kept,
+        )
         for _ in range(7)
     ]
     return median(float(run.stdout) for run in runs)
@@ -164,12 +216,23 @@ def make_floor(theta_2: Array, out: dict[str, Array]) -> Callable[[], object]:
 
 
 @click.command()
-@click.option("--positions", default=1_000_000, show_default=True, type=click.IntRange(1000))
+@click.option(
+    "--positions", default=1_000_000, show_default=True, type=click.IntRange(1000)
+)
 @click.option("--rounds", default=5, show_default=True, type=click.IntRange(1))
 @click.option(
-    "--largest", default=1_000_000, show_default=True, type=click.IntRange(1000, 10**8), help="For the growth, to 1e8."
+    "--largest",
+    default=1_000_000,
+    show_default=True,
+    type=click.IntRange(1000, 10**8),
+    help="For the growth, to 1e8.",
 )
-@click.option("--picture", type=click.Path(path_type=Path), metavar="FILE", help="Draw the growth: svg, png or pdf.")
+@click.option(
+    "--picture",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Draw the growth: svg, png or pdf.",
+)
 def bench(positions: int, rounds: int, largest: int, picture: Path | None) -> int:
     """Time NumPy, C and the 13x13 system side by side; ratios that must hold."""
     if picture is not None:
@@ -181,7 +244,9 @@ def bench(positions: int, rounds: int, largest: int, picture: Path | None) -> in
         arguments = ["--positions", positions, "--rounds", rounds, "--largest", largest]
         arguments += ["--picture", picture] if picture is not None else []
         line = [sys.executable, "-m", "fourbar_lab", "bench", *map(str, arguments)]
-        status = subprocess.run(line, env=os.environ | dict.fromkeys(ONE_THREAD, "1"), check=False).returncode
+        status = subprocess.run(
+            line, env=os.environ | dict.fromkeys(ONE_THREAD, "1"), check=False
+        ).returncode
         return status if status >= 0 else BROKEN  # below 0: a signal ended it
     measurement = measure(positions, rounds, largest)
     rows: list[tuple[str, ...]] = []
@@ -189,18 +254,38 @@ def bench(positions: int, rounds: int, largest: int, picture: Path | None) -> in
     for what, measured in measurement.rows.items():
         limit = LIMITS.get(what)
         if limit is None:
-            rows.append((what, f"{1e-6 * measured:.1f} ms" if what == JUDGED else f"{measured:.1f} ns/position"))
+            rows.append(
+                (
+                    what,
+                    f"{1e-6 * measured:.1f} ms"
+                    if what == JUDGED
+                    else f"{measured:.1f} ns/position",
+                )
+            )
             continue
         holds = limit.holds(measured)
-        rows.append((what, f"{measured:.2f}", f"{limit.sign} {limit.bound:g}", "holds" if holds else "fails"))
+        rows.append(
+            (
+                what,
+                f"{measured:.2f}",
+                f"{limit.sign} {limit.bound:g}",
+                "holds" if holds else "fails",
+            )
+        )
         broken += [] if holds else [f"{what}: {limit.reason}"]
     console = Console()
     title = f"{positions} positions, one core, medians of {rounds} interleaved rounds; {name_machine()}"
     console.print(make_table(("what", "measured", "needed", ""), rows, title=title))
-    for title, times in ((OVER_POSITIONS, measurement.over_positions), (OVER_LINKAGES, measurement.over_linkages)):
+    for title, times in (
+        (OVER_POSITIONS, measurement.over_positions),
+        (OVER_LINKAGES, measurement.over_linkages),
+    ):
         counts = sorted({n for timed in times.values() for n in timed})
         head = ["ns each", *(f"{n:.0e}".replace("e+0", "e") for n in counts)]
-        cells = [[who, *(f"{timed[n]:.4g}" if n in timed else "" for n in counts)] for who, timed in times.items()]
+        cells = [
+            [who, *(f"{timed[n]:.4g}" if n in timed else "" for n in counts)]
+            for who, timed in times.items()
+        ]
         console.print(make_table(head, cells, title=title))
     for who, reason in measurement.not_run.items():
         click.echo(f"not run: {who}: {reason}")
@@ -214,7 +299,10 @@ def bench(positions: int, rounds: int, largest: int, picture: Path | None) -> in
 def measure(positions: int, rounds: int, largest: int) -> Measured:
     """Measure the ratios of LIMITS and ns per position, and the times by how many."""
     scene, command = make_example(), make_command(positions)
-    limits, swing = make_example(WITH_LIMITS), make_command(positions, *choose_range(WITH_LIMITS))
+    limits, swing = (
+        make_example(WITH_LIMITS),
+        make_command(positions, *choose_range(WITH_LIMITS)),
+    )
     everything, angles = allocate(UNKNOWNS, command), allocate(ANGLES, command)
     batch, solved = min(positions, THIRTEEN_BATCH), make_command(min(positions, SOLVED))
     bodies, many = make_bodies(scene, make_command(batch)), len(solved.theta_2)
@@ -225,17 +313,34 @@ def measure(positions: int, rounds: int, largest: int) -> Measured:
         ANGLES_ALONE: (positions, lambda: solve(scene, at=command, out=angles)),
         SYSTEM: (batch, lambda: solve_thirteen(bodies, 2)),
         FLOOR: (positions, make_floor(command.theta_2, angles)),
-        "input between limits: all": (positions, lambda: solve(limits, at=swing, out=everything)),
-        "input between limits: positions only": (positions, lambda: solve(limits, at=swing, out=angles)),
+        "input between limits: all": (
+            positions,
+            lambda: solve(limits, at=swing, out=everything),
+        ),
+        "input between limits: positions only": (
+            positions,
+            lambda: solve(limits, at=swing, out=angles),
+        ),
         FORCES: (many, lambda: solve(scene, "force", at=solved)),
         BARS: (many, lambda: solve(scene, "error", at=solved)),
-        "13x13 of one position": (ALONE, lambda: [solve_thirteen(lone, 2) for _ in range(ALONE)]),
+        "13x13 of one position": (
+            ALONE,
+            lambda: [solve_thirteen(lone, 2) for _ in range(ALONE)],
+        ),
         ONE: (ALONE, lambda: [solve(alone) for _ in range(ALONE)]),
-        "one position with error bars": (ALONE, lambda: [solve(alone, "error") for _ in range(ALONE)]),
+        "one position with error bars": (
+            ALONE,
+            lambda: [solve(alone, "error") for _ in range(ALONE)],
+        ),
     }
     if "C" in peers.here:
-        actions["C, all"] = (positions, partial(peers.here["C"], command.theta_2, np.zeros((15, positions))))
-    times = time_interleaved({name: action for name, (_, action) in actions.items()}, rounds)
+        actions["C, all"] = (
+            positions,
+            partial(peers.here["C"], command.theta_2, np.zeros((15, positions))),
+        )
+    times = time_interleaved(
+        {name: action for name, (_, action) in actions.items()}, rounds
+    )
     rows = {name: 1e9 * times[name] / count for name, (count, _) in actions.items()}
     by_positions = time_positions(peers.here, largest, rounds)
     by_linkages = time_linkages(positions, rounds)
@@ -243,9 +348,14 @@ def measure(positions: int, rounds: int, largest: int) -> Measured:
     exact = [engine for engine in ENGINES if not engine.through_time]
     if not any(engine.missing() for engine in exact):
         rows[JUDGED] = 1e9 * time_judging(exact, max(1, positions // PER_SCENE))
-    rows |= {name: rows[row.of] / rows[row.over] for name, row in LIMITS.items() if {row.of, row.over} <= rows.keys()}
     rows |= {
-        "study of linkages / positions": by_linkages[STUDY][most] / by_linkages[POSITIONS][most],
+        name: rows[row.of] / rows[row.over]
+        for name, row in LIMITS.items()
+        if {row.of, row.over} <= rows.keys()
+    }
+    rows |= {
+        "study of linkages / positions": by_linkages[STUDY][most]
+        / by_linkages[POSITIONS][most],
         "growth from 1000 positions on": max(cost.values()) / cost[min(cost)],
         "memory beyond the result, MB": measure_memory(min(positions, 1_000_000)),
         "import fourbar / import numpy": import_cost(),
@@ -257,7 +367,8 @@ def time_judging(engines: list[Engine], scenes: int) -> float:
     """Time the check of a random scene as `run` does it, nothing drawn: median CPU time in s."""
     suite = Random(scenes + 1, 0, tuple(DrawnType))
     judgings = (
-        partial(judge_for_report, suite.name(i), suite.scene(i), engines, draw=False) for i in range(scenes + 1)
+        partial(judge_for_report, suite.name(i), suite.scene(i), engines, draw=False)
+        for i in range(scenes + 1)
     )
     times = [time_call(action) for action in judgings]
     return median(times[1:])  # the first one imports the engines

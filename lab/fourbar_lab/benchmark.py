@@ -19,11 +19,22 @@ from fourbar.errors import DependencyError, FourBarError, InputError
 from fourbar.quantities import PIN_FORCES
 from fourbar.writing import write_text
 from fourbar_lab.simulators.problems import PROBLEMS, list_problems
-from fourbar_validation.check.problem import MISSING, RESULT, find_levels, judge, read_problem
+from fourbar_validation.check.problem import (
+    MISSING,
+    RESULT,
+    find_levels,
+    judge,
+    read_problem,
+)
 from fourbar_validation.compare.answer import EngineError
 from fourbar_validation.compare.rows import say_error, write_csv, write_one_line
 from fourbar_validation.engines import protocol
-from fourbar_validation.engines.environments import FILE, Entry, prepare_program, read_engines_of
+from fourbar_validation.engines.environments import (
+    FILE,
+    Entry,
+    prepare_program,
+    read_engines_of,
+)
 from fourbar_validation.engines.guests import HELLO
 from fourbar_validation.engines.processes import Running
 from fourbar_validation.places import find_checkout
@@ -35,7 +46,18 @@ ENGINES = Path(__file__).parent / FILE
 REFUSED = "R"
 DIFFERENTIATED = "crank_rocker"
 """Problem whose errors are drawn over time, and at which an engine that has derivatives is asked for them."""
-COLUMNS = ("problem", "engine", "version", "setting", "quantity", "error", "level", "letters", "seconds", "reason")
+COLUMNS = (
+    "problem",
+    "engine",
+    "version",
+    "setting",
+    "quantity",
+    "error",
+    "level",
+    "letters",
+    "seconds",
+    "reason",
+)
 """Columns of the table."""
 KIND = re.compile(r" \((released|slider-crank)\)$")
 """End of the name of an entry that answers one kind of problem for the row that the rest of its name names."""
@@ -86,12 +108,18 @@ class MatrixRow:
 def name_row(engine: str, version: str) -> str:
     """Name an engine with its version, which stands before the way in which it is used."""
     program, colon, way = engine.partition(":")
-    return engine if not version or version in engine else f"{program} {version}{colon}{way}"
+    return (
+        engine
+        if not version or version in engine
+        else f"{program} {version}{colon}{way}"
+    )
 
 
 def read_reasons(file: Path) -> dict[str, str]:
     """Read why letters are not A, by the name of a row, or by what it begins with."""
-    reasons: dict[str, str] = tomllib.loads(file.read_text(encoding="utf-8")).get("because", {})
+    reasons: dict[str, str] = tomllib.loads(file.read_text(encoding="utf-8")).get(
+        "because", {}
+    )
     return reasons
 
 
@@ -99,10 +127,16 @@ class Benchmark:
     """A run over engines and problems; what an earlier one was answered by the same version is not asked again."""
 
     def __init__(
-        self, engines: Iterable[Entry], reasons: Mapping[str, str], problems: Iterable[str], out: Path
+        self,
+        engines: Iterable[Entry],
+        reasons: Mapping[str, str],
+        problems: Iterable[str],
+        out: Path,
     ) -> None:
         self.engines, self.reasons, self.out = list(engines), reasons, out
-        self.problems = {name: read_problem(PROBLEMS / f"{name}.json") for name in problems}
+        self.problems = {
+            name: read_problem(PROBLEMS / f"{name}.json") for name in problems
+        }
         self.rows: dict[str, MatrixRow] = {}
 
     def run(self, seconds: float) -> None:
@@ -117,7 +151,9 @@ class Benchmark:
                 hello = running.ask_again(HELLO, 0)
                 if "error" in hello:
                     raise EngineError(str(hello["error"]))
-                for setting in [entry.setting] if entry.setting else hello.get("settings") or [""]:
+                for setting in (
+                    [entry.setting] if entry.setting else hello.get("settings") or [""]
+                ):
                     self._ask_engine(entry, hello, setting, running)
             except EngineError as error:
                 self._leave_out(entry, str(error))
@@ -127,9 +163,13 @@ class Benchmark:
     def _leave_out(self, entry: Entry, reason: str) -> None:
         row = self.rows.setdefault(KIND.sub("", entry.name), MatrixRow(entry))
         for problem in self.problems:
-            row.cells.setdefault(problem, MatrixCell(reason=f"not run: {write_one_line(reason)}"))
+            row.cells.setdefault(
+                problem, MatrixCell(reason=f"not run: {write_one_line(reason)}")
+            )
 
-    def _ask_engine(self, entry: Entry, hello: dict[str, Any], setting: str, running: Running) -> None:
+    def _ask_engine(
+        self, entry: Entry, hello: dict[str, Any], setting: str, running: Running
+    ) -> None:
         """Ask an engine in one setting every problem."""
         way = "" if entry.setting else setting
         joint = ", " if ":" in entry.name else ": "
@@ -142,61 +182,109 @@ class Benchmark:
             if problem["mechanism"] not in hello.get("mechanisms", ["four-bar"]):
                 lacking = [problem["mechanism"]]
             if lacking:
-                cell.letters, cell.reason = REFUSED, f"refused: it does not take {', '.join(lacking)}"
+                cell.letters, cell.reason = (
+                    REFUSED,
+                    f"refused: it does not take {', '.join(lacking)}",
+                )
             else:
                 for result in self._ask_problem(row, setting, label, problem, running):
                     row.changed = row.changed or str(result.get("shared", ""))
                     self._judge(problem, result, cell)
             if cell.letters not in ("AA", REFUSED):
                 cell.reason = cell.reason or self._explain(label)
-            if cell.letters != REFUSED or name not in row.cells:  # another kind of this row may have answered
+            if (
+                cell.letters != REFUSED or name not in row.cells
+            ):  # another kind of this row may have answered
                 row.cells[name] = cell
         if DIFFERENTIATED in self.problems and not row.slopes:
             problem = self.problems[DIFFERENTIATED]
-            question = {"ask": "slopes", "scene": problem["scene"], "command": problem["command"]}
-            result = self._take_or_ask(row, label, "slopes", {"problem": DIFFERENTIATED}, question, running)
+            question = {
+                "ask": "slopes",
+                "scene": problem["scene"],
+                "command": problem["command"],
+            }
+            result = self._take_or_ask(
+                row, label, "slopes", {"problem": DIFFERENTIATED}, question, running
+            )
             row.slopes = compare_slopes(problem, result.get("slopes", []))
 
     def _ask_problem(
-        self, row: MatrixRow, setting: str, label: str, problem: dict[str, Any], running: Running
+        self,
+        row: MatrixRow,
+        setting: str,
+        label: str,
+        problem: dict[str, Any],
+        running: Running,
     ) -> Iterator[dict[str, Any]]:
         """Ask one problem, at each number of steps."""
-        question: dict[str, Any] = {key: problem[key] for key in ("ask", "scene", "command", "times") if key in problem}
+        question: dict[str, Any] = {
+            key: problem[key]
+            for key in ("ask", "scene", "command", "times")
+            if key in problem
+        }
         entry, name = row.entry, problem["problem"]
-        for steps in entry.steps if problem["ask"] == "answer" and entry.steps else (None,):
+        for steps in (
+            entry.steps if problem["ask"] == "answer" and entry.steps else (None,)
+        ):
             asked: dict[str, Any] = {"name": setting} if setting else {}
             asked |= {} if steps is None else {"steps_per_turn": steps}
             stem = name if steps is None else f"{name}-{steps}"
             full = question | ({"setting": asked} if asked else {})
-            yield self._take_or_ask(row, label, stem, {"schema": RESULT, "problem": name}, full, running)
+            yield self._take_or_ask(
+                row, label, stem, {"schema": RESULT, "problem": name}, full, running
+            )
 
     def _take_or_ask(
-        self, row: MatrixRow, label: str, stem: str, stated: dict[str, Any], question: dict[str, Any], running: Running
+        self,
+        row: MatrixRow,
+        label: str,
+        stem: str,
+        stated: dict[str, Any],
+        question: dict[str, Any],
+        running: Running,
     ) -> dict[str, Any]:
         """Take the result of an earlier run by the same version, unless it broke down, or ask and store it."""
         file = self.out / "results" / re.sub(r"[^\w.-]+", "-", label) / f"{stem}.json"
         result = json.loads(file.read_text(encoding="utf-8")) if file.is_file() else {}
-        if result.get("version") != row.text("version") or result.get("reason", "").startswith("broke down"):
-            result = {**stated, "engine": label, "version": row.text("version"), **_ask(running, question)}
+        if result.get("version") != row.text("version") or result.get(
+            "reason", ""
+        ).startswith("broke down"):
+            result = {
+                **stated,
+                "engine": label,
+                "version": row.text("version"),
+                **_ask(running, question),
+            }
             file.parent.mkdir(parents=True, exist_ok=True)
             write_text(file, json.dumps(result))
         return {**result, "file": file.relative_to(self.out)}
 
-    def _judge(self, problem: dict[str, Any], result: dict[str, Any], cell: MatrixCell) -> None:
+    def _judge(
+        self, problem: dict[str, Any], result: dict[str, Any], cell: MatrixCell
+    ) -> None:
         """Judge one result; of several timesteps the finest that is answered stands."""
         if "answers" not in result:
             refused = result["reason"].startswith("refused")
             cell.reason = cell.reason if cell.runs else result["reason"]
-            cell.letters = cell.letters if cell.runs else REFUSED if refused else MISSING
+            cell.letters = (
+                cell.letters if cell.runs else REFUSED if refused else MISSING
+            )
             return
         try:
             judged = judge(problem, result)
         except InputError as error:
-            cell.letters, cell.reason = MISSING, f"an answer that cannot be judged: {error}"
+            cell.letters, cell.reason = (
+                MISSING,
+                f"an answer that cannot be judged: {error}",
+            )
             return
         levels = find_levels([row for row in judged if row.level != MISSING])
-        reactions, drive = (levels.get(name, MISSING) for name in ("reactions", "torque"))
-        cell.letters = reactions + (drive if "torque" in find_levels(judged) else levels.get("motion", MISSING))
+        reactions, drive = (
+            levels.get(name, MISSING) for name in ("reactions", "torque")
+        )
+        cell.letters = reactions + (
+            drive if "torque" in find_levels(judged) else levels.get("motion", MISSING)
+        )
         cell.reason, cell.file = "", str(result["file"])
         numbers = [(row.quantity, f"{row.error:.1e}", row.level) for row in judged]
         gap = result.get("evidence", {}).get("gap")
@@ -217,12 +305,25 @@ class Benchmark:
             for label, row in self.rows.items():
                 cell, version = row.cells[problem], row.text("version")
                 if not cell.runs:
-                    line = [problem, label, version, "", "all", "", cell.letters, cell.letters, "", cell.reason]
+                    line = [
+                        problem,
+                        label,
+                        version,
+                        "",
+                        "all",
+                        "",
+                        cell.letters,
+                        cell.letters,
+                        "",
+                        cell.reason,
+                    ]
                     table.append(line)
                 for run in cell.runs:
                     finest = run is cell.runs[-1]
                     for quantity, error, level in run.numbers:
-                        reason = cell.reason if finest and level not in ("A", "") else ""
+                        reason = (
+                            cell.reason if finest and level not in ("A", "") else ""
+                        )
                         reason = "not read" if level == MISSING else reason
                         table.append([problem, label, version, run.setting, quantity, error, level if finest else "",
                                       cell.letters if finest else "", f"{run.seconds:.3g}", reason])  # fmt: skip
@@ -234,12 +335,23 @@ class Benchmark:
     def write(self) -> None:
         """Write the table and the page."""
         write_text(self.out / "benchmark.csv", write_csv(COLUMNS, self.list_rows()))
-        rows = {name_row(label, row.text("version")): row for label, row in self.rows.items()}
+        rows = {
+            name_row(label, row.text("version")): row
+            for label, row in self.rows.items()
+        }
         chart = draw_work_precision(rows) if DIFFERENTIATED in self.problems else ""
-        page = {"machine": name_machine(), "problems": self.problems, "rows": rows, "chart": shrink_svg(chart)}
+        page = {
+            "machine": name_machine(),
+            "problems": self.problems,
+            "rows": rows,
+            "chart": shrink_svg(chart),
+        }
         if chart:
             write_text(self.out / "benchmark.svg", chart)
-        write_text(self.out / "benchmark.html", render("fourbar_lab", "benchmark.html.j2", **page))
+        write_text(
+            self.out / "benchmark.html",
+            render("fourbar_lab", "benchmark.html.j2", **page),
+        )
 
 
 def draw_work_precision(rows: Mapping[str, MatrixRow]) -> str:
@@ -250,17 +362,31 @@ def draw_work_precision(rows: Mapping[str, MatrixRow]) -> str:
     lines: dict[str, list[tuple[float, float]]] = {}
     for name, row in rows.items():
         for run in row.cells[DIFFERENTIATED].runs:
-            errors = [float(error) for quantity, error, _ in run.numbers if quantity in ("torque", *PIN_FORCES)]
+            errors = [
+                float(error)
+                for quantity, error, _ in run.numbers
+                if quantity in ("torque", *PIN_FORCES)
+            ]
             if run.setting.endswith("/rev") and run.seconds > 0.0:
-                lines.setdefault(name, []).append((run.seconds, float(np.nanmax(errors))))
+                lines.setdefault(name, []).append(
+                    (run.seconds, float(np.nanmax(errors)))
+                )
     if not lines:
         return ""
     figure = Figure(figsize=(4.8, 8.2), layout="constrained")
     axes = figure.add_subplot()
     for number, (name, points) in enumerate(lines.items()):
-        colour = [0.8 * part for part in colormaps["turbo"]((number + 0.5) / len(lines))[:3]]
-        look = {"marker": "osD^vP*Xh<>"[number % 11], "linestyle": ("-", "--", ":", "-.")[number % 4], "color": colour}
-        axes.loglog(*zip(*points, strict=True), label=name, markersize=4, linewidth=1, **look)
+        colour = [
+            0.8 * part for part in colormaps["turbo"]((number + 0.5) / len(lines))[:3]
+        ]
+        look = {
+            "marker": "osD^vP*Xh<>"[number % 11],
+            "linestyle": ("-", "--", ":", "-.")[number % 4],
+            "color": colour,
+        }
+        axes.loglog(
+            *zip(*points, strict=True), label=name, markersize=4, linewidth=1, **look
+        )
     axes.set_xlabel("processor time of the run, s")
     axes.set_ylabel("greatest error of torque and pin forces")
     axes.grid(alpha=0.3)
@@ -288,25 +414,42 @@ def _ask(running: Running, question: dict[str, Any]) -> dict[str, Any]:
     if "answers" in reply or "slopes" in reply:
         kept = ("answers", "at", "setting", "evidence", "shared", "seconds", "slopes")
         return {key: reply[key] for key in kept if key in reply} | spent
-    word, text = ("refused", reply["refusal"]) if "refusal" in reply else ("broke down", reply.get("error", ""))
+    word, text = (
+        ("refused", reply["refusal"])
+        if "refusal" in reply
+        else ("broke down", reply.get("error", ""))
+    )
     return {"reason": f"{word}: {write_one_line(str(text))}", **spent}
 
 
-def compare_slopes(problem: dict[str, Any], slopes: Iterable[Any]) -> list[tuple[str, dict[str, str]]]:
+def compare_slopes(
+    problem: dict[str, Any], slopes: Iterable[Any]
+) -> list[tuple[str, dict[str, str]]]:
     """Compare derivatives of the torque with the formulas' at the state that the engine took: relative errors."""
-    scene, _ = protocol.command_from_json(protocol.scene_from_json(problem["scene"]), problem["command"])
+    scene, _ = protocol.command_from_json(
+        protocol.scene_from_json(problem["scene"]), problem["command"]
+    )
     compared = []
     try:
         for way in slopes:
             errors = {}
             if "by" in way:
-                angle, speed, acceleration = (float(way[key]) for key in scene.motion.names)
-                motion = scene.motion.replace(angle=angle, speed=speed, acceleration=acceleration)
+                angle, speed, acceleration = (
+                    float(way[key]) for key in scene.motion.names
+                )
+                motion = scene.motion.replace(
+                    angle=angle, speed=speed, acceleration=acceleration
+                )
                 ours = sensitivity(replace(scene, motion=motion))
                 pairs = {"torque": (way["torque"], ours.value("torque"))}
-                pairs |= {key: (theirs, ours.of("torque", key)) for key, theirs in way["by"].items()}
+                pairs |= {
+                    key: (theirs, ours.of("torque", key))
+                    for key, theirs in way["by"].items()
+                }
                 errors = {
-                    key: "zero" if theirs == 0.0 else f"{abs(theirs / float(np.ravel(value)[0]) - 1.0):.1e}"
+                    key: "zero"
+                    if theirs == 0.0
+                    else f"{abs(theirs / float(np.ravel(value)[0]) - 1.0):.1e}"
                     for key, (theirs, value) in pairs.items()
                 }
             compared.append((write_one_line(str(way["how"])), errors))
@@ -321,21 +464,42 @@ def _find_order(runs: list[Run]) -> float | None:
         return None
     errors, steps = [], []
     for run in runs[-2:]:
-        errors += [float(error) for quantity, error, _ in run.numbers if quantity == "torque"]
+        errors += [
+            float(error) for quantity, error, _ in run.numbers if quantity == "torque"
+        ]
         steps += [float(number) for number in re.findall(r"(\d+)/rev$", run.setting)]
-    if len(errors) < 2 or len(steps) < 2 or not all(0.0 < error < math.inf for error in errors) or steps[0] == steps[1]:
+    if (
+        len(errors) < 2
+        or len(steps) < 2
+        or not all(0.0 < error < math.inf for error in errors)
+        or steps[0] == steps[1]
+    ):
         return None
     return math.log(errors[0] / errors[1]) / math.log(steps[1] / steps[0])
 
 
 @click.command()
 @click.option(
-    "--engines", type=click.Path(path_type=Path), help="A file like engines.toml, whose engines alone are asked."
+    "--engines",
+    type=click.Path(path_type=Path),
+    help="A file like engines.toml, whose engines alone are asked.",
 )
-@click.option("--problem", "problems", multiple=True, metavar="NAME", help="These alone (repeat).")
-@click.option("-o", "--out", type=click.Path(path_type=Path), default=Path("results/benchmark"), show_default=True)
-@click.option("--time-limit", default=600.0, show_default=True, help="Seconds for each question.")
-def command(engines: Path | None, problems: tuple[str, ...], out: Path, time_limit: float) -> None:
+@click.option(
+    "--problem", "problems", multiple=True, metavar="NAME", help="These alone (repeat)."
+)
+@click.option(
+    "-o",
+    "--out",
+    type=click.Path(path_type=Path),
+    default=Path("results/benchmark"),
+    show_default=True,
+)
+@click.option(
+    "--time-limit", default=600.0, show_default=True, help="Seconds for each question."
+)
+def command(
+    engines: Path | None, problems: tuple[str, ...], out: Path, time_limit: float
+) -> None:
     """Ask every engine every problem of models/problems, and write benchmark.csv and one page.
 
     Each engine runs in its environment, which pip makes once. An engine that runs through time is asked at each of its
@@ -344,10 +508,19 @@ def command(engines: Path | None, problems: tuple[str, ...], out: Path, time_lim
     find_checkout("benchmark")
     for name in problems:
         if name not in list_problems():
-            raise InputError("--problem", name, f"must be one of {', '.join(list_problems())}")
+            raise InputError(
+                "--problem", name, f"must be one of {', '.join(list_problems())}"
+            )
     entries = read_engines_of(engines or ENGINES)
     out.mkdir(parents=True, exist_ok=True)
-    benchmark = Benchmark(entries.values(), read_reasons(engines or ENGINES), problems or list_problems(), out)
+    benchmark = Benchmark(
+        entries.values(),
+        read_reasons(engines or ENGINES),
+        problems or list_problems(),
+        out,
+    )
     benchmark.run(time_limit)
     benchmark.write()
-    click.echo(f"wrote {out}/benchmark.csv, .html: {len(benchmark.rows)} engines, {len(benchmark.problems)} problems")
+    click.echo(
+        f"wrote {out}/benchmark.csv, .html: {len(benchmark.rows)} engines, {len(benchmark.problems)} problems"
+    )

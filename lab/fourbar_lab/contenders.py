@@ -35,7 +35,13 @@ Loop = Callable[[Array, Array], None]
 angles into an array (15, n)."""
 SOURCE = Path(__file__).with_name("bench_loop.c")
 FLAGS = ("-O3", "-march=native")
-LOOKS = (("#0072B2", "o"), ("#D55E00", "s"), ("#1a1a1a", "^"), ("#007A5A", "v"), ("#8A3B78", "D"))
+LOOKS = (
+    ("#0072B2", "o"),
+    ("#D55E00", "s"),
+    ("#1a1a1a", "^"),
+    ("#007A5A", "v"),
+    ("#8A3B78", "D"),
+)
 """Colours and marks in the order of the contenders."""
 AT_ONCE = 1_000_000
 """Positions of a call: more are evaluated in pieces of this many, so that their memory is bounded (150 MB)."""
@@ -44,7 +50,11 @@ SHORTEST = 200_000
 MOST_LINKAGES = 100_000
 MOST_LOOPED = 1000
 """Linkages that are solved one after the other: beyond them the cost of one no longer changes."""
-STUDY, POSITIONS, LOOPED = "study, NumPy", "one linkage, as many positions", "one after the other"
+STUDY, POSITIONS, LOOPED = (
+    "study, NumPy",
+    "one linkage, as many positions",
+    "one after the other",
+)
 LINKAGE = FourBar(0.3, Bar(0.1, 0.2), Bar(0.25, 0.5), Bar(0.22, 0.4))
 """Crank-rocker a = 0.1, b = 0.25, c = 0.22, d = 0.3 m, uniform bars."""
 
@@ -63,7 +73,9 @@ def make_example(linkage: FourBar = LINKAGE, theta_2: float | None = 0.0) -> Sce
 
 def make_command(n: int, start: float = 0.0, stop: float = 2.0 * np.pi) -> Command:
     """Command n positions, over a revolution unless specified otherwise."""
-    return Command(np.linspace(start, stop, n), np.broadcast_to(np.int8(1), (n,)), 10.0, 0.0)
+    return Command(
+        np.linspace(start, stop, n), np.broadcast_to(np.int8(1), (n,)), 10.0, 0.0
+    )
 
 
 def allocate(names: Iterable[str], command: Command) -> dict[str, Array]:
@@ -72,10 +84,17 @@ def allocate(names: Iterable[str], command: Command) -> dict[str, Array]:
     return {name: getattr(first, name) for name in names}
 
 
-def time_interleaved(actions: Mapping[str, Callable[[], object]], rounds: int, calls: int = 1) -> dict[str, float]:
+def time_interleaved(
+    actions: Mapping[str, Callable[[], object]], rounds: int, calls: int = 1
+) -> dict[str, float]:
     """Time a call of each action in turn, in CPU seconds: the median, the first round apart."""
-    clocks = {name: partial(time_call, action, calls) for name, action in actions.items()}
-    return {name: median(times[1:]) for name, times in time_in_turns(clocks, rounds + 1).items()}
+    clocks = {
+        name: partial(time_call, action, calls) for name, action in actions.items()
+    }
+    return {
+        name: median(times[1:])
+        for name, times in time_in_turns(clocks, rounds + 1).items()
+    }
 
 
 def collect_loops() -> Peers:
@@ -83,7 +102,10 @@ def collect_loops() -> Peers:
     loops: dict[str, Loop | str] = {"NumPy": _make_solve_loop(), "C": compile_loop()}
     loops |= {name: _make_library_loop(name) for name in ("JAX", "PyTorch")}
     reasons = {name: loop for name, loop in loops.items() if isinstance(loop, str)}
-    return Peers({name: loop for name, loop in loops.items() if not isinstance(loop, str)}, reasons)
+    return Peers(
+        {name: loop for name, loop in loops.items() if not isinstance(loop, str)},
+        reasons,
+    )
 
 
 def _make_solve_loop() -> Loop:
@@ -135,15 +157,30 @@ def compile_loop() -> Loop | str:
         return "no C compiler is installed"
     with tempfile.TemporaryDirectory() as folder:
         library = Path(folder) / "loop.so"
-        line = [compiler, *FLAGS, "-fPIC", "-shared", str(SOURCE), "-o", str(library), "-lm"]
-        made = subprocess.run(line, capture_output=True, encoding="utf-8", errors="replace", check=False)
+        line = [
+            compiler,
+            *FLAGS,
+            "-fPIC",
+            "-shared",
+            str(SOURCE),
+            "-o",
+            str(library),
+            "-lm",
+        ]
+        made = subprocess.run(
+            line, capture_output=True, encoding="utf-8", errors="replace", check=False
+        )
         if made.returncode != 0:
             return f"{compiler} fails: {(made.stderr.strip().splitlines() or ['without a word'])[0]}"
         loop = ctypes.CDLL(str(library)).loop
     pointer = ctypes.POINTER(ctypes.c_double)
 
     def call(theta_2: Array, out: Array) -> None:
-        loop(ctypes.c_long(len(theta_2)), theta_2.ctypes.data_as(pointer), out.ctypes.data_as(pointer))
+        loop(
+            ctypes.c_long(len(theta_2)),
+            theta_2.ctypes.data_as(pointer),
+            out.ctypes.data_as(pointer),
+        )
 
     return call
 
@@ -155,7 +192,9 @@ def time_positions(peers: dict[str, Loop], largest: int, rounds: int) -> Times:
         at_once, calls = min(n, AT_ONCE), max(1, SHORTEST // n, n // AT_ONCE)
         theta_2, out = make_command(at_once).theta_2, np.zeros((15, at_once))
         actions = {name: partial(loop, theta_2, out) for name, loop in peers.items()}
-        for name, value in time_interleaved(actions, rounds if n <= AT_ONCE else 1, calls).items():
+        for name, value in time_interleaved(
+            actions, rounds if n <= AT_ONCE else 1, calls
+        ).items():
             times[name][n] = 1e9 * value / at_once
     return times
 
@@ -170,7 +209,9 @@ def time_linkages(largest: int, rounds: int) -> Times:
 
     def looped(lengths: Any) -> None:
         for length in lengths.tolist():
-            linkage = replace(scene.linkage, coupler=replace(scene.linkage.coupler, length=length))
+            linkage = replace(
+                scene.linkage, coupler=replace(scene.linkage.coupler, length=length)
+            )
             solve(replace(scene, linkage=linkage))
 
     for m in [10**k for k in range(6) if 10**k <= min(largest, MOST_LINKAGES)]:
@@ -181,7 +222,9 @@ def time_linkages(largest: int, rounds: int) -> Times:
         }
         if m <= MOST_LOOPED:
             actions[LOOPED] = partial(looped, lengths)
-        for name, value in time_interleaved(actions, rounds, max(1, MOST_LOOPED // m)).items():
+        for name, value in time_interleaved(
+            actions, rounds, max(1, MOST_LOOPED // m)
+        ).items():
             times[name][m] = 1e9 * value / m
     return times
 
@@ -193,15 +236,39 @@ def draw_bench(over_positions: Times, over_linkages: Times, path: Path) -> None:
 
         figure = Figure(figsize=(8.4, 4.0), layout="constrained")
         positions_axes, linkages_axes = figure.subplots(1, 2)
-        _draw_panel(positions_axes, over_positions, "ns per position, every unknown", "positions")
-        _draw_panel(linkages_axes, over_linkages, "ns per linkage, every force at one position", "linkages")
-        figure.supxlabel(f"One core: {name_machine()}", size=6.8, x=0.012, ha="left", parse_math=False)
+        _draw_panel(
+            positions_axes,
+            over_positions,
+            "ns per position, every unknown",
+            "positions",
+        )
+        _draw_panel(
+            linkages_axes,
+            over_linkages,
+            "ns per linkage, every force at one position",
+            "linkages",
+        )
+        figure.supxlabel(
+            f"One core: {name_machine()}",
+            size=6.8,
+            x=0.012,
+            ha="left",
+            parse_math=False,
+        )
         Drawing(figure).save(path)
 
 
 def _draw_panel(axes: "Axes", times: Times, title: str, over: str) -> None:
     for (who, timed), (colour, mark) in zip(times.items(), LOOKS, strict=False):
-        axes.loglog(list(timed), list(timed.values()), color=colour, marker=mark, ms=3.5, lw=1.1, label=who)
+        axes.loglog(
+            list(timed),
+            list(timed.values()),
+            color=colour,
+            marker=mark,
+            ms=3.5,
+            lw=1.1,
+            label=who,
+        )
     axes.set_title(title)
     axes.set_xlabel(over)
     axes.set_ylabel("ns")

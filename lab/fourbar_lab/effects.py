@@ -34,15 +34,30 @@ EFFECTS: dict[str, kinds.Effect | None] = {
     "viscous at pin B": kinds.Viscous.at(B=0.01),
     "friction": kinds.Friction.at(O2=0.01, A=0.01, O4=0.01),
     "friction at pin B": kinds.Friction.at(B=0.01),
-    "pin_friction": kinds.PinFriction.at(O2=(0.1, 0.01), A=(0.1, 0.01), B=(0.1, 0.01), O4=(0.1, 0.01)),
+    "pin_friction": kinds.PinFriction.at(
+        O2=(0.1, 0.01), A=(0.1, 0.01), B=(0.1, 0.01), O4=(0.1, 0.01)
+    ),
     "torsion": kinds.Torsion.at(O4=(2.0, 1.9, 0.1)),
     "springs": kinds.Springs(
-        (kinds.Spring(kinds.SpringEnd(1, 0.1, -1.5), kinds.SpringEnd(4, 0.08, 0.0), 200.0, 0.05, 3.0),)
+        (
+            kinds.Spring(
+                kinds.SpringEnd(1, 0.1, -1.5),
+                kinds.SpringEnd(4, 0.08, 0.0),
+                200.0,
+                0.05,
+                3.0,
+            ),
+        )
     ),
     "flywheel": kinds.Flywheel(0.02),
     "load": kinds.Load(4, (3.0, 0.7), (0.05, 1.0), 0.2),
     "load over theta_2": kinds.Load(
-        4, (3.0, 0.7), (0.05, 1.0), 0.2, "world", kinds.Table((0.0, 3.0, math.tau), (0.0, 1.0, 0.0))
+        4,
+        (3.0, 0.7),
+        (0.05, 1.0),
+        0.2,
+        "world",
+        kinds.Table((0.0, 3.0, math.tau), (0.0, 1.0, 0.0)),
     ),
 }
 EFFECTS |= {
@@ -60,7 +75,12 @@ POSITIONS = 1000
 """Positions of the formulas in one unit of work, as they take arrays."""
 ROUNDS = 31
 """Pairs of runs, first one ahead and then the other."""
-AMOUNTS = {"formulas": 40, SIMULATION: 1000, "mujoco-inverse": 100, "pinocchio-inverse": 100}
+AMOUNTS = {
+    "formulas": 40,
+    SIMULATION: 1000,
+    "mujoco-inverse": 100,
+    "pinocchio-inverse": 100,
+}
 """Units of work of one run: 10 to 20 ms, long against the clock's resolution and short against what disturbs it."""
 ABOUT = (
     "Processor time of a position, of a step of the simulation (RK4), in us without effects; with an effect relative "
@@ -74,7 +94,12 @@ def make_scene(effect: str, positions: int) -> Scene:
     acting = EFFECTS[effect]
     loads = (acting,) if isinstance(acting, kinds.Load) else ()
     effects = () if acting is None or loads else (acting,)
-    return Scene(linkage, Motion(Sweep(0.13, 0.13 + math.tau, positions - 1), 10.0), loads=loads, effects=effects)
+    return Scene(
+        linkage,
+        Motion(Sweep(0.13, 0.13 + math.tau, positions - 1), 10.0),
+        loads=loads,
+        effects=effects,
+    )
 
 
 def prepare_formulas(effect: str) -> Callable[[int], Any]:
@@ -116,7 +141,10 @@ def prepare_answers(name: str, effect: str) -> Callable[[int], Any]:
 WORKLOADS: dict[str, Callable[[str], Callable[[int], Any]]] = {
     "formulas": prepare_formulas,
     SIMULATION: prepare_simulation,
-    **{name: partial(prepare_answers, name) for name in ("mujoco-inverse", "pinocchio-inverse")},
+    **{
+        name: partial(prepare_answers, name)
+        for name in ("mujoco-inverse", "pinocchio-inverse")
+    },
 }
 
 
@@ -136,14 +164,20 @@ class EffectCost(NamedTuple):
 def measure(engine: str, effect: str, rounds: int = ROUNDS) -> EffectCost:
     """Time neighbouring runs with and without an effect: both meet the same disturbances."""
     amount = AMOUNTS[engine]
-    works = {which: partial(WORKLOADS[engine](name), amount) for which, name in enumerate(("none", effect))}
+    works = {
+        which: partial(WORKLOADS[engine](name), amount)
+        for which, name in enumerate(("none", effect))
+    }
     for work in works.values():
         work()
     clocks = {which: partial(time_call, work) for which, work in works.items()}
     bare, loaded = map(np.array, time_in_turns(clocks, rounds).values())
     units = amount * (POSITIONS if engine == "formulas" else 1)
     return EffectCost(
-        engine, effect, float(np.median(bare)) / units, *np.percentile(loaded / bare, [25, 50, 75]).tolist()
+        engine,
+        effect,
+        float(np.median(bare)) / units,
+        *np.percentile(loaded / bare, [25, 50, 75]).tolist(),
     )
 
 
@@ -161,41 +195,82 @@ def list_rows(costs: Iterable[EffectCost]) -> tuple[list[str], list[list[str]]]:
             elif effect == "none":
                 cells.append(f"{1e6 * one.seconds:.3g} us")
             else:
-                low, median, high = (f"{100.0 * (ratio - 1.0):+.0f}" for ratio in one[3:])
+                low, median, high = (
+                    f"{100.0 * (ratio - 1.0):+.0f}" for ratio in one[3:]
+                )
                 cells.append(f"{median} % [{low}, {high}]")
         table.append(cells)
     return engines, table
 
 
-def list_pairs(engines: tuple[str, ...], effects: tuple[str, ...]) -> list[tuple[str, str]]:
+def list_pairs(
+    engines: tuple[str, ...], effects: tuple[str, ...]
+) -> list[tuple[str, str]]:
     """Pair each engine with each effect that it has, the simulation with each flag that the bare scene switches off."""
-    chosen = [(engine, effect) for engine in engines for effect in effects if (engine, effect) not in NO_COUNTERPART]
-    return chosen + [(SIMULATION, name) for name in (DEFAULT_FLAGS, *list_flags()) if SIMULATION in engines]
+    chosen = [
+        (engine, effect)
+        for engine in engines
+        for effect in effects
+        if (engine, effect) not in NO_COUNTERPART
+    ]
+    return chosen + [
+        (SIMULATION, name)
+        for name in (DEFAULT_FLAGS, *list_flags())
+        if SIMULATION in engines
+    ]
 
 
 @click.command()
-@click.option("--engines", metavar="NAMES", default=",".join(WORKLOADS), show_default=True, help="Comma-separated.")
+@click.option(
+    "--engines",
+    metavar="NAMES",
+    default=",".join(WORKLOADS),
+    show_default=True,
+    help="Comma-separated.",
+)
 @click.option("--only", metavar="NAMES", help="Comma-separated; left out: all.")
-@click.option("-o", "--out", type=click.Path(path_type=Path, dir_okay=False), help="Write the table as Markdown too.")
+@click.option(
+    "-o",
+    "--out",
+    type=click.Path(path_type=Path, dir_okay=False),
+    help="Write the table as Markdown too.",
+)
 def effects(engines: str, only: str | None, out: Path | None) -> int:
     """Time each effect in each engine, and each flag of MuJoCo; a minute."""
     from rich.console import Console
     from rich.progress import track
 
     wanted = tuple(name.strip() for name in engines.split(","))
-    chosen = tuple(EFFECTS) if only is None else tuple(dict.fromkeys(["none", *only.split(",")]))
-    for option, names, allowed in (("--engines", wanted, WORKLOADS), ("--only", chosen, EFFECTS)):
+    chosen = (
+        tuple(EFFECTS)
+        if only is None
+        else tuple(dict.fromkeys(["none", *only.split(",")]))
+    )
+    for option, names, allowed in (
+        ("--engines", wanted, WORKLOADS),
+        ("--only", chosen, EFFECTS),
+    ):
         for name in names:
             if name not in allowed:
                 raise InputError(option, name, "must be among " + ", ".join(allowed))
     for engine in ENGINES:
         if engine.name in wanted and (reason := engine.missing()):
             raise DependencyError(f"{engine.name}: {reason}")
-    costs = [measure(*pair) for pair in track(list_pairs(wanted, chosen), description="timing", transient=True)]
+    costs = [
+        measure(*pair)
+        for pair in track(
+            list_pairs(wanted, chosen), description="timing", transient=True
+        )
+    ]
     columns, rows = list_rows(costs)
     Console().print(make_table(["effect", *columns], rows, caption=ABOUT))
     if out is not None:
-        what = {"about": ABOUT, "head": ["", *columns], "rows": rows, "setup": describe_setup()}
+        what = {
+            "about": ABOUT,
+            "head": ["", *columns],
+            "rows": rows,
+            "setup": describe_setup(),
+        }
         write_text(out, render("fourbar_lab", "effects.md.j2", **what))
         click.echo(f"written to {out}")
     return 0

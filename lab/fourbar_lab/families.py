@@ -7,7 +7,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from fourbar.effects import LinearDrive, Load, Spring, SpringEnd, Springs, Table, Torsion
+from fourbar.effects import (
+    LinearDrive,
+    Load,
+    Spring,
+    SpringEnd,
+    Springs,
+    Table,
+    Torsion,
+)
 from fourbar.linkage import MOVING_BARS, PINS, SECOND_PIN, Bar, FourBar
 from fourbar.scene import Scene
 from fourbar.scene.motion import Motion
@@ -29,7 +37,9 @@ from fourbar_validation.scenes.random import (
 def spread_masses(spread: float) -> Ranges:
     """Spread masses over decades to either side, one bar of ten without any; centres anywhere about the bar."""
     return Ranges(
-        mass=draw_chance(0.9, draw_product(draw_decades(-spread, spread), draw_uniform(0.2, 5.0))),
+        mass=draw_chance(
+            0.9, draw_product(draw_decades(-spread, spread), draw_uniform(0.2, 5.0))
+        ),
         inertia=draw_uniform(0.0, 0.5),
         centre=draw_uniform(-0.5, 1.5),
         centre_angle=draw_chance(0.5, draw_uniform(-3.0, 3.0)),
@@ -80,19 +90,31 @@ def _draw_near_change_point(rng: np.random.Generator) -> Place:
         lengths, straight = (x, x, y, y), 0.0
     else:
         # multiples of 2^-20 so that d + a = b + c, or d - a = b - c, holds exactly
-        d, a, b = (float(round(v * 2**20)) / 2**20 for v in sorted(rng.uniform(0.1, 1.0, 3), reverse=True))
+        d, a, b = (
+            float(round(v * 2**20)) / 2**20
+            for v in sorted(rng.uniform(0.1, 1.0, 3), reverse=True)
+        )
         b = float(min(b, d + a - 0.01))
-        lengths, straight = ((d, a, b, d + a - b), math.pi) if rng.random() < 0.5 else ((d, a, d - a + b, b), 0.0)
+        lengths, straight = (
+            ((d, a, b, d + a - b), math.pi)
+            if rng.random() < 0.5
+            else ((d, a, d - a + b, b), 0.0)
+        )
     distance = float(rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-8, 0))
     if rng.random() < 0.3:
         k = int(rng.integers(0, 4))
-        lengths = tuple(v * (1.0 + 0.1 * distance**2) if i == k else v for i, v in enumerate(lengths))
+        lengths = tuple(
+            v * (1.0 + 0.1 * distance**2) if i == k else v
+            for i, v in enumerate(lengths)
+        )
     return lengths, command_angle(straight + distance)
 
 
 def _draw_with_ratios(rng: np.random.Generator) -> Place:
     """Draw crank to ground, coupler to diagonal, and masses, each in ratios from 1e-6 to 1e6."""
-    lengths, angle = draw_uneven_lengths(rng, draw_decades(-6.0, 6.0), draw_decades(-1.0, 1.0))
+    lengths, angle = draw_uneven_lengths(
+        rng, draw_decades(-6.0, 6.0), draw_decades(-1.0, 1.0)
+    )
     return lengths, command_angle(angle)
 
 
@@ -107,17 +129,33 @@ def scales(rng: np.random.Generator) -> Scene:
     for number in MOVING_BARS:
         bar = link.bar(number)
         bars.append(
-            Bar(bar.length * k, bar.mass, bar.moment_of_inertia * k * k, (bar.mass_centre[0] * k, bar.mass_centre[1]))
+            Bar(
+                bar.length * k,
+                bar.mass,
+                bar.moment_of_inertia * k * k,
+                (bar.mass_centre[0] * k, bar.mass_centre[1]),
+            )
         )
-    loads = tuple(replace(load, at=(load.at[0] * k, load.at[1]), moment=load.moment * k) for load in scene.loads)
-    return replace(scene, linkage=FourBar(link.ground * k, bars[0], bars[1], bars[2], link.ground_angle), loads=loads)
+    loads = tuple(
+        replace(load, at=(load.at[0] * k, load.at[1]), moment=load.moment * k)
+        for load in scene.loads
+    )
+    return replace(
+        scene,
+        linkage=FourBar(link.ground * k, bars[0], bars[1], bars[2], link.ground_angle),
+        loads=loads,
+    )
 
 
 def speeds(rng: np.random.Generator) -> Scene:
     """Draw omega_2 up to 1e6 rad/s, alpha_2 up to 1e12 rad/s^2, and the static case."""
     scene = ANYWHERE.draw(rng)
-    omega = float(rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-3, 6)) * bool(rng.random() < 0.9)
-    alpha = float(rng.choice([0.0, rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-3, 12)]))
+    omega = float(rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-3, 6)) * bool(
+        rng.random() < 0.9
+    )
+    alpha = float(
+        rng.choice([0.0, rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-3, 12)])
+    )
     return replace(scene, motion=scene.motion.replace(speed=omega, acceleration=alpha))
 
 
@@ -130,22 +168,38 @@ def massless(rng: np.random.Generator) -> Scene:
     """Draw a linkage of the random family without masses, loads and effects: only what is added makes forces."""
     scene = ANYWHERE.draw(rng)
     d, a, b, c = scene.linkage.lengths
-    return replace(scene, linkage=FourBar(d, Bar(a), Bar(b), Bar(c), scene.linkage.ground_angle), loads=(), effects=())
+    return replace(
+        scene,
+        linkage=FourBar(d, Bar(a), Bar(b), Bar(c), scene.linkage.ground_angle),
+        loads=(),
+        effects=(),
+    )
 
 
 def springs(rng: np.random.Generator) -> Scene:
     """Draw a spring near the length at which its force is zero, with a preload in every other scene."""
     scene = massless(rng)
-    first, second = (int(bar) for bar in rng.choice((1, *MOVING_BARS), 2, replace=False))
-    start, end = (SpringEnd(bar, *rng.uniform((0.0, -3.0), (1.0, 3.0)).tolist()) for bar in (first, second))
-    marked = replace(scene, points=(Point("P", first, start[1:]), Point("Q", second, end[1:])))
+    first, second = (
+        int(bar) for bar in rng.choice((1, *MOVING_BARS), 2, replace=False)
+    )
+    start, end = (
+        SpringEnd(bar, *rng.uniform((0.0, -3.0), (1.0, 3.0)).tolist())
+        for bar in (first, second)
+    )
+    marked = replace(
+        scene, points=(Point("P", first, start[1:]), Point("Q", second, end[1:]))
+    )
     places = solve(marked, "position").points
     distance = math.hypot(*(places["Q"] - places["P"])[0])
     stiffness, preload = float(rng.uniform(10.0, 1000.0)), 0.0
     if rng.random() < 0.5:
         preload = float(rng.uniform(-0.5, 2.0)) * stiffness * distance
     spring = Spring(
-        start, end, stiffness, max(distance * (1.0 + draw_deviation(rng)) + preload / stiffness, 0.0), preload
+        start,
+        end,
+        stiffness,
+        max(distance * (1.0 + draw_deviation(rng)) + preload / stiffness, 0.0),
+        preload,
     )
     return replace(scene, effects=(Springs((spring,)),))
 
@@ -159,13 +213,22 @@ def torsion(rng: np.random.Generator) -> Scene:
     scene = massless(rng)
     solution, pin = solve(scene, "position"), str(rng.choice(["A", "B", "O4"]))
     assert solution.theta_3 is not None and solution.theta_4 is not None
-    theta = (scene.linkage.ground_angle, solution.theta_2[0], solution.theta_3[0], solution.theta_4[0])
+    theta = (
+        scene.linkage.ground_angle,
+        solution.theta_2[0],
+        solution.theta_3[0],
+        solution.theta_4[0],
+    )
     first, second = PINS[pin]
     stiffness, preload = float(rng.uniform(0.1, 10.0)), 0.0
     if rng.random() < 0.5:
         preload = float(rng.uniform(-2.0, 2.0)) * stiffness
     turns = math.tau * float(rng.choice([0, 0, int(rng.integers(-100, 100))]))
-    rest = float(theta[second - 1] - theta[first - 1]) * (1.0 + draw_deviation(rng)) + preload / stiffness + turns
+    rest = (
+        float(theta[second - 1] - theta[first - 1]) * (1.0 + draw_deviation(rng))
+        + preload / stiffness
+        + turns
+    )
     return replace(scene, effects=(Torsion.at(**{pin: (stiffness, rest, preload)}),))
 
 
@@ -179,20 +242,43 @@ def tables(rng: np.random.Generator) -> Scene:
     angle = float(np.asarray(scene.motion.theta_2)) - linkage.ground_angle
     before, after = 10.0 ** rng.uniform(-3.0, 0.3, 2)
     rise = float(rng.uniform(-2.0, 2.0))
-    first = -rise * before * ((1.0 + draw_deviation(rng)) if rng.random() < 0.5 else float(rng.uniform(-2.0, 2.0)))
-    table = Table((angle - before, angle + after), (first, first + rise * (before + after)))
+    first = (
+        -rise
+        * before
+        * (
+            (1.0 + draw_deviation(rng))
+            if rng.random() < 0.5
+            else float(rng.uniform(-2.0, 2.0))
+        )
+    )
+    table = Table(
+        (angle - before, angle + after), (first, first + rise * (before + after))
+    )
     turns = int(rng.choice([0, 1, -1, int(10.0 ** rng.uniform(0.0, 9.0))]))
     size, arm = float(rng.uniform(0.1, 10.0)), float(rng.uniform(0.0, 1.0))
     turned = (float(x) for x in rng.uniform(-3.0, 3.0, 2))
     frame, moment = str(rng.choice(["world", "bar"])), float(rng.choice([0.0, size]))
-    load = Load(int(rng.choice(MOVING_BARS)), (size, next(turned)), (arm, next(turned)), moment, frame, table)
+    load = Load(
+        int(rng.choice(MOVING_BARS)),
+        (size, next(turned)),
+        (arm, next(turned)),
+        moment,
+        frame,
+        table,
+    )
     motion = scene.motion.replace(angle=angle + math.tau * turns)
-    return replace(scene, linkage=replace(linkage, ground_angle=0.0), loads=(load,), motion=motion)
+    return replace(
+        scene, linkage=replace(linkage, ground_angle=0.0), loads=(load,), motion=motion
+    )
 
 
 def drives(rng: np.random.Generator) -> Scene:
     """Draw a cylinder between any two bars."""
-    return _put_cylinder(ANYWHERE.draw(rng), rng, *rng.choice((1, *MOVING_BARS), 2, replace=False).tolist())
+    return _put_cylinder(
+        ANYWHERE.draw(rng),
+        rng,
+        *rng.choice((1, *MOVING_BARS), 2, replace=False).tolist(),
+    )
 
 
 def strokes(rng: np.random.Generator) -> Scene:
@@ -201,9 +287,21 @@ def strokes(rng: np.random.Generator) -> Scene:
     scene = _put_cylinder(ANYWHERE.draw(rng), rng, 1, bar)
     solution = solve(scene, "acceleration")
     assert solution.stroke is not None and solution.stroke_speed is not None
-    assert solution.theta_3 is not None and solution.theta_4 is not None and solution.omega_4 is not None
-    first, second = (solution.theta_3, solution.theta_4) if bar == 2 else (solution.theta_2, solution.theta_3)
-    grows = solution.stroke_speed[0] * (float(scene.motion.speed or 0.0) if bar == 2 else solution.omega_4[0]) > 0.0
+    assert (
+        solution.theta_3 is not None
+        and solution.theta_4 is not None
+        and solution.omega_4 is not None
+    )
+    first, second = (
+        (solution.theta_3, solution.theta_4)
+        if bar == 2
+        else (solution.theta_2, solution.theta_3)
+    )
+    grows = (
+        solution.stroke_speed[0]
+        * (float(scene.motion.speed or 0.0) if bar == 2 else solution.omega_4[0])
+        > 0.0
+    )
     motion = Motion(
         stroke=float(solution.stroke[0]),
         stroke_speed=float(solution.stroke_speed[0]),
@@ -214,8 +312,13 @@ def strokes(rng: np.random.Generator) -> Scene:
     return replace(scene, motion=motion)
 
 
-def _put_cylinder(scene: Scene, rng: np.random.Generator, one: int, other: int) -> Scene:
-    ends = (SpringEnd(bar, *rng.uniform((0.05, -3.0), (1.0, 3.0)).tolist()) for bar in (one, other))
+def _put_cylinder(
+    scene: Scene, rng: np.random.Generator, one: int, other: int
+) -> Scene:
+    ends = (
+        SpringEnd(bar, *rng.uniform((0.05, -3.0), (1.0, 3.0)).tolist())
+        for bar in (one, other)
+    )
     return replace(scene, drive_bar=None, drive=LinearDrive(*ends))  # type: ignore[arg-type]
 
 
@@ -227,20 +330,44 @@ def near_pins(rng: np.random.Generator) -> Scene:
     scene, pin = massless(rng), str(rng.choice(list(PINS)))
     near = {"O2": 1, "A": 3, "B": 3, "O4": 4}[pin]
     (far,) = {*PINS[pin]} - {near}
-    distance, angle = float(10.0 ** rng.uniform(-11.0, -1.0)), float(rng.uniform(-3.0, 3.0))
+    distance, angle = (
+        float(10.0 ** rng.uniform(-11.0, -1.0)),
+        float(rng.uniform(-3.0, 3.0)),
+    )
     if pin == SECOND_PIN[near]:
-        distance, angle = cmath.polar(scene.linkage.lengths[near - 1] - cmath.rect(distance, angle))
-    start, end = SpringEnd(near, distance, angle), SpringEnd(far, *rng.uniform((0.1, -3.0), (1.0, 3.0)).tolist())
+        distance, angle = cmath.polar(
+            scene.linkage.lengths[near - 1] - cmath.rect(distance, angle)
+        )
+    start, end = (
+        SpringEnd(near, distance, angle),
+        SpringEnd(far, *rng.uniform((0.1, -3.0), (1.0, 3.0)).tolist()),
+    )
     if rng.random() < 0.5:
         start, end = end, start
     kind = rng.integers(0, 3)
     if kind == 0 and pin in ("A", "B", "O4"):
-        bars = {bar: replace(scene.linkage.bar(bar), centre=(0.0, 0.0)) for bar in MOVING_BARS}
-        force, frame = (1.0, float(rng.uniform(-3.0, 3.0))), str(rng.choice(["world", "bar"]))
-        linkage = FourBar(scene.linkage.ground, bars[2], bars[3], bars[4], scene.linkage.ground_angle)
-        return replace(scene, linkage=linkage, loads=(Load(near, force, (distance, angle), 0.0, frame),))
+        bars = {
+            bar: replace(scene.linkage.bar(bar), centre=(0.0, 0.0))
+            for bar in MOVING_BARS
+        }
+        force, frame = (
+            (1.0, float(rng.uniform(-3.0, 3.0))),
+            str(rng.choice(["world", "bar"])),
+        )
+        linkage = FourBar(
+            scene.linkage.ground, bars[2], bars[3], bars[4], scene.linkage.ground_angle
+        )
+        return replace(
+            scene,
+            linkage=linkage,
+            loads=(Load(near, force, (distance, angle), 0.0, frame),),
+        )
     if kind == 1:
-        return replace(ANYWHERE.draw(rng), drive_bar=None, drive=LinearDrive(start, end))  # type: ignore[arg-type]
+        return replace(
+            ANYWHERE.draw(rng),
+            drive_bar=None,
+            drive=LinearDrive(start, end),  # type: ignore[arg-type]
+        )
     stiffness, length = float(rng.uniform(10.0, 1000.0)), float(rng.uniform(0.0, 2.0))
     return replace(scene, effects=(Springs((Spring(start, end, stiffness, length),)),))
 

@@ -42,12 +42,20 @@ LOADS = (
     Load(2, (1.0, 0.3), (0.02, -0.7)),
 )
 WEIGHT = Gravity(9.81, -1.3)
-POINTS = (Point("P", 3, (0.1, 0.7)), Point("Q", 4, (0.05, -0.3)), Point("R", 2, (0.03, 0.2)))
+POINTS = (
+    Point("P", 3, (0.1, 0.7)),
+    Point("Q", 4, (0.05, -0.3)),
+    Point("R", 2, (0.03, 0.2)),
+)
 CRANK_ROCKER = Scene(CRANK, TURN, 2, LOADS, (WEIGHT,), points=POINTS)
 FAULT_SCENES: dict[str, Scene] = {
     "crank-rocker": CRANK_ROCKER,
-    "coupler driven": replace(CRANK_ROCKER, motion=TURN.replace(branch=CROSSED), drive_bar=3),
-    "output driven": replace(CRANK_ROCKER, motion=Motion(Sweep(0.5, 1.5, 12), -10.0, 5.0), drive_bar=4),
+    "coupler driven": replace(
+        CRANK_ROCKER, motion=TURN.replace(branch=CROSSED), drive_bar=3
+    ),
+    "output driven": replace(
+        CRANK_ROCKER, motion=Motion(Sweep(0.5, 1.5, 12), -10.0, 5.0), drive_bar=4
+    ),
     "cylinder": replace(
         CRANK_ROCKER,
         motion=TURN.replace(branch=CROSSED),
@@ -56,18 +64,35 @@ FAULT_SCENES: dict[str, Scene] = {
     ),
     "stroke": replace(
         CRANK_ROCKER,
-        motion=Motion(stroke=Sweep(0.25, 0.35, 12), stroke_speed=0.2, stroke_acceleration=0.1, side="left"),
+        motion=Motion(
+            stroke=Sweep(0.25, 0.35, 12),
+            stroke_speed=0.2,
+            stroke_acceleration=0.1,
+            side="left",
+        ),
         drive_bar=None,  # type: ignore[arg-type]
         drive=LinearDrive(SpringEnd(1, 0.3, 2.2), SpringEnd(2, 0.12, 0.4)),
     ),
     "stroke of the output": replace(
         CRANK_ROCKER,
-        motion=Motion(stroke=Sweep(0.33, 0.36, 12), stroke_speed=0.2, stroke_acceleration=0.1, side="right"),
+        motion=Motion(
+            stroke=Sweep(0.33, 0.36, 12),
+            stroke_speed=0.2,
+            stroke_acceleration=0.1,
+            side="right",
+        ),
         drive_bar=None,  # type: ignore[arg-type]
         drive=LinearDrive(SpringEnd(1, 0.5, -0.5), SpringEnd(4, 0.09, 0.7)),
     ),
-    "output commanded": replace(CRANK_ROCKER, motion=Motion(theta_4=Sweep(1.8, 2.5, 12), omega_4=3.0), drive_bar=4),
-    "coupler commanded": replace(CRANK_ROCKER, motion=Motion(theta_3=Sweep(0.4, 0.8, 12), omega_3=3.0, branch=CROSSED)),
+    "output commanded": replace(
+        CRANK_ROCKER,
+        motion=Motion(theta_4=Sweep(1.8, 2.5, 12), omega_4=3.0),
+        drive_bar=4,
+    ),
+    "coupler commanded": replace(
+        CRANK_ROCKER,
+        motion=Motion(theta_3=Sweep(0.4, 0.8, 12), omega_3=3.0, branch=CROSSED),
+    ),
     "cylinder on the ground": replace(
         CRANK_ROCKER,
         drive_bar=None,  # type: ignore[arg-type]
@@ -82,23 +107,34 @@ FAULT_SCENES: dict[str, Scene] = {
         effects=(WEIGHT,),
     ),
     "near a limit": Scene(
-        ROCKER, Motion(limit_positions(ROCKER)[0].theta_2 + np.array([1e-2, 1e-3]), 1.0), effects=(WEIGHT,)
+        ROCKER,
+        Motion(limit_positions(ROCKER)[0].theta_2 + np.array([1e-2, 1e-3]), 1.0),
+        effects=(WEIGHT,),
     ),
     "nearest to a limit": Scene(
-        ROCKER, Motion(limit_positions(ROCKER)[0].theta_2 + np.array([1e-3, 1e-13]), 1.0), effects=(WEIGHT,)
+        ROCKER,
+        Motion(limit_positions(ROCKER)[0].theta_2 + np.array([1e-3, 1e-13]), 1.0),
+        effects=(WEIGHT,),
     ),
-    "a hair from a limit": Scene(ROCKER, Motion(FromLimit(1, 1e-9), 1.0), effects=(WEIGHT,)),
+    "a hair from a limit": Scene(
+        ROCKER, Motion(FromLimit(1, 1e-9), 1.0), effects=(WEIGHT,)
+    ),
     "positions": Scene(CRANK, Motion(Sweep(0.0, 6.0, 12))),
     "damped": replace(
         CRANK_ROCKER,
-        effects=(Viscous.at(O2=0.01, A=0.02, B=0.03, O4=0.015), Friction.at(O2=0.02, A=0.05, B=0.04, O4=0.03)),
+        effects=(
+            Viscous.at(O2=0.01, A=0.02, B=0.03, O4=0.015),
+            Friction.at(O2=0.02, A=0.05, B=0.04, O4=0.03),
+        ),
     ),
     "sprung": replace(
         CRANK_ROCKER,
         effects=(
             Springs(
                 (
-                    Spring(SpringEnd(1, 0.2, 0.6), SpringEnd(3, 0.15, -0.4), 80.0, 0.1, 2.0),
+                    Spring(
+                        SpringEnd(1, 0.2, 0.6), SpringEnd(3, 0.15, -0.4), 80.0, 0.1, 2.0
+                    ),
                     Spring(SpringEnd(2, 0.05, 0.3), SpringEnd(4, 0.1, 0.5), 50.0, 0.12),
                 )
             ),
@@ -110,14 +146,27 @@ FAULT_SCENES: dict[str, Scene] = {
         CRANK_ROCKER,
         effects=(
             Springs(
-                tuple(Spring(SpringEnd(i, 0.12, 0.5), SpringEnd(j, 0.09, -0.4), 60.0, 0.1) for i, j in PINS.values())
+                tuple(
+                    Spring(SpringEnd(i, 0.12, 0.5), SpringEnd(j, 0.09, -0.4), 60.0, 0.1)
+                    for i, j in PINS.values()
+                )
             ),
         ),
     ),
-    "flywheel": replace(CRANK_ROCKER, effects=(Flywheel(0.003, 2), Torsion.at(A=(0.5, 0.2, 0.1)))),
-    "wound": Scene(CRANK, Motion(Sweep(0.0, 9.0, 30), 5.0), effects=(Torsion.at(O2=(0.5, 1.0, 0.1)),)),
-    "sliding pins": replace(CRANK_ROCKER, effects=(WEIGHT, PinFriction.at(A=(0.2, 0.02), O4=(0.3, 0.03)))),
-    "one sliding pin": replace(CRANK_ROCKER, effects=(WEIGHT, PinFriction.at(B=(0.3, 0.03))), drive_bar=4),
+    "flywheel": replace(
+        CRANK_ROCKER, effects=(Flywheel(0.003, 2), Torsion.at(A=(0.5, 0.2, 0.1)))
+    ),
+    "wound": Scene(
+        CRANK,
+        Motion(Sweep(0.0, 9.0, 30), 5.0),
+        effects=(Torsion.at(O2=(0.5, 1.0, 0.1)),),
+    ),
+    "sliding pins": replace(
+        CRANK_ROCKER, effects=(WEIGHT, PinFriction.at(A=(0.2, 0.02), O4=(0.3, 0.03)))
+    ),
+    "one sliding pin": replace(
+        CRANK_ROCKER, effects=(WEIGHT, PinFriction.at(B=(0.3, 0.03))), drive_bar=4
+    ),
     "at rest": Scene(
         CRANK,
         Motion(Sweep(0.1, 6.0, 12), 0.0),
@@ -133,17 +182,30 @@ FAULT_SCENES: dict[str, Scene] = {
                 (3.0, 0.7),
                 (0.05, 1.0),
                 0.2,
-                table=Table((0.1, 2.0, 4.0, 0.1 + 2.0 * math.pi), (1.0, -0.5, 2.0, 1.0)),
+                table=Table(
+                    (0.1, 2.0, 4.0, 0.1 + 2.0 * math.pi), (1.0, -0.5, 2.0, 1.0)
+                ),
             ),
         ),
     ),
     "law": Scene(
         CRANK,
-        Motion(law=Law((0.0, 0.2, 0.5, 0.9, 1.2), (0.3, 1.5, 3.1, 5.2, 0.3 + 2.0 * math.pi), 16, "periodic")),
+        Motion(
+            law=Law(
+                (0.0, 0.2, 0.5, 0.9, 1.2),
+                (0.3, 1.5, 3.1, 5.2, 0.3 + 2.0 * math.pi),
+                16,
+                "periodic",
+            )
+        ),
         effects=(WEIGHT,),
     ),
-    "law at rest": Scene(CRANK, Motion(law=Law((0.0, 0.3, 0.7, 1.0), (0.3, 1.0, 2.2, 3.0), 16, "rest"))),
-    "free law": Scene(CRANK, Motion(law=Law((0.0, 0.3, 0.7, 1.0, 1.4), (0.3, 1.0, 2.2, 3.0, 3.3), 16))),
+    "law at rest": Scene(
+        CRANK, Motion(law=Law((0.0, 0.3, 0.7, 1.0), (0.3, 1.0, 2.2, 3.0), 16, "rest"))
+    ),
+    "free law": Scene(
+        CRANK, Motion(law=Law((0.0, 0.3, 0.7, 1.0, 1.4), (0.3, 1.0, 2.2, 3.0, 3.3), 16))
+    ),
     "released": Scene(CRANK, Motion(1.0, 3.0, free=Free(0.5, 50)), effects=(WEIGHT,)),
     "released, damped": Scene(
         CRANK,
@@ -153,12 +215,20 @@ FAULT_SCENES: dict[str, Scene] = {
         (WEIGHT, Viscous.at(O4=0.01, B=0.003), Friction.at(O2=0.02)),
     ),
     "double rocker released": Scene(
-        ROCKER, Motion(math.radians(50.0), 0.0, through="follow", free=Free(1.0, 100)), effects=(Gravity(),)
+        ROCKER,
+        Motion(math.radians(50.0), 0.0, through="follow", free=Free(1.0, 100)),
+        effects=(Gravity(),),
     ),
-    "several solutions": Scene(CRANK, Motion(np.array([2.3, 2.5]), 10.0), effects=(PinFriction.at(A=(50.0, 0.01)),)),
+    "several solutions": Scene(
+        CRANK,
+        Motion(np.array([2.3, 2.5]), 10.0),
+        effects=(PinFriction.at(A=(50.0, 0.01)),),
+    ),
     "near a reversal": Scene(
         CRANK,
-        Motion(limit_positions(CRANK, 4)[0].theta_2 + np.array([1.0, 1e-2, 1e-4]), 10.0),
+        Motion(
+            limit_positions(CRANK, 4)[0].theta_2 + np.array([1.0, 1e-2, 1e-4]), 10.0
+        ),
         effects=(Friction.at(O4=0.03),),
     ),
     "short output": Scene(
@@ -175,18 +245,40 @@ FAULT_SCENES: dict[str, Scene] = {
         Motion(-0.8201413926223766, 10.0),
     ),
     "left open": Scene(ROCKER, Motion(omega_2=3.0)),
-    "many turns away": Scene(CRANK, Motion(Sweep(20.0, 22.0, 10), 5.0), effects=(Torsion.at(O2=(0.5, 1.0, 0.1)),)),
+    "many turns away": Scene(
+        CRANK,
+        Motion(Sweep(20.0, 22.0, 10), 5.0),
+        effects=(Torsion.at(O2=(0.5, 1.0, 0.1)),),
+    ),
     "ends of a spring nearly meet": Scene(
         CRANK,
         Motion(1.0 + np.array([1e-5, 0.1, 1.0]), 10.0),
-        effects=(Springs((Spring(SpringEnd(1, 0.1, 0.8), SpringEnd(2, 0.1, 0.0), 80.0, 0.05),)),),
+        effects=(
+            Springs(
+                (Spring(SpringEnd(1, 0.1, 0.8), SpringEnd(2, 0.1, 0.0), 80.0, 0.05),)
+            ),
+        ),
     ),
-    "held by friction": Scene(CRANK, Motion(1.0, 0.0, free=Free(0.5, 5)), effects=(WEIGHT, Friction.at(B=0.3, O2=2.0))),
-    "held in the end": Scene(CRANK, Motion(1.0, 3.0, free=Free(1.0, 20)), effects=(WEIGHT, Friction.at(A=0.3, O4=1.0))),
+    "held by friction": Scene(
+        CRANK,
+        Motion(1.0, 0.0, free=Free(0.5, 5)),
+        effects=(WEIGHT, Friction.at(B=0.3, O2=2.0)),
+    ),
+    "held in the end": Scene(
+        CRANK,
+        Motion(1.0, 3.0, free=Free(1.0, 20)),
+        effects=(WEIGHT, Friction.at(A=0.3, O4=1.0)),
+    ),
     "from rest against friction": Scene(
-        CRANK, Motion(1.0, 0.0, free=Free(0.5, 20)), effects=(WEIGHT, Friction.at(A=0.01, O4=0.02))
+        CRANK,
+        Motion(1.0, 0.0, free=Free(0.5, 20)),
+        effects=(WEIGHT, Friction.at(A=0.01, O4=0.02)),
     ),
-    "released to a limit": Scene(ROCKER, Motion(math.radians(50.0), 3.0, free=Free(1.0, 100)), effects=(Gravity(),)),
+    "released to a limit": Scene(
+        ROCKER,
+        Motion(math.radians(50.0), 3.0, free=Free(1.0, 100)),
+        effects=(Gravity(),),
+    ),
     "turning over change points": Scene(
         FourBar(0.3, Bar(0.1, 0.2), Bar(0.3, 0.5), Bar(0.1, 0.4)),
         Motion(0.5, 25.0, through="follow", free=Free(0.4, 400)),
@@ -197,9 +289,16 @@ FAULT_SCENES: dict[str, Scene] = {
         Motion(np.array([0.0018, 0.01]), 10.0),
         effects=(WEIGHT,),
     ),
-    "no torque": Scene(uniform(0.3, 0.1, 0.3, 0.1), Motion(np.array([0.5, 1.0]), 10.0), 3, effects=(WEIGHT,)),
+    "no torque": Scene(
+        uniform(0.3, 0.1, 0.3, 0.1),
+        Motion(np.array([0.5, 1.0]), 10.0),
+        3,
+        effects=(WEIGHT,),
+    ),
     "shipped": Scene(SLENDER, TURN, effects=(WEIGHT,), points=POINTS),
-    "shipped, limited": Scene(ROCKER, Motion(Sweep(0.3, 1.4, 22), 3.0), effects=(WEIGHT,)),
+    "shipped, limited": Scene(
+        ROCKER, Motion(Sweep(0.3, 1.4, 22), 3.0), effects=(WEIGHT,)
+    ),
     "shipped, loaded": Scene(SLENDER, TURN, 2, LOADS, (WEIGHT,)),
     "simulated": Scene(
         CRANK,
@@ -209,11 +308,19 @@ FAULT_SCENES: dict[str, Scene] = {
         (
             WEIGHT,
             Viscous.at(A=0.002, B=0.003),
-            Springs((Spring(SpringEnd(1, 0.2, 0.6), SpringEnd(3, 0.15, -0.4), 80.0, 0.1, 2.0),)),
+            Springs(
+                (
+                    Spring(
+                        SpringEnd(1, 0.2, 0.6), SpringEnd(3, 0.15, -0.4), 80.0, 0.1, 2.0
+                    ),
+                )
+            ),
         ),
     ),
     "simulated, dry": Scene(
-        CRANK, Motion(Sweep(0.1, 3.0, 8), 10.0), effects=(Friction.at(A=0.05, B=0.04), Torsion.at(O4=(0.3, 1.2, -0.05)))
+        CRANK,
+        Motion(Sweep(0.1, 3.0, 8), 10.0),
+        effects=(Friction.at(A=0.05, B=0.04), Torsion.at(O4=(0.3, 1.2, -0.05))),
     ),
     "simulated cylinder": Scene(
         CRANK,
@@ -223,15 +330,25 @@ FAULT_SCENES: dict[str, Scene] = {
     ),
     "simulated stroke": Scene(
         CRANK,
-        Motion(stroke=Sweep(0.25, 0.35, 8), stroke_speed=0.2, stroke_acceleration=0.1, side="left"),
+        Motion(
+            stroke=Sweep(0.25, 0.35, 8),
+            stroke_speed=0.2,
+            stroke_acceleration=0.1,
+            side="left",
+        ),
         loads=LOADS,
         drive=LinearDrive(SpringEnd(1, 0.3, 2.2), SpringEnd(2, 0.12, 0.4)),
     ),
-    "simulated, quickening": Scene(CRANK, Motion(Sweep(0.1, 3.0, 8), 10.0, 20.0), 4, effects=(Flywheel(0.003, 4),)),
+    "simulated, quickening": Scene(
+        CRANK, Motion(Sweep(0.1, 3.0, 8), 10.0, 20.0), 4, effects=(Flywheel(0.003, 4),)
+    ),
 }
 """Scenes by the name under which an entry of faults.toml tries its fault; scenes called "shipped" judge what else is
 shipped."""
 CAPABILITIES = read_default_suite()
 for index in range(len(CAPABILITIES)):
     if (name := CAPABILITIES.name(index)) in CAPABILITIES.not_drawn:
-        FAULT_SCENES |= {f"{judged}, {name}": CAPABILITIES.scene(index) for judged in ("simulated", "shipped")}
+        FAULT_SCENES |= {
+            f"{judged}, {name}": CAPABILITIES.scene(index)
+            for judged in ("simulated", "shipped")
+        }

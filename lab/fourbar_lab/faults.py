@@ -26,10 +26,17 @@ Failing = dict[str, list[str]]
 
 def try_faults(numbers: Sequence[int]) -> list[Failing] | str:
     """Try the fault of each number in turn, or none: the rows that fail, or why there is no result."""
-    packages = dict.fromkeys(str(folder) for folder in (FORMULAS.parent, PACKAGE.parent, Path(__file__).parents[1]))
+    packages = dict.fromkeys(
+        str(folder)
+        for folder in (FORMULAS.parent, PACKAGE.parent, Path(__file__).parents[1])
+    )
     line = [sys.executable, "-P", injection.__file__, *numbers]
-    done = run_to_end(line, seconds=SECONDS, variables={"PYTHONPATH": os.pathsep.join(packages)})
-    return done.why or [json.loads(each) for each in done.out.splitlines()[-max(1, len(numbers)) :]]
+    done = run_to_end(
+        line, seconds=SECONDS, variables={"PYTHONPATH": os.pathsep.join(packages)}
+    )
+    return done.why or [
+        json.loads(each) for each in done.out.splitlines()[-max(1, len(numbers)) :]
+    ]
 
 
 def explain_survival(entry: dict[str, Any], failing: Failing | str) -> str | None:
@@ -57,13 +64,25 @@ def try_in_turn(numbers: Sequence[int]) -> list[Failing | str]:
 def try_every_fault(workers: int) -> Iterator[tuple[str, str | None]]:
     """Try every fault: the reason why it survives, or None; first the tree without a fault."""
     entries, rows = read_faults(), try_faults(())
-    failing = rows if isinstance(rows, str) else [row for outcome in rows[0].values() for row in outcome]
+    failing = (
+        rows
+        if isinstance(rows, str)
+        else [row for outcome in rows[0].values() for row in outcome]
+    )
     yield "no fault", f"the harness fails without one: {failing}" if failing else None
-    chunks = [range(start, min(start + CHUNK, len(entries))) for start in range(0, len(entries), CHUNK)]
-    for chunk, outcomes in zip(chunks, apply_each(try_in_turn, chunks, workers), strict=True):
+    chunks = [
+        range(start, min(start + CHUNK, len(entries)))
+        for start in range(0, len(entries), CHUNK)
+    ]
+    for chunk, outcomes in zip(
+        chunks, apply_each(try_in_turn, chunks, workers), strict=True
+    ):
         for number, outcome in zip(chunk, outcomes, strict=True):
             why = explain_survival(entries[number], outcome)
-            yield entries[number]["fault"], None if why and "harmless" in entries[number] else why
+            yield (
+                entries[number]["fault"],
+                None if why and "harmless" in entries[number] else why,
+            )
 
 
 @click.command()
@@ -74,10 +93,17 @@ def command(workers: int) -> int:
     from rich.progress import track
 
     results = list(
-        track(try_every_fault(workers), "injecting", total=len(read_faults()) + 1, console=Console(stderr=True))
+        track(
+            try_every_fault(workers),
+            "injecting",
+            total=len(read_faults()) + 1,
+            console=Console(stderr=True),
+        )
     )
     survivors = [(fault, why) for fault, why in results if why is not None]
     for fault, why in survivors:
         click.echo(f"{fault}: {why}")
-    click.echo(f"{len(results) - 1} faults, {len(survivors)} of them survive without a reason on record")
+    click.echo(
+        f"{len(results) - 1} faults, {len(survivors)} of them survive without a reason on record"
+    )
     return FAILED if survivors else HOLDS

@@ -62,14 +62,22 @@ RANGES = {
         ORDINARY,
         mass=draw_chance(0.85, SIZES[True]),
         inertia=draw_chance(0.85, ORDINARY.inertia),
-        centre=draw_product(ORDINARY.centre, draw_chance(0.2, draw_decades(0.0, 3.0), 1.0)),
-        ground_angle=lambda rng: float(rng.choice([0.0, math.pi, rng.uniform(-3.2, 3.2)])),
+        centre=draw_product(
+            ORDINARY.centre, draw_chance(0.2, draw_decades(0.0, 3.0), 1.0)
+        ),
+        ground_angle=lambda rng: float(
+            rng.choice([0.0, math.pi, rng.uniform(-3.2, 3.2)])
+        ),
         load=draw_product(ORDINARY.load, SIZES[True]),
         speed=draw_chance(0.95, SIZES[True]),
     ),
 }
 """Distributions from which the scenes are drawn: ordinary, adversarial."""
-KEPT = Path("results/counterexamples") if CHECKOUT is None else CHECKOUT / "tests" / "counterexamples"
+KEPT = (
+    Path("results/counterexamples")
+    if CHECKOUT is None
+    else CHECKOUT / "tests" / "counterexamples"
+)
 DIGITS = (1, 2, 3, 6, 10)
 ROUNDS = 4
 NUMBER = re.compile(r'(?<=")-?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?= )')
@@ -77,7 +85,11 @@ NUMBER = re.compile(r'(?<=")-?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?= )')
 NEEDED = ("[motion]", "theta_2", "omega_2")
 """A scene without them has no torque, and fails for another reason."""
 LAB = Path(__file__).parent
-EXACT = tuple(hold_fully(w) for w in ENGINES if w.name in ("pinocchio-inverse", "mujoco-inverse", "free-body"))
+EXACT = tuple(
+    hold_fully(w)
+    for w in ENGINES
+    if w.name in ("pinocchio-inverse", "mujoco-inverse", "free-body")
+)
 """The exact engines, held to full accuracy or to what was predicted for the position."""
 CHUNK, CHUNK_OF_PROOFS = 200, 10
 """Scenes per task: some seconds, which is what an interruption costs."""
@@ -94,17 +106,27 @@ def draw_fuzz_scene(seed: int, index: int) -> Scene:
             scene = FAMILIES[index % 2 == 1].draw(rng)
         except InputError:
             continue
-        alpha = float(rng.uniform(-10.0, 10.0)) if rng.random() < 1.0 / 3.0 else scene.motion.alpha_2
+        alpha = (
+            float(rng.uniform(-10.0, 10.0))
+            if rng.random() < 1.0 / 3.0
+            else scene.motion.alpha_2
+        )
         return replace(scene, motion=scene.motion.replace(acceleration=alpha))
 
 
 def _draw_place(hard: bool, rng: np.random.Generator) -> Place:
     size = SIZES[hard](rng)
     lengths = tuple(float(x * size) for x in _draw_lengths(rng, hard))
-    return lengths, lambda rng, linkage: linkage.ground_angle + _draw_angles(rng, hard, lengths)
+    return (
+        lengths,
+        lambda rng, linkage: linkage.ground_angle + _draw_angles(rng, hard, lengths),
+    )
 
 
-FAMILIES = {hard: RandomFamily(partial(_draw_place, hard), RANGES[hard]) for hard in (False, True)}
+FAMILIES = {
+    hard: RandomFamily(partial(_draw_place, hard), RANGES[hard])
+    for hard in (False, True)
+}
 """Families of the scenes: ordinary, adversarial."""
 
 
@@ -115,13 +137,18 @@ def _draw_lengths(rng: np.random.Generator, hard: bool) -> Any:
     if choice < 0.1:
         return (x[0], x[1], x[0], x[1])
     if choice < 0.2:
-        return (x[0], x[1], x[1], x[0]) if rng.random() < 0.5 else (x[0], x[0], x[1], x[1])
+        return (
+            (x[0], x[1], x[1], x[0]) if rng.random() < 0.5 else (x[0], x[0], x[1], x[1])
+        )
     if choice < 0.35:
         return (
             x[0],
             x[1],
             x[2],
-            x[0] + x[1] - x[2] + float(rng.choice([0.0, 1.0, -1.0])) * 10.0 ** rng.uniform(-15, -3),
+            x[0]
+            + x[1]
+            - x[2]
+            + float(rng.choice([0.0, 1.0, -1.0])) * 10.0 ** rng.uniform(-15, -3),
         )
     if choice < 0.6:
         small = 10.0 ** rng.uniform(-6, 0, 2)
@@ -132,7 +159,9 @@ def _draw_lengths(rng: np.random.Generator, hard: bool) -> Any:
     return x
 
 
-def _draw_angles(rng: np.random.Generator, hard: bool, lengths: tuple[float, ...]) -> Any:
+def _draw_angles(
+    rng: np.random.Generator, hard: bool, lengths: tuple[float, ...]
+) -> Any:
     """Draw theta_2 - theta_1: anywhere, or near a limit position, a change point, or many turns away."""
     psi = rng.uniform(-3.2, 3.2, POSITIONS)
     if not hard:
@@ -143,13 +172,13 @@ def _draw_angles(rng: np.random.Generator, hard: bool, lengths: tuple[float, ...
         diagonal = b + c if rng.random() < 0.5 else abs(b - c)
         cosine = (a * a + d * d - diagonal**2) / (2 * a * d)
         base = math.acos(min(1.0, max(-1.0, cosine)))
-        psi = float(rng.choice([-1.0, 1.0])) * base + rng.choice([-1.0, 1.0], POSITIONS) * 10.0 ** rng.uniform(
-            -14, -1, POSITIONS
-        )
+        psi = float(rng.choice([-1.0, 1.0])) * base + rng.choice(
+            [-1.0, 1.0], POSITIONS
+        ) * 10.0 ** rng.uniform(-14, -1, POSITIONS)
     elif choice < 0.6:
-        psi = float(rng.choice([0.0, math.pi])) + rng.choice([-1.0, 0.0, 1.0], POSITIONS) * 10.0 ** rng.uniform(
-            -9, -1, POSITIONS
-        )
+        psi = float(rng.choice([0.0, math.pi])) + rng.choice(
+            [-1.0, 0.0, 1.0], POSITIONS
+        ) * 10.0 ** rng.uniform(-9, -1, POSITIONS)
     elif choice < 0.65:
         psi = psi + 2 * math.pi * rng.integers(-1000, 1000)
     return psi
@@ -160,7 +189,9 @@ def shrink_scene(scene: Scene, fails: Callable[[Scene], bool]) -> Scene:
     lines = dump(scene).splitlines()
     for _ in range(ROUNDS):
         before = lines
-        for number in reversed(range(len(lines))):  # lines that a change removes lie behind
+        for number in reversed(
+            range(len(lines))
+        ):  # lines that a change removes lie behind
             for simpler in _list_simpler(lines, number):
                 try:
                     simpler_scene = loads("\n".join(simpler))
@@ -178,13 +209,25 @@ def _list_simpler(lines: list[str], number: int) -> Iterator[list[str]]:
     """Leave out one line, or the table that it begins, or put a simpler entry in the line."""
     line, until = lines[number], number + 1
     if line.startswith("["):
-        until = next((i for i in range(until, len(lines)) if lines[i].startswith("[")), len(lines))
+        until = next(
+            (i for i in range(until, len(lines)) if lines[i].startswith("[")),
+            len(lines),
+        )
     if not line.startswith(NEEDED):
         yield [*lines[:number], *lines[until:]]
     key, _, value = line.partition(" = ")
-    entries = [f"{key} = {json.dumps(each)}" for each in json.loads(value)] if value.startswith('["') else []
+    entries = (
+        [f"{key} = {json.dumps(each)}" for each in json.loads(value)]
+        if value.startswith('["')
+        else []
+    )
     for digits in DIGITS:
-        entries.append(NUMBER.sub(lambda match, digits=digits: f"{float(match[0]):.{digits}g}", line))  # type: ignore[misc]
+        entries.append(
+            NUMBER.sub(
+                lambda match, digits=digits: f"{float(match[0]):.{digits}g}",
+                line,  # type: ignore[misc]
+            )
+        )
     for entry in entries:
         if entry != line:
             yield [*lines[:number], entry, *lines[number + 1 :]]
@@ -217,7 +260,11 @@ def list_findings(scene: Scene) -> list[str]:
 def _check_file(scene: Scene) -> list[str]:
     """Write a scene file and read it again: it must be the same scene to the last digit."""
     again = dump(loads(dump(scene)))
-    return [] if again == dump(scene) else ["file: a scene that was written and read is another one"]
+    return (
+        []
+        if again == dump(scene)
+        else ["file: a scene that was written and read is another one"]
+    )
 
 
 def _check_assembly(scene: Scene, commanded: Command, solution: Solution) -> list[str]:
@@ -227,25 +274,43 @@ def _check_assembly(scene: Scene, commanded: Command, solution: Solution) -> lis
     problems = []
     margin = np.abs(find_margin(scene.linkage, commanded.theta_2))
     for i, theta_2 in enumerate(commanded.theta_2):
-        closes = closure(make_balls(scene, float(theta_2)), int(commanded.branch[i])) is not None
+        closes = (
+            closure(make_balls(scene, float(theta_2)), int(commanded.branch[i]))
+            is not None
+        )
         if closes != bool(solution.assembled[i]) and margin[i] > TOUCHING_MARGIN:
-            problems.append(f"assembled: the formulas say {bool(solution.assembled[i])} at theta_2 = {theta_2!r}")
+            problems.append(
+                f"assembled: the formulas say {bool(solution.assembled[i])} at theta_2 = {theta_2!r}"
+            )
         angles = (solution.theta_3[i], solution.theta_4[i])
         if np.isfinite(angles).any() and not solution.assembled[i]:
-            problems.append(f"assembled: angles where the loop does not close, theta_2 = {theta_2!r}")
+            problems.append(
+                f"assembled: angles where the loop does not close, theta_2 = {theta_2!r}"
+            )
     return problems
 
 
 def _check_engines(question: Question) -> list[str]:
-    scene, commanded, solution, rows = question.scene, question.at, question.solution, list(check_identities(question))
+    scene, commanded, solution, rows = (
+        question.scene,
+        question.at,
+        question.solution,
+        list(check_identities(question)),
+    )
     for engine in EXACT:
         answer = engine.start().answer(scene, commanded)
         held = hold(engine, scene, commanded, answer)
         rows += Comparison("", scene, answer, solution, held).rows()
-        if engine.name == "pinocchio-inverse" and answer.refusal is None:  # the quicker of two exact engines
-            rows += check_statements("", scene, engine.start(), answer, predicted=held.predicted)
+        if (
+            engine.name == "pinocchio-inverse" and answer.refusal is None
+        ):  # the quicker of two exact engines
+            rows += check_statements(
+                "", scene, engine.start(), answer, predicted=held.predicted
+            )
     # half of the scenes are drawn where doubles have few digits: that they are undecided is no fault
-    failed = [row for row in rows if row.verdict == FAILS and row.quantity != "undecided"]
+    failed = [
+        row for row in rows if row.verdict == FAILS and row.quantity != "undecided"
+    ]
     return [f"{row.engine} {row.quantity}: {row.reason}" for row in failed]
 
 
@@ -262,28 +327,58 @@ def _find_lost(_: int, error: Exception, __: object) -> list[str]:
     return [f"{LOST} {say_error(error)}"]
 
 
-def run(count: int, seed: int, out: Path, workers: int, bounds: bool = False) -> Iterator[dict[str, list[str]]]:
+def run(
+    count: int, seed: int, out: Path, workers: int, bounds: bool = False
+) -> Iterator[dict[str, list[str]]]:
     """Examine the scenes chunk by chunk, what is wrong by number; chunks of an interrupted run are read."""
     size = CHUNK_OF_PROOFS if bounds else CHUNK
     with Store(out, {"seed": seed, "bounds": bounds, **name_code(LAB)}).held() as store:
-        chunks = {min(start + size, count): range(start, min(start + size, count)) for start in range(0, count, size)}
+        chunks = {
+            min(start + size, count): range(start, min(start + size, count))
+            for start in range(0, count, size)
+        }
         done = store.done() & chunks.keys()
         yield from (store.read(stop)[0] for stop in sorted(done))
         todo = [chunk for chunk in chunks.items() if chunk[0] not in done]
-        of, longest = partial(examine, seed, bounds), None if bounds else processes.SECONDS
-        for stop, outcomes in processes.apply_over_processes(of, todo, workers, seconds=longest, instead=_find_lost):
-            wrong = {str(number): outcome for number, outcome in zip(chunks[stop], outcomes, strict=True) if outcome}
+        of, longest = (
+            partial(examine, seed, bounds),
+            None if bounds else processes.SECONDS,
+        )
+        for stop, outcomes in processes.apply_over_processes(
+            of, todo, workers, seconds=longest, instead=_find_lost
+        ):
+            wrong = {
+                str(number): outcome
+                for number, outcome in zip(chunks[stop], outcomes, strict=True)
+                if outcome
+            }
             store.put(stop, [wrong])
             yield wrong
 
 
 @click.command()
-@click.option("--scenes", default=100_000, show_default=True, type=click.IntRange(1), help="Half of them adversarial.")
-@click.option("--bounds", is_flag=True, help="Search for values outside proven extremes instead; two seconds a scene.")
-@click.option("--seed", default=0, show_default=True, type=click.IntRange(0))
-@click.option("--workers", default=2, show_default=True, type=click.IntRange(1), help="Processes.")
 @click.option(
-    "-o", "--out", type=click.Path(path_type=Path, file_okay=False), default=Path("results/fuzz"), show_default=True
+    "--scenes",
+    default=100_000,
+    show_default=True,
+    type=click.IntRange(1),
+    help="Half of them adversarial.",
+)
+@click.option(
+    "--bounds",
+    is_flag=True,
+    help="Search for values outside proven extremes instead; two seconds a scene.",
+)
+@click.option("--seed", default=0, show_default=True, type=click.IntRange(0))
+@click.option(
+    "--workers", default=2, show_default=True, type=click.IntRange(1), help="Processes."
+)
+@click.option(
+    "-o",
+    "--out",
+    type=click.Path(path_type=Path, file_okay=False),
+    default=Path("results/fuzz"),
+    show_default=True,
 )
 def fuzz(scenes: int, bounds: bool, seed: int, workers: int, out: Path) -> int:
     """Put random scenes through files, formulas and exact engines; every failure is shrunk and kept."""
@@ -293,16 +388,29 @@ def fuzz(scenes: int, bounds: bool, seed: int, workers: int, out: Path) -> int:
     console = Console(stderr=True)
     wrong: dict[str, list[str]] = {}
     chunks = -(-scenes // (CHUNK_OF_PROOFS if bounds else CHUNK))
-    for chunk in track(run(scenes, seed, out, workers, bounds), "fuzzing", total=chunks, console=console):
+    for chunk in track(
+        run(scenes, seed, out, workers, bounds),
+        "fuzzing",
+        total=chunks,
+        console=console,
+    ):
         wrong |= chunk
     for number in sorted(wrong, key=int)[:SHOWN]:
         source, name = wrong[number][0], "bounds_seed" if bounds else "seed"
         scene = (outside.draw_scene if bounds else draw_fuzz_scene)(seed, int(number))
-        if not bounds and not source.startswith(LOST):  # a proof at each step, or the end of this process
-            scene = shrink_scene(scene, lambda candidate: bool(list_findings(candidate)))
+        if not bounds and not source.startswith(
+            LOST
+        ):  # a proof at each step, or the end of this process
+            scene = shrink_scene(
+                scene, lambda candidate: bool(list_findings(candidate))
+            )
             source = list_findings(scene)[0]
         title = f"found by fuzzing, seed {seed}, scene {number}"
-        path = keep(replace(scene, title=title, source=source), f"{name}_{seed}_scene_{number}")
+        path = keep(
+            replace(scene, title=title, source=source), f"{name}_{seed}_scene_{number}"
+        )
         console.print(f"scene {number}: {wrong[number][0]}\n  kept as {path.name}")
-    print(f"{len(wrong)} of {scenes} scenes fail (seed {seed}{'' if bounds else ', half of them adversarial'})")
+    print(
+        f"{len(wrong)} of {scenes} scenes fail (seed {seed}{'' if bounds else ', half of them adversarial'})"
+    )
     return 1 if wrong else 0

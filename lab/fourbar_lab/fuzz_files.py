@@ -17,15 +17,66 @@ HANG = 5.0
 MOST_POSITIONS = 10_000
 """A mutated file may ask for 10^8 positions, and may have them; here only the reading of it is tried."""
 PIECES = (
-    *('"', "'", "[", "]", "{", "}", "=", "\n", "#", ",", ".", "\\", "\x00", "\ud7ff", "é", "∞", "--", "1e999", "nan"),
-    *("-0.0", "1e308 m", "1e-320 m", "0 m", "inf m", "48 kg", "deg", "m^99", "m/s/s/s", "9**9**9", "(((((", "0x10 m"),
-    *("true", "[[loads]]", "[effects]", '"""', "'''", "1979-05-27", "__import__('os')", "../../etc/passwd"),
-    *("<script>alert(1)</script>", "</mujoco>", "${x}", "{{x}}", "%s%n", "steps = 99999999999999999999"),
+    *(
+        '"',
+        "'",
+        "[",
+        "]",
+        "{",
+        "}",
+        "=",
+        "\n",
+        "#",
+        ",",
+        ".",
+        "\\",
+        "\x00",
+        "\ud7ff",
+        "é",
+        "∞",
+        "--",
+        "1e999",
+        "nan",
+    ),
+    *(
+        "-0.0",
+        "1e308 m",
+        "1e-320 m",
+        "0 m",
+        "inf m",
+        "48 kg",
+        "deg",
+        "m^99",
+        "m/s/s/s",
+        "9**9**9",
+        "(((((",
+        "0x10 m",
+    ),
+    *(
+        "true",
+        "[[loads]]",
+        "[effects]",
+        '"""',
+        "'''",
+        "1979-05-27",
+        "__import__('os')",
+        "../../etc/passwd",
+    ),
+    *(
+        "<script>alert(1)</script>",
+        "</mujoco>",
+        "${x}",
+        "{{x}}",
+        "%s%n",
+        "steps = 99999999999999999999",
+    ),
 )
 """Text that is put into files: the syntax itself, numbers at the edge, and text that other formats would run."""
 
 
-def mutate_files(seed: int, indices: Sequence[int], originals: Sequence[str]) -> Iterator[tuple[int, str]]:
+def mutate_files(
+    seed: int, indices: Sequence[int], originals: Sequence[str]
+) -> Iterator[tuple[int, str]]:
     """Mutate scene files; each depends on (seed, index) alone."""
     for index in indices:
         rng = np.random.default_rng([seed, index])
@@ -46,7 +97,13 @@ def _mutate(text: str, rng: np.random.Generator, originals: Sequence[str]) -> st
             return text[:start] + PIECES[int(rng.integers(len(PIECES)))] + text[start:]
         case 1:  # a piece in place of a value
             head, _, _ = lines[line].partition("=")
-            return "".join([*lines[:line], f"{head}= {PIECES[int(rng.integers(len(PIECES)))]}\n", *lines[line + 1 :]])
+            return "".join(
+                [
+                    *lines[:line],
+                    f"{head}= {PIECES[int(rng.integers(len(PIECES)))]}\n",
+                    *lines[line + 1 :],
+                ]
+            )
         case 2:  # something cut out
             return text[:start] + text[start + length :]
         case 3:  # one character changed
@@ -91,9 +148,13 @@ def fuzz_files(count: int, seed: int) -> int:
 
     originals = [file.read_text(encoding="utf-8") for file in list_model_files()]
     failed = 0
-    for index, text in track(mutate_files(seed, range(count), originals), total=count, description="mutants"):
+    for index, text in track(
+        mutate_files(seed, range(count), originals), total=count, description="mutants"
+    ):
         if what := try_out(text):
             failed += 1
             click.echo(f"mutant {index}: {what}\n{text!r}")
-    click.echo(f"{count} mutated scene files, {failed} of them ended in a traceback or a hang")
+    click.echo(
+        f"{count} mutated scene files, {failed} of them ended in a traceback or a hang"
+    )
     return 1 if failed else 0

@@ -21,7 +21,9 @@ PACKAGES = ("fourbar", "fourbar_validation")
 
 def read_faults() -> list[dict[str, Any]]:
     """Read the list: the keys of an entry are fault, file, old, new, scenes, caught_by and perhaps harmless."""
-    entries: list[dict[str, Any]] = tomllib.loads(FAULTS.read_text(encoding="utf-8"))["injected"]
+    entries: list[dict[str, Any]] = tomllib.loads(FAULTS.read_text(encoding="utf-8"))[
+        "injected"
+    ]
     return entries
 
 
@@ -32,8 +34,15 @@ def inject_fault(entry: dict[str, Any]) -> dict[str, str]:
         text = _find_file(change["file"]).read_text(encoding="utf-8")
         if text.count(change["old"]) != 1:
             count = text.count(change["old"])
-            raise ValueError(f"{entry['fault']}: {count} places in {change['file']} read {change['old']!r}")
-        name = change["file"].removesuffix(".py").removesuffix("/__init__").replace("/", ".")
+            raise ValueError(
+                f"{entry['fault']}: {count} places in {change['file']} read {change['old']!r}"
+            )
+        name = (
+            change["file"]
+            .removesuffix(".py")
+            .removesuffix("/__init__")
+            .replace("/", ".")
+        )
         texts[name] = text.replace(change["old"], change["new"])
     return texts
 
@@ -54,7 +63,9 @@ class FaultFinder(importlib.abc.MetaPathFinder):
         self.left = set(self.texts)
         """Modules that are not loaded yet."""
 
-    def find_spec(self, fullname: str, path: Any, target: Any = None) -> importlib.machinery.ModuleSpec | None:
+    def find_spec(
+        self, fullname: str, path: Any, target: Any = None
+    ) -> importlib.machinery.ModuleSpec | None:
         """Find a module with the fault, or None."""
         if fullname not in self.texts:
             return None
@@ -89,8 +100,12 @@ def list_failing(names: list[str]) -> dict[str, list[str]]:
         simulated = name.startswith("simulated")
         offered = HARD_ENGINES if name.startswith("to full accuracy") else ENGINES
         engines = [engine for engine in offered if simulated or not engine.through_time]
-        rows = judge(name, FAULT_SCENES[name], engines, shipped=name.startswith("shipped")).rows
-        failing[name] = [f"{row.engine} {row.quantity}: {row.reason}" for row in rows if row.failed]
+        rows = judge(
+            name, FAULT_SCENES[name], engines, shipped=name.startswith("shipped")
+        ).rows
+        failing[name] = [
+            f"{row.engine} {row.quantity}: {row.reason}" for row in rows if row.failed
+        ]
     return failing
 
 
@@ -99,8 +114,14 @@ def main() -> None:
     if len(sys.argv) == 1:
         print(json.dumps(list_failing([])))
     for number in map(int, sys.argv[1:]):
-        for name in [name for name in sys.modules if name.partition(".")[0] in (*PACKAGES, "fourbar_lab")]:
-            del sys.modules[name]  # modules of the previous fault; the engines' libraries stay
+        for name in [
+            name
+            for name in sys.modules
+            if name.partition(".")[0] in (*PACKAGES, "fourbar_lab")
+        ]:
+            del sys.modules[
+                name
+            ]  # modules of the previous fault; the engines' libraries stay
         entry = read_faults()[number]
         finder = FaultFinder(entry)
         sys.meta_path.insert(0, finder)

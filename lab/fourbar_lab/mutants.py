@@ -37,17 +37,40 @@ from fourbar_validation.run.identities import check_identities, compare_status
 from fourbar_validation.run.question import Question
 
 PAIRS = (
-    *((ast.Add, ast.Sub), (ast.Mult, ast.Div), (ast.Lt, ast.LtE), (ast.Gt, ast.GtE), (ast.Eq, ast.NotEq)),
-    *((ast.And, ast.Or), (ast.Is, ast.IsNot), (ast.In, ast.NotIn), (ast.USub, ast.UAdd), (ast.BitAnd, ast.BitOr)),
+    *(
+        (ast.Add, ast.Sub),
+        (ast.Mult, ast.Div),
+        (ast.Lt, ast.LtE),
+        (ast.Gt, ast.GtE),
+        (ast.Eq, ast.NotEq),
+    ),
+    *(
+        (ast.And, ast.Or),
+        (ast.Is, ast.IsNot),
+        (ast.In, ast.NotIn),
+        (ast.USub, ast.UAdd),
+        (ast.BitAnd, ast.BitOr),
+    ),
 )
-OTHER: dict[type, type] = {a: b for a, b in PAIRS} | {b: a for a, b in PAIRS} | {ast.Pow: ast.Mult}
+OTHER: dict[type, type] = (
+    {a: b for a, b in PAIRS} | {b: a for a, b in PAIRS} | {ast.Pow: ast.Mult}
+)
 """Replacement of each operator."""
 CHANGES = 1e-9
 SECONDS = 20
 """A mutant that computes longer than this hangs: the run would be stopped, which is a failure too."""
 LEAST = 0.95
 """Share of the mutants that must be caught."""
-MODULES = ("arithmetic", "position", "motion", "pin_forces", "torque", "path", "mobility", "transmission")
+MODULES = (
+    "arithmetic",
+    "position",
+    "motion",
+    "pin_forces",
+    "torque",
+    "path",
+    "mobility",
+    "transmission",
+)
 SCENES = 10
 EXACT = ("pinocchio-inverse", "mujoco-inverse", FREE_BODY)
 
@@ -75,16 +98,23 @@ def compile_mutants(module: ModuleType) -> Iterator[Mutant]:
     """Compile every mutant of the functions and methods of a module."""
     tree = ast.parse(inspect.getsource(module))
     classes = [node for node in tree.body if isinstance(node, ast.ClassDef)]
-    for prefix, body in (("", tree.body), *((f"{each.name}.", each.body) for each in classes)):
+    for prefix, body in (
+        ("", tree.body),
+        *((f"{each.name}.", each.body) for each in classes),
+    ):
         for definition in body:
             if not isinstance(definition, ast.FunctionDef):
                 continue
             qualified = prefix + definition.name
-            for node in (inner for statement in definition.body for inner in ast.walk(statement)):
+            for node in (
+                inner for statement in definition.body for inner in ast.walk(statement)
+            ):
                 for field, changed in _list_changes(node):
                     original, before = getattr(node, field), ast.unparse(node)
                     setattr(node, field, changed)
-                    code = _find_code(compile(tree, inspect.getfile(module), "exec"), qualified)
+                    code = _find_code(
+                        compile(tree, inspect.getfile(module), "exec"), qualified
+                    )
                     name = f"{module.__name__}.{qualified}, line {node.lineno}: {before} -> {ast.unparse(node)}"  # type: ignore[attr-defined]
                     setattr(node, field, original)
                     assert code is not None
@@ -120,7 +150,9 @@ def _find_function(module: ModuleType, qualified: str) -> FunctionType:
     """Find the function itself, below its decorators."""
     owner, _, name = qualified.rpartition(".")
     function = inspect.getattr_static(getattr(module, owner) if owner else module, name)
-    function = inspect.unwrap(getattr(function, "fget", None) or getattr(function, "__func__", function))
+    function = inspect.unwrap(
+        getattr(function, "fget", None) or getattr(function, "__func__", function)
+    )
     assert isinstance(function, FunctionType)
     return function
 
@@ -131,13 +163,19 @@ class HangError(Exception):
 
 def choose_scenes() -> list[Scene]:
     """Choose random linkages of every type, drive and branch, and a parallelogram near its change point."""
-    from fourbar_validation.scenes.hard_families import approach_change_point, dress, sweep_turn
+    from fourbar_validation.scenes.hard_families import (
+        approach_change_point,
+        dress,
+        sweep_turn,
+    )
     from fourbar_validation.scenes.random import DrawnType, draw_random_scene
 
     chosen = [draw_random_scene(0, index, tuple(DrawnType)) for index in range(SCENES)]
     chosen.append(sweep_turn(dress((0.3, 0.1, 0.25, 0.22)), 12))
     chosen += [
-        scene for name, scene in approach_change_point(distances=(1e-2, 1e-4)) if name.startswith(("par", "kite a = d"))
+        scene
+        for name, scene in approach_change_point(distances=(1e-2, 1e-4))
+        if name.startswith(("par", "kite a = d"))
     ]
     return chosen
 
@@ -145,9 +183,17 @@ def choose_scenes() -> list[Scene]:
 def compute_numbers(scene: Scene, command: Command) -> dict[str, Any]:
     """Compute every number that the formulas state of a scene and of its linkage."""
     solution = solve(scene, "force", at=command)
-    numbers = {name: getattr(solution, name) for name in UNITS if getattr(solution, name) is not None}
+    numbers = {
+        name: getattr(solution, name)
+        for name in UNITS
+        if getattr(solution, name) is not None
+    }
     numbers["status"] = solution.status_code.astype(float)
-    return numbers | collect_stated(scene.linkage) | collect_stated_of_motion(scene, command)
+    return (
+        numbers
+        | collect_stated(scene.linkage)
+        | collect_stated_of_motion(scene, command)
+    )
 
 
 def collect_stated(linkage: FourBar) -> dict[str, Any]:
@@ -156,14 +202,19 @@ def collect_stated(linkage: FourBar) -> dict[str, Any]:
         "default_range": mobility.choose_range(linkage),
         "change_points": mobility.change_points(linkage),
         "time_ratio": mobility.time_ratio(linkage) or math.nan,
-        "extremes": [*transmission.transmission_extremes(linkage), transmission.transmission_extremes(linkage).worst],
+        "extremes": [
+            *transmission.transmission_extremes(linkage),
+            transmission.transmission_extremes(linkage).worst,
+        ],
     }
     for bar in MOVING_BARS:
         numbers[f"limits_{bar}"] = mobility.limit_positions(linkage, bar)
         numbers[f"intervals_{bar}"] = mobility.find_intervals(linkage, bar)
         numbers[f"turns_{bar}"] = mobility.turns_fully(linkage, bar)
         numbers[f"swing_{bar}"] = mobility.swing(linkage, bar)
-    sweep = linkage.ground_angle + np.array([-0.5, 0.5, 4.0, 2.0])  # through both change points, and back
+    sweep = linkage.ground_angle + np.array(
+        [-0.5, 0.5, 4.0, 2.0]
+    )  # through both change points, and back
     numbers["through"] = mobility.follow_smooth_path(linkage, sweep, 1)
     return {name: np.array(value, dtype=float) for name, value in numbers.items()}
 
@@ -176,7 +227,9 @@ def collect_stated_of_motion(scene: Scene, command: Command) -> dict[str, Any]:
         "transmission_angle": transmission.transmission_angle(state),
         "speed_ratio": transmission.speed_ratio(state),
         "mechanical_advantage": transmission.mechanical_advantage(state, 0.2, 0.3),
-        "to_singular": transmission.distance_to_singular(scene.linkage, command.theta_2, scene.drive_bar, branch),
+        "to_singular": transmission.distance_to_singular(
+            scene.linkage, command.theta_2, scene.drive_bar, branch
+        ),
     }
 
 
@@ -192,16 +245,27 @@ def is_changed(before: dict[str, Any], after: dict[str, Any]) -> bool:
     return False
 
 
-def is_caught(scene: Scene, command: Command, answers: list[tuple[Engine, Answer]]) -> bool:
+def is_caught(
+    scene: Scene, command: Command, answers: list[tuple[Engine, Answer]]
+) -> bool:
     """Check a scene: whether any comparison or identity fails."""
     question = Question("", scene, command)
     solution, rows = question.solution, list(check_identities(question))
     for engine, answer in answers:
-        rows += Comparison("", scene, answer, solution, hold(engine, scene, command, answer)).rows()
-        if engine.name == FREE_BODY and (reference := make_reference(scene, answer)) is not None:
+        rows += Comparison(
+            "", scene, answer, solution, hold(engine, scene, command, answer)
+        ).rows()
+        if (
+            engine.name == FREE_BODY
+            and (reference := make_reference(scene, answer)) is not None
+        ):
             rows.append(compare_status(question, reference))
     if not any(row.verdict == FAILS for row in rows):
-        rows += [row for engine, answer in answers for row in check_statements("", scene, engine.start(), answer)]
+        rows += [
+            row
+            for engine, answer in answers
+            for row in check_statements("", scene, engine.start(), answer)
+        ]
     return any(row.verdict == FAILS for row in rows)
 
 
@@ -219,7 +283,9 @@ def make_baselines() -> list[Baseline]:
     made = []
     for scene in choose_scenes():
         command = command_of(scene)
-        answers = [(w, w.start().answer(scene, command)) for w in ENGINES if w.name in EXACT]
+        answers = [
+            (w, w.start().answer(scene, command)) for w in ENGINES if w.name in EXACT
+        ]
         if is_caught(scene, command, answers):
             raise RuntimeError(f"the harness fails without a mutant: {scene.title}")
         made.append(Baseline(scene, command, answers, compute_numbers(scene, command)))
@@ -246,7 +312,12 @@ def judge_mutant(mutant: Mutant, tried: Sequence[Baseline]) -> bool | None:
 
 @click.command()
 @click.option("--module", type=click.Choice(MODULES), help="Only this one.")
-@click.option("--most", default=0, type=click.IntRange(0), help="At most this many of each module.")
+@click.option(
+    "--most",
+    default=0,
+    type=click.IntRange(0),
+    help="At most this many of each module.",
+)
 def command(module: str | None, most: int) -> int:
     """Change operators and numbers of the formulas, one at a time; 95 % of those that matter must fail the harness.
 
@@ -256,7 +327,9 @@ def command(module: str | None, most: int) -> int:
     from rich.progress import track
 
     if not hasattr(signal, "SIGALRM"):
-        raise FourBarError("mutants ends what hangs by SIGALRM, which Windows does not have")
+        raise FourBarError(
+            "mutants ends what hangs by SIGALRM, which Windows does not have"
+        )
 
     def alarm(*_: object) -> None:
         raise HangError
@@ -267,14 +340,29 @@ def command(module: str | None, most: int) -> int:
     for name in [module] if module else MODULES:
         chosen = list(compile_mutants(import_module(f"fourbar.formulas.{name}")))
         if most and len(chosen) > most:
-            chosen = [chosen[i] for i in np.random.default_rng(0).choice(len(chosen), most, replace=False)]
-        verdicts = [judge_mutant(mutant, tried) for mutant in track(chosen, name, console=shown)]
-        survivors = [mutant.name for mutant, verdict in zip(chosen, verdicts, strict=True) if verdict is False]
+            chosen = [
+                chosen[i]
+                for i in np.random.default_rng(0).choice(
+                    len(chosen), most, replace=False
+                )
+            ]
+        verdicts = [
+            judge_mutant(mutant, tried) for mutant in track(chosen, name, console=shown)
+        ]
+        survivors = [
+            mutant.name
+            for mutant, verdict in zip(chosen, verdicts, strict=True)
+            if verdict is False
+        ]
         count = sum(verdict is not None for verdict in verdicts)
-        click.echo(f"{name}: {count - len(survivors)} of {count} caught, of {len(chosen)} mutants tried")
+        click.echo(
+            f"{name}: {count - len(survivors)} of {count} caught, of {len(chosen)} mutants tried"
+        )
         changing, missed = changing + count, missed + survivors
     signal.signal(signal.SIGALRM, before)
     for line in missed:
         click.echo(f"not caught: {line}")
-    click.echo(f"the harness catches {changing - len(missed)} of {changing} mutants that change a number")
+    click.echo(
+        f"the harness catches {changing - len(missed)} of {changing} mutants that change a number"
+    )
     return HOLDS if changing and len(missed) <= (1.0 - LEAST) * changing else FAILED

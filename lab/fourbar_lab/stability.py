@@ -46,7 +46,11 @@ def solve_position(scene: Scene, angle: float) -> dict[str, Any]:
     commanded = np.full(times, angle)
     scene = replace(scene, motion=scene.motion.replace(angle=commanded))
     solution = solve(scene, "error")
-    return {name: array[0] for name in UNITS if (array := getattr(solution, name)) is not None}
+    return {
+        name: array[0]
+        for name in UNITS
+        if (array := getattr(solution, name)) is not None
+    }
 
 
 def judge(scene: Scene, tally: Tally, sample: str, library: str = "numpy") -> None:
@@ -54,10 +58,17 @@ def judge(scene: Scene, tally: Tally, sample: str, library: str = "numpy") -> No
     tally.samples += 1
     motion, angle = scene.motion, float(np.asarray(scene.motion.angle))
     drive = "torque" if scene.drive is None else "drive_force"
-    internal = scene.drive is not None and 1 not in (scene.drive.start.bar, scene.drive.end.bar)
+    internal = scene.drive is not None and 1 not in (
+        scene.drive.start.bar,
+        scene.drive.end.bar,
+    )
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        solution = solve_position(scene, angle) if library == "numpy" else evaluate(scene, library)
+        solution = (
+            solve_position(scene, angle)
+            if library == "numpy"
+            else evaluate(scene, library)
+        )
     tally.warned += [f"{sample}: {warning.message}" for warning in caught]
     exact = compute_reference(scene, motion.branch, angle)
     if exact is None:
@@ -66,19 +77,34 @@ def judge(scene: Scene, tally: Tally, sample: str, library: str = "numpy") -> No
             tally.worst["assembled"] = (math.inf, sample)
         return
     values, sensitivity = exact
-    if library != "numpy" and math.isnan(solution["sin_mu"]) and is_untold(values["sin_mu"], sensitivity["sin_mu"]):
+    if (
+        library != "numpy"
+        and math.isnan(solution["sin_mu"])
+        and is_untold(values["sin_mu"], sensitivity["sin_mu"])
+    ):
         tally.untold += 1
         return
     errors: dict[str, float] = {}
     for name in solution:
         for component, index in list_components(name):
-            if component not in values or name == motion.commanded or name.endswith("_error"):
+            if (
+                component not in values
+                or name == motion.commanded
+                or name.endswith("_error")
+            ):
                 continue
             own, rate = np.ravel(solution[name])[index], sensitivity[component]
-            if internal and name in PIN_FORCES:  # a component that the drive has no part in is left of larger ones
+            if (
+                internal and name in PIN_FORCES
+            ):  # a component that the drive has no part in is left of larger ones
                 rate = max(sensitivity[other] for other, _ in list_components(name))
-            if library != "numpy":  # lengths are no constants there: no bar rests or stays parallel exactly
-                rate += max(compute_allowed(0.0, sensitivity[other]) for other, _ in list_components(name))
+            if (
+                library != "numpy"
+            ):  # lengths are no constants there: no bar rests or stays parallel exactly
+                rate += max(
+                    compute_allowed(0.0, sensitivity[other])
+                    for other, _ in list_components(name)
+                )
             part, errors[component] = compute_ratio(name, own, values[component], rate)
             tally.note(component, part, sample)
     if drive not in values:
@@ -86,19 +112,31 @@ def judge(scene: Scene, tally: Tally, sample: str, library: str = "numpy") -> No
         return
     if f"{drive}_error" not in solution:
         return
-    force = max(math.hypot(errors[f"{name}_x"], errors[f"{name}_y"]) for name in PIN_FORCES)
+    force = max(
+        math.hypot(errors[f"{name}_x"], errors[f"{name}_y"]) for name in PIN_FORCES
+    )
     strongest = max(math.hypot(*solution[name]) for name in PIN_FORCES)
     for name, error, size in (
         (f"{drive}_error", errors[drive], abs(solution[drive])),
         ("force_error", force, strongest),
     ):
         bar = float(solution[name])
-        tally.too_small[name] = max(tally.too_small.get(name, 0.0), float(find_used(error, bar)))
-        tally.too_large[name] = tally.too_large.get(name, 0) + (bar > TOO_LARGE * max(error, HALF_A_DIGIT * size))
+        tally.too_small[name] = max(
+            tally.too_small.get(name, 0.0), float(find_used(error, bar))
+        )
+        tally.too_large[name] = tally.too_large.get(name, 0) + (
+            bar > TOO_LARGE * max(error, HALF_A_DIGIT * size)
+        )
 
 
 def run(
-    family: str, samples: range, seed: int = 0, bar: int = 2, library: str = "numpy", *, derivatives: bool = False
+    family: str,
+    samples: range,
+    seed: int = 0,
+    bar: int = 2,
+    library: str = "numpy",
+    *,
+    derivatives: bool = False,
 ) -> Tally:
     """Judge some samples of a family; each depends on the family, the seed and its number alone.
 
@@ -113,7 +151,9 @@ def run(
         rng = np.random.default_rng([seed, list(FAMILIES).index(family), number])
         scene = feed_back(FAMILIES[family](rng), bar)
         if scene is not None:
-            (judge_slopes if derivatives else judge)(scene, tally, f"{family} {number}", library)
+            (judge_slopes if derivatives else judge)(
+                scene, tally, f"{family} {number}", library
+            )
     return tally
 
 
@@ -131,21 +171,46 @@ def feed_back(scene: Scene, bar: int) -> Scene | None:
 
 def read_commanded(solution: Solution, bar: int) -> tuple[float, float, float, float]:
     """Return angle, speed and acceleration of a bar at the first position, and the sine whose sign its branch is."""
-    theta, omega, alpha = (float(getattr(solution, f"{name}_{bar}")[0]) for name in ("theta", "omega", "alpha"))
+    theta, omega, alpha = (
+        float(getattr(solution, f"{name}_{bar}")[0])
+        for name in ("theta", "omega", "alpha")
+    )
     first, second = {2: (3, 4), 3: (2, 4), 4: (2, 3)}[bar]
-    one, other = (float(getattr(solution, f"theta_{each}")[0]) for each in (first, second))
+    one, other = (
+        float(getattr(solution, f"theta_{each}")[0]) for each in (first, second)
+    )
     return theta, omega, alpha, math.sin(other - one)
 
 
-def _run(seed: int, bar: int, library: str, derivatives: bool, task: tuple[str, range]) -> Tally:
+def _run(
+    seed: int, bar: int, library: str, derivatives: bool, task: tuple[str, range]
+) -> Tally:
     return run(*task, seed, bar, library, derivatives=derivatives)
 
 
 @click.command()
-@click.option("--samples", default=FULL, show_default=True, type=click.IntRange(1), help="Samples per family.")
-@click.option("--family", "families", multiple=True, type=click.Choice(list(FAMILIES)), help="Only these (repeatable).")
+@click.option(
+    "--samples",
+    default=FULL,
+    show_default=True,
+    type=click.IntRange(1),
+    help="Samples per family.",
+)
+@click.option(
+    "--family",
+    "families",
+    multiple=True,
+    type=click.Choice(list(FAMILIES)),
+    help="Only these (repeatable).",
+)
 @click.option("--seed", default=0, show_default=True)
-@click.option("--bar", default=2, show_default=True, type=click.IntRange(2, 4), help="Whose motion is commanded.")
+@click.option(
+    "--bar",
+    default=2,
+    show_default=True,
+    type=click.IntRange(2, 4),
+    help="Whose motion is commanded.",
+)
 @click.option(
     "--library",
     default="numpy",
@@ -153,37 +218,89 @@ def _run(seed: int, bar: int, library: str, derivatives: bool, task: tuple[str, 
     type=click.Choice(["numpy", *LIBRARIES]),
     help="Whose arrays: jax and torch by `fourbar.function`, jax compiled.",
 )
-@click.option("--derivatives", is_flag=True, help="Judge those by every number of a scene; numpy: `sensitivity`.")
+@click.option(
+    "--derivatives",
+    is_flag=True,
+    help="Judge those by every number of a scene; numpy: `sensitivity`.",
+)
 @click.option("--jobs", default=2, show_default=True, help="Processes.")
 def stability(
-    samples: int, families: tuple[str, ...], seed: int, bar: int, library: str, derivatives: bool, jobs: int
+    samples: int,
+    families: tuple[str, ...],
+    seed: int,
+    bar: int,
+    library: str,
+    derivatives: bool,
+    jobs: int,
 ) -> int:
     """Measure the error of every output against 50-digit arithmetic, and whether the error bars hold."""
     from rich.console import Console
     from rich.progress import track
 
     chosen = families or tuple(FAMILIES)
-    parts = [range(start, min(start + CHUNK, samples)) for start in range(0, samples, CHUNK)]
+    parts = [
+        range(start, min(start + CHUNK, samples)) for start in range(0, samples, CHUNK)
+    ]
     tasks = [(family, part) for family in chosen for part in parts]
     results = apply_each(partial(_run, seed, bar, library, derivatives), tasks, jobs)
     tallies = {family: Tally() for family in chosen}
-    for (family, _), tally in track(zip(tasks, results, strict=True), "samples", total=len(tasks)):
+    for (family, _), tally in track(
+        zip(tasks, results, strict=True), "samples", total=len(tasks)
+    ):
         tallies[family].add(tally)
     rows = []
-    for name in dict.fromkeys(name for tally in tallies.values() for name in tally.worst):
-        cells = [tallies[family].worst.get(name, (math.nan, ""))[0] for family in chosen]
-        rows.append((name, *("-" if math.isnan(cell) else f"{cell:.3f}" + " fails" * (cell > 1.0) for cell in cells)))
+    for name in dict.fromkeys(
+        name for tally in tallies.values() for name in tally.worst
+    ):
+        cells = [
+            tallies[family].worst.get(name, (math.nan, ""))[0] for family in chosen
+        ]
+        rows.append(
+            (
+                name,
+                *(
+                    "-" if math.isnan(cell) else f"{cell:.3f}" + " fails" * (cell > 1.0)
+                    for cell in cells
+                ),
+            )
+        )
     bars = ("torque_error", "drive_force_error", "force_error")
-    for name in (name for name in bars if any(name in tally.too_small for tally in tallies.values())):
-        rows.append((f"error / {name}", *(f"{tallies[family].too_small.get(name, math.nan):.2f}" for family in chosen)))
-        shares = (100.0 * tallies[family].too_large.get(name, 0) / tallies[family].samples for family in chosen)
-        rows.append((f"% {name} > {TOO_LARGE:.0f} x error", *(f"{share:.2f}" for share in shares)))
-    rows.append(("not assembled", *(str(tallies[family].not_assembled) for family in chosen)))
+    for name in (
+        name
+        for name in bars
+        if any(name in tally.too_small for tally in tallies.values())
+    ):
+        rows.append(
+            (
+                f"error / {name}",
+                *(
+                    f"{tallies[family].too_small.get(name, math.nan):.2f}"
+                    for family in chosen
+                ),
+            )
+        )
+        shares = (
+            100.0 * tallies[family].too_large.get(name, 0) / tallies[family].samples
+            for family in chosen
+        )
+        rows.append(
+            (
+                f"% {name} > {TOO_LARGE:.0f} x error",
+                *(f"{share:.2f}" for share in shares),
+            )
+        )
+    rows.append(
+        ("not assembled", *(str(tallies[family].not_assembled) for family in chosen))
+    )
     rows.append(("no torque", *(str(tallies[family].no_torque) for family in chosen)))
     if library != "numpy" or derivatives:
-        rows.append(("no digit tells", *(str(tallies[family].untold) for family in chosen)))
+        rows.append(
+            ("no digit tells", *(str(tallies[family].untold) for family in chosen))
+        )
     console = Console()
-    if not console.is_terminal:  # in a file the columns of all families keep their width
+    if (
+        not console.is_terminal
+    ):  # in a file the columns of all families keep their width
         console.width = WIDE
     of = ", of derivatives by every number" if derivatives else ""
     title = f"largest error / (8 eps (|y| + sum |x dy/dx|)), {samples} samples each, seed {seed}, {library}{of}"

@@ -65,8 +65,12 @@ class Tally:
     def holds(self) -> bool:
         """Return whether anything was compared, and error and error bars are as promised."""
         bars = all(ratio <= TOO_SMALL for ratio in self.too_small.values())
-        useful = all(is_by_chance(count, self.samples) for count in self.too_large.values())
-        errors = bool(self.worst) and all(ratio <= 1.0 for ratio, _ in self.worst.values())
+        useful = all(
+            is_by_chance(count, self.samples) for count in self.too_large.values()
+        )
+        errors = bool(self.worst) and all(
+            ratio <= 1.0 for ratio, _ in self.worst.values()
+        )
         return errors and bars and useful and not self.warned
 
 
@@ -82,12 +86,19 @@ def list_components(name: str) -> list[tuple[str, Any]]:
     return [(f"{name}_x", 0), (f"{name}_y", 1)] if name in VECTORS else [(name, 0)]
 
 
-def compute_ratio(name: str, ours: float, value: Any, sensitivity: float) -> tuple[float, float]:
+def compute_ratio(
+    name: str, ours: float, value: Any, sensitivity: float
+) -> tuple[float, float]:
     """Compute an error over what is allowed, and the error: 0 where the balls cannot tell it from the truth."""
     error = value - float(ours) if math.isfinite(ours) else math.inf
     size = abs(float(value.mid()))
     if name.startswith("theta"):
-        error, size = math.remainder(float(error), 2.0 * math.pi) if math.isfinite(ours) else error, 1.0
+        error, size = (
+            math.remainder(float(error), 2.0 * math.pi)
+            if math.isfinite(ours)
+            else error,
+            1.0,
+        )
     wrong = abs(float(error)) if value.rad() < abs(error) else 0.0
     return float(find_used(wrong, compute_allowed(size, sensitivity))), wrong
 

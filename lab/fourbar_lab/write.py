@@ -23,7 +23,9 @@ def find_stale(files: Iterable[Path]) -> list[Path]:
     stale = []
     for file in files:
         xml = file.with_suffix(".xml")
-        if not xml.is_file() or not _is_same(xml.read_text(encoding="utf-8"), write_mjcf(load(file))):
+        if not xml.is_file() or not _is_same(
+            xml.read_text(encoding="utf-8"), write_mjcf(load(file))
+        ):
             stale.append(file)
     return stale
 
@@ -32,7 +34,10 @@ def _is_same(one: str, other: str) -> bool:
     if NUMBER.split(one) != NUMBER.split(other):
         return False
     numbers = zip(NUMBER.findall(one), NUMBER.findall(other), strict=True)
-    return all(a == b or math.isclose(float(a), float(b), rel_tol=ROUND_OFF, abs_tol=ROUND_OFF) for a, b in numbers)
+    return all(
+        a == b or math.isclose(float(a), float(b), rel_tol=ROUND_OFF, abs_tol=ROUND_OFF)
+        for a, b in numbers
+    )
 
 
 def write_models(files: Iterable[Path]) -> list[Path]:

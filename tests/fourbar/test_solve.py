@@ -13,7 +13,17 @@ from hypothesis import strategies as st
 
 import fourbar
 from fourbar.cli import status
-from fourbar.effects import Friction, Gravity, Load, PinFriction, Spring, SpringEnd, Springs, Torsion, Viscous
+from fourbar.effects import (
+    Friction,
+    Gravity,
+    Load,
+    PinFriction,
+    Spring,
+    SpringEnd,
+    Springs,
+    Torsion,
+    Viscous,
+)
 from fourbar.errors import HOLDS, InputError
 from fourbar.linkage import MOVING_BARS, PINS
 from fourbar.quantities import JAMMED, OK, STAGE_OF, STAGES
@@ -24,7 +34,12 @@ from fourbar.show.plot import draw
 from fourbar.solution import Solution
 from fourbar.solve import solve
 
-EXAMPLES = settings(max_examples=120, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+EXAMPLES = settings(
+    max_examples=120,
+    deadline=None,
+    derandomize=True,
+    suppress_health_check=list(HealthCheck),
+)
 """The same examples on every run: what is new is looked for by fuzzing."""
 FORCES = ("F12", "F32", "F43", "F14", "torque", "torque_error", "force_error")
 
@@ -47,8 +62,12 @@ def without_value(solution: Solution) -> dict[str, list[str]]:
     return missing
 
 
-magnitudes = st.floats(-320.0, 308.0).map(lambda exponent: 10.0**exponent) | st.sampled_from([0.0, 1.0])
-numbers = st.builds(lambda sign, size: sign * size, st.sampled_from([1.0, -1.0]), magnitudes) | st.floats(-10.0, 10.0)
+magnitudes = st.floats(-320.0, 308.0).map(
+    lambda exponent: 10.0**exponent
+) | st.sampled_from([0.0, 1.0])
+numbers = st.builds(
+    lambda sign, size: sign * size, st.sampled_from([1.0, -1.0]), magnitudes
+) | st.floats(-10.0, 10.0)
 sizes = magnitudes | st.floats(0.0, 10.0)
 angles = st.floats(-7.0, 7.0) | st.sampled_from([0.0, math.pi, math.pi / 2]) | numbers
 pairs = st.tuples(numbers, angles)
@@ -58,71 +77,126 @@ per_pin = st.dictionaries(st.sampled_from(list(PINS)), sizes, min_size=1)
 @st.composite
 def linkages(draw: st.DrawFn) -> fourbar.FourBar:
     """Lengths that close somewhere: of a few round numbers, so that bars are equal, or of any size."""
-    lengths = [draw(st.sampled_from([1.0, 2.0, 3.0]) | st.floats(0.5, 3.0)) for _ in range(4)]
+    lengths = [
+        draw(st.sampled_from([1.0, 2.0, 3.0]) | st.floats(0.5, 3.0)) for _ in range(4)
+    ]
     if draw(st.booleans()):  # pairs of equal bars
-        lengths = [lengths[i] for i in draw(st.sampled_from([(0, 1, 0, 1), (0, 0, 1, 1), (0, 1, 1, 0)]))]
+        lengths = [
+            lengths[i]
+            for i in draw(st.sampled_from([(0, 1, 0, 1), (0, 0, 1, 1), (0, 1, 1, 0)]))
+        ]
     longest = lengths.index(max(lengths))
-    lengths[longest] = min(lengths[longest], (1.0 - 1e-12) * (sum(lengths) - lengths[longest]))
-    scale = draw(st.sampled_from([1.0]) | st.floats(-300.0, 306.0).map(lambda exponent: 10.0**exponent))
+    lengths[longest] = min(
+        lengths[longest], (1.0 - 1e-12) * (sum(lengths) - lengths[longest])
+    )
+    scale = draw(
+        st.sampled_from([1.0])
+        | st.floats(-300.0, 306.0).map(lambda exponent: 10.0**exponent)
+    )
     bars = []
     for length in lengths[1:]:
         mass, inertia = draw(sizes), draw(st.none() | sizes)
-        if inertia is None and not math.isfinite(mass * scale * length * scale * length):
+        if inertia is None and not math.isfinite(
+            mass * scale * length * scale * length
+        ):
             inertia = 0.0
         bars.append(fourbar.Bar(scale * length, mass, inertia, draw(st.none() | pairs)))
-    return fourbar.FourBar(scale * lengths[0], *bars, draw(st.just(0.0) | st.floats(-7.0, 7.0)))
+    return fourbar.FourBar(
+        scale * lengths[0], *bars, draw(st.just(0.0) | st.floats(-7.0, 7.0))
+    )
 
 
 @st.composite
 def scenes(draw: st.DrawFn) -> Scene:
     """Every drive bar, every effect, magnitudes from the least double to the greatest."""
     linkage = draw(linkages())
-    loads = draw(st.lists(st.builds(Load, st.sampled_from(MOVING_BARS), pairs, pairs, numbers), max_size=2))
-    ends = [st.builds(SpringEnd, st.just(bar), numbers, angles) for bar in draw(st.permutations([1, *MOVING_BARS]))[:2]]
+    loads = draw(
+        st.lists(
+            st.builds(Load, st.sampled_from(MOVING_BARS), pairs, pairs, numbers),
+            max_size=2,
+        )
+    )
+    ends = [
+        st.builds(SpringEnd, st.just(bar), numbers, angles)
+        for bar in draw(st.permutations([1, *MOVING_BARS]))[:2]
+    ]
     possible = [
         st.builds(Gravity, numbers, angles),
         per_pin.map(lambda pins: Viscous.at(**pins)),
         per_pin.map(lambda pins: Friction.at(**pins)),
-        st.dictionaries(st.sampled_from(list(PINS)), st.tuples(sizes, sizes), min_size=1, max_size=2).map(
-            lambda pins: PinFriction.at(**pins)
+        st.dictionaries(
+            st.sampled_from(list(PINS)), st.tuples(sizes, sizes), min_size=1, max_size=2
+        ).map(lambda pins: PinFriction.at(**pins)),
+        st.dictionaries(
+            st.sampled_from(list(PINS)),
+            st.tuples(sizes.filter(bool), angles, numbers),
+            min_size=1,
+        ).map(lambda pins: Torsion.at(**pins)),
+        st.builds(Spring, *ends, sizes.filter(bool), sizes, numbers).map(
+            lambda spring: Springs((spring,))
         ),
-        st.dictionaries(st.sampled_from(list(PINS)), st.tuples(sizes.filter(bool), angles, numbers), min_size=1).map(
-            lambda pins: Torsion.at(**pins)
-        ),
-        st.builds(Spring, *ends, sizes.filter(bool), sizes, numbers).map(lambda spring: Springs((spring,))),
     ]
     effects = [draw(strategy) for strategy in possible if draw(st.integers(0, 3)) == 0]
-    theta_2 = linkage.ground_angle + np.array(draw(st.lists(angles, min_size=1, max_size=4)))
+    theta_2 = linkage.ground_angle + np.array(
+        draw(st.lists(angles, min_size=1, max_size=4))
+    )
     omega_2 = draw(numbers.filter(lambda omega: math.isfinite(omega * omega)))
     motion = Motion(theta_2, omega_2, draw(numbers), draw(st.sampled_from([1, -1])))
-    return Scene(linkage, motion, draw(st.sampled_from(MOVING_BARS)), tuple(loads), tuple(effects))
+    return Scene(
+        linkage,
+        motion,
+        draw(st.sampled_from(MOVING_BARS)),
+        tuple(loads),
+        tuple(effects),
+    )
 
 
 @pytest.mark.slow
 @EXAMPLES
 @given(scenes(), st.sampled_from(STAGES))
-def test_where_the_status_is_ok_every_requested_quantity_is_a_number(scene: Scene, stage: str) -> None:
+def test_where_the_status_is_ok_every_requested_quantity_is_a_number(
+    scene: Scene, stage: str
+) -> None:
     solution = solved(scene, stage)
     assert without_value(solution) == {}
-    infinite = [name for name in STAGE_OF if (values := getattr(solution, name)) is not None and np.isinf(values).any()]
+    infinite = [
+        name
+        for name in STAGE_OF
+        if (values := getattr(solution, name)) is not None and np.isinf(values).any()
+    ]
     assert infinite == [], "no value is NaN, never infinite"
 
 
-PARALLELOGRAM, KITE = fourbar.uniform(1.0, 0.5, 1.0, 0.5), fourbar.uniform(1.0, 0.5, 0.5, 1.0)
+PARALLELOGRAM, KITE = (
+    fourbar.uniform(1.0, 0.5, 1.0, 0.5),
+    fourbar.uniform(1.0, 0.5, 0.5, 1.0),
+)
 CRANK_ROCKER = fourbar.uniform(0.3, 0.1, 0.25, 0.22)
 
 
-@pytest.mark.parametrize(("linkage", "branch", "drive_bar"), [(PARALLELOGRAM, 1, 3), (KITE, -1, 4)])
-def test_a_bar_that_does_not_turn_takes_no_torque(linkage: fourbar.FourBar, branch: int, drive_bar: int) -> None:
+@pytest.mark.parametrize(
+    ("linkage", "branch", "drive_bar"), [(PARALLELOGRAM, 1, 3), (KITE, -1, 4)]
+)
+def test_a_bar_that_does_not_turn_takes_no_torque(
+    linkage: fourbar.FourBar, branch: int, drive_bar: int
+) -> None:
     """T3 of a parallelogram and T4 of a folded kite would have a pole at every position."""
     motion = Motion(np.linspace(0.3, 2.0, 5), 1.0, 2.0, branch)
-    for effects in ((), (Gravity(),), (Friction.at(A=0.1), PinFriction.at(B=(0.1, 0.01)))):
+    for effects in (
+        (),
+        (Gravity(),),
+        (Friction.at(A=0.1), PinFriction.at(B=(0.1, 0.01))),
+    ):
         solution = solved(Scene(linkage, motion, drive_bar, effects=effects))
         assert solution.status == ["no_torque"] * 5
         assert getattr(solution, f"omega_{drive_bar}") == pytest.approx(np.zeros(5))
         assert all(np.isnan(getattr(solution, name)).all() for name in FORCES)
-        assert np.isfinite(solution.alpha_4).all() and not solution.drive_condition.any()  # type: ignore[union-attr, arg-type]
-    assert solved(Scene(linkage, motion, drive_bar), "acceleration").status == ["ok"] * 5
+        assert (
+            np.isfinite(solution.alpha_4).all() and not solution.drive_condition.any()
+        )  # type: ignore[union-attr, arg-type]
+    assert (
+        solved(Scene(linkage, motion, drive_bar), "acceleration").status == ["ok"] * 5
+    )
     assert solved(Scene(linkage, motion, 2)).status == ["ok"] * 5
 
 
@@ -130,11 +204,17 @@ def test_a_sweep_through_a_change_point_loses_that_position_alone() -> None:
     motion = Motion(np.array([-0.4, 0.0, 0.4]), 1.0)
     assert solved(Scene(PARALLELOGRAM, motion)).status == ["ok", "singular", "ok"]
     # the drive on 3: in the crossed branch for theta_2 < 0 all bars stay parallel to the other pair
-    assert solved(Scene(PARALLELOGRAM, motion, 3)).status == ["ok", "singular", "no_torque"]
+    assert solved(Scene(PARALLELOGRAM, motion, 3)).status == [
+        "ok",
+        "singular",
+        "no_torque",
+    ]
 
 
 def heavy(mass: float) -> fourbar.FourBar:
-    return fourbar.FourBar(3.0, fourbar.Bar(1.0, 1.0), fourbar.Bar(2.5, mass, 1.0), fourbar.Bar(2.2, 1.0))
+    return fourbar.FourBar(
+        3.0, fourbar.Bar(1.0, 1.0), fourbar.Bar(2.5, mass, 1.0), fourbar.Bar(2.2, 1.0)
+    )
 
 
 def test_beyond_the_range_of_doubles_the_status_says_so_from_that_stage_on() -> None:
@@ -142,21 +222,38 @@ def test_beyond_the_range_of_doubles_the_status_says_so_from_that_stage_on() -> 
     solution = solved(Scene(heavy(1e308), motion))
     assert solution.status == ["overflow"] * 5
     assert all(np.isnan(getattr(solution, name)).all() for name in FORCES)
-    assert all(np.isfinite(getattr(solution, name)).all() for name in ("theta_3", "omega_3", "alpha_3", "a_G3"))
+    assert all(
+        np.isfinite(getattr(solution, name)).all()
+        for name in ("theta_3", "omega_3", "alpha_3", "a_G3")
+    )
     assert solved(Scene(heavy(1e308), motion), "acceleration").status == ["ok"] * 5
     at_rest = Motion(np.linspace(0.3, 2.0, 5), 0.0)
     assert solved(Scene(heavy(1e308), at_rest)).status == ["ok"] * 5
     long = fourbar.uniform(30.0, 10.0, 25.0, 22.0)
     fast = solved(Scene(long, Motion(np.array([0.3]), 1e154)))
-    assert fast.status == ["overflow"] and fast.omega_2 == [1e154] and np.isfinite(fast.omega_4).all()  # type: ignore[arg-type]
-    assert np.isnan(fast.alpha_3).all() and np.isnan(fast.a_A).all() and np.isnan(fast.torque).all()  # type: ignore[arg-type]
+    assert (
+        fast.status == ["overflow"]
+        and fast.omega_2 == [1e154]
+        and np.isfinite(fast.omega_4).all()
+    )  # type: ignore[arg-type]
+    assert (
+        np.isnan(fast.alpha_3).all()
+        and np.isnan(fast.a_A).all()
+        and np.isnan(fast.torque).all()
+    )  # type: ignore[arg-type]
 
 
 def test_where_it_depends_on_the_position_only_those_positions_are_lost() -> None:
     """The force of a spring of 1e308 N/m, 0.8 m long, at a distance that grows with theta_2."""
     spring = Spring(SpringEnd(1, 3.0, 0.0), SpringEnd(2, 1.0, 0.0), 1e308, 0.0)
     solution = solved(
-        Scene(heavy(1.0), Motion(np.array([0.1, 1.0, 3.0]), 1.0), 4, effects=(Springs((spring,)),)), "force"
+        Scene(
+            heavy(1.0),
+            Motion(np.array([0.1, 1.0, 3.0]), 1.0),
+            4,
+            effects=(Springs((spring,)),),
+        ),
+        "force",
     )
     assert solution.status[2] == "overflow"
     assert without_value(solution) == {}
@@ -164,7 +261,9 @@ def test_where_it_depends_on_the_position_only_those_positions_are_lost() -> Non
 
 @pytest.mark.parametrize("omega", [1.4e154, -1e200, 1.7e308])
 def test_a_speed_whose_square_is_no_number_is_refused_in_one_line(omega: float) -> None:
-    with pytest.raises(InputError, match=r"motion\.omega_2 = .*: must be below 1\.341e\+154 rad/s") as caught:
+    with pytest.raises(
+        InputError, match=r"motion\.omega_2 = .*: must be below 1\.341e\+154 rad/s"
+    ) as caught:
         Motion(0.3, omega)
     assert "\n" not in str(caught.value)
 
@@ -172,20 +271,33 @@ def test_a_speed_whose_square_is_no_number_is_refused_in_one_line(omega: float) 
 def test_lengths_and_sweeps_beyond_the_range_of_doubles_are_refused() -> None:
     with pytest.raises(InputError, match="lengths = "):
         fourbar.FourBar(1e308, *[fourbar.Bar(1e308, inertia=0.0)] * 3)
-    assert solved(Scene(fourbar.FourBar(4e307, *[fourbar.Bar(4e307)] * 3), Motion(1.0, 1e-200))).status == ["ok"]
+    assert solved(
+        Scene(fourbar.FourBar(4e307, *[fourbar.Bar(4e307)] * 3), Motion(1.0, 1e-200))
+    ).status == ["ok"]
     with pytest.raises(InputError, match=r"motion\.theta_2\.to = 1e\+308"):
         Sweep(-1e308, 1e308, 3)
 
 
 def test_an_angle_that_is_no_number_is_not_reported_as_not_closing() -> None:
-    for lengths in ((3.0, 1.0, 2.5, 2.2), (4.0, 2.5, 2.5, 2.8)):  # the second closes in a part of the turn alone
-        linkage = fourbar.FourBar(lengths[0], *(fourbar.Bar(length) for length in lengths[1:]), 1e308)
-        closing = next(x for x in 1e308 + 1e292 * np.arange(9) if solve(Scene(linkage, Motion(x))).assembled[0])
+    for lengths in (
+        (3.0, 1.0, 2.5, 2.2),
+        (4.0, 2.5, 2.5, 2.8),
+    ):  # the second closes in a part of the turn alone
+        linkage = fourbar.FourBar(
+            lengths[0], *(fourbar.Bar(length) for length in lengths[1:]), 1e308
+        )
+        closing = next(
+            x
+            for x in 1e308 + 1e292 * np.arange(9)
+            if solve(Scene(linkage, Motion(x))).assembled[0]
+        )
         solution = solved(Scene(linkage, Motion(np.array([-1e308, closing]), 1.0)))
         assert solution.status == ["overflow", "ok"] and without_value(solution) == {}
 
 
-def test_what_is_beyond_the_range_of_doubles_is_nan_where_the_loop_does_not_close_too() -> None:
+def test_what_is_beyond_the_range_of_doubles_is_nan_where_the_loop_does_not_close_too() -> (
+    None
+):
     rocker = fourbar.uniform(40.0, 25.0, 25.0, 28.0)
     solution = solved(Scene(rocker, Motion(np.array([2.5]), 1.0, 1e308)))
     assert solution.status == ["not_assembled"] and np.isnan(solution.a_A).all()  # type: ignore[arg-type]
@@ -194,7 +306,10 @@ def test_what_is_beyond_the_range_of_doubles_is_nan_where_the_loop_does_not_clos
 def test_where_friction_jams_the_motion_that_would_begin_the_status_says_so() -> None:
     """At rest with a large pin: one of the two torques does not exist, torque and forces at rest do."""
     scene = Scene(
-        CRANK_ROCKER, Motion(np.linspace(0.1, 6.2, 60), 0.0), 4, effects=(Gravity(), PinFriction.at(A=(0.9, 0.2)))
+        CRANK_ROCKER,
+        Motion(np.linspace(0.1, 6.2, 60), 0.0),
+        4,
+        effects=(Gravity(), PinFriction.at(A=(0.9, 0.2))),
     )
     solution = solved(scene)
     jammed = solution.status_code == JAMMED
@@ -222,11 +337,18 @@ bar = {drive_bar}
 
 @pytest.mark.parametrize(
     ("changes", "words"),
-    [({"drive_bar": 3}, "no torque"), ({"mass": "1e308 kg", "omega": "100 rad/s"}, "overflow")],
+    [
+        ({"drive_bar": 3}, "no torque"),
+        ({"mass": "1e308 kg", "omega": "100 rad/s"}, "overflow"),
+    ],
 )
-def test_analyze_says_it_in_every_form(changes: dict[str, Any], words: str, tmp_path: Path, capfd: Any) -> None:
+def test_analyze_says_it_in_every_form(
+    changes: dict[str, Any], words: str, tmp_path: Path, capfd: Any
+) -> None:
     file = tmp_path / "scene.toml"
-    file.write_text(SCENE.format(**{"mass": "1 kg", "omega": "1 rad/s", "drive_bar": 2, **changes}))
+    file.write_text(
+        SCENE.format(**{"mass": "1 kg", "omega": "1 rad/s", "drive_bar": 2, **changes})
+    )
     name = words.replace(" ", "_")
     with warnings.catch_warnings():
         warnings.simplefilter("always")
@@ -238,21 +360,36 @@ def test_analyze_says_it_in_every_form(changes: dict[str, Any], words: str, tmp_
         assert document["status"] == [name] * 5 and document["torque"] == [None] * 5
         assert status(["analyze", str(file), "--csv"]) == HOLDS
         lines, errors = capfd.readouterr()
-        assert [line.split(",")[0] for line in lines.splitlines()[1:]] == [name] * 5 and errors == ""
-        assert collect_page_data(fourbar.load(file), {})["branches"]["1"]["status"].count(name) >= 5
+        assert [line.split(",")[0] for line in lines.splitlines()[1:]] == [
+            name
+        ] * 5 and errors == ""
+        assert (
+            collect_page_data(fourbar.load(file), {})["branches"]["1"]["status"].count(
+                name
+            )
+            >= 5
+        )
 
 
-def test_analyze_refuses_a_speed_without_a_square_in_one_line(tmp_path: Path, capfd: Any) -> None:
+def test_analyze_refuses_a_speed_without_a_square_in_one_line(
+    tmp_path: Path, capfd: Any
+) -> None:
     file = tmp_path / "scene.toml"
     file.write_text(SCENE.format(mass="1 kg", omega="1e200 rad/s", drive_bar=2))
     assert status(["analyze", str(file)]) == 2
     out, errors = capfd.readouterr()
-    assert out == "" and errors.count("\n") == 1 and f"{file}: motion.omega_2 = 1e+200: must be below" in errors
+    assert (
+        out == ""
+        and errors.count("\n") == 1
+        and f"{file}: motion.omega_2 = 1e+200: must be below" in errors
+    )
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("figure", ["overview", "torque", "forces", "hodograph"])
-def test_figures_without_a_single_force_are_drawn_without_a_word(figure: str, tmp_path: Path) -> None:
+def test_figures_without_a_single_force_are_drawn_without_a_word(
+    figure: str, tmp_path: Path
+) -> None:
     scene = Scene(PARALLELOGRAM, Motion(np.linspace(0.3, 2.0, 5), 1.0), 3)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -261,6 +398,8 @@ def test_figures_without_a_single_force_are_drawn_without_a_word(figure: str, tm
 
 def test_free_bodies_without_forces_are_refused_with_the_reason(tmp_path: Path) -> None:
     scene = Scene(PARALLELOGRAM, Motion(np.array([0.3]), 1.0), 3)
-    with pytest.raises(InputError, match=r"freebody.*no value at theta_2 = 17\.1887 deg: no_torque"):
+    with pytest.raises(
+        InputError, match=r"freebody.*no value at theta_2 = 17\.1887 deg: no_torque"
+    ):
         draw(scene, tmp_path / "figure.svg", "freebody")
     assert list(tmp_path.iterdir()) == []

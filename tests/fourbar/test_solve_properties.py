@@ -19,7 +19,12 @@ WORST_CONDITION = 0.2
 """Sines below this are drawn elsewhere: here every relation must hold to round-off."""
 ROUND_OFF = 100.0 * 2.0**-52 / WORST_CONDITION**3
 """Two methods of fifty roundings each, divided by the motion condition squared and the drive condition: 2.8e-12."""
-EXAMPLES = settings(max_examples=60, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
+EXAMPLES = settings(
+    max_examples=60,
+    deadline=None,
+    derandomize=True,
+    suppress_health_check=[HealthCheck.too_slow],
+)
 """The same examples on every run: what is new is looked for by fuzzing."""
 FORCES = ("F12", "F32", "F43", "F14")
 
@@ -31,16 +36,35 @@ def between(low: float, high: float) -> st.SearchStrategy[float]:
 @st.composite
 def scenes(draw: st.DrawFn, effects: bool = True) -> Scene:
     """Lengths from the angles of the triangle A, B, O4, so every scene assembles with a known condition."""
-    d, a, psi = draw(between(0.1, 1.0)), draw(between(0.1, 1.0)), draw(between(-3.1, 3.1))
+    d, a, psi = (
+        draw(between(0.1, 1.0)),
+        draw(between(0.1, 1.0)),
+        draw(between(-3.1, 3.1)),
+    )
     e = abs(d - a * complex(math.cos(psi), math.sin(psi)))
     assume(e > 0.05)
-    mu = draw(between(math.asin(WORST_CONDITION) + 0.01, math.pi - math.asin(WORST_CONDITION) - 0.01))
+    mu = draw(
+        between(
+            math.asin(WORST_CONDITION) + 0.01,
+            math.pi - math.asin(WORST_CONDITION) - 0.01,
+        )
+    )
     beta = draw(between(0.1, 0.9)) * (math.pi - mu)
-    b, c = e * math.sin(math.pi - mu - beta) / math.sin(mu), e * math.sin(beta) / math.sin(mu)
+    b, c = (
+        e * math.sin(math.pi - mu - beta) / math.sin(mu),
+        e * math.sin(beta) / math.sin(mu),
+    )
     bars = []
     for length in (a, b, c):
         mass, k = draw(between(0.0, 5.0)), draw(between(0.01, 0.5))
-        bars.append(Bar(length, mass, mass * length**2 * k, (length * draw(between(-0.5, 1.5)), draw(between(-3, 3)))))
+        bars.append(
+            Bar(
+                length,
+                mass,
+                mass * length**2 * k,
+                (length * draw(between(-0.5, 1.5)), draw(between(-3, 3))),
+            )
+        )
     loads = [
         Load(
             draw(st.sampled_from(MOVING_BARS)),
@@ -55,13 +79,28 @@ def scenes(draw: st.DrawFn, effects: bool = True) -> Scene:
     if effects and draw(st.booleans()):
         terms.append(Gravity(9.81, draw(between(-3, 3))))
     if effects and draw(st.booleans()):
-        terms.append(Viscous.at(O2=draw(between(0, 1)), B=draw(between(0, 1)), O4=draw(between(0, 1))))
+        terms.append(
+            Viscous.at(
+                O2=draw(between(0, 1)), B=draw(between(0, 1)), O4=draw(between(0, 1))
+            )
+        )
     omega = draw(st.sampled_from([-1.0, 1.0])) * draw(between(0.5, 20.0))
     theta_1 = draw(between(-3, 3))
-    motion = Motion(theta_1 + psi, omega, draw(between(-50, 50)), draw(st.sampled_from([-1, 1])))
-    scene = Scene(FourBar(d, *bars, theta_1), motion, draw(st.sampled_from(MOVING_BARS)), tuple(loads), tuple(terms))
+    motion = Motion(
+        theta_1 + psi, omega, draw(between(-50, 50)), draw(st.sampled_from([-1, 1]))
+    )
+    scene = Scene(
+        FourBar(d, *bars, theta_1),
+        motion,
+        draw(st.sampled_from(MOVING_BARS)),
+        tuple(loads),
+        tuple(terms),
+    )
     solution = fourbar.solve(scene, "force")
-    assume(solution.drive_condition is not None and solution.drive_condition[0] >= WORST_CONDITION)
+    assume(
+        solution.drive_condition is not None
+        and solution.drive_condition[0] >= WORST_CONDITION
+    )
     return scene
 
 
@@ -77,25 +116,43 @@ def force_size(scene: Scene, solution: Solution) -> float:
 
 def torque_size(scene: Scene, solution: Solution, size: float) -> float:
     """Sum of the magnitudes of all moments, N m; `size` is that of the forces."""
-    longest = max(*scene.linkage.lengths, *(abs(scene.linkage.bar(bar).mass_centre[0]) for bar in MOVING_BARS), 0.5)
-    couples = abs(float(solution.torque[0])) + sum(abs(load.moment) for load in scene.loads)
+    longest = max(
+        *scene.linkage.lengths,
+        *(abs(scene.linkage.bar(bar).mass_centre[0]) for bar in MOVING_BARS),
+        0.5,
+    )
+    couples = abs(float(solution.torque[0])) + sum(
+        abs(load.moment) for load in scene.loads
+    )
     for bar in MOVING_BARS:
-        couples += scene.linkage.bar(bar).moment_of_inertia * abs(float(getattr(solution, f"alpha_{bar}")[0]))
+        couples += scene.linkage.bar(bar).moment_of_inertia * abs(
+            float(getattr(solution, f"alpha_{bar}")[0])
+        )
     for effect in scene.effects:
         if isinstance(effect, Viscous):
-            speeds = sum(abs(float(getattr(solution, f"omega_{bar}")[0])) for bar in MOVING_BARS)
+            speeds = sum(
+                abs(float(getattr(solution, f"omega_{bar}")[0])) for bar in MOVING_BARS
+            )
             couples += 3.0 * speeds
     return couples + longest * size
 
 
 def same_forces(
-    scene: Scene, ours: Solution, theirs: dict[str, np.ndarray], torque: float, factor: float = 1.0
+    scene: Scene,
+    ours: Solution,
+    theirs: dict[str, np.ndarray],
+    torque: float,
+    factor: float = 1.0,
 ) -> None:
     """Forces and torque of `ours` equal those given, in units of everything that acts."""
     size = force_size(scene, ours)
     for name, expected in theirs.items():
-        assert np.abs(getattr(ours, name)[0] - expected).max() <= factor * ROUND_OFF * size, name
-    assert abs(float(ours.torque[0]) - torque) <= factor * ROUND_OFF * torque_size(scene, ours, size)
+        assert (
+            np.abs(getattr(ours, name)[0] - expected).max() <= factor * ROUND_OFF * size
+        ), name
+    assert abs(float(ours.torque[0]) - torque) <= factor * ROUND_OFF * torque_size(
+        scene, ours, size
+    )
 
 
 def forces(solution: Solution) -> dict[str, np.ndarray]:
@@ -107,8 +164,14 @@ def forces(solution: Solution) -> dict[str, np.ndarray]:
 def test_the_loop_closes(scene: Scene) -> None:
     s, link = fourbar.solve(scene), scene.linkage
     d, a, b, c = link.lengths
-    loop = a * np.exp(1j * s.theta_2) + b * np.exp(1j * s.theta_3) - c * np.exp(1j * s.theta_4)
-    assert abs(loop[0] - d * np.exp(1j * link.ground_angle)) <= ROUND_OFF * sum(link.lengths)
+    loop = (
+        a * np.exp(1j * s.theta_2)
+        + b * np.exp(1j * s.theta_3)
+        - c * np.exp(1j * s.theta_4)
+    )
+    assert abs(loop[0] - d * np.exp(1j * link.ground_angle)) <= ROUND_OFF * sum(
+        link.lengths
+    )
     assert np.sign(np.sin(s.theta_4 - s.theta_3))[0] == scene.motion.branch
 
 
@@ -127,7 +190,11 @@ def test_power_balance(scene: Scene) -> None:
         return omega * np.array([-arm[1], arm[0]])
 
     d, theta_1 = scene.linkage.ground, scene.linkage.ground_angle
-    foot = {2: np.zeros(2), 3: A, 4: d * np.array([math.cos(theta_1), math.sin(theta_1)])}
+    foot = {
+        2: np.zeros(2),
+        3: A,
+        4: d * np.array([math.cos(theta_1), math.sin(theta_1)]),
+    }
     base = {2: np.zeros(2), 3: spin(w[2], A), 4: np.zeros(2)}
     for bar in MOVING_BARS:
         part, G = scene.linkage.bar(bar), getattr(s, f"G{bar}")[0]
@@ -138,19 +205,30 @@ def test_power_balance(scene: Scene) -> None:
         terms += abs(gain) + abs(turn)
     for load in scene.loads:
         turn = float(getattr(s, f"theta_{load.bar}")[0]) if load.frame == "bar" else 0.0
-        force = load.force[0] * np.array([math.cos(load.force[1] + turn), math.sin(load.force[1] + turn)])
-        arm = load.at[0] * np.array([math.cos(load.at[1] + turn), math.sin(load.at[1] + turn)])
-        given_power = force @ (velocity[load.bar] + spin(w[load.bar], arm)) + load.moment * w[load.bar]
-        power += given_power
-        terms += abs(load.force[0]) * float(np.hypot(*velocity[load.bar]) + abs(w[load.bar]) * 0.5) + abs(
-            load.moment * w[load.bar]
+        force = load.force[0] * np.array(
+            [math.cos(load.force[1] + turn), math.sin(load.force[1] + turn)]
         )
+        arm = load.at[0] * np.array(
+            [math.cos(load.at[1] + turn), math.sin(load.at[1] + turn)]
+        )
+        given_power = (
+            force @ (velocity[load.bar] + spin(w[load.bar], arm))
+            + load.moment * w[load.bar]
+        )
+        power += given_power
+        terms += abs(load.force[0]) * float(
+            np.hypot(*velocity[load.bar]) + abs(w[load.bar]) * 0.5
+        ) + abs(load.moment * w[load.bar])
     for effect in scene.effects:
         if isinstance(effect, Gravity):
-            pull = effect.magnitude * np.array([math.cos(effect.angle), math.sin(effect.angle)])
+            pull = effect.magnitude * np.array(
+                [math.cos(effect.angle), math.sin(effect.angle)]
+            )
             for bar in MOVING_BARS:
                 power += scene.linkage.bar(bar).mass * pull @ velocity[bar]
-                terms += scene.linkage.bar(bar).mass * 9.81 * float(np.hypot(*velocity[bar]))
+                terms += (
+                    scene.linkage.bar(bar).mass * 9.81 * float(np.hypot(*velocity[bar]))
+                )
         else:
             assert isinstance(effect, Viscous)
             for pin, k in effect.coefficients:
@@ -168,13 +246,17 @@ def test_ground_carries_what_acts_and_what_accelerates(scene: Scene) -> None:
     total = s.F12[0] + s.F14[0]
     for load in scene.loads:
         turn = float(getattr(s, f"theta_{load.bar}")[0]) if load.frame == "bar" else 0.0
-        total = total + load.force[0] * np.array([math.cos(load.force[1] + turn), math.sin(load.force[1] + turn)])
+        total = total + load.force[0] * np.array(
+            [math.cos(load.force[1] + turn), math.sin(load.force[1] + turn)]
+        )
     for bar in MOVING_BARS:
         mass = scene.linkage.bar(bar).mass
         total = total - mass * getattr(s, f"a_G{bar}")[0]
         for effect in scene.effects:
             if isinstance(effect, Gravity):
-                total = total + mass * effect.magnitude * np.array([math.cos(effect.angle), math.sin(effect.angle)])
+                total = total + mass * effect.magnitude * np.array(
+                    [math.cos(effect.angle), math.sin(effect.angle)]
+                )
     assert np.abs(total).max() <= ROUND_OFF * force_size(scene, s)
 
 
@@ -189,23 +271,42 @@ def test_mirror_symmetry(scene: Scene) -> None:
 
     mirrored = replace(
         scene,
-        linkage=FourBar(link.ground, bar(link.input), bar(link.coupler), bar(link.output), -link.ground_angle),
+        linkage=FourBar(
+            link.ground,
+            bar(link.input),
+            bar(link.coupler),
+            bar(link.output),
+            -link.ground_angle,
+        ),
         motion=Motion(-float(m.theta_2), -m.omega_2, -m.alpha_2, -m.branch),
         loads=tuple(
-            replace(load, force=(load.force[0], -load.force[1]), at=(load.at[0], -load.at[1]), moment=-load.moment)
+            replace(
+                load,
+                force=(load.force[0], -load.force[1]),
+                at=(load.at[0], -load.at[1]),
+                moment=-load.moment,
+            )
             for load in scene.loads
         ),
-        effects=tuple(replace(e, angle=-e.angle) if isinstance(e, Gravity) else e for e in scene.effects),
+        effects=tuple(
+            replace(e, angle=-e.angle) if isinstance(e, Gravity) else e
+            for e in scene.effects
+        ),
     )
     ours, of_mirrored = fourbar.solve(scene), fourbar.solve(mirrored)
     flipped = {name: value * (1.0, -1.0) for name, value in forces(of_mirrored).items()}
     same_forces(scene, ours, flipped, -float(of_mirrored.torque[0]))
-    assert abs(math.remainder(float(ours.theta_4[0] + of_mirrored.theta_4[0]), math.tau)) <= ROUND_OFF
+    assert (
+        abs(math.remainder(float(ours.theta_4[0] + of_mirrored.theta_4[0]), math.tau))
+        <= ROUND_OFF
+    )
 
 
 @EXAMPLES
 @given(scenes(), st.integers(-20, 20), st.integers(-20, 20), st.integers(-20, 20))
-def test_length_mass_and_time_scale(scene: Scene, length: int, mass: int, time: int) -> None:
+def test_length_mass_and_time_scale(
+    scene: Scene, length: int, mass: int, time: int
+) -> None:
     """By powers of two, which round nothing: forces scale as m L/t^2, torques as m L^2/t^2."""
     L, M, T = 2.0**length, 2.0**mass, 2.0**time
     force, torque = M * L / T**2, M * L * L / T**2
@@ -221,7 +322,13 @@ def test_length_mass_and_time_scale(scene: Scene, length: int, mass: int, time: 
 
     scaled = replace(
         scene,
-        linkage=FourBar(link.ground * L, bar(link.input), bar(link.coupler), bar(link.output), link.ground_angle),
+        linkage=FourBar(
+            link.ground * L,
+            bar(link.input),
+            bar(link.coupler),
+            bar(link.output),
+            link.ground_angle,
+        ),
         motion=m.replace(speed=m.omega_2 / T, acceleration=m.alpha_2 / T**2),
         loads=tuple(
             replace(
@@ -259,7 +366,9 @@ def test_forces_go_as_the_speed_squared(scene: Scene, times: float) -> None:
 @given(scenes())
 def test_time_reversal(scene: Scene) -> None:
     """Backwards through the same position: the same forces, without what depends on the sense of motion."""
-    still = replace(scene, effects=tuple(e for e in scene.effects if isinstance(e, Gravity)))
+    still = replace(
+        scene, effects=tuple(e for e in scene.effects if isinstance(e, Gravity))
+    )
     back = replace(still, motion=still.motion.replace(speed=-still.motion.omega_2))
     ours, of_back = fourbar.solve(still), fourbar.solve(back)
     same_forces(still, ours, forces(of_back), float(of_back.torque[0]))
@@ -278,10 +387,17 @@ def test_frame_rotation(scene: Scene, turn: float) -> None:
         loads=tuple(
             load
             if load.frame == "bar"
-            else replace(load, force=(load.force[0], load.force[1] + turn), at=(load.at[0], load.at[1] + turn))
+            else replace(
+                load,
+                force=(load.force[0], load.force[1] + turn),
+                at=(load.at[0], load.at[1] + turn),
+            )
             for load in scene.loads
         ),
-        effects=tuple(replace(e, angle=e.angle + turn) if isinstance(e, Gravity) else e for e in scene.effects),
+        effects=tuple(
+            replace(e, angle=e.angle + turn) if isinstance(e, Gravity) else e
+            for e in scene.effects
+        ),
     )
     ours, of_turned = fourbar.solve(scene), fourbar.solve(turned)
     cosine, sine = math.cos(turn), math.sin(turn)
@@ -310,18 +426,31 @@ def test_relabelled_from_the_other_end(scene: Scene) -> None:
     names = {2: 4, 3: 3, 4: 2}
 
     def relabelled(load: Load) -> Load:
-        if load.bar == 3 and load.frame == "bar":  # the bar's line points in the opposite direction
-            return replace(load, force=(load.force[0], load.force[1] + math.pi), at=(load.at[0], load.at[1] + math.pi))
+        if (
+            load.bar == 3 and load.frame == "bar"
+        ):  # the bar's line points in the opposite direction
+            return replace(
+                load,
+                force=(load.force[0], load.force[1] + math.pi),
+                at=(load.at[0], load.at[1] + math.pi),
+            )
         return replace(load, bar=names[load.bar])
 
     pins = {"O2": "O4", "A": "B", "B": "A", "O4": "O2"}
     other_end = Scene(
         FourBar(link.ground, link.output, coupler, link.input, theta_1),
-        Motion(float(s.theta_4[0]), float(s.omega_4[0]), float(s.alpha_4[0]), _branch_from_the_other_end(s)),
+        Motion(
+            float(s.theta_4[0]),
+            float(s.omega_4[0]),
+            float(s.alpha_4[0]),
+            _branch_from_the_other_end(s),
+        ),
         names[scene.drive_bar],
         tuple(relabelled(load) for load in scene.loads),
         tuple(
-            Viscous.at(**{pins[pin]: k for pin, k in e.coefficients}) if isinstance(e, Viscous) else e
+            Viscous.at(**{pins[pin]: k for pin, k in e.coefficients})
+            if isinstance(e, Viscous)
+            else e
             for e in scene.effects
         ),
     )
@@ -332,7 +461,13 @@ def test_relabelled_from_the_other_end(scene: Scene) -> None:
     # F32 at A is now F34 = -F43, F43 at B is F23 = -F32
     exchanged = {"F12": o.F14[0], "F14": o.F12[0], "F32": -o.F43[0], "F43": -o.F32[0]}
     # omega_4 and alpha_4 were rounded before, and lose what the shape of the linkage makes of it
-    same_forces(scene, s, exchanged, float(o.torque[0]), factor=10.0 * shape(scene) / WORST_CONDITION)
+    same_forces(
+        scene,
+        s,
+        exchanged,
+        float(o.torque[0]),
+        factor=10.0 * shape(scene) / WORST_CONDITION,
+    )
 
 
 def _branch_from_the_other_end(s: Solution) -> int:
@@ -349,7 +484,11 @@ def shape(scene: Scene) -> float:
 @pytest.mark.parametrize("name", FORCES)
 def test_a_wrong_force_would_be_seen(name: str) -> None:
     """The comparison itself: a part in 1e9 is noticed."""
-    scene = Scene(fourbar.uniform(0.3, 0.1, 0.25, 0.22), Motion(1.0, 10.0, 1.0), effects=(Gravity(),))
+    scene = Scene(
+        fourbar.uniform(0.3, 0.1, 0.25, 0.22),
+        Motion(1.0, 10.0, 1.0),
+        effects=(Gravity(),),
+    )
     s = fourbar.solve(scene)
     wrong = forces(s)
     wrong[name] = wrong[name] * (1.0 + 1e-9)

@@ -19,7 +19,9 @@ def mode(path: Path) -> int:
 
 
 @pytest.mark.parametrize("before", [0o600, 0o640, 0o664, 0o755], ids=oct)
-def test_an_existing_file_keeps_its_mode_and_a_new_one_is_an_ordinary_file(tmp_path: Path, before: int) -> None:
+def test_an_existing_file_keeps_its_mode_and_a_new_one_is_an_ordinary_file(
+    tmp_path: Path, before: int
+) -> None:
     path = tmp_path / "a"
     write_bytes(path, b"new")
     umask = os.umask(0)
@@ -32,7 +34,9 @@ def test_an_existing_file_keeps_its_mode_and_a_new_one_is_an_ordinary_file(tmp_p
     assert mode(path) == 0o600
 
 
-def test_a_symbolic_link_stays_and_the_file_that_it_names_is_written(tmp_path: Path) -> None:
+def test_a_symbolic_link_stays_and_the_file_that_it_names_is_written(
+    tmp_path: Path,
+) -> None:
     (tmp_path / "far").mkdir()
     real, link, chain = tmp_path / "far" / "real", tmp_path / "link", tmp_path / "chain"
     link.symlink_to("far/real")
@@ -55,11 +59,15 @@ def test_a_symbolic_link_stays_and_the_file_that_it_names_is_written(tmp_path: P
 def test_save_and_analyze_write_through_links_and_keep_the_mode(tmp_path: Path) -> None:
     for name, write in {
         "scene.toml": lambda path: fourbar.save(fourbar.load(CRANK_ROCKER), path),
-        "table.csv": lambda path: status(["analyze", str(CRANK_ROCKER), "--csv", "-o", str(path)]),
+        "table.csv": lambda path: status(
+            ["analyze", str(CRANK_ROCKER), "--csv", "-o", str(path)]
+        ),
     }.items():
         real, link = tmp_path / name, tmp_path / f"link_{name}"
         real.write_text("old")
         real.chmod(0o600)
         link.symlink_to(real)
         write(link)
-        assert link.is_symlink() and mode(real) == 0o600 and real.read_text() != "old", name
+        assert (
+            link.is_symlink() and mode(real) == 0o600 and real.read_text() != "old"
+        ), name

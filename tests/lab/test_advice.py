@@ -30,7 +30,9 @@ def test_the_search_knows_when_nothing_serves() -> None:
     setup = TrialSetup(scene, command(scene))
     assert find_cheapest(setup, 1e-3, {("RK4", True): 1.0}) is not None
     trials: list[object] = []
-    setup.try_out = lambda settings, build=None: trials.append(settings) or hopeless(scene)  # type: ignore[method-assign,func-returns-value]
+    setup.try_out = lambda settings, build=None: (
+        trials.append(settings) or hopeless(scene)
+    )  # type: ignore[method-assign,func-returns-value]
     assert find_cheapest(setup, 1e-3, {("RK4", True): 1.0}) is None and len(trials) > 50
 
 
@@ -45,11 +47,21 @@ def test_a_count_that_cannot_decide_says_which_one_can(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     case = advice.AdviceCase(0, 1e-3, True, 5e-4, 20.0, 19.0)
-    monkeypatch.setattr(advice, "measure_case", lambda seed, index, costs: replace(case, index=index))
+    monkeypatch.setattr(
+        advice, "measure_case", lambda seed, index, costs: replace(case, index=index)
+    )
     monkeypatch.setattr(advice, "time_relative_costs", lambda setup: {})
     for count, status in ((40, 1), (73, 0)):
-        assert ended(["advice", "--count", str(count), "--out", str(tmp_path / str(count))]) == status
-        stated = "undecided: with 0 not met the bound is reached from --count 73 on" in capsys.readouterr().out
+        assert (
+            ended(
+                ["advice", "--count", str(count), "--out", str(tmp_path / str(count))]
+            )
+            == status
+        )
+        stated = (
+            "undecided: with 0 not met the bound is reached from --count 73 on"
+            in capsys.readouterr().out
+        )
         assert stated == (status == 1)
 
 

@@ -31,21 +31,35 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_every_limit_is_of_a_row_that_is_measured(tmp_path: Path) -> None:
     measured = bench.measure(1000, 1, 10_000)
     assert bench.LIMITS.keys() - measured.not_run.keys() <= measured.rows.keys()
-    numbers = [measured.rows, *measured.over_positions.values(), *measured.over_linkages.values()]
-    assert all(math.isfinite(value) and value > 0.0 for row in numbers for value in row.values())
+    numbers = [
+        measured.rows,
+        *measured.over_positions.values(),
+        *measured.over_linkages.values(),
+    ]
+    assert all(
+        math.isfinite(value) and value > 0.0
+        for row in numbers
+        for value in row.values()
+    )
     assert set(measured.over_positions["NumPy"]) == {1000, 10_000}
     assert set(measured.over_linkages["study, NumPy"]) == {1, 10, 100, 1000}
     assert set(measured.over_linkages["one after the other"]) == {1, 10}
-    contenders.draw_bench(measured.over_positions, measured.over_linkages, tmp_path / "bench.svg")
+    contenders.draw_bench(
+        measured.over_positions, measured.over_linkages, tmp_path / "bench.svg"
+    )
     picture = (tmp_path / "bench.svg").read_text()
     assert picture.count('<g id="axes_') == 2 and picture.count('<g id="line2d_') > 15
 
 
 @pytest.mark.slow
-def test_every_contender_finds_the_same_unknowns(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_every_contender_finds_the_same_unknowns(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     scene, command = make_example(), make_command(500)
     solution = solve(scene, at=command)
-    expected = np.concatenate([np.atleast_2d(getattr(solution, name).T) for name in UNKNOWNS])
+    expected = np.concatenate(
+        [np.atleast_2d(getattr(solution, name).T) for name in UNKNOWNS]
+    )
     peers = contenders.collect_loops()
     assert {"NumPy", "C"} <= set(peers.here) or "C" in peers.not_run
     for name, loop in peers.here.items():
@@ -53,29 +67,46 @@ def test_every_contender_finds_the_same_unknowns(monkeypatch: pytest.MonkeyPatch
         loop(command.theta_2, out)
         off = out - expected
         off[:2] = np.remainder(off[:2] + np.pi, 2 * np.pi) - np.pi
-        assert (np.abs(off).max(axis=1) <= ROUNDING * np.abs(expected).max(axis=1)).all(), name
+        assert (
+            np.abs(off).max(axis=1) <= ROUNDING * np.abs(expected).max(axis=1)
+        ).all(), name
 
 
-def test_more_positions_than_fit_are_evaluated_in_pieces(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_more_positions_than_fit_are_evaluated_in_pieces(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setattr(contenders, "AT_ONCE", 1000)
     monkeypatch.setattr(contenders, "SHORTEST", 1)
     sizes: list[int] = []
-    times = contenders.time_positions({"it": lambda theta_2, out: sizes.append(len(theta_2))}, 10_000, 1)
+    times = contenders.time_positions(
+        {"it": lambda theta_2, out: sizes.append(len(theta_2))}, 10_000, 1
+    )
     assert set(times["it"]) == {1000, 10_000} and sizes == [1000] * (2 + 2 * 10)
 
 
-def test_what_is_missing_is_named_with_its_reason(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_is_missing_is_named_with_its_reason(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setenv("PATH", "")
     for library in ("jax", "torch"):
         monkeypatch.setitem(sys.modules, library, None)
     peers = contenders.collect_loops()
-    assert set(peers.here) == {"NumPy"} and set(peers.not_run) == {"C", "JAX", "PyTorch"}
+    assert set(peers.here) == {"NumPy"} and set(peers.not_run) == {
+        "C",
+        "JAX",
+        "PyTorch",
+    }
     rows = {"growth from 1000 positions on": 1.0}
-    monkeypatch.setattr(bench, "measure", lambda *_: bench.Measured(rows, {}, {}, peers.not_run))
+    monkeypatch.setattr(
+        bench, "measure", lambda *_: bench.Measured(rows, {}, {}, peers.not_run)
+    )
     for variable in bench.ONE_THREAD:
         monkeypatch.setenv(variable, "1")
     process = CliRunner().invoke(bench.bench, standalone_mode=False)
-    assert process.return_value == HOLDS and "not run: C: no C compiler is installed\n" in process.output
+    assert (
+        process.return_value == HOLDS
+        and "not run: C: no C compiler is installed\n" in process.output
+    )
 
 
 @pytest.mark.parametrize("name", bench.LIMITS)
@@ -83,10 +114,16 @@ def test_what_is_missing_is_named_with_its_reason(monkeypatch: pytest.MonkeyPatc
 def test_what_is_beyond_its_limit_fails_with_the_reason(
     name: str, spoiled: float | str | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    rows = {what: limit.bound for what, limit in bench.LIMITS.items()} | {"all, 1000 positions": 100.0}
+    rows = {what: limit.bound for what, limit in bench.LIMITS.items()} | {
+        "all, 1000 positions": 100.0
+    }
     limit = bench.LIMITS[name]
     if spoiled is not None:
-        rows[name] = math.nan if spoiled != "beyond" else limit.bound * (0.99 if limit.sign == ">=" else 1.01)
+        rows[name] = (
+            math.nan
+            if spoiled != "beyond"
+            else limit.bound * (0.99 if limit.sign == ">=" else 1.01)
+        )
     monkeypatch.setattr(bench, "measure", lambda *_: bench.Measured(rows, {}, {}, {}))
     for variable in bench.ONE_THREAD:
         monkeypatch.setenv(variable, "1")

@@ -22,13 +22,18 @@ WRONG = ('"torque": moments[0]', '"torque": 1.1 * moments[0]')
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     """A stranger's folder: the engine of the page, one that is wrong, and the entries of both."""
-    (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "protocol.md").read_text(), re.DOTALL)[:1]
+    (code,) = re.findall(
+        r"```python\n(.*?)```", (ROOT / "docs" / "protocol.md").read_text(), re.DOTALL
+    )[:1]
     assert WRONG[0] in code
     (tmp_path / "mine.py").write_text(code)
     (tmp_path / "wrong.py").write_text(code.replace(*WRONG))
     (tmp_path / "dead.py").write_text("raise SystemExit('no licence')")
     names = ("mine", "wrong", "dead")
-    entries = [f'[[engine]]\nname = "{name}"\ncommand = ["python", "{tmp_path / name}.py"]\n' for name in names]
+    entries = [
+        f'[[engine]]\nname = "{name}"\ncommand = ["python", "{tmp_path / name}.py"]\n'
+        for name in names
+    ]
     entries.append('[[engine]]\nname = "absent"\ncommand = ["no_such_program"]\n')
     (tmp_path / "engines.toml").write_text("\n".join(entries))
     return tmp_path
@@ -36,35 +41,71 @@ def folder(tmp_path: Path) -> Path:
 
 def run(folder: Path, *problems: str) -> dict[tuple[str, str], str]:
     """The letters of a run, by engine and problem."""
-    options = [option for name in problems or PROBLEMS_ASKED for option in ("--problem", name)]
-    line = ["benchmark", "--engines", str(folder / "engines.toml"), "-o", str(folder / "out"), "--time-limit", "60"]
+    options = [
+        option for name in problems or PROBLEMS_ASKED for option in ("--problem", name)
+    ]
+    line = [
+        "benchmark",
+        "--engines",
+        str(folder / "engines.toml"),
+        "-o",
+        str(folder / "out"),
+        "--time-limit",
+        "60",
+    ]
     assert status([*line, *options]) == 0
-    table = list(csv.DictReader((folder / "out" / "benchmark.csv").read_text().splitlines()))
-    return {(row["engine"], row["problem"]): read_cell_text(row["letters"]) for row in table if row["letters"]}
+    table = list(
+        csv.DictReader((folder / "out" / "benchmark.csv").read_text().splitlines())
+    )
+    return {
+        (row["engine"], row["problem"]): read_cell_text(row["letters"])
+        for row in table
+        if row["letters"]
+    }
 
 
-def test_a_stranger_s_engine_has_the_letters_that_its_numbers_earn(folder: Path) -> None:
+def test_a_stranger_s_engine_has_the_letters_that_its_numbers_earn(
+    folder: Path,
+) -> None:
     letters = run(folder)
-    assert letters["mine", "crank_rocker"] == "AA" and letters["wrong", "crank_rocker"] == "AD"
+    assert (
+        letters["mine", "crank_rocker"] == "AA"
+        and letters["wrong", "crank_rocker"] == "AD"
+    )
     assert letters["mine", "slider_crank"] == letters["mine", "sprung"] == REFUSED
     assert {letters[name, "crank_rocker"] for name in ("dead", "absent")} == {"-"}
-    table = list(csv.DictReader((folder / "out" / "benchmark.csv").read_text().splitlines()))
-    reasons = {row["engine"]: row["reason"] for row in table if row["problem"] == "crank_rocker"}
+    table = list(
+        csv.DictReader((folder / "out" / "benchmark.csv").read_text().splitlines())
+    )
+    reasons = {
+        row["engine"]: row["reason"]
+        for row in table
+        if row["problem"] == "crank_rocker"
+    }
     assert "no licence" in reasons["dead"] and "no_such_program" in reasons["absent"]
-    wrong = {row["quantity"]: row for row in table if row["engine"] == "wrong" and row["problem"] == "crank_rocker"}
+    wrong = {
+        row["quantity"]: row
+        for row in table
+        if row["engine"] == "wrong" and row["problem"] == "crank_rocker"
+    }
     assert wrong["torque"]["level"] == "D" and wrong["F12"]["level"] == "A"
     assert 5e-3 < float(wrong["torque"]["error"]) < 2e-1
     page = (folder / "out" / "benchmark.html").read_text()
     assert all(
-        f'href="#{name}-crank_rocker"' in page and f'id="{name}-crank_rocker"' in page for name in ("mine", "dead")
+        f'href="#{name}-crank_rocker"' in page and f'id="{name}-crank_rocker"' in page
+        for name in ("mine", "dead")
     )
 
 
 def test_what_was_answered_is_not_asked_again(folder: Path) -> None:
     first = run(folder, "crank_rocker")
     code = (folder / "mine.py").read_text()
-    (folder / "mine.py").write_text(code.replace('question["ask"] == "answer"', "1 / 0"))  # hello too
-    (folder / "mine.py").write_text(code.replace("        told = [", "        1 / 0\n        told = ["))
+    (folder / "mine.py").write_text(
+        code.replace('question["ask"] == "answer"', "1 / 0")
+    )  # hello too
+    (folder / "mine.py").write_text(
+        code.replace("        told = [", "        1 / 0\n        told = [")
+    )
     assert run(folder, "crank_rocker") == first
     file = folder / "out" / "results" / "mine" / "crank_rocker.json"
     problem = read_problem(PROBLEMS / "crank_rocker.json")
@@ -76,25 +117,48 @@ def test_what_was_answered_is_not_asked_again(folder: Path) -> None:
 def test_the_engines_of_the_lab_are_entries_that_a_run_finds_too() -> None:
     engines, reasons = read_engines_of(ENGINES), read_reasons(ENGINES)
     assert len(engines) >= 25 and engines.items() <= read_engines([]).items()
-    assert not [name for name in engines if "," in name], "`run --engines` takes a comma-separated list"
+    assert not [name for name in engines if "," in name], (
+        "`run --engines` takes a comma-separated list"
+    )
     rows = {name.partition(":")[0] for name in engines}
     assert all(any(reason.startswith(row) for row in rows) for reason in reasons)
 
 
 def test_a_row_names_its_version_before_its_way() -> None:
     assert name_row("MuJoCo: simulated", "4.0.0") == "MuJoCo 4.0.0: simulated"
-    assert name_row("mujoco 3.3.7", "3.3.7") == "mujoco 3.3.7" and name_row("mine", "") == "mine"
+    assert (
+        name_row("mujoco 3.3.7", "3.3.7") == "mujoco 3.3.7"
+        and name_row("mine", "") == "mine"
+    )
 
 
 @pytest.mark.parametrize(
-    "text", ["[[engine]]", '[[engine]]\nname = "x"', '[[engine]]\nname = "x"\ncommand = "y"\ncolour = 1', "]", None]
+    "text",
+    [
+        "[[engine]]",
+        '[[engine]]\nname = "x"',
+        '[[engine]]\nname = "x"\ncommand = "y"\ncolour = 1',
+        "]",
+        None,
+    ],
 )
 def test_entries_that_cannot_be_read_are_named_in_one_line(
     text: str | None, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     if text is not None:
         (tmp_path / "engines.toml").write_text(text)
-    assert status(["benchmark", "--engines", str(tmp_path / "engines.toml"), "-o", str(tmp_path / "out")]) == 2
+    assert (
+        status(
+            [
+                "benchmark",
+                "--engines",
+                str(tmp_path / "engines.toml"),
+                "-o",
+                str(tmp_path / "out"),
+            ]
+        )
+        == 2
+    )
     assert capsys.readouterr().err.count("\n") == 1
 
 
@@ -102,7 +166,9 @@ def test_entries_that_cannot_be_read_are_named_in_one_line(
 def test_an_engine_answers_the_slider_cranks(library: str, folder: Path) -> None:
     pytest.importorskip(library)
     program = ["python", "-m", "fourbar_lab.simulators.slider_engines", library]
-    (folder / "engines.toml").write_text(f'[[engine]]\nname = "it"\ncommand = {json.dumps(program)}\n')
+    (folder / "engines.toml").write_text(
+        f'[[engine]]\nname = "it"\ncommand = {json.dumps(program)}\n'
+    )
     letters = run(folder, "slider_crank", "slider_crank_offset", "crank_rocker")
     assert sorted(letters.values()) == ["AA", "AA", REFUSED]
 
@@ -131,23 +197,45 @@ for question in map(json.loads, sys.stdin):
 """
 
 
-def test_of_several_timesteps_the_finest_is_judged_and_each_setting_is_a_row(folder: Path) -> None:
+def test_of_several_timesteps_the_finest_is_judged_and_each_setting_is_a_row(
+    folder: Path,
+) -> None:
     (folder / "slow.py").write_text(SLOW.format(path=str(folder / "mine.py")))
     (folder / "engines.toml").write_text(
         f'[[engine]]\nname = "slow"\ncommand = ["python", "{folder / "slow.py"}"]\nsteps = [9, 100, 1000]\n'
         '[because]\n"slow: bad" = "its torque is wrong on purpose"\n"slow" = "another reason"\n'
     )
     letters = run(folder, "crank_rocker", "sprung")
-    assert letters["slow: good", "crank_rocker"] == "AA" and letters["slow: bad", "crank_rocker"] == "AC"
+    assert (
+        letters["slow: good", "crank_rocker"] == "AA"
+        and letters["slow: bad", "crank_rocker"] == "AC"
+    )
     assert letters["slow: bad", "sprung"] == REFUSED
-    table = list(csv.DictReader((folder / "out" / "benchmark.csv").read_text().splitlines()))
-    torque = {row["setting"]: row for row in table if row["engine"] == "slow: bad" and row["quantity"] == "torque"}
-    assert {setting: row["level"] for setting, row in torque.items()} == {"RK4 100/rev": "", "RK4 1000/rev": "C"}
+    table = list(
+        csv.DictReader((folder / "out" / "benchmark.csv").read_text().splitlines())
+    )
+    torque = {
+        row["setting"]: row
+        for row in table
+        if row["engine"] == "slow: bad" and row["quantity"] == "torque"
+    }
+    assert {setting: row["level"] for setting, row in torque.items()} == {
+        "RK4 100/rev": "",
+        "RK4 1000/rev": "C",
+    }
     assert torque["RK4 1000/rev"]["reason"] == "its torque is wrong on purpose"
-    missing = [row for row in table if row["engine"] == "slow: good" and row["quantity"] == "F43" and row["level"]]
+    missing = [
+        row
+        for row in table
+        if row["engine"] == "slow: good" and row["quantity"] == "F43" and row["level"]
+    ]
     assert [(row["level"], row["reason"]) for row in missing] == [("-", "not read")]
     page = (folder / "out" / "benchmark.html").read_text()
-    assert "order 2.0" in page and "Derivatives of the torque, by hand" in page and "slow 2: bad" in page
+    assert (
+        "order 2.0" in page
+        and "Derivatives of the torque, by hand" in page
+        and "slow 2: bad" in page
+    )
 
 
 def test_a_simulator_answers_single_states_at_its_own_motion(folder: Path) -> None:
@@ -156,13 +244,17 @@ def test_a_simulator_answers_single_states_at_its_own_motion(folder: Path) -> No
     (folder / "engines.toml").write_text(
         f'[[engine]]\nname = "it"\nadapter = "{adapter}"\nsetting = "generated file"\n'
     )
-    letters = run(folder, "crank_rocker", "sprung", "change_point", "second_on_the_crank")
+    letters = run(
+        folder, "crank_rocker", "sprung", "change_point", "second_on_the_crank"
+    )
     assert sorted(letters.values()) == ["AA", REFUSED, REFUSED, REFUSED]
     (file,) = (folder / "out" / "results").glob("*/crank_rocker.json")
     assert "at" in json.loads(file.read_text())
 
 
-def test_an_entry_of_one_kind_of_problem_answers_in_the_row_of_another(folder: Path) -> None:
+def test_an_entry_of_one_kind_of_problem_answers_in_the_row_of_another(
+    folder: Path,
+) -> None:
     pytest.importorskip("pinocchio")
     released = "fourbar_validation.engines.pinocchio:PinocchioReleased"
     (folder / "engines.toml").write_text(
@@ -170,5 +262,11 @@ def test_an_entry_of_one_kind_of_problem_answers_in_the_row_of_another(folder: P
         f'[[engine]]\nname = "it (released)"\nadapter = "{released}"\n'
     )
     letters = run(folder, "crank_rocker", "gz_physics_987", "slider_crank")
-    assert letters["it", "crank_rocker"] == "AA" and letters["it", "slider_crank"] == REFUSED
-    assert letters["it", "gz_physics_987"][:1] == "-" and letters["it", "gz_physics_987"][1:] in "AB"
+    assert (
+        letters["it", "crank_rocker"] == "AA"
+        and letters["it", "slider_crank"] == REFUSED
+    )
+    assert (
+        letters["it", "gz_physics_987"][:1] == "-"
+        and letters["it", "gz_physics_987"][1:] in "AB"
+    )

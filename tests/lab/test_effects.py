@@ -16,9 +16,13 @@ SAVED = 0.08
 
 
 def test_the_bare_scene_steps_faster_than_with_default_flags() -> None:
-    works = {effect: effects.prepare_simulation(effect) for effect in ("none", DEFAULT_FLAGS)}
+    works = {
+        effect: effects.prepare_simulation(effect) for effect in ("none", DEFAULT_FLAGS)
+    }
     best = dict.fromkeys(works, float("inf"))
-    for _ in range(100):  # by turns, a millisecond each: the least is free of what else the machine does
+    for _ in range(
+        100
+    ):  # by turns, a millisecond each: the least is free of what else the machine does
         for effect, work in works.items():
             began = time.perf_counter()
             work(50)
@@ -26,26 +30,45 @@ def test_the_bare_scene_steps_faster_than_with_default_flags() -> None:
     assert best["none"] <= (1.0 - SAVED) * best[DEFAULT_FLAGS]
 
 
-def test_a_workload_with_twice_the_work_costs_twice_as_much(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_workload_with_twice_the_work_costs_twice_as_much(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     def prepare(effect: str) -> object:
         return lambda amount: sum(range((1 + (effect == "twice")) * 1000 * amount))
 
     monkeypatch.setitem(effects.WORKLOADS, "formulas", prepare)
     measured = effects.measure("formulas", "twice", 5)
-    assert 1.5 < measured.median < 2.5 and measured.low <= measured.median <= measured.high and measured.seconds > 0.0
+    assert (
+        1.5 < measured.median < 2.5
+        and measured.low <= measured.median <= measured.high
+        and measured.seconds > 0.0
+    )
 
 
 def test_the_table_has_a_row_for_each_effect_and_flag(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(
-        effects, "measure", lambda engine, effect: effects.EffectCost(engine, effect, 2e-6, 1.1, 1.2, 1.25)
+        effects,
+        "measure",
+        lambda engine, effect: effects.EffectCost(engine, effect, 2e-6, 1.1, 1.2, 1.25),
     )
-    assert status(["effects", "--only", "pin_friction", "-o", str(tmp_path / "effects.md")]) == HOLDS
+    assert (
+        status(
+            ["effects", "--only", "pin_friction", "-o", str(tmp_path / "effects.md")]
+        )
+        == HOLDS
+    )
     text = (tmp_path / "effects.md").read_text().replace("\\", "")
     assert "| none | 2 us | 2 us | 2 us | 2 us |" in text
-    assert "| pin_friction | +20 % [+10, +25] | no counterpart | +20 % [+10, +25] | +20 % [+10, +25] |" in text
-    assert "| none, island left on |  | +20 % [+10, +25] |  |  |" in text and "written to" in capsys.readouterr().out
+    assert (
+        "| pin_friction | +20 % [+10, +25] | no counterpart | +20 % [+10, +25] | +20 % [+10, +25] |"
+        in text
+    )
+    assert (
+        "| none, island left on |  | +20 % [+10, +25] |  |  |" in text
+        and "written to" in capsys.readouterr().out
+    )
 
 
 def test_an_engine_that_is_missing_is_named(

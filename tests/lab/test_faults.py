@@ -15,17 +15,31 @@ from tests.support.scenes import thesis
 
 ENTRIES = {entry["fault"]: number for number, entry in enumerate(read_faults())}
 IN_FORCES = (
-    *("with the drive on the output F43 of the wrong sense", "F23 in place of F32", "a load on the wrong bar"),
+    *(
+        "with the drive on the output F43 of the wrong sense",
+        "F23 in place of F32",
+        "a load on the wrong bar",
+    ),
     *("inertia about the mass centre in place of the pin", "gravity points upwards"),
     "alpha_3 in place of the x-component of a_G4",
 )
 IN_TORQUE = (
-    *("J'/2 q'^2 dropped", "the torque off by 1e-9", "the centripetal part of a point outwards"),
+    *(
+        "J'/2 q'^2 dropped",
+        "the torque off by 1e-9",
+        "the centripetal part of a point outwards",
+    ),
     "the other branch is closed",
 )
 ELSEWHERE = (
-    *("a third of all positions is called singular", "MuJoCo's loop without the drift of its Jacobian"),
-    *("what no torque balances is called an overflow", "dry friction that holds a released linkage loads no pin"),
+    *(
+        "a third of all positions is called singular",
+        "MuJoCo's loop without the drift of its Jacobian",
+    ),
+    *(
+        "what no torque balances is called an overflow",
+        "dry friction that holds a released linkage loads no pin",
+    ),
 )
 CHOSEN = {"forces": IN_FORCES, "torque": IN_TORQUE, "elsewhere": ELSEWHERE}
 """Some of each kind; `python -m fourbar_lab faults` tries them all."""
@@ -37,7 +51,9 @@ def test_every_entry_fits_its_module_and_is_tried_on_a_scene() -> None:
     for entry in read_faults():
         for name, text in inject_fault(entry).items():
             compile(text, name, "exec")
-        assert entry["scenes"] and set(entry["scenes"]) <= FAULT_SCENES.keys(), entry["fault"]
+        assert entry["scenes"] and set(entry["scenes"]) <= FAULT_SCENES.keys(), entry[
+            "fault"
+        ]
         assert entry["caught_by"] or entry["harmless"], entry["fault"]
 
 
@@ -45,10 +61,15 @@ def test_every_entry_fits_its_module_and_is_tried_on_a_scene() -> None:
     "chosen",
     [
         pytest.param(IN_FORCES[:1], id="one"),
-        *(pytest.param(chosen, id=name, marks=pytest.mark.slow) for name, chosen in CHOSEN.items()),
+        *(
+            pytest.param(chosen, id=name, marks=pytest.mark.slow)
+            for name, chosen in CHOSEN.items()
+        ),
     ],
 )
-def test_an_injected_fault_fails_the_harness_where_its_entry_says(chosen: tuple[str, ...]) -> None:
+def test_an_injected_fault_fails_the_harness_where_its_entry_says(
+    chosen: tuple[str, ...],
+) -> None:
     """A fault of the formulas is noticed by every exact engine by itself."""
     outcomes = try_faults([ENTRIES[fault] for fault in chosen])
     assert not isinstance(outcomes, str), outcomes
@@ -61,12 +82,16 @@ def test_an_injected_fault_fails_the_harness_where_its_entry_says(chosen: tuple[
 def test_what_does_not_fail_or_fails_elsewhere_survives() -> None:
     entry = {"caught_by": ["torque"]}
     assert "nothing fails" in (explain_survival(entry, {"crank": []}) or "")
-    assert "none of torque" in (explain_survival(entry, {"crank": ["free-body F12: equivalence"]}) or "")
+    assert "none of torque" in (
+        explain_survival(entry, {"crank": ["free-body F12: equivalence"]}) or ""
+    )
     assert "raises" in (explain_survival(entry, "NameError") or "")
     assert explain_survival(entry, {"crank": ["free-body torque: equivalence"]}) is None
 
 
-def test_positions_outside_the_range_fail_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_positions_outside_the_range_fail_the_run(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     true = fourbar_validation.run.question.solve
 
     def pretend(*arguments: object, **keywords: object) -> Solution:
@@ -81,10 +106,19 @@ def test_positions_outside_the_range_fail_the_run(monkeypatch: pytest.MonkeyPatc
     assert {(engine, "assembled") for engine in EXACT} <= failing
 
 
-def test_a_fault_that_ends_the_process_costs_no_other_one(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_fault_that_ends_the_process_costs_no_other_one(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     def tried(numbers: list[int]) -> list[dict[str, list[str]]] | str:
-        return "it ended" if 2 in numbers else [{"crank": [f"free-body F{n}: "]} for n in numbers]
+        return (
+            "it ended"
+            if 2 in numbers
+            else [{"crank": [f"free-body F{n}: "]} for n in numbers]
+        )
 
     monkeypatch.setattr(faults, "try_faults", tried)
-    assert faults.try_in_turn([0, 1]) == [{"crank": ["free-body F0: "]}, {"crank": ["free-body F1: "]}]
+    assert faults.try_in_turn([0, 1]) == [
+        {"crank": ["free-body F0: "]},
+        {"crank": ["free-body F1: "]},
+    ]
     assert faults.try_in_turn([1, 2]) == [{"crank": ["free-body F1: "]}, "it ended"]

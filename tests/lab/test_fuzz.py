@@ -31,7 +31,9 @@ SEED = 0
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("path", sorted(KEPT.glob("*.toml")), ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "path", sorted(KEPT.glob("*.toml")), ids=lambda path: path.stem
+)
 def test_a_kept_counterexample_holds(path: Path) -> None:
     findings = (outside if path.stem.startswith("bounds") else examine).list_findings
     assert findings(loads(path.read_text(encoding="utf-8"))) == []
@@ -52,7 +54,10 @@ def test_a_scene_depends_on_its_number_alone() -> None:
 
 def test_half_are_adversarial() -> None:
     """Odd scenes reach where even ones never go: bars in a ratio beyond 100, or positions that barely close."""
-    spread = [max(s.linkage.lengths) / min(s.linkage.lengths) for s in (draw_fuzz_scene(SEED, i) for i in range(200))]
+    spread = [
+        max(s.linkage.lengths) / min(s.linkage.lengths)
+        for s in (draw_fuzz_scene(SEED, i) for i in range(200))
+    ]
     assert max(spread[0::2]) < 20.0
     assert max(spread[1::2]) > 1e3
 
@@ -61,30 +66,42 @@ def small_error(true: object) -> object:
     """One part in 1e9 of the moment of bar 3."""
 
     def wrong(lengths, angles, drive_bar, w, *others):  # type: ignore[no-untyped-def]
-        return true(lengths, angles, drive_bar, w._replace(M3=(1.0 + 1e-9) * w.M3), *others)  # type: ignore[operator]
+        return true(
+            lengths, angles, drive_bar, w._replace(M3=(1.0 + 1e-9) * w.M3), *others
+        )  # type: ignore[operator]
 
     return wrong
 
 
-def test_an_error_of_a_billionth_is_found_and_shrunk(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_an_error_of_a_billionth_is_found_and_shrunk(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     solving = import_module("fourbar.evaluation.case")
     monkeypatch.setattr(solving, "pin_forces", small_error(solving.pin_forces))
-    scene = replace(crank_rocker(), motion=fourbar.Motion(np.array([1.0, 2.0]), 10.0, 5.0))
+    scene = replace(
+        crank_rocker(), motion=fourbar.Motion(np.array([1.0, 2.0]), 10.0, 5.0)
+    )
     assert examine.list_findings(scene)
-    small = shrink_scene(scene, lambda candidate: bool(examine.list_findings(candidate)))
+    small = shrink_scene(
+        scene, lambda candidate: bool(examine.list_findings(candidate))
+    )
     assert len(small.loads) + len(small.effects) < 3 and examine.list_findings(small)
     kept = keep(small, "billionth", tmp_path)
     assert examine.list_findings(loads(kept.read_text(encoding="utf-8")))
 
 
 def test_a_limit_off_by_a_billionth_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    scene = replace(crank_rocker(), motion=fourbar.Motion(np.array([1.0, 2.0]), 10.0, 5.0))
+    scene = replace(
+        crank_rocker(), motion=fourbar.Motion(np.array([1.0, 2.0]), 10.0, 5.0)
+    )
     assert examine.list_findings(scene) == []
     true = fourbar.formulas.mobility.limit_positions
     monkeypatch.setattr(
         fourbar.formulas.mobility,
         "limit_positions",
-        lambda *arguments: tuple(limit._replace(theta_4=limit.theta_4 + 1e-9) for limit in true(*arguments)),
+        lambda *arguments: tuple(
+            limit._replace(theta_4=limit.theta_4 + 1e-9) for limit in true(*arguments)
+        ),
     )
     kinds = {finding.split(":")[0] for finding in examine.list_findings(scene)}
     assert kinds == {"pinocchio-inverse range", "pinocchio-inverse limit_positions"}
@@ -95,8 +112,14 @@ def test_a_force_that_vanishes_is_held_to_its_prediction(
     monkeypatch: pytest.MonkeyPatch, times: float, found: bool
 ) -> None:
     """Relative to 0 no error has a size: it is judged in newtons, and not left unjudged."""
-    scene = loads((KEPT / "bar_with_all_mass_stands_for_an_instant.toml").read_text(encoding="utf-8"))
-    engine = next(engine for engine in examine.EXACT if engine.name == "pinocchio-inverse")
+    scene = loads(
+        (KEPT / "bar_with_all_mass_stands_for_an_instant.toml").read_text(
+            encoding="utf-8"
+        )
+    )
+    engine = next(
+        engine for engine in examine.EXACT if engine.name == "pinocchio-inverse"
+    )
     solution = fourbar.solve(scene, "force")
     assert solution.F12 is not None and not solution.F12.any()
     answer = engine.start().answer(scene, examine.command(scene))
@@ -115,7 +138,9 @@ def test_a_traceback_is_a_finding(monkeypatch: pytest.MonkeyPatch) -> None:
     assert examine.list_findings(crank_rocker()) == ["ZeroDivisionError: oops"]
 
 
-def test_a_position_that_does_not_close_is_a_finding(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_position_that_does_not_close_is_a_finding(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     scene = replace(crank_rocker(), linkage=fourbar.uniform(0.3, 0.25, 0.1, 0.22))
     scene = replace(scene, motion=fourbar.Motion(np.array([3.0]), 1.0), loads=())
     true = fourbar.solve
@@ -131,12 +156,16 @@ def test_a_position_that_does_not_close_is_a_finding(monkeypatch: pytest.MonkeyP
 
 
 @pytest.mark.slow
-def test_an_interrupted_run_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_interrupted_run_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("fourbar_lab.fuzz.CHUNK", 4)
     first = run(12, 1, tmp_path, 1)
     next(first)
     first.close()
-    with Store(tmp_path, {"seed": 1, "bounds": False, **name_code(LAB)}).held() as store:
+    with Store(
+        tmp_path, {"seed": 1, "bounds": False, **name_code(LAB)}
+    ).held() as store:
         assert store.done() >= {4}
         store.put(4, [{"0": ["left by the run before"]}])
     findings = list(run(12, 1, tmp_path, 1))
@@ -144,7 +173,9 @@ def test_an_interrupted_run_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 
 
 @pytest.mark.slow
-def test_a_scene_that_kills_its_worker_costs_itself_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_scene_that_kills_its_worker_costs_itself_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(examine, "examine", dies_in_scene_2)
     (finding,) = run(4, 1, tmp_path, 1)
     assert finding.keys() == {"2"} and finding["2"][0].startswith(examine.LOST)
@@ -156,7 +187,9 @@ def dies_in_scene_2(seed: int, bounds: bool, index: int) -> list[str]:
     return []
 
 
-def watched(monkeypatch: pytest.MonkeyPatch, change: Any = lambda extremes: extremes) -> list[Extremes]:
+def watched(
+    monkeypatch: pytest.MonkeyPatch, change: Any = lambda extremes: extremes
+) -> list[Extremes]:
     """The proofs that the search is held against, each changed."""
     proven, true = [], outside.extremes
 
@@ -171,26 +204,35 @@ def watched(monkeypatch: pytest.MonkeyPatch, change: Any = lambda extremes: extr
 @pytest.mark.slow
 def test_no_value_lies_outside_what_is_proven(monkeypatch: pytest.MonkeyPatch) -> None:
     proven = watched(monkeypatch)
-    assert not [number for number in range(45, 48) if examine.examine(SEED, True, number)]
+    assert not [
+        number for number in range(45, 48) if examine.examine(SEED, True, number)
+    ]
     assert len(proven) == 3 and any(extremes.nominal for extremes in proven)
 
 
 @pytest.mark.slow
-def test_bounds_narrower_by_a_millionth_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_bounds_narrower_by_a_millionth_are_found(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     def within(extremes: dict[str, Extreme], part: float) -> dict[str, Extreme]:
         return {
-            name: x._replace(low=x.low + part * abs(x.low), high=x.high + part * abs(x.high))
+            name: x._replace(
+                low=x.low + part * abs(x.low), high=x.high + part * abs(x.high)
+            )
             for name, x in extremes.items()
         }
 
     def narrower(extremes: Extremes) -> Extremes:
-        return extremes._replace(least=within(extremes.least, 1e-6), greatest=within(extremes.greatest, -1e-6))
+        return extremes._replace(
+            least=within(extremes.least, 1e-6),
+            greatest=within(extremes.greatest, -1e-6),
+        )
 
     watched(monkeypatch, narrower)
     findings = outside.list_findings(outside.draw_scene(SEED, 45))
-    assert [line.split(":")[0] for line in findings if "beyond" in line] == ["extremes torque"] * 2 + [
-        "extremes |F12|"
-    ] * 2
+    assert [line.split(":")[0] for line in findings if "beyond" in line] == [
+        "extremes torque"
+    ] * 2 + ["extremes |F12|"] * 2
 
 
 @pytest.mark.slow
@@ -202,7 +244,9 @@ def test_a_ball_that_decides_silently_is_found(monkeypatch: pytest.MonkeyPatch) 
             across = tension_spring.end.place(state) - tension_spring.start.place(state)
             distance = np.abs(across)
             if isinstance(distance, Sloped):
-                distance.values += np.array([float(ball.contains(0)) for ball in distance.values], dtype=object)
+                distance.values += np.array(
+                    [float(ball.contains(0)) for ball in distance.values], dtype=object
+                )
             actions.pull(
                 tension_spring.start,
                 tension_spring.end,
@@ -219,9 +263,18 @@ def test_a_scene_with_a_value_outside_is_kept_as_it_is(
 ) -> None:
     scene = fourbar.dump(outside.draw_scene(3, 1))
     judge_here(monkeypatch)
-    monkeypatch.setattr(outside, "list_findings", lambda of: ["outside"] if fourbar.dump(of) == scene else [])
+    monkeypatch.setattr(
+        outside,
+        "list_findings",
+        lambda of: ["outside"] if fourbar.dump(of) == scene else [],
+    )
     monkeypatch.setattr(examine, "keep", lambda of, name: keep(of, name, tmp_path))
     assert examine.fuzz.callback(2, True, 3, 1, tmp_path / "out") == 1
     assert capsys.readouterr().out == "1 of 2 scenes fail (seed 3)\n"
     (kept,) = tmp_path.glob("bounds_seed_3_scene_1.toml")
-    assert fourbar.dump(replace(loads(kept.read_text(encoding="utf-8")), title="", source="")) == scene
+    assert (
+        fourbar.dump(
+            replace(loads(kept.read_text(encoding="utf-8")), title="", source="")
+        )
+        == scene
+    )

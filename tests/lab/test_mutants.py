@@ -24,7 +24,10 @@ def test_a_number_counts_as_changed_from_a_billionth_on() -> None:
     for part, counts in ((1e-12, False), (1e-8, True)):
         after = {**before, "torque": before["torque"] * (1.0 + part)}
         assert is_changed(before, after) == counts
-    assert is_changed(before, {**before, "torque": np.where(np.arange(61) == 3, np.nan, before["torque"])})
+    assert is_changed(
+        before,
+        {**before, "torque": np.where(np.arange(61) == 3, np.nan, before["torque"])},
+    )
     assert is_changed(before, {**before, "F12": None})
 
 
@@ -33,13 +36,23 @@ def test_without_a_mutant_the_harness_holds() -> None:
     """Near change points too, where the engines lose as many digits as they are expected to."""
     for scene in harness.choose_scenes()[-3:]:
         command = command_of(scene)
-        answers = [(w, w.start().answer(scene, command)) for w in harness.ENGINES if w.name in harness.EXACT]
+        answers = [
+            (w, w.start().answer(scene, command))
+            for w in harness.ENGINES
+            if w.name in harness.EXACT
+        ]
         assert not is_caught(scene, command, answers)
 
 
-def test_the_harness_alone_catches_a_wrong_sign(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_harness_alone_catches_a_wrong_sign(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     command = command_of(SCENE)
-    answers = [(w, w.start().answer(SCENE, command)) for w in harness.ENGINES if w.name in harness.EXACT]
+    answers = [
+        (w, w.start().answer(SCENE, command))
+        for w in harness.ENGINES
+        if w.name in harness.EXACT
+    ]
     assert not is_caught(SCENE, command, answers)
     true = harness.solve
 
@@ -52,7 +65,9 @@ def test_the_harness_alone_catches_a_wrong_sign(monkeypatch: pytest.MonkeyPatch)
     assert is_caught(SCENE, command, answers)
 
 
-def test_a_mutant_acts_wherever_its_function_was_imported_and_while_it_is_active_alone() -> None:
+def test_a_mutant_acts_wherever_its_function_was_imported_and_while_it_is_active_alone() -> (
+    None
+):
     command = command_of(SCENE)
     before = compute_numbers(SCENE, command)
     tried = list(compile_mutants(torque))
@@ -63,15 +78,21 @@ def test_a_mutant_acts_wherever_its_function_was_imported_and_while_it_is_active
     assert not is_changed(before, compute_numbers(SCENE, command))
 
 
-def test_every_operator_and_number_of_functions_methods_and_properties_is_changed(tmp_path: Path) -> None:
-    source = "A = 3\ndef f(x):\n    return -x if 0 < x <= 1.5 and x is not None else x**2\n"
+def test_every_operator_and_number_of_functions_methods_and_properties_is_changed(
+    tmp_path: Path,
+) -> None:
+    source = (
+        "A = 3\ndef f(x):\n    return -x if 0 < x <= 1.5 and x is not None else x**2\n"
+    )
     source += "class C:\n    @property\n    def p(self):\n        return [self + k for k in (True,)]\n"
     (tmp_path / "small.py").write_text(source)
     spec = importlib.util.spec_from_file_location("small", tmp_path / "small.py")
     assert spec is not None and spec.loader is not None
     small = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(small)
-    names = sorted(mutant.name.partition(", line ")[2] for mutant in compile_mutants(small))
+    names = sorted(
+        mutant.name.partition(", line ")[2] for mutant in compile_mutants(small)
+    )
     assert names == sorted([
         *("3: -x -> +x", "3: 0 -> 1", "3: 1.5 -> 2.5", "3: 2 -> 3", "3: x ** 2 -> x * 2"),
         *("3: 0 < x <= 1.5 -> 0 <= x <= 1.5", "3: 0 < x <= 1.5 -> 0 < x < 1.5", "3: x is not None -> x is None"),
@@ -83,12 +104,23 @@ def test_every_operator_and_number_of_functions_methods_and_properties_is_change
 @pytest.mark.posix
 @pytest.mark.parametrize(
     ("verdicts", "status"),
-    [([], FAILED), ([None], FAILED), ([True] * 94 + [False] * 6, FAILED), ([True] * 95 + [False] * 5 + [None], HOLDS)],
+    [
+        ([], FAILED),
+        ([None], FAILED),
+        ([True] * 94 + [False] * 6, FAILED),
+        ([True] * 95 + [False] * 5 + [None], HOLDS),
+    ],
 )
 def test_few_mutants_may_be_missed_and_none_that_matters_is_no_success(
-    verdicts: list[bool | None], status: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    verdicts: list[bool | None],
+    status: int,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
-    some = [harness.Mutant(str(n), lambda: None, (lambda: None).__code__) for n, _ in enumerate(verdicts)]  # type: ignore[arg-type]
+    some = [
+        harness.Mutant(str(n), lambda: None, (lambda: None).__code__)
+        for n, _ in enumerate(verdicts)
+    ]  # type: ignore[arg-type]
     next_verdicts = iter(verdicts)
     monkeypatch.setattr(harness, "make_baselines", list)
     monkeypatch.setattr(harness, "compile_mutants", lambda _: some)
@@ -98,8 +130,14 @@ def test_few_mutants_may_be_missed_and_none_that_matters_is_no_success(
 
 
 @pytest.mark.posix
-def test_a_mutant_that_hangs_or_raises_is_caught(monkeypatch: pytest.MonkeyPatch) -> None:
-    tried = [harness.Baseline(SCENE, command := command_of(SCENE), [], compute_numbers(SCENE, command))]
+def test_a_mutant_that_hangs_or_raises_is_caught(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    tried = [
+        harness.Baseline(
+            SCENE, command := command_of(SCENE), [], compute_numbers(SCENE, command)
+        )
+    ]
     mutant = next(compile_mutants(torque))
 
     def raises(*_: object) -> None:

@@ -24,25 +24,46 @@ ONCE_BAD = {
     # seed, number, and what once was beyond its bound there
     "random": [
         (0, 131),  # bar of the torque
-        (0, 986),  # F43, F14: the moment of -m a_A about O2 as a difference of large numbers
-        (3, 78),  # sin mu: Heron's factor of a short coupler and output by the longer route
+        (
+            0,
+            986,
+        ),  # F43, F14: the moment of -m a_A about O2 as a difference of large numbers
+        (
+            3,
+            78,
+        ),  # sin mu: Heron's factor of a short coupler and output by the longer route
         (3, 1063),  # bars: rounding of theta_2 - theta_1 near a whole turn
     ],
     "scales": [
         (0, 347),  # bars, likewise
         (0, 952),
         (0, 1091),
-        (0, 5133),  # F32, driven on bar 4: the moment about B of a coupler whose mass centre lies there
+        (
+            0,
+            5133,
+        ),  # F32, driven on bar 4: the moment about B of a coupler whose mass centre lies there
     ],
     "speeds": [(0, 246), (0, 784)],  # bars, likewise
     "ratios": [
-        (0, 36),  # torque: products of constants rounded to doubles in the pass with 32 digits
+        (
+            0,
+            36,
+        ),  # torque: products of constants rounded to doubles in the pass with 32 digits
         (0, 828),  # drive condition: length of the unit vector of a short bar
     ],
     "drives": [
-        (0, 31),  # F12_y: the drive of bars 2 and 4 has no part in it, and the contract takes the vector
-        (0, 857),  # power beside a pole: a stroke's speed and the force had other roundings of ds/dq
-        (0, 2997),  # condition, of bars that meet: from speeds of the ends in place of the turn at their pin
+        (
+            0,
+            31,
+        ),  # F12_y: the drive of bars 2 and 4 has no part in it, and the contract takes the vector
+        (
+            0,
+            857,
+        ),  # power beside a pole: a stroke's speed and the force had other roundings of ds/dq
+        (
+            0,
+            2997,
+        ),  # condition, of bars that meet: from speeds of the ends in place of the turn at their pin
         (0, 4506),  # bar: the arm about pin B as a difference
     ],
     "strokes": [(0, 42)],  # its own speed, as computed from the angle's
@@ -53,7 +74,10 @@ ONCE_BAD = {
         (0, 164),  # bar of the forces: directions of bars that stay parallel
         (0, 580),  # bars: products of constants
         (0, 464),  # v_B: the small sine of theta_4 as a difference of large angles
-        (0, 6915),  # bar of the forces: half a last digit lost in theta_2 - theta_1, added to it, was rounded away
+        (
+            0,
+            6915,
+        ),  # bar of the forces: half a last digit lost in theta_2 - theta_1, added to it, was rounded away
     ],
 }
 ONCE_TOO_WIDE = [126, 1497, 2410, 6894, 7017]
@@ -67,7 +91,9 @@ def tallies() -> dict[str, Tally]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("family", FAMILIES)
-def test_every_output_is_within_what_the_inputs_last_digits_do(family: str, tallies: dict[str, Tally]) -> None:
+def test_every_output_is_within_what_the_inputs_last_digits_do(
+    family: str, tallies: dict[str, Tally]
+) -> None:
     tally = tallies[family]
     assert tally.samples == SAMPLES
     assert tally.not_assembled < SAMPLES / 10
@@ -78,10 +104,14 @@ def test_every_output_is_within_what_the_inputs_last_digits_do(family: str, tall
 
 @pytest.mark.parametrize("bar", [3, 4])
 @pytest.mark.parametrize("family", FAMILIES)
-def test_fed_back_as_a_command_of_another_bar_every_output_returns_within_it_too(family: str, bar: int) -> None:
+def test_fed_back_as_a_command_of_another_bar_every_output_returns_within_it_too(
+    family: str, bar: int
+) -> None:
     tally = run(family, range(FED_BACK), bar=bar)
     assert tally.samples > FED_BACK / 2 and not tally.not_assembled and not tally.warned
-    assert not {name: entry for name, entry in tally.worst.items() if not entry[0] <= 1.0}
+    assert not {
+        name: entry for name, entry in tally.worst.items() if not entry[0] <= 1.0
+    }
     assert {"theta_2", "omega_2", "alpha_2"} <= tally.worst.keys()
     assert all(ratio <= TOO_SMALL for ratio in tally.too_small.values())
 
@@ -95,20 +125,34 @@ def installed(library: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("library", LIBRARIES)
 @pytest.mark.parametrize("family", ["change_point", "tables", "torsion"])
-def test_every_output_is_within_it_in_other_libraries_too(library: str, family: str) -> None:
+def test_every_output_is_within_it_in_other_libraries_too(
+    library: str, family: str
+) -> None:
     installed(library)
     tally = run(family, range(FED_BACK // 4), library=library)
     assert tally.holds() and not tally.untold and "torque" in tally.worst
 
 
 @pytest.mark.slow
-@pytest.mark.filterwarnings("ignore:There is a performance drop")  # PyTorch maps no product's derivative
+@pytest.mark.filterwarnings(
+    "ignore:There is a performance drop"
+)  # PyTorch maps no product's derivative
 @pytest.mark.parametrize("library", ["numpy", *LIBRARIES])
-def test_derivatives_are_within_what_the_inputs_last_digits_do_to_them(library: str) -> None:
+def test_derivatives_are_within_what_the_inputs_last_digits_do_to_them(
+    library: str,
+) -> None:
     installed(library)
-    family = "tables" if library == "jax" else "random"  # which JAX compiles for a quarter of a minute
-    tally = run(family, range(6 if library == "numpy" else 1), library=library, derivatives=True)
-    assert tally.holds() and not tally.untold and {"torque", "F12_x", "theta_4", "a_B_y"} <= tally.worst.keys()
+    family = (
+        "tables" if library == "jax" else "random"
+    )  # which JAX compiles for a quarter of a minute
+    tally = run(
+        family, range(6 if library == "numpy" else 1), library=library, derivatives=True
+    )
+    assert (
+        tally.holds()
+        and not tally.untold
+        and {"torque", "F12_x", "theta_4", "a_B_y"} <= tally.worst.keys()
+    )
 
 
 def test_the_power_of_a_bar_that_hardly_turns_has_its_digits() -> None:
@@ -117,12 +161,17 @@ def test_the_power_of_a_bar_that_hardly_turns_has_its_digits() -> None:
 
 
 @pytest.mark.slow
-def test_a_derivative_that_is_left_out_is_a_failure(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_derivative_that_is_left_out_is_a_failure(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """The reference says where there is none: where the loop does not close, or dry friction holds a pin at rest."""
 
     def lost(scene: fourbar.Scene) -> fourbar.Sensitivity:
         sensitivity = fourbar.sensitivity(scene)
-        by = {name: np.full_like(slopes, np.nan) for name, slopes in sensitivity.by.items()}
+        by = {
+            name: np.full_like(slopes, np.nan)
+            for name, slopes in sensitivity.by.items()
+        }
         return replace(sensitivity, status=["no_torque"], by=by)
 
     def judged(scene: fourbar.Scene) -> Tally:
@@ -130,11 +179,24 @@ def test_a_derivative_that_is_left_out_is_a_failure(monkeypatch: pytest.MonkeyPa
         return tally
 
     scene = ANYWHERE.draw(np.random.default_rng(0))
-    held = replace(scene, motion=scene.motion.replace(speed=0.0), effects=(fourbar.effects.Friction.at(A=0.1, B=0.1),))
-    apart = replace(scene, linkage=fourbar.uniform(0.3, 0.2, 0.1, 0.1), motion=scene.motion.replace(angle=3.0))
-    assert (judged(held).no_torque, judged(apart).not_assembled) == (1, 1) and judged(scene).holds()
+    held = replace(
+        scene,
+        motion=scene.motion.replace(speed=0.0),
+        effects=(fourbar.effects.Friction.at(A=0.1, B=0.1),),
+    )
+    apart = replace(
+        scene,
+        linkage=fourbar.uniform(0.3, 0.2, 0.1, 0.1),
+        motion=scene.motion.replace(angle=3.0),
+    )
+    assert (judged(held).no_torque, judged(apart).not_assembled) == (1, 1) and judged(
+        scene
+    ).holds()
     monkeypatch.setattr("fourbar_lab.slopes.sensitivity", lost)
-    assert all(ratio == np.inf for ratio, _ in judged(scene).worst.values()) and judged(scene).worst
+    assert (
+        all(ratio == np.inf for ratio, _ in judged(scene).worst.values())
+        and judged(scene).worst
+    )
 
 
 def test_the_numbers_of_a_table_are_inputs() -> None:
@@ -154,11 +216,22 @@ def test_kites_that_stand_still_beside_no_exact_directions() -> None:
     assert run("change_point", range(751, 752), library="torch").holds()
 
 
-def test_error_bars_are_neither_too_small_nor_useless(tallies: dict[str, Tally]) -> None:
-    for bar, families in (("torque_error", 10), ("drive_force_error", 3), ("force_error", 12)):
+def test_error_bars_are_neither_too_small_nor_useless(
+    tallies: dict[str, Tally],
+) -> None:
+    for bar, families in (
+        ("torque_error", 10),
+        ("drive_force_error", 3),
+        ("force_error", 12),
+    ):
         judged = [tally for tally in tallies.values() if bar in tally.too_small]
-        assert len(judged) == families and max(tally.too_small[bar] for tally in judged) <= TOO_SMALL
-        assert is_by_chance(sum(tally.too_large[bar] for tally in judged), SAMPLES * families)
+        assert (
+            len(judged) == families
+            and max(tally.too_small[bar] for tally in judged) <= TOO_SMALL
+        )
+        assert is_by_chance(
+            sum(tally.too_large[bar] for tally in judged), SAMPLES * families
+        )
 
 
 def test_a_share_is_one_that_chance_explains() -> None:
@@ -166,17 +239,24 @@ def test_a_share_is_one_that_chance_explains() -> None:
     def least_unexplained(samples: int) -> int:
         beyond, k = 1.0, 0
         while beyond >= CHANCE:
-            beyond -= math.comb(samples, k) * USELESS**k * (1.0 - USELESS) ** (samples - k)
+            beyond -= (
+                math.comb(samples, k) * USELESS**k * (1.0 - USELESS) ** (samples - k)
+            )
             k += 1
         return k
 
     for samples in (1, 60, 500):
         k = least_unexplained(samples)
-        assert is_by_chance(k - 1, samples) and (k > samples or not is_by_chance(k, samples))
+        assert is_by_chance(k - 1, samples) and (
+            k > samples or not is_by_chance(k, samples)
+        )
     assert is_by_chance(100, 10_000) and not is_by_chance(160, 10_000)
 
 
-@pytest.mark.parametrize(("family", "seed", "number"), [(f, *sample) for f, bad in ONCE_BAD.items() for sample in bad])
+@pytest.mark.parametrize(
+    ("family", "seed", "number"),
+    [(f, *sample) for f, bad in ONCE_BAD.items() for sample in bad],
+)
 def test_samples_that_once_were_bad(family: str, seed: int, number: int) -> None:
     tally = run(family, range(number, number + 1), seed)
     assert all(ratio <= 1.0 for ratio, _ in tally.worst.values())
@@ -184,13 +264,17 @@ def test_samples_that_once_were_bad(family: str, seed: int, number: int) -> None
 
 
 @pytest.mark.parametrize("number", ONCE_TOO_WIDE)
-def test_bars_that_stay_parallel_are_charged_what_the_subtraction_lost_alone(number: int) -> None:
+def test_bars_that_stay_parallel_are_charged_what_the_subtraction_lost_alone(
+    number: int,
+) -> None:
     tally = run("change_point", range(number, number + 1))
     assert not any(tally.too_large.values())
     assert all(ratio <= TOO_SMALL for ratio in tally.too_small.values())
 
 
-def test_an_angle_without_a_value_is_beyond_what_is_allowed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_angle_without_a_value_is_beyond_what_is_allowed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     def lost(*arguments: object, **options: object) -> fourbar.Solution:
         solution = fourbar.solve(*arguments, **options)  # type: ignore[arg-type]
         solution.theta_3[:] = np.nan
@@ -198,7 +282,11 @@ def test_an_angle_without_a_value_is_beyond_what_is_allowed(monkeypatch: pytest.
 
     monkeypatch.setattr("fourbar_lab.stability.solve", lost)
     tally = run("random", range(2))
-    assert tally.worst["theta_3"][0] == np.inf and tally.worst["theta_4"][0] <= 1.0 and not tally.holds()
+    assert (
+        tally.worst["theta_3"][0] == np.inf
+        and tally.worst["theta_4"][0] <= 1.0
+        and not tally.holds()
+    )
 
 
 def test_a_tally_adds_up() -> None:
@@ -210,14 +298,26 @@ def test_a_tally_adds_up() -> None:
 
 def test_the_command_line_says_how_few_digits_are_left() -> None:
     linkage = fourbar.uniform(0.3, 0.1, 0.25, 0.22)
-    dead = float(np.arccos((0.3**2 + 0.35**2 - 0.22**2) / (2 * 0.3 * 0.35)))  # bars 2, 3 in line
+    dead = float(
+        np.arccos((0.3**2 + 0.35**2 - 0.22**2) / (2 * 0.3 * 0.35))
+    )  # bars 2, 3 in line
     for angle, warned in ((dead + 1e-11, True), (dead + 0.5, False)):
         scene = fourbar.Scene(linkage, fourbar.Motion(angle, 10.0), drive_bar=4)
         lines = write_block(scene, fourbar.solve(scene, "error"))
-        assert any("digits left of T4" in line and "bars 2 and 3" in line for line in lines) is warned
-    nothing = fourbar.FourBar(0.3, fourbar.Bar(0.1), fourbar.Bar(0.25), fourbar.Bar(0.22))
+        assert (
+            any(
+                "digits left of T4" in line and "bars 2 and 3" in line for line in lines
+            )
+            is warned
+        )
+    nothing = fourbar.FourBar(
+        0.3, fourbar.Bar(0.1), fourbar.Bar(0.25), fourbar.Bar(0.22)
+    )
     scene = fourbar.Scene(nothing, fourbar.Motion(1.0, 5.0))
-    assert not any("digits left" in line for line in write_block(scene, fourbar.solve(scene, "error")))
+    assert not any(
+        "digits left" in line
+        for line in write_block(scene, fourbar.solve(scene, "error"))
+    )
 
 
 def test_error_bars_grow_towards_a_dead_centre() -> None:
@@ -226,7 +326,10 @@ def test_error_bars_grow_towards_a_dead_centre() -> None:
     reach = 0.35
     theta = float(np.arccos((0.3**2 + reach**2 - 0.22**2) / (2 * 0.3 * reach)))
     bars = [
-        fourbar.solve(fourbar.Scene(linkage, fourbar.Motion(theta + offset, 10.0), drive_bar=4), "error").torque_error
+        fourbar.solve(
+            fourbar.Scene(linkage, fourbar.Motion(theta + offset, 10.0), drive_bar=4),
+            "error",
+        ).torque_error
         for offset in (1e-1, 1e-4, 1e-7)
     ]
     assert bars[0] is not None and bars[1] is not None and bars[2] is not None

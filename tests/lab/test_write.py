@@ -35,7 +35,9 @@ def test_a_changed_scene_makes_its_mjcf_stale(tmp_path: Path) -> None:
     assert text != xml.read_text(encoding="utf-8")
     assert find_stale([file]) == [file]
     xml.write_text(text, encoding="utf-8")
-    changed = file.read_text(encoding="utf-8").replace("branch = ", 'alpha_2 = "1 rad/s^2"\nbranch = ')
+    changed = file.read_text(encoding="utf-8").replace(
+        "branch = ", 'alpha_2 = "1 rad/s^2"\nbranch = '
+    )
     file.write_text(changed, encoding="utf-8")
     assert find_stale([file]) == [file]
     with pytest.raises(InputError):

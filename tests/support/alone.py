@@ -18,7 +18,10 @@ CLEAN.set_forkserver_preload(LIBRARIES)
 
 def become(program: str, line: list[str], folder: Path) -> None:
     """`python -m program line` in a folder, with what it prints in two files there."""
-    assert not {name.partition(".")[0] for name in sys.modules} & {"fourbar", "fourbar_validation"}
+    assert not {name.partition(".")[0] for name in sys.modules} & {
+        "fourbar",
+        "fourbar_validation",
+    }
     for number, name in ((1, "printed"), (2, "complained")):
         os.dup2(os.open(folder / name, os.O_CREAT | os.O_WRONLY), number)
     os.chdir(folder)

@@ -41,13 +41,25 @@ CORES = {
 
 def here() -> str:
     """What this process calculates with: the BLAS kernel of NumPy and the vectorised functions of NumPy."""
-    return " ".join([find_blas() or "unknown BLAS", *(name for name in __cpu_dispatch__ if __cpu_features__[name])])
+    return " ".join(
+        [
+            find_blas() or "unknown BLAS",
+            *(name for name in __cpu_dispatch__ if __cpu_features__[name]),
+        ]
+    )
 
 
 def environment(core: str) -> dict[str, str]:
     """The variables under which OpenBLAS, NumPy and the C library take this CPU for another."""
-    off = [name for name in __cpu_dispatch__ if __cpu_features__[name] and name.startswith(CORES[core].lacks)]
-    blas_and_numpy = {"OPENBLAS_CORETYPE": core, "NPY_DISABLE_CPU_FEATURES": " ".join(off)}
+    off = [
+        name
+        for name in __cpu_dispatch__
+        if __cpu_features__[name] and name.startswith(CORES[core].lacks)
+    ]
+    blas_and_numpy = {
+        "OPENBLAS_CORETYPE": core,
+        "NPY_DISABLE_CPU_FEATURES": " ".join(off),
+    }
     return blas_and_numpy | {"GLIBC_TUNABLES": CORES[core].tunables}
 
 
@@ -56,7 +68,9 @@ def machine(core: str | None = None) -> str:
     """What a fresh process calculates with, as it is started or under the variables of a core."""
     line = [sys.executable, "-c", f"from {__name__} import here; print(here())"]
     changed = os.environ | ({} if core is None else environment(core))
-    return subprocess.run(line, cwd=ROOT, env=changed, capture_output=True, text=True, check=True).stdout.strip()
+    return subprocess.run(
+        line, cwd=ROOT, env=changed, capture_output=True, text=True, check=True
+    ).stdout.strip()
 
 
 def why_not(core: str) -> str | None:

@@ -21,6 +21,12 @@ def answer_in_balls(scene: Scene, at: Command | None = None) -> dict[str, np.nda
             rows.append({name: float(ball.mid()) for name, ball in outputs.items()})
     finally:
         ctx.prec = precision
-    columns = {name: np.array([row.get(name, np.nan) for row in rows]) for name in set().union(*rows)}
+    columns = {
+        name: np.array([row.get(name, np.nan) for row in rows])
+        for name in set().union(*rows)
+    }
     ends = [name.removesuffix("_x") for name in columns if name.endswith("_x")]
-    return columns | {name: np.stack([columns[f"{name}_x"], columns[f"{name}_y"]], axis=-1) for name in ends}
+    return columns | {
+        name: np.stack([columns[f"{name}_x"], columns[f"{name}_y"]], axis=-1)
+        for name in ends
+    }

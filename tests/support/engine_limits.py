@@ -63,7 +63,9 @@ def _near_toggle(sine: float) -> bool:
     cosine = -math.sqrt(1.0 - sine * sine)
     squared = b * b + c * c - 2.0 * b * c * cosine
     psi = math.acos((d * d + a * a - squared) / (2.0 * d * a))
-    return not _simulated(set_angles(dress((d, a, b, c), 1), np.linspace(psi - 0.5, psi, 20))).alarms
+    return not _simulated(
+        set_angles(dress((d, a, b, c), 1), np.linspace(psi - 0.5, psi, 20))
+    ).alarms
 
 
 def _base() -> Scene:
@@ -75,7 +77,9 @@ def _at_speed(omega_2: float) -> Scene:
 
 
 def _crank_acceleration(value: float) -> bool:
-    answer = _simulated(replace(_at_speed(math.sqrt(value / 0.1)), loads=(), effects=()))
+    answer = _simulated(
+        replace(_at_speed(math.sqrt(value / 0.1)), loads=(), effects=())
+    )
     return not answer.alarms and answer.evidence["force_gap"] < 1e-3
 
 
@@ -83,7 +87,11 @@ def _loaded(ratio: float) -> bool:
     (_, scene), *_ = scale_loads(exponents=(3,))
     times = ratio / compute_load_ratio(scene)
     heavier = tuple(
-        replace(load, force=load.force and (load.force[0] * times, load.force[1]), moment=load.moment * times)
+        replace(
+            load,
+            force=load.force and (load.force[0] * times, load.force[1]),
+            moment=load.moment * times,
+        )
         for load in scene.loads
     )
     answer = _simulated(replace(scene, loads=heavier))
@@ -105,7 +113,10 @@ def _centre_kept(r: float) -> bool:
     base = _base()
     scene = replace_bars(base, output=replace(base.linkage.output, centre=(r, 0.5)))
     loop = ClosedLoop(write_mjcf(scene, replace(RECIPE, timestep=1e-3), keyframe=False))
-    return bool(loop.model.body_sameframe[loop.body["output"]] != mujoco.mjtSameFrame.mjSAMEFRAME_BODY)
+    return bool(
+        loop.model.body_sameframe[loop.body["output"]]
+        != mujoco.mjtSameFrame.mjSAMEFRAME_BODY
+    )
 
 
 def _proximal(mu: float) -> bool:
@@ -122,7 +133,9 @@ def _proximal(mu: float) -> bool:
 
 MEASURED = (
     Measured(NEAREST_TOGGLE, 0.06, 0.01, _near_toggle),
-    Measured(FASTEST, 3e4, 3e5, lambda omega_2: not _simulated(_at_speed(omega_2)).alarms),
+    Measured(
+        FASTEST, 3e4, 3e5, lambda omega_2: not _simulated(_at_speed(omega_2)).alarms
+    ),
     Measured(SLOWEST, 1e-10, 1e-11, _crank_acceleration),
     Measured(HEAVIEST, 1e10, 1e11, _loaded),
     Measured(NEAREST_CENTRE, 2e-6, 5e-7, _centre_kept),

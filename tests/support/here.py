@@ -39,7 +39,10 @@ def judge_here(monkeypatch: pytest.MonkeyPatch) -> None:
     """Do in this process, one item after another, what workers would do that are not under test; shipped neither."""
 
     def over_none(
-        function: Callable[[Any], Any], chunks: Iterable[workers.Chunk], *_: object, **__: object
+        function: Callable[[Any], Any],
+        chunks: Iterable[workers.Chunk],
+        *_: object,
+        **__: object,
     ) -> Iterator[tuple[int, list[Any]]]:
         for number, items in chunks:
             yield number, [function(item) for item in items]
@@ -50,4 +53,6 @@ def judge_here(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def judge_solve_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave out what is shipped besides `solve`, a second of work for each scene that is drawn."""
-    monkeypatch.setattr(judge, "CHECKS", tuple(check for check in judge.CHECKS if not check.shipped))
+    monkeypatch.setattr(
+        judge, "CHECKS", tuple(check for check in judge.CHECKS if not check.shipped)
+    )

@@ -23,7 +23,13 @@ class Angle(Right):
 
     def answer(self, scene: Any, command: Any) -> Answer:
         answer = super().answer(scene, command)
-        return Answer(self.name, "exact", command, answer.assembled, {"theta_3": answer.quantities["theta_3"]})
+        return Answer(
+            self.name,
+            "exact",
+            command,
+            answer.assembled,
+            {"theta_3": answer.quantities["theta_3"]},
+        )
 
 
 class Releases(Right):
@@ -103,7 +109,13 @@ class Lacks(Right):
     def answer(self, scene: Any, command: Any) -> Answer:
         answer = super().answer(scene, command)
         theta = answer.quantities["theta_3"]
-        return Answer(self.name, "wrong", command, answer.assembled, {"theta_3": theta, "theta_4": np.nan * theta})
+        return Answer(
+            self.name,
+            "wrong",
+            command,
+            answer.assembled,
+            {"theta_3": theta, "theta_4": np.nan * theta},
+        )
 
 
 class Shapes(Right):

@@ -57,7 +57,9 @@ class Step(NamedTuple):
 
     def at(self, h: Ball) -> tuple[list[Ball], list[Ball]]:
         """Angles and speeds h seconds after the start."""
-        return [_sum(terms, h) for terms in self.theta], [_sum(terms, h) for terms in self.omega]
+        return [_sum(terms, h) for terms in self.theta], [
+            _sum(terms, h) for terms in self.omega
+        ]
 
     def length(self) -> Ball:
         """The step at whose end the last two terms are TRUNCATION."""
@@ -83,7 +85,11 @@ def _dot(u: Three, v: Three) -> Ball:
 
 
 def _cross(u: Three, v: Three) -> list[Ball]:
-    return [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]]
+    return [
+        u[1] * v[2] - u[2] * v[1],
+        u[2] * v[0] - u[0] * v[2],
+        u[0] * v[1] - u[1] * v[0],
+    ]
 
 
 class Equations:
@@ -97,11 +103,17 @@ class Equations:
         mass = [arb(bar.mass) for bar in bars]
         polar = [(arb(bar.mass_centre[0]), arb(bar.mass_centre[1])) for bar in bars]  # type: ignore[index]
         self.centre = [(r * phi.cos(), r * phi.sin()) for r, phi in polar]
-        self.M = [arb(bar.moment_of_inertia) + m * r * r for bar, m, (r, _) in zip(bars, mass, polar, strict=True)]
+        self.M = [
+            arb(bar.moment_of_inertia) + m * r * r
+            for bar, m, (r, _) in zip(bars, mass, polar, strict=True)
+        ]
         self.M[0] += mass[1] * a * a
         self.m3_a = mass[1] * a
         # constant forces at the mass centres, those of a bar's own axes, and couples
-        self.world, self.own = [[arb(0), arb(0)] for _ in bars], [[arb(0), arb(0)] for _ in bars]
+        self.world, self.own = (
+            [[arb(0), arb(0)] for _ in bars],
+            [[arb(0), arb(0)] for _ in bars],
+        )
         self.couple = [arb(0)] * 3
         self.damping: list[tuple[int, int, Ball]] = []
         for term in terms:
@@ -114,16 +126,31 @@ class Equations:
         elif isinstance(term, Viscous):
             self.damping += [(*PINS[pin], arb(k)) for pin, k in term.coefficients]
         elif isinstance(term, Load):
-            k, (size, angle), (r, angle_of_place) = term.bar - 2, term.force or (0.0, 0.0), term.at
-            _push((self.own if term.frame == "bar" else self.world)[k], arb(size), arb(angle))
-            self.couple[k] += arb(term.moment) + arb(r) * arb(size) * (arb(angle) - arb(angle_of_place)).sin()
+            k, (size, angle), (r, angle_of_place) = (
+                term.bar - 2,
+                term.force or (0.0, 0.0),
+                term.at,
+            )
+            _push(
+                (self.own if term.frame == "bar" else self.world)[k],
+                arb(size),
+                arb(angle),
+            )
+            self.couple[k] += (
+                arb(term.moment)
+                + arb(r) * arb(size) * (arb(angle) - arb(angle_of_place)).sin()
+            )
         else:
             raise NotImplementedError(type(term).__name__)
 
-    def start(self, linkage: FourBar, theta_2: float, omega_2: float, branch: int) -> tuple[list[Ball], list[Ball]]:
+    def start(
+        self, linkage: FourBar, theta_2: float, omega_2: float, branch: int
+    ) -> tuple[list[Ball], list[Ball]]:
         """Angles and speeds; not at a limit position."""
         x = dict(zip(("d", "a", "b", "c"), self.lengths, strict=True))
-        closed = closure(x | {"theta_1": arb(linkage.ground_angle), "theta_2": arb(theta_2)}, branch)
+        closed = closure(
+            x | {"theta_1": arb(linkage.ground_angle), "theta_2": arb(theta_2)}, branch
+        )
         assert closed is not None
         theta = [arb(theta_2), *(u.arg().mid() for u in closed[1:])]
         t = self.direction(theta)
@@ -141,7 +168,9 @@ class Equations:
     def stretch(self, theta: Three) -> float:
         """|t| of the product of the two longest moving bars: 0 at a change point."""
         t = self.direction(theta)
-        return float(_dot(t, t).sqrt()) / math.prod(sorted(map(float, self.lengths[1:]))[1:])
+        return float(_dot(t, t).sqrt()) / math.prod(
+            sorted(map(float, self.lengths[1:]))[1:]
+        )
 
     def closed(self, theta: Three, omega: Three) -> tuple[list[Ball], list[Ball]]:
         """The nearest angles and speeds that close the loop: an open one has no change point to pass."""
@@ -151,7 +180,10 @@ class Equations:
             xx, xy, yy = _dot(S, S), _dot(S, y_C), _dot(y_C, y_C)
             det = xx * yy - xy * xy
             p, q = (yy * gap[0] - xy * gap[1]) / det, (xx * gap[1] - xy * gap[0]) / det
-            theta = [(angle - p * x - q * y).mid() for angle, x, y in zip(theta, S, y_C, strict=True)]
+            theta = [
+                (angle - p * x - q * y).mid()
+                for angle, x, y in zip(theta, S, y_C, strict=True)
+            ]
         t = self.direction(theta)
         share = _dot(t, omega) / _dot(t, t)
         return list(theta), [(w * share).mid() for w in t]
@@ -162,7 +194,10 @@ class Equations:
         squared = [w * w for w in omega]
         cosine, sine = C[0] * C[1] + S[0] * S[1], S[1] * C[0] - C[1] * S[0]
         x, y = self.centre[1]
-        M23, h = self.m3_a * (x * cosine - y * sine), self.m3_a * (x * sine + y * cosine)
+        M23, h = (
+            self.m3_a * (x * cosine - y * sine),
+            self.m3_a * (x * sine + y * cosine),
+        )
         f = [h * squared[1], -h * squared[0], 0 * h]
         for k, force in enumerate(self.forces(C, S, omega)):
             f[k] = f[k] + force
@@ -170,8 +205,14 @@ class Equations:
         # a u_2 omega_2^2 + b u_3 omega_3^2 - c u_4 omega_4^2
         gamma_x, gamma_y = _dot(P_y, squared), -_dot(P_x, squared)
         t = _cross(P_x, P_y)
-        Mt = [self.M[0] * t[0] + M23 * t[1], self.M[1] * t[1] + M23 * t[0], self.M[2] * t[2]]
-        bound = _cross([gamma_x * v - gamma_y * u for u, v in zip(P_x, P_y, strict=True)], Mt)
+        Mt = [
+            self.M[0] * t[0] + M23 * t[1],
+            self.M[1] * t[1] + M23 * t[0],
+            self.M[2] * t[2],
+        ]
+        bound = _cross(
+            [gamma_x * v - gamma_y * u for u, v in zip(P_x, P_y, strict=True)], Mt
+        )
         share, work = 1 / _dot(t, Mt), _dot(t, f)
         return [(u + work * v) * share for u, v in zip(bound, t, strict=True)]
 
@@ -179,9 +220,18 @@ class Equations:
         """The couple of everything that acts on each angle."""
         total = list(self.couple)
         for k in range(3):
-            (x, y), (fx, fy), (own_x, own_y) = self.centre[k], self.world[k], self.own[k]
+            (x, y), (fx, fy), (own_x, own_y) = (
+                self.centre[k],
+                self.world[k],
+                self.own[k],
+            )
             # F . i u (x + i y)
-            total[k] = total[k] + (x * fy - y * fx) * C[k] - (x * fx + y * fy) * S[k] + (x * own_y - y * own_x)
+            total[k] = (
+                total[k]
+                + (x * fy - y * fx) * C[k]
+                - (x * fx + y * fy) * S[k]
+                + (x * own_y - y * own_x)
+            )
         (fx, fy), (own_x, own_y), a = self.world[1], self.own[1], self.lengths[1]
         force = fx + own_x * C[1] - own_y * S[1], fy + own_y * C[1] + own_x * S[1]
         total[0] = total[0] + a * (force[1] * C[0] - force[0] * S[0])
@@ -194,10 +244,15 @@ class Equations:
 
     def step(self, theta: Three, omega: Three) -> Step:
         """The series of the motion, one term longer with each evaluation."""
-        angles, speeds = [[q, w] for q, w in zip(theta, omega, strict=True)], [[w] for w in omega]
+        angles, speeds = (
+            [[q, w] for q, w in zip(theta, omega, strict=True)],
+            [[w] for w in omega],
+        )
         for count in range(1, ORDER):
             ctx.cap = count
-            alpha = self.accelerations([arb_series(q) for q in angles], [arb_series(w) for w in speeds])
+            alpha = self.accelerations(
+                [arb_series(q) for q in angles], [arb_series(w) for w in speeds]
+            )
             for q, w, terms in zip(angles, speeds, alpha, strict=True):
                 w.append((terms[count - 1] / count).mid())
                 q.append(w[count] / (count + 1))
@@ -245,12 +300,20 @@ def released(
             step = equations.step(theta, omega)
             h = step.length()
             if equations.stretch(step.at(h)[0]) < SINGULAR:
-                h *= arb(max(SHORTER, key=lambda part: equations.stretch(step.at(h * arb(part))[0])))
+                h *= arb(
+                    max(
+                        SHORTER,
+                        key=lambda part: equations.stretch(step.at(h * arb(part))[0]),
+                    )
+                )
             before = _sine(theta)
             new = equations.closed(*step.at(h))
             if _sine(new[0]) * before < 0.0:
                 all_bars = _sine(new[0], 0, 1) * _sine(theta, 0, 1) < 0.0
-                limits, change_points = limits + (not all_bars), change_points + all_bars
+                limits, change_points = (
+                    limits + (not all_bars),
+                    change_points + all_bars,
+                )
                 if not follow:
                     h = _crossing(lambda h: _sine(step.at(h)[0]) * before, h)  # noqa: B023 - called at once
                     stopped = float(t + h)

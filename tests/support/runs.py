@@ -15,8 +15,18 @@ def read_run(path: Path) -> tuple[About, list[Row]]:
     return run.about, list(run.rows())
 
 
-def compare_rows(old: tuple[About, Iterable[Row]], new: tuple[About, Iterable[Row]], kept: int = KEPT) -> Differences:
+def compare_rows(
+    old: tuple[About, Iterable[Row]], new: tuple[About, Iterable[Row]], kept: int = KEPT
+) -> Differences:
     """Two runs compared whose rows stand in any order."""
     before, after = (sort_rows(run[1]) for run in (old, new))
-    by_scene = ([(name, list(rows)) for name, rows in groupby(run, lambda row: row.scene)] for run in (before, after))
-    return compare_runs((old[0], next(by_scene)), (new[0], next(by_scene)), {row.engine for row in after}, kept)
+    by_scene = (
+        [(name, list(rows)) for name, rows in groupby(run, lambda row: row.scene)]
+        for run in (before, after)
+    )
+    return compare_runs(
+        (old[0], next(by_scene)),
+        (new[0], next(by_scene)),
+        {row.engine for row in after},
+        kept,
+    )

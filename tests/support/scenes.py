@@ -19,7 +19,10 @@ def crank_rocker(**changes: object) -> fourbar.Scene:
     parts: dict[str, object] = {
         "linkage": linkage,
         "motion": fourbar.Motion(fourbar.Sweep(0.1, 0.1 + 2 * math.pi, 60), 10.0, 5.0),
-        "loads": (fourbar.Load(4, (3.0, 0.7), (0.05, 1.0)), fourbar.Load(3, moment=-0.2)),
+        "loads": (
+            fourbar.Load(4, (3.0, 0.7), (0.05, 1.0)),
+            fourbar.Load(3, moment=-0.2),
+        ),
         "effects": (fourbar.Gravity(),),
         "title": "crank-rocker",
     }
@@ -42,4 +45,6 @@ def thesis(theta_2: object = None) -> fourbar.Scene:
     loads = [fourbar.Load(2, (10.0, 0.0), (0.05, math.radians(265.0)))]
     loads += [fourbar.Load(bar, moment=-0.15) for bar in (2, 3, 4)]
     angles = np.radians([135.0]) if theta_2 is None else theta_2
-    return fourbar.Scene(linkage, fourbar.Motion(angles, 0.2244), 4, tuple(loads), title="thesis")  # type: ignore[arg-type]
+    return fourbar.Scene(
+        linkage, fourbar.Motion(angles, 0.2244), 4, tuple(loads), title="thesis"
+    )  # type: ignore[arg-type]

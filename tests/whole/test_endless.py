@@ -44,13 +44,21 @@ READING = [
 def test_what_may_never_end_is_not_waited_for(
     line: list[str], what: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    endless = {"pipe": tmp_path / "pipe", "device": Path("/dev/zero"), "directory": tmp_path / "folder"}[what]
+    endless = {
+        "pipe": tmp_path / "pipe",
+        "device": Path("/dev/zero"),
+        "directory": tmp_path / "folder",
+    }[what]
     os.mkfifo(tmp_path / "pipe")
     (tmp_path / "folder").mkdir()
     before = sorted(tmp_path.rglob("*"))
     out = str(tmp_path / "out")
-    program, *arguments = (part.replace("ENDLESS", str(endless)).replace("OUT", out) for part in line)
-    status = fourbar.cli.status if program == "fourbar" else fourbar_validation.cli.status
+    program, *arguments = (
+        part.replace("ENDLESS", str(endless)).replace("OUT", out) for part in line
+    )
+    status = (
+        fourbar.cli.status if program == "fourbar" else fourbar_validation.cli.status
+    )
     assert status(arguments) == BAD_INPUT
     printed = capsys.readouterr()
     assert printed.err.count("\n") == 1 and endless.name in printed.err
@@ -63,8 +71,15 @@ def test_a_file_on_standard_input_is_read_and_a_pipe_is_not() -> None:
     """`< scene.toml` is an ordinary file with a size, `cat scene.toml |` is a pipe."""
     command = [sys.executable, "-m", "fourbar", "analyze", "/dev/stdin"]
     with Path(SCENE).open("rb") as scene:
-        assert subprocess.run(command, stdin=scene, stdout=subprocess.DEVNULL, check=False).returncode == 0
-    piped = subprocess.run(command, input=Path(SCENE).read_bytes(), capture_output=True, check=False)
+        assert (
+            subprocess.run(
+                command, stdin=scene, stdout=subprocess.DEVNULL, check=False
+            ).returncode
+            == 0
+        )
+    piped = subprocess.run(
+        command, input=Path(SCENE).read_bytes(), capture_output=True, check=False
+    )
     assert piped.returncode == BAD_INPUT and b"must be an ordinary file" in piped.stderr
 
 
@@ -92,9 +107,17 @@ def test_a_free_motion_without_end_is_given_up_with_its_reason(
     monkeypatch.setattr(free_motion, "STEPS", 500)
     for command, ending in (("analyze", "csv"), ("plot", "svg"), ("animate", "html")):
         out = tmp_path / f"out.{ending}"
-        assert fourbar.cli.status([command, str(tmp_path / "released.toml"), "-o", str(out)]) == BAD_INPUT
+        assert (
+            fourbar.cli.status(
+                [command, str(tmp_path / "released.toml"), "-o", str(out)]
+            )
+            == BAD_INPUT
+        )
         printed = capsys.readouterr().err
-        assert printed.count("\n") == 1 and "released.toml: motion.free.duration = 1000000000.0" in printed
+        assert (
+            printed.count("\n") == 1
+            and "released.toml: motion.free.duration = 1000000000.0" in printed
+        )
         assert "followed for 500 steps" in printed and not out.exists()
 
 
@@ -104,19 +127,26 @@ def test_a_long_free_motion_stops_at_ctrl_c(tmp_path: Path) -> None:
     (tmp_path / "released.toml").write_text(RELEASED)
     begin = "from fourbar.cli import main; print(flush=True); main()"
     command = [sys.executable, "-c", begin, "analyze", str(tmp_path / "released.toml")]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as running:
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    ) as running:
         assert running.stdout is not None and running.stdout.readline()
         time.sleep(1.0)
         assert running.poll() is None
         presses = 0
-        while presses < 3:  # Python drops an interrupt that falls into a destructor; a user presses again
+        while (
+            presses < 3
+        ):  # Python drops an interrupt that falls into a destructor; a user presses again
             presses += 1
             running.send_signal(signal.SIGINT)
             with suppress(subprocess.TimeoutExpired):
                 running.wait(timeout=10.0)
                 break
         _, printed = running.communicate(timeout=10.0)
-    assert running.returncode == INTERRUPTED and printed.splitlines()[-1] == b"error: interrupted"
+    assert (
+        running.returncode == INTERRUPTED
+        and printed.splitlines()[-1] == b"error: interrupted"
+    )
     assert presses > 1 or printed.strip() == b"error: interrupted"
 
 
@@ -125,9 +155,14 @@ def test_a_free_motion_too_long_for_the_engines_is_refused_before_a_run(
 ) -> None:
     (tmp_path / "released.toml").write_text(RELEASED)
     assert (
-        fourbar_validation.cli.status(["run", str(tmp_path / "released.toml"), "--out", str(tmp_path / "out")])
+        fourbar_validation.cli.status(
+            ["run", str(tmp_path / "released.toml"), "--out", str(tmp_path / "out")]
+        )
         == BAD_INPUT
     )
     printed = capsys.readouterr().err
-    assert "motion.free.duration" in printed and "must not exceed 100 s in a run" in printed
+    assert (
+        "motion.free.duration" in printed
+        and "must not exceed 100 s in a run" in printed
+    )
     assert not (tmp_path / "out").exists()

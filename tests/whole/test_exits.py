@@ -14,7 +14,16 @@ import fourbar
 import fourbar.cli
 import fourbar_lab.cli
 import fourbar_validation.cli
-from fourbar.errors import BAD_INPUT, BROKEN, FAILED, HOLDS, INTERRUPTED, DependencyError, InputError, run
+from fourbar.errors import (
+    BAD_INPUT,
+    BROKEN,
+    FAILED,
+    HOLDS,
+    INTERRUPTED,
+    DependencyError,
+    InputError,
+    run,
+)
 from fourbar.writing import write_text
 from fourbar_lab.bench import Measured
 from fourbar_lab.tally import Tally
@@ -60,13 +69,24 @@ def leaving() -> click.Group:
 
 @pytest.mark.parametrize(
     "command",
-    ["check {0} {1} --json {1}", "check {0} {1} --junit {0}", "advise {0} --error 1e-3 -o {0}", "run {0} --junit {0}"],
+    [
+        "check {0} {1} --json {1}",
+        "check {0} {1} --junit {0}",
+        "advise {0} --error 1e-3 -o {0}",
+        "run {0} --junit {0}",
+    ],
 )
 def test_no_command_writes_over_what_it_reads(
-    command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    command: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    texts = {"scene.toml": Path(MODEL).read_text(), "theirs.csv": "theta_2,torque\n1.0,0.2\n"}
+    texts = {
+        "scene.toml": Path(MODEL).read_text(),
+        "theirs.csv": "theta_2,torque\n1.0,0.2\n",
+    }
     for name, text in texts.items():
         Path(name).write_text(text)
     assert fourbar_validation.cli.status(command.format(*texts).split()) == BAD_INPUT
@@ -95,7 +115,10 @@ def test_no_command_writes_over_what_it_reads(
         (raising(ModuleNotFoundError("No module named 'x'", name="x")), BROKEN),
         (raising(OSError(28, "No space left on device")), BROKEN),
         (raising(OSError("without a number")), BROKEN),
-        (raising(BrokenPipeError(32, "Broken pipe")), BROKEN),  # of a worker: standard output is whole
+        (
+            raising(BrokenPipeError(32, "Broken pipe")),
+            BROKEN,
+        ),  # of a worker: standard output is whole
         (leaving(), HOLDS),
         (raising(RuntimeError("a bug")), BROKEN),
         (raising(KeyboardInterrupt()), INTERRUPTED),
@@ -103,26 +126,42 @@ def test_no_command_writes_over_what_it_reads(
     ],
 )
 def test_every_end_has_its_status(
-    group: click.Group, status: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    group: click.Group,
+    status: int,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.delenv("FOURBAR_TRACEBACK", raising=False)
-    monkeypatch.setattr(sys, "stdout", sys.stdout)  # click lets go of it where a pipe breaks
+    monkeypatch.setattr(
+        sys, "stdout", sys.stdout
+    )  # click lets go of it where a pipe breaks
     monkeypatch.setattr(sys, "stderr", sys.stderr)
     assert run(group, "program", ["go"]) == status
     printed = capsys.readouterr().err.strip()
     assert (
         "\n" not in printed
         and "None" not in printed
-        and bool(printed) == (status in (BROKEN, INTERRUPTED) or "must be" in printed or "such" in printed)
+        and bool(printed)
+        == (
+            status in (BROKEN, INTERRUPTED) or "must be" in printed or "such" in printed
+        )
     )
 
 
 @pytest.mark.parametrize("module", ["fourbar", "validation"])
-def test_an_interruption_while_the_libraries_are_imported_is_one_line(module: str, tmp_path: Path) -> None:
+def test_an_interruption_while_the_libraries_are_imported_is_one_line(
+    module: str, tmp_path: Path
+) -> None:
     (tmp_path / "numpy.py").write_text("raise KeyboardInterrupt")
     paths = os.pathsep.join((str(tmp_path), str(ROOT), str(ROOT / "validation")))
     line = [sys.executable, "-m", module, "--help"]
-    done = subprocess.run(line, env={**os.environ, "PYTHONPATH": paths}, capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        line,
+        env={**os.environ, "PYTHONPATH": paths},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert (done.returncode, done.stderr) == (INTERRUPTED, "error: interrupted\n")
 
 
@@ -131,22 +170,31 @@ def test_a_program_without_output_streams_runs(monkeypatch: pytest.MonkeyPatch) 
     """One started with `>&- 2>&-`, or on Windows without a console."""
     for stream in ("stdout", "stderr"):
         monkeypatch.setattr(sys, stream, None)
-    assert [fourbar.cli.status(["analyze", file]) for file in (MODEL, NO_FILE)] == [HOLDS, BAD_INPUT]
+    assert [fourbar.cli.status(["analyze", file]) for file in (MODEL, NO_FILE)] == [
+        HOLDS,
+        BAD_INPUT,
+    ]
     sys.stdout.close()
     sys.stderr.close()
 
 
-def test_a_full_disk_names_the_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_full_disk_names_the_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def full(_: int) -> None:
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr("os.fsync", full)
     with pytest.raises(OSError, match="No space left on device") as caught:
         write_text(tmp_path / "report.md", "text")
-    assert caught.value.filename == str(tmp_path / "report.md") and not list(tmp_path.iterdir())
+    assert caught.value.filename == str(tmp_path / "report.md") and not list(
+        tmp_path.iterdir()
+    )
 
 
-ROW = Row("scene", "engine", "exact", "torque", 1e-15, 1e-14, AGREES, "equivalence", 1.0, 1.0)
+ROW = Row(
+    "scene", "engine", "exact", "torque", 1e-15, 1e-14, AGREES, "equivalence", 1.0, 1.0
+)
 TABLE = "theta_2 [deg], torque\n60, 1.0\n"
 """A torque that is not that of the crank-rocker."""
 
@@ -154,13 +202,23 @@ TABLE = "theta_2 [deg], torque\n60, 1.0\n"
 def study(folder: Path) -> dict[str, str]:
     """Files that the commands of the table are given."""
     write_results([ROW], folder / "good.csv")
-    write_results([Row("scene", "engine", "exact", "torque", 1.0, 1e-14, FAILS, "", 1.0, 1.0)], folder / "bad.csv")
+    write_results(
+        [Row("scene", "engine", "exact", "torque", 1.0, 1e-14, FAILS, "", 1.0, 1.0)],
+        folder / "bad.csv",
+    )
     (folder / "theirs.csv").write_text(TABLE)
     (folder / "scene.toml").write_text(fourbar.dump(crank_rocker()))
-    return {name: str(folder / name) for name in ("good.csv", "bad.csv", "theirs.csv", "scene.toml", "out")}
+    return {
+        name: str(folder / name)
+        for name in ("good.csv", "bad.csv", "theirs.csv", "scene.toml", "out")
+    }
 
 
-VALIDATION, FOURBAR, LAB = fourbar_validation.cli.status, fourbar.cli.status, fourbar_lab.cli.status
+VALIDATION, FOURBAR, LAB = (
+    fourbar_validation.cli.status,
+    fourbar.cli.status,
+    fourbar_lab.cli.status,
+)
 STATUSES: list[tuple[Callable[[list[str]], int], str, int]] = [
     (FOURBAR, "--version", HOLDS),
     (FOURBAR, "--help", HOLDS),
@@ -197,9 +255,15 @@ STATUSES: list[tuple[Callable[[list[str]], int], str, int]] = [
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("command", "line", "status"), STATUSES, ids=[line for _, line, _ in STATUSES])
+@pytest.mark.parametrize(
+    ("command", "line", "status"), STATUSES, ids=[line for _, line, _ in STATUSES]
+)
 def test_every_command_ends_with_its_status(
-    command: Callable[[list[str]], int], line: str, status: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    command: Callable[[list[str]], int],
+    line: str,
+    status: int,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     files = study(tmp_path)
     monkeypatch.chdir(tmp_path)
@@ -207,15 +271,23 @@ def test_every_command_ends_with_its_status(
     assert command([files.get(word, word) for word in line.split()]) == status
 
 
-def test_a_figure_that_no_erratum_explains_is_status_1(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_figure_that_no_erratum_explains_is_status_1(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     assert VALIDATION(["published"]) == HOLDS
     wrong = PublishedFigure("2.4 positions", "1 theta3_1", "167.877224", 167.8)
-    monkeypatch.setattr("fourbar_validation.published.comparison.list_figures", lambda: iter([wrong]))
+    monkeypatch.setattr(
+        "fourbar_validation.published.comparison.list_figures", lambda: iter([wrong])
+    )
     assert VALIDATION(["published"]) == FAILED
 
 
-def test_no_figure_at_all_is_status_1(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    monkeypatch.setattr("fourbar_validation.published.comparison.list_figures", lambda: iter([]))
+def test_no_figure_at_all_is_status_1(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(
+        "fourbar_validation.published.comparison.list_figures", lambda: iter([])
+    )
     assert VALIDATION(["published"]) == FAILED
     assert "Nothing was compared" in capsys.readouterr().out
 
@@ -223,7 +295,9 @@ def test_no_figure_at_all_is_status_1(monkeypatch: pytest.MonkeyPatch, capsys: p
 STABILITY = ["stability", "--samples", "3", "--family", "random", "--jobs", "1"]
 
 
-def test_a_torque_off_in_its_twelfth_digit_is_status_1(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_torque_off_in_its_twelfth_digit_is_status_1(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     true = fourbar.solve
 
     def off(*arguments: object, **options: object) -> fourbar.Solution:
@@ -250,21 +324,32 @@ def test_samples_that_compare_nothing_are_status_1(
     assert "random: nothing was compared" in capsys.readouterr().out
 
 
-def test_a_ratio_that_is_not_reached_is_status_1(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_ratio_that_is_not_reached_is_status_1(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     for name in ONE_THREAD:
         monkeypatch.setenv(name, "1")
     rows = {"growth from 1000 positions on": 1.1, "floor": 1.0}
-    monkeypatch.setattr("fourbar_lab.bench.measure", lambda *_: Measured(rows, {}, {}, {}))
+    monkeypatch.setattr(
+        "fourbar_lab.bench.measure", lambda *_: Measured(rows, {}, {}, {})
+    )
     assert LAB(["bench"]) == HOLDS
     rows["growth from 1000 positions on"] = 2.0
     assert LAB(["bench"]) == FAILED
 
 
-@pytest.mark.parametrize(("ended", "status"), [(0, HOLDS), (1, FAILED), (3, BROKEN), (-11, BROKEN)])
-def test_bench_passes_on_how_its_own_process_ended(ended: int, status: int, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(
+    ("ended", "status"), [(0, HOLDS), (1, FAILED), (3, BROKEN), (-11, BROKEN)]
+)
+def test_bench_passes_on_how_its_own_process_ended(
+    ended: int, status: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
     for name in ONE_THREAD:
         monkeypatch.delenv(name, raising=False)
-    monkeypatch.setattr("fourbar_lab.bench.subprocess.run", lambda line, **_: subprocess.CompletedProcess(line, ended))
+    monkeypatch.setattr(
+        "fourbar_lab.bench.subprocess.run",
+        lambda line, **_: subprocess.CompletedProcess(line, ended),
+    )
     assert LAB(["bench"]) == status
 
 
@@ -286,7 +371,11 @@ PROCESSES = [
     ("fourbar_lab", "benchmark --no-such-option", BAD_INPUT),
     ("fourbar_lab", "findings --release 1.0", BAD_INPUT),
     ("validation", f"accept {NO_FILE}", BAD_INPUT),
-    ("validation", f"compare accepted {ROOT / 'validation/fourbar_validation/regression/accepted'}", HOLDS),
+    (
+        "validation",
+        f"compare accepted {ROOT / 'validation/fourbar_validation/regression/accepted'}",
+        HOLDS,
+    ),
     ("validation", f"check {NO_FILE} {NO_FILE}", BAD_INPUT),
     ("validation", f"check-mjcf {NO_FILE} {NO_FILE}", BAD_INPUT),
     ("fourbar_lab", "fuzz-files --count 1", HOLDS),
@@ -304,10 +393,18 @@ PROCESSES = [
 ]
 
 
-@pytest.mark.parametrize(("program", "line", "status"), PROCESSES, ids=[f"{p} {w.split()[0]}" for p, w, _ in PROCESSES])
-def test_each_command_in_a_process_of_its_own(program: str, line: str, status: int, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("program", "line", "status"),
+    PROCESSES,
+    ids=[f"{p} {w.split()[0]}" for p, w, _ in PROCESSES],
+)
+def test_each_command_in_a_process_of_its_own(
+    program: str, line: str, status: int, tmp_path: Path
+) -> None:
     ended, complained = alone(program, line.split(), tmp_path)
-    assert (ended, bool(complained.strip())) == (status, status == BAD_INPUT), complained
+    assert (ended, bool(complained.strip())) == (status, status == BAD_INPUT), (
+        complained
+    )
 
 
 def test_every_command_is_in_the_table_of_processes() -> None:
@@ -320,18 +417,27 @@ def test_every_command_is_in_the_table_of_processes() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not Path("/dev/full").exists(), reason="only Linux has a device that is always full")
+@pytest.mark.skipif(
+    not Path("/dev/full").exists(), reason="only Linux has a device that is always full"
+)
 def test_what_was_printed_without_being_written_out_is_not_lost_in_silence() -> None:
     code = "import click, sys; from fourbar.errors import run; "
-    code += (
-        "sys.exit(run(click.Group(commands={'go': click.command(name='go')(lambda: print('printed'))}), 'p', ['go']))"
-    )
+    code += "go = click.command(name='go')(lambda: print('printed')); "
+    code += "sys.exit(run(click.Group(commands={'go': go}), 'p', ['go']))"
     reading, writing = os.pipe()
     os.close(reading)
     full = os.open("/dev/full", os.O_WRONLY)
-    for out, status, printed in ((full, BROKEN, "error: output: No space left on device\n"), (writing, HOLDS, "")):
+    for out, status, printed in (
+        (full, BROKEN, "error: output: No space left on device\n"),
+        (writing, HOLDS, ""),
+    ):
         done = subprocess.run(
-            [sys.executable, "-c", code], cwd=ROOT, stdout=out, stderr=subprocess.PIPE, text=True, check=False
+            [sys.executable, "-c", code],
+            cwd=ROOT,
+            stdout=out,
+            stderr=subprocess.PIPE,
+            text=True,
+            check=False,
         )
         os.close(out)
         assert (done.returncode, done.stderr) == (status, printed)
@@ -352,8 +458,16 @@ def test_a_module_that_the_harness_lacks_is_in_the_extra_of_the_harness(
     monkeypatch.setitem(sys.modules, "filelock", None)
     assert (
         fourbar_validation.cli.status(
-            ["run", str(ROOT / "models" / "crank_rocker.toml"), "--out", str(tmp_path / "out")]
+            [
+                "run",
+                str(ROOT / "models" / "crank_rocker.toml"),
+                "--out",
+                str(tmp_path / "out"),
+            ]
         )
         == BROKEN
     )
-    assert 'filelock is not installed: pip install ".[validation]"' in capsys.readouterr().err
+    assert (
+        'filelock is not installed: pip install ".[validation]"'
+        in capsys.readouterr().err
+    )

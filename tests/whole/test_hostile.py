@@ -55,7 +55,10 @@ def scene_text(title: str) -> str:
 class Named:
     """Scenes whose name, title and source are hostile: where the beginning or the whole matters each by itself."""
 
-    texts: tuple[str, ...] = (*(HOSTILE[kind] for kind in ("path", "markdown", "rich")), " ".join(HOSTILE.values()))
+    texts: tuple[str, ...] = (
+        *(HOSTILE[kind] for kind in ("path", "markdown", "rich")),
+        " ".join(HOSTILE.values()),
+    )
 
     def __len__(self) -> int:
         return len(self.texts)
@@ -94,7 +97,10 @@ def test_reports_hold_hostile_text_as_text(
     for name, output in (("terminal", shown), ("markdown", markdown), ("html", html)):
         assert not STEERING.search(output), (name, STEERING.findall(output))
     # nothing was written outside the requested folder
-    assert {path.name for path in tmp_path.rglob("*") if path.is_dir()} == {"deep", "out"}
+    assert {path.name for path in tmp_path.rglob("*") if path.is_dir()} == {
+        "deep",
+        "out",
+    }
 
 
 @pytest.mark.parametrize("title", [*HOSTILE.values(), "\ud800", "é" * 10_000, ""])
@@ -110,15 +116,24 @@ def test_sdf_and_usd_hold_a_hostile_title_as_a_text(kind: str) -> None:
     scene = crank_rocker(title=HOSTILE[kind])
     root = ET.fromstring(write_sdf(scene, without_loads=True))
     (model,) = root.findall(".//model")
-    *_, title = re.findall(r"^ *doc = (.*)$", write_usd(scene, without_loads=True), re.MULTILINE)
-    assert not STEERING.search(model.attrib["name"] + json.loads(title)) and not root.findall(".//script")
+    *_, title = re.findall(
+        r"^ *doc = (.*)$", write_usd(scene, without_loads=True), re.MULTILINE
+    )
+    assert not STEERING.search(
+        model.attrib["name"] + json.loads(title)
+    ) and not root.findall(".//script")
 
 
 @pytest.mark.parametrize("kind", HOSTILE)
-def test_differences_hold_hostile_names_as_text(kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_differences_hold_hostile_names_as_text(
+    kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     name = HOSTILE[kind]
     # a table written by somebody else, whose names nothing has looked at
-    for folder, cells in (("old", ("1e-15", "1e-14", "true", "agrees")), ("new", ("1e-3", "1e-14", "false", "fails"))):
+    for folder, cells in (
+        ("old", ("1e-15", "1e-14", "true", "agrees")),
+        ("new", ("1e-3", "1e-14", "false", "fails")),
+    ):
         (tmp_path / folder).mkdir()
         with (tmp_path / folder / "results.csv").open("w", newline="") as file:
             writer = csv.writer(file)
@@ -139,10 +154,28 @@ def test_differences_hold_hostile_names_as_text(kind: str, tmp_path: Path, capsy
         assert not STEERING.search((tmp_path / form).read_text()), form
 
 
-@pytest.mark.parametrize("text", ["scene\n", "scene,engine\nx\n", "\0", "a" * 200_000 + ",b\n1,2\n", '"', "[" * 9999])
-def test_what_is_no_table_of_results_is_one_line(text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize(
+    "text",
+    [
+        "scene\n",
+        "scene,engine\nx\n",
+        "\0",
+        "a" * 200_000 + ",b\n1,2\n",
+        '"',
+        "[" * 9999,
+    ],
+)
+def test_what_is_no_table_of_results_is_one_line(
+    text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     good = ",".join(COLUMNS) + "\n"
-    for rows, record in ((text, "{}"), (good + "x,y\n", "{}"), (good, text), (good, '{"versions": 3}'), (good, "[]")):
+    for rows, record in (
+        (text, "{}"),
+        (good + "x,y\n", "{}"),
+        (good, text),
+        (good, '{"versions": 3}'),
+        (good, "[]"),
+    ):
         (tmp_path / "results.csv").write_text(rows)
         (tmp_path / "record.json").write_text(record)
         code = status(["compare", str(tmp_path), str(tmp_path)])
@@ -151,8 +184,12 @@ def test_what_is_no_table_of_results_is_one_line(text: str, tmp_path: Path, caps
         assert len(printed.err.splitlines()) == 1
 
 
-@pytest.mark.parametrize("name", ["../out", "/tmp/out", "a/b", "..", ".", "", "a\x00b", "a\x1b[0m"])
-def test_a_baseline_has_a_name_and_no_path(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize(
+    "name", ["../out", "/tmp/out", "a/b", "..", ".", "", "a\x00b", "a\x1b[0m"]
+)
+def test_a_baseline_has_a_name_and_no_path(
+    name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert status(["accept", "results", "--as", name]) == BAD_INPUT
     printed = capsys.readouterr().err
     assert "--as" in printed
@@ -167,7 +204,10 @@ def test_a_hostile_name_of_a_bad_file_is_shown_and_not_sent(
     name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / name).write_text('title = "no lengths"')
-    assert status(["run", str(tmp_path / name), "--out", str(tmp_path / "out")]) == BAD_INPUT
+    assert (
+        status(["run", str(tmp_path / name), "--out", str(tmp_path / "out")])
+        == BAD_INPUT
+    )
     printed = capsys.readouterr().err
     assert not STEERING.search(printed)
     assert len(printed.splitlines()) == 1
@@ -183,9 +223,20 @@ def test_a_suite_file_of_hostile_names_runs_and_they_are_shown_and_not_sent(
         (tmp_path / name).write_text(scene_text("fine"))
     suite = tmp_path / "suite.toml"
     suite.write_text(f"scenes = {json.dumps(names)}")
-    arguments = ["--suite", str(suite), "--engines", "free-body", "--no-pictures", "--out", str(tmp_path / "out")]
+    arguments = [
+        "--suite",
+        str(suite),
+        "--engines",
+        "free-body",
+        "--no-pictures",
+        "--out",
+        str(tmp_path / "out"),
+    ]
     assert status(["run", *arguments]) == HOLDS
-    assert {row.scene for row in read_columns(tmp_path / "out" / "results.csv")} == {"\\x1b[31m<b>[red]x", "a\\nb"}
+    assert {row.scene for row in read_columns(tmp_path / "out" / "results.csv")} == {
+        "\\x1b[31m<b>[red]x",
+        "a\\nb",
+    }
     # the progress bar steers the terminal itself; what is printed at the end does not
     assert not STEERING.search(capsys.readouterr().out)
 
@@ -205,8 +256,12 @@ LISTS = [
 ]
 
 
-@pytest.mark.parametrize(("what", "name", "text"), LISTS, ids=[case[0] for case in LISTS])
-def test_a_suite_file_lists_scenes_from_its_own_folder(what: str, name: str, text: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("what", "name", "text"), LISTS, ids=[case[0] for case in LISTS]
+)
+def test_a_suite_file_lists_scenes_from_its_own_folder(
+    what: str, name: str, text: str, tmp_path: Path
+) -> None:
     suite = read_suite(listed(tmp_path, text, name))
     assert [suite.name(i) for i in range(len(suite))] == ["a", "b"]
 
@@ -224,15 +279,28 @@ BAD_LISTS = [
 ]
 
 
-@pytest.mark.parametrize(("what", "text", "words"), BAD_LISTS, ids=[case[0] for case in BAD_LISTS])
-def test_a_bad_suite_file_is_one_line(what: str, text: str | bytes, words: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("what", "text", "words"), BAD_LISTS, ids=[case[0] for case in BAD_LISTS]
+)
+def test_a_bad_suite_file_is_one_line(
+    what: str, text: str | bytes, words: str, tmp_path: Path
+) -> None:
     with pytest.raises(InputError) as caught:
         read_suite(listed(tmp_path, text))
     assert words in str(caught.value)
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("text", ["scenes = 3", "scenes = [3]", "scene = []", "scenes = [", "scenes = " + "[" * 9999])
+@pytest.mark.parametrize(
+    "text",
+    [
+        "scenes = 3",
+        "scenes = [3]",
+        "scene = []",
+        "scenes = [",
+        "scenes = " + "[" * 9999,
+    ],
+)
 def test_a_bad_suite_in_toml_is_one_line(text: str, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"suite\.toml"):
         read_suite(listed(tmp_path, text, "suite.toml"))
@@ -260,7 +328,9 @@ class Greedy:
         return Answer("greedy", "exact", refusal="declined")
 
 
-def test_a_system_that_sets_no_limit_of_memory_goes_on_without(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_system_that_sets_no_limit_of_memory_goes_on_without(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     resource = pytest.importorskip("resource")
     asked = []
 
@@ -275,11 +345,17 @@ def test_a_system_that_sets_no_limit_of_memory_goes_on_without(monkeypatch: pyte
 
 @pytest.mark.slow
 @pytest.mark.linux
-def test_running_out_of_memory_costs_its_own_row(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_running_out_of_memory_costs_its_own_row(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     suite = read_suite(listed(tmp_path, "a.toml\nb.toml\n"))
     monkeypatch.setattr(fourbar_validation.run.run, "CHUNK", {True: 2, False: 2})
     greedy = Engine("greedy", Greedy, EQUIVALENCE)
     run(suite, tmp_path / "run", (*EXACT, greedy), RunOptions(workers=1, drawn=False))
-    failing = [row for row in read_columns(tmp_path / "run" / "results.csv") if row.verdict == FAILS]
+    failing = [
+        row
+        for row in read_columns(tmp_path / "run" / "results.csv")
+        if row.verdict == FAILS
+    ]
     assert {(row.scene, row.engine) for row in failing} == {("b", "greedy")}
     assert "MemoryError" in failing[0].reason

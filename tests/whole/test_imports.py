@@ -10,8 +10,23 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-HEAVY = ("pint", "click", "rich", "jinja2", "matplotlib", "scipy", "mujoco", "pinocchio", "flint", "mpmath", "tornado")
-ENGINES = {name: name.removeprefix("py") for name in ("mujoco", "pinocchio", "exudyn", "opensim", "pydrake")}
+HEAVY = (
+    "pint",
+    "click",
+    "rich",
+    "jinja2",
+    "matplotlib",
+    "scipy",
+    "mujoco",
+    "pinocchio",
+    "flint",
+    "mpmath",
+    "tornado",
+)
+ENGINES = {
+    name: name.removeprefix("py")
+    for name in ("mujoco", "pinocchio", "exudyn", "opensim", "pydrake")
+}
 PACKAGES = {
     "fourbar": ROOT / "fourbar",
     "fourbar_validation": ROOT / "validation" / "fourbar_validation",
@@ -64,7 +79,9 @@ def imported(path: Path, *, types: bool = False) -> set[str]:
         else {
             inner
             for node in ast.walk(tree)
-            if isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING"
+            if isinstance(node, ast.If)
+            and isinstance(node.test, ast.Name)
+            and node.test.id == "TYPE_CHECKING"
             for inner in ast.walk(node)
         }
     )
@@ -79,19 +96,25 @@ def imported(path: Path, *, types: bool = False) -> set[str]:
 
 def test_import_fourbar_loads_numpy_alone() -> None:
     code = "import sys, fourbar; print(*sorted({name.partition('.')[0] for name in sys.modules}))"
-    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    out = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    ).stdout.split()
     assert "numpy" in out
     assert not set(HEAVY) & set(out)
 
 
-@pytest.mark.parametrize("path", sorted((ROOT / "fourbar").rglob("*.py")), ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "path", sorted((ROOT / "fourbar").rglob("*.py")), ids=lambda path: path.stem
+)
 def test_the_product_knows_neither_harness_nor_engines(path: Path) -> None:
     roots = {name.partition(".")[0] for name in imported(path)}
     assert not roots & {"fourbar_validation", "fourbar_lab", "tests", *ENGINES}
 
 
 HARNESS_AND_LAB = sorted(
-    path for name in ("fourbar_validation", "fourbar_lab") for path in PACKAGES[name].rglob("*.py")
+    path
+    for name in ("fourbar_validation", "fourbar_lab")
+    for path in PACKAGES[name].rglob("*.py")
 )
 
 
@@ -101,7 +124,10 @@ def test_each_engine_is_imported_under_its_own_name_alone(path: Path) -> None:
     assert not {name for name in names if name.partition(".")[0] == "tests"}
     for engine, its_name in ENGINES.items():
         if any(name.partition(".")[0] == engine for name in names):
-            assert {"engines", "simulators"} & {path.parent.name, path.parent.parent.name}
+            assert {"engines", "simulators"} & {
+                path.parent.name,
+                path.parent.parent.name,
+            }
             assert its_name in path.relative_to(ROOT).as_posix()
 
 
@@ -114,9 +140,14 @@ def modules(package: str) -> dict[str, Path]:
     """Every module of a package, but for its dunder files at the top."""
     top = PACKAGES[package]
     names = {
-        path.relative_to(top.parent).with_suffix("").as_posix().replace("/", "."): path for path in top.rglob("*.py")
+        path.relative_to(top.parent).with_suffix("").as_posix().replace("/", "."): path
+        for path in top.rglob("*.py")
     }
-    return {name: path for name, path in names.items() if not name.split(".")[1].startswith("__")}
+    return {
+        name: path
+        for name, path in names.items()
+        if not name.split(".")[1].startswith("__")
+    }
 
 
 @pytest.mark.parametrize("package", LAYERS)
@@ -125,28 +156,38 @@ def test_layers_stand_on_floors(package: str) -> None:
     entries = {
         path.name.removesuffix(".py")
         for path in PACKAGES[package].iterdir()
-        if not path.name.startswith("__") and (path.suffix == ".py" or any(path.glob("*.py")))
+        if not path.name.startswith("__")
+        and (path.suffix == ".py" or any(path.glob("*.py")))
     }
     assert {name for floor in floors for name in floor} == entries
     assert (
         len(
-            [path for path in PACKAGES[package].iterdir() if not path.name.startswith("__") and path.name != "py.typed"]
+            [
+                path
+                for path in PACKAGES[package].iterdir()
+                if not path.name.startswith("__") and path.name != "py.typed"
+            ]
         )
         <= MOST[package]
     )
     height = {name: number for number, floor in enumerate(floors) for name in floor}
     for name, path in modules(package).items():
-        for used_module in (module for module in imported(path) if module.startswith(f"{package}.")):
+        for used_module in (
+            module for module in imported(path) if module.startswith(f"{package}.")
+        ):
             using, used = layer(name), layer(used_module)
             if used in height and used != using:
-                assert height[used] < height[using] or (using, used) in ON_ONE_FLOOR, f"{name} imports {used_module}"
+                assert height[used] < height[using] or (using, used) in ON_ONE_FLOOR, (
+                    f"{name} imports {used_module}"
+                )
 
 
 @pytest.mark.parametrize("package", PACKAGES)
 def test_no_modules_import_each_other_in_a_circle_types_included(package: str) -> None:
     names = modules(package)
     uses = {
-        name: {used for used in imported(path, types=True) if used in names} - {name} for name, path in names.items()
+        name: {used for used in imported(path, types=True) if used in names} - {name}
+        for name, path in names.items()
     }
     while leaves := {name for name, used in uses.items() if not used & uses.keys()}:
         uses = {name: used for name, used in uses.items() if name not in leaves}
@@ -166,7 +207,9 @@ def test_no_class_name_stands_for_two_things() -> None:
 
 def test_the_picture_of_the_layers_is_what_the_imports_make() -> None:
     picture = (ROOT / "docs" / "architecture.svg").read_text(encoding="utf-8")
-    assert picture == runpy.run_path(str(ROOT / "docs" / "architecture.py"))["text"](), "python docs/architecture.py"
+    assert (
+        picture == runpy.run_path(str(ROOT / "docs" / "architecture.py"))["text"]()
+    ), "python docs/architecture.py"
 
 
 def test_the_formulas_know_numpy_and_the_linkage_alone() -> None:
@@ -180,11 +223,19 @@ def test_what_judges_knows_no_engine_library(name: str) -> None:
     paths = [*(PACKAGES["fourbar_validation"] / name).rglob("*.py")]
     assert paths
     for path in paths:
-        assert not {module.partition(".")[0] for module in imported(path)} & set(ENGINES), path
+        assert not {module.partition(".")[0] for module in imported(path)} & set(
+            ENGINES
+        ), path
 
 
 def test_nothing_that_is_shipped_knows_the_lab() -> None:
     """Not even as a text such as "module:Class", which no import shows."""
-    shipped = [path for package in ("fourbar", "fourbar_validation") for path in PACKAGES[package].rglob("*.py")]
+    shipped = [
+        path
+        for package in ("fourbar", "fourbar_validation")
+        for path in PACKAGES[package].rglob("*.py")
+    ]
     assert len(shipped) > 200
-    assert not [path for path in shipped if "fourbar_lab" in path.read_text(encoding="utf-8")]
+    assert not [
+        path for path in shipped if "fourbar_lab" in path.read_text(encoding="utf-8")
+    ]

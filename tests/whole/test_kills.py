@@ -33,7 +33,14 @@ from fourbar_validation.run.command import choose_engines
 from fourbar_validation.run.run import COLLECTING, RunOptions, run
 from fourbar_validation.run.store import RunningError, Store
 from fourbar_validation.scenes.random import DrawnType
-from fourbar_validation.scenes.suites import AS_LONG_AS, MOST_POSITIONS, Files, Random, Suite, read_scene_files
+from fourbar_validation.scenes.suites import (
+    AS_LONG_AS,
+    MOST_POSITIONS,
+    Files,
+    Random,
+    Suite,
+    read_scene_files,
+)
 from tests.support.guests import list_processes, write_program
 from tests.support.here import Heard, judge_here
 from tests.support.unlucky import Few, Moody, Unlucky, dies_at_first
@@ -44,31 +51,51 @@ KILLS = int(os.environ.get("KILLS", "1"))
 FULL = "KILLS" in os.environ
 COUNT, IN_A_CHUNK = (220, 20) if FULL else (30, 3)
 """Scenes of a run, none of them drawn, so that the work is the judging alone; and as many chunks in a small run."""
-SMALL = f"import fourbar_validation.run.run as run; run.CHUNK = {{False: {IN_A_CHUNK}}}; "
-HARNESS = "import runpy; runpy.run_module('validation', run_name='__main__', alter_sys=True)"
+SMALL = (
+    f"import fourbar_validation.run.run as run; run.CHUNK = {{False: {IN_A_CHUNK}}}; "
+)
+HARNESS = (
+    "import runpy; runpy.run_module('validation', run_name='__main__', alter_sys=True)"
+)
 PROGRAM = ("-m", "validation") if FULL else ("-c", SMALL + HARNESS)
 TYPES = tuple(DrawnType)
 EXACT = choose_engines("free-body")
 
 
-def judge_all(suite: Suite, out: Path, engines: tuple[Engine, ...] = EXACT, workers: int = 2) -> Summary:
+def judge_all(
+    suite: Suite, out: Path, engines: tuple[Engine, ...] = EXACT, workers: int = 2
+) -> Summary:
     heard = Heard()
-    summary = run(suite, out, engines, RunOptions(workers=workers, drawn=False, sample=0), progress=heard)
+    summary = run(
+        suite,
+        out,
+        engines,
+        RunOptions(workers=workers, drawn=False, sample=0),
+        progress=heard,
+    )
     assert heard.scenes[COLLECTING] == len(suite)
     return summary
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(300)  # its hangs alone take half a minute, and every new worker imports the harness again
-def test_an_engine_that_crashes_or_hangs_costs_its_own_rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.timeout(
+    300
+)  # its hangs alone take half a minute, and every new worker imports the harness again
+def test_an_engine_that_crashes_or_hangs_costs_its_own_rows(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(fourbar_validation.run.run, "CHUNK", {True: 2, False: 2})
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
-    hangs = 2.0 * max(1.0, load / (os.cpu_count() or 1))  # s; a busy machine is given longer
+    hangs = 2.0 * max(
+        1.0, load / (os.cpu_count() or 1)
+    )  # s; a busy machine is given longer
     moody = Engine("moody", Moody, EQUIVALENCE)
     monkeypatch.setattr(workers, "SECONDS", hangs)
     judge_all(Few(), tmp_path / "run", (*EXACT, moody))
     rows = list(read_columns(tmp_path / "run" / "results.csv"))
-    failing = {(row.scene, row.engine): row.reason for row in rows if row.verdict == FAILS}
+    failing = {
+        (row.scene, row.engine): row.reason for row in rows if row.verdict == FAILS
+    }
     assert set(failing) == {("b", "moody"), ("c", "moody")}
     assert "crashed" in failing["b", "moody"]
     assert "hung" in failing["c", "moody"]
@@ -78,8 +105,12 @@ def test_an_engine_that_crashes_or_hangs_costs_its_own_rows(tmp_path: Path, monk
 
 @pytest.mark.slow
 @pytest.mark.posix
-@pytest.mark.parametrize(("parent", "limit"), [("os.getppid()", 1.0), ("1", 100.0)], ids=["hangs", "orphan"])
-def test_a_worker_ends_itself_in_the_scene_that_hangs_and_with_its_parent(parent: str, limit: float) -> None:
+@pytest.mark.parametrize(
+    ("parent", "limit"), [("os.getppid()", 1.0), ("1", 100.0)], ids=["hangs", "orphan"]
+)
+def test_a_worker_ends_itself_in_the_scene_that_hangs_and_with_its_parent(
+    parent: str, limit: float
+) -> None:
     """The limit is that of a scene, whatever the others of its chunk took; the orphan's parent is another process."""
     judge = (
         "import os; from tests.support.unlucky import Few, Moody; from fourbar_validation.engines import workers; "
@@ -91,7 +122,13 @@ def test_a_worker_ends_itself_in_the_scene_that_hangs_and_with_its_parent(parent
     )
     began = time.monotonic()
     line = [sys.executable, "-c", judge]
-    done = subprocess.run(line, cwd=Path(__file__).parents[2], capture_output=True, check=False, timeout=60)
+    done = subprocess.run(
+        line,
+        cwd=Path(__file__).parents[2],
+        capture_output=True,
+        check=False,
+        timeout=60,
+    )
     assert (done.stdout, done.returncode) == (b"ready", 1), done.stderr
     assert not done.stderr and time.monotonic() - began < 60.0
 
@@ -108,7 +145,12 @@ def test_what_comes_from_outside_is_not_held_against_the_engine(
         (tmp_path / "lives" / f"{how} {life}").touch()
     monkeypatch.setenv("LIVES", str(tmp_path / "lives"))
     unlucky = Engine("unlucky", Unlucky, EQUIVALENCE)
-    assert judge_all(Few(("a",)), tmp_path / "run", (*EXACT, unlucky), workers=1).counts[FAILS] == 0
+    assert (
+        judge_all(Few(("a",)), tmp_path / "run", (*EXACT, unlucky), workers=1).counts[
+            FAILS
+        ]
+        == 0
+    )
     assert not list((tmp_path / "lives").iterdir())
 
 
@@ -152,19 +194,29 @@ def test_random_scenes_depend_on_seed_and_index_alone() -> None:
 
 
 def test_two_runs_into_one_folder_refuse_each_other(tmp_path: Path) -> None:
-    with Store(tmp_path, {}).held(), pytest.raises(RunningError), Store(tmp_path, {}).held():
+    with (
+        Store(tmp_path, {}).held(),
+        pytest.raises(RunningError),
+        Store(tmp_path, {}).held(),
+    ):
         pass
     with Store(tmp_path, {}).held():
         pass
 
 
-def test_another_suite_or_code_does_not_resume_the_parts_of_this_one(tmp_path: Path) -> None:
+def test_another_suite_or_code_does_not_resume_the_parts_of_this_one(
+    tmp_path: Path,
+) -> None:
     one = {"scenes": "one", **name_code()}
     for identity, kept, note in (
         (one, 0, []),
         (one, 1, []),
         (one | {"scenes": "two"}, 0, ["made again: the parts of another run (scenes)"]),
-        (one | {"code": "changed"}, 0, ["made again: the parts of another run (code, scenes)"]),
+        (
+            one | {"code": "changed"},
+            0,
+            ["made again: the parts of another run (code, scenes)"],
+        ),
     ):
         with Store(tmp_path, identity).held() as store:
             assert (len(store.done()), store.notes) == (kept, note)
@@ -184,23 +236,44 @@ def test_the_hash_of_the_code_is_that_of_its_modules(tmp_path: Path) -> None:
         (tmp_path / name).write_text(text)
         hashes.append(hash_modules(tmp_path / "fourbar", tmp_path / "harness"))
     assert len(set(hashes)) == 3 and hashes[2] == hashes[3] == hashes[4]
-    project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text(encoding="utf-8"))
-    read = project["tool"]["setuptools"]["package-data"]["fourbar"]  # what is only shown decides no number
-    assert {Path(name).suffix for name in read if not name.startswith("show/") and name != "py.typed"} <= set(CODE)
+    project = tomllib.loads(
+        (Path(__file__).parents[2] / "pyproject.toml").read_text(encoding="utf-8")
+    )
+    read = project["tool"]["setuptools"]["package-data"][
+        "fourbar"
+    ]  # what is only shown decides no number
+    assert {
+        Path(name).suffix
+        for name in read
+        if not name.startswith("show/") and name != "py.typed"
+    } <= set(CODE)
     assert build("numpy") and build("no-such-package") == ""
 
 
-def test_damaged_swapped_and_foreign_parts_are_made_again_and_named(tmp_path: Path) -> None:
-    row = Row("a", "engine", "exact", "torque", math.nan, math.inf, REFUSES, "a limit", -0.0, 1e-300)
+def test_damaged_swapped_and_foreign_parts_are_made_again_and_named(
+    tmp_path: Path,
+) -> None:
+    row = Row(
+        "a",
+        "engine",
+        "exact",
+        "torque",
+        math.nan,
+        math.inf,
+        REFUSES,
+        "a limit",
+        -0.0,
+        1e-300,
+    )
     record = Record("a", title="A", rows=[row])
     with Store(tmp_path / "foreign", {"scenes": "two"}).held() as foreign:
         foreign.put(4, [record.kept_all()])
     with Store(tmp_path / "run", {"scenes": "one"}).held() as store:
         for chunk in range(6):
             store.put(chunk, [record.kept_all()])
-        assert store.done() == set(range(6)) and repr([Record.restore(kept) for kept in store.read(5)]) == repr(
-            [record]
-        )
+        assert store.done() == set(range(6)) and repr(
+            [Record.restore(kept) for kept in store.read(5)]
+        ) == repr([record])
         first = store.parts / "000000"
         first.write_bytes(first.read_bytes()[:-1])
         (store.parts / "000001").write_bytes(b"")
@@ -210,7 +283,13 @@ def test_damaged_swapped_and_foreign_parts_are_made_again_and_named(tmp_path: Pa
         shutil.copy(tmp_path / "foreign" / "parts" / "000004", store.parts / "000004")
         assert store.done() == {5}
         assert [note.rpartition(": ")[2] for note in store.notes] == [
-            *("is damaged", "is damaged", "is another part", "is another part", "is of another run")
+            *(
+                "is damaged",
+                "is damaged",
+                "is another part",
+                "is another part",
+                "is of another run",
+            )
         ]
         (store.parts / "000005").write_bytes(b"{}")
         with pytest.raises(DependencyError, match="is damaged; run it again"):
@@ -230,9 +309,27 @@ def start(
     stderr: int = subprocess.DEVNULL,
     more: Sequence[str] = (),
 ) -> subprocess.Popen[bytes]:
-    command = [sys.executable, *(program or PROGRAM), "run", "--random", str(count), "--workers", str(workers)]
+    command = [
+        sys.executable,
+        *(program or PROGRAM),
+        "run",
+        "--random",
+        str(count),
+        "--workers",
+        str(workers),
+    ]
     return subprocess.Popen(
-        [*command, "--engines", "free-body", "--no-pictures", "--sample-shipped", "0", "--out", str(out), *more],
+        [
+            *command,
+            "--engines",
+            "free-body",
+            "--no-pictures",
+            "--sample-shipped",
+            "0",
+            "--out",
+            str(out),
+            *more,
+        ],
         cwd=Path(__file__).parents[2],
         stdout=subprocess.DEVNULL,
         stderr=stderr,
@@ -242,7 +339,11 @@ def start(
 
 def wait_for_parts(out: Path, process: subprocess.Popen[bytes], at_least: int) -> None:
     deadline = time.monotonic() + 60.0
-    while len(list(out.glob("parts/0*"))) < at_least and process.poll() is None and time.monotonic() < deadline:
+    while (
+        len(list(out.glob("parts/0*"))) < at_least
+        and process.poll() is None
+        and time.monotonic() < deadline
+    ):
         time.sleep(0.01)
 
 
@@ -259,7 +360,9 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.posix
 @pytest.mark.usefixtures("interruptible")
 @pytest.mark.timeout(120 + 20 * KILLS)
-def test_whatever_ended_it_a_rerun_goes_on_and_ends_with_the_same_bytes(tmp_path: Path, undisturbed: Path) -> None:
+def test_whatever_ended_it_a_rerun_goes_on_and_ends_with_the_same_bytes(
+    tmp_path: Path, undisturbed: Path
+) -> None:
     """Interrupted, killed at random moments and met with a full disk, one after the other in one folder."""
     process = start(tmp_path, COUNT)
     wait_for_parts(tmp_path, process, at_least=1)
@@ -287,36 +390,52 @@ def test_whatever_ended_it_a_rerun_goes_on_and_ends_with_the_same_bytes(tmp_path
     assert start(tmp_path, COUNT).wait(timeout=100) == 0
     for name in ("results.csv", "results.parquet"):
         assert (tmp_path / name).read_bytes() == (undisturbed / name).read_bytes()
-    assert {path.name for path in tmp_path.iterdir()} == {path.name for path in undisturbed.iterdir()}
+    assert {path.name for path in tmp_path.iterdir()} == {
+        path.name for path in undisturbed.iterdir()
+    }
 
 
 def workers_of(process: subprocess.Popen[bytes]) -> list[int]:
     """The processes that judge: no zombie of one that was killed, nor Python's tracker of resources."""
     try:
-        children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
-        return [int(pid) for pid in children if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes()]
+        children = (
+            Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
+        )
+        return [
+            int(pid)
+            for pid in children
+            if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes()
+        ]
     except OSError:  # one of them has just gone
         return []
 
 
 @pytest.mark.linux
 @pytest.mark.timeout(240 + 20 * KILLS)
-def test_a_worker_killed_at_random_moments_changes_no_byte(tmp_path: Path, undisturbed: Path) -> None:
+def test_a_worker_killed_at_random_moments_changes_no_byte(
+    tmp_path: Path, undisturbed: Path
+) -> None:
     rng = np.random.default_rng(SEED + 1)
     kills = runs = 0
-    while kills < KILLS:  # a run is over after some ten of them, or before the first: another one takes the rest
+    while (
+        kills < KILLS
+    ):  # a run is over after some ten of them, or before the first: another one takes the rest
         out, runs = tmp_path / str(runs), runs + 1
         process = start(out, COUNT, workers=2)
         while kills < KILLS and process.poll() is None:
             wait_for_parts(out, process, at_least=1)
-            time.sleep(float(rng.uniform(0.0, 0.5)))  # a worker needs a moment to start again
+            time.sleep(
+                float(rng.uniform(0.0, 0.5))
+            )  # a worker needs a moment to start again
             workers = workers_of(process)
             if workers:
                 with suppress(ProcessLookupError):
                     os.kill(workers[int(rng.integers(len(workers)))], signal.SIGKILL)
                     kills += 1
         assert process.wait(timeout=100) == 0
-        assert (out / "results.csv").read_bytes() == (undisturbed / "results.csv").read_bytes()
+        assert (out / "results.csv").read_bytes() == (
+            undisturbed / "results.csv"
+        ).read_bytes()
 
 
 @pytest.mark.slow
@@ -336,19 +455,26 @@ def test_any_process_of_a_run_with_a_guest_killed_changes_no_byte(
         while kills < 4 * KILLS and process.poll() is None:
             time.sleep(float(rng.uniform(0.0, 1.0)))
             victims = list_processes(f"MARK_OF_TEST={tmp_path}")
-            with suppress(ProcessLookupError, ValueError):  # it is over: nobody is there to be chosen
+            with suppress(
+                ProcessLookupError, ValueError
+            ):  # it is over: nobody is there to be chosen
                 os.kill(victims[int(rng.integers(len(victims)))], signal.SIGKILL)
                 kills += 1
         if kills < 4 * KILLS and process.wait(timeout=100) == 0:
             shutil.rmtree(out)  # over before it was killed often enough
     process.wait(timeout=100)
     assert start(out, COUNT, more=more).wait(timeout=100) == 0
-    assert (out / "results.csv").read_bytes() == (tmp_path / "undisturbed" / "results.csv").read_bytes()
+    assert (out / "results.csv").read_bytes() == (
+        tmp_path / "undisturbed" / "results.csv"
+    ).read_bytes()
     time.sleep(2.0)
     assert not list_processes(f"MARK_OF_TEST={tmp_path}")
 
 
-@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="a folder that root may write to")
+@pytest.mark.skipif(
+    not hasattr(os, "geteuid") or os.geteuid() == 0,
+    reason="a folder that root may write to",
+)
 def test_a_read_only_folder_is_reported(tmp_path: Path) -> None:
     tmp_path.chmod(0o500)
     with pytest.raises((OSError, FourBarError)):
@@ -359,24 +485,36 @@ def test_a_read_only_folder_is_reported(tmp_path: Path) -> None:
     ("motion", "key"),
     [
         ('theta_2 = { from = "0 deg", to = "9 deg", steps = %d }', "motion.theta_2"),
-        ('law = { time = ["0 s", "1 s"], theta_2 = ["0 deg", "9 deg"], ends = "rest", steps = %d }', "motion.law"),
+        (
+            'law = { time = ["0 s", "1 s"], theta_2 = ["0 deg", "9 deg"], ends = "rest", steps = %d }',
+            "motion.law",
+        ),
         ('theta_2 = "1 deg"\nfree = { duration = "1 s", steps = %d }', "motion.free"),
     ],
 )
-def test_a_scene_of_too_many_positions_is_refused_before_anything_runs(motion: str, key: str, tmp_path: Path) -> None:
-    lengths = '[lengths]\nground = "4 m"\ninput = "1 m"\ncoupler = "3 m"\noutput = "3 m"\n'
+def test_a_scene_of_too_many_positions_is_refused_before_anything_runs(
+    motion: str, key: str, tmp_path: Path
+) -> None:
+    lengths = (
+        '[lengths]\nground = "4 m"\ninput = "1 m"\ncoupler = "3 m"\noutput = "3 m"\n'
+    )
     masses = '[bars.input]\nmass = "1 kg"\n[bars.coupler]\nmass = "1 kg"\n[bars.output]\nmass = "1 kg"\n'
     path = tmp_path / "long.toml"
     path.write_text(f"{lengths}{masses}[motion]\n{motion % (MOST_POSITIONS - 1)}\n")
     a_second = AS_LONG_AS if key == "motion.free" else 0
     assert read_scene_files([path]).positions == MOST_POSITIONS + a_second
     path.write_text(f"{lengths}{masses}[motion]\n{motion % MOST_POSITIONS}\n")
-    with pytest.raises(InputError, match=rf"{key}.steps = {MOST_POSITIONS}: must be below {MOST_POSITIONS} in a run"):
+    with pytest.raises(
+        InputError,
+        match=rf"{key}.steps = {MOST_POSITIONS}: must be below {MOST_POSITIONS} in a run",
+    ):
         read_scene_files([path])
 
 
 def test_a_scene_of_many_positions_has_longer_before_it_counts_as_hanging() -> None:
-    assert pool.find_time_limit(Files((), 50_000), ()) > 20 * pool.find_time_limit(Random(1, 0, TYPES), ())
+    assert pool.find_time_limit(Files((), 50_000), ()) > 20 * pool.find_time_limit(
+        Random(1, 0, TYPES), ()
+    )
 
 
 class Blunders:
@@ -389,7 +527,9 @@ class Blunders:
         self.titles.append(scene.title)
         if scene.title == "b":
             raise RuntimeError("no licence")
-        return Answer("blunders", "exact", refusal=None if scene.title == "c" else "declined")
+        return Answer(
+            "blunders", "exact", refusal=None if scene.title == "c" else "declined"
+        )
 
 
 def test_of_a_long_suite_what_fails_has_pictures_and_what_is_nearest_to_it(
@@ -409,11 +549,15 @@ def test_of_a_long_suite_what_fails_has_pictures_and_what_is_nearest_to_it(
     monkeypatch.setattr(fourbar_validation.run.run, "PICTURED", 3)
     monkeypatch.setattr(fourbar_validation.run.run, "write_html", lambda *_, **__: "")
     blunders = Engine("blunders", Blunders, EQUIVALENCE)
-    without = run(Few(), tmp_path / "without", (*EXACT, blunders), RunOptions(drawn=False))
+    without = run(
+        Few(), tmp_path / "without", (*EXACT, blunders), RunOptions(drawn=False)
+    )
     assert not drawn and not any(record.figure for record in without.shown)
     once = Blunders.titles.count("b")
     last = run(Few(), tmp_path / "with", (*EXACT, blunders))
     assert len(drawn) == 3 and {"b", "c"} < set(drawn)
     assert {record.name for record in last.shown if record.figure} == set(drawn)
     assert Blunders.titles.count("b") == 2 * once
-    assert (tmp_path / "with" / "results.csv").read_bytes() == (tmp_path / "without" / "results.csv").read_bytes()
+    assert (tmp_path / "with" / "results.csv").read_bytes() == (
+        tmp_path / "without" / "results.csv"
+    ).read_bytes()

@@ -11,15 +11,29 @@ from pathlib import Path
 
 import pytest
 
-from tests.support.another_machine import BEFORE, CORES, ROOT, environment, machine, why_not
+from tests.support.another_machine import (
+    BEFORE,
+    CORES,
+    ROOT,
+    environment,
+    machine,
+    why_not,
+)
 
 ALL = os.environ.get("MACHINES") == "all"
 TESTS = ROOT / "tests"
-SAMPLE = [TESTS / "fourbar/formulas/test_pin_forces.py", TESTS / "validation/regression/test_accepted.py"]
+SAMPLE = [
+    TESTS / "fourbar/formulas/test_pin_forces.py",
+    TESTS / "validation/regression/test_accepted.py",
+]
 """Identities, and the accepted state of the exact engines."""
 BUT = {*(TESTS / "whole").glob("*.py"), *TESTS.rglob("test_bench*.py")}
 """Of no number, or of the time that it takes."""
-NUMERICAL = [file for file in sorted({*TESTS.rglob("test_*.py")} - BUT) if "numpy" in file.read_text(encoding="utf-8")]
+NUMERICAL = [
+    file
+    for file in sorted({*TESTS.rglob("test_*.py")} - BUT)
+    if "numpy" in file.read_text(encoding="utf-8")
+]
 
 
 @pytest.mark.slow
@@ -29,14 +43,37 @@ def test_the_numbers_hold_on_another_machine(core: str, tmp_path: Path) -> None:
     reasons = {name: why_not(name) for name in ([core] if ALL else CORES)}
     possible = [name for name, reason in reasons.items() if reason is None]
     if not possible:
-        pytest.skip("not run: " + "; ".join(f"{name}: {reason}" for name, reason in reasons.items()))
+        pytest.skip(
+            "not run: "
+            + "; ".join(f"{name}: {reason}" for name, reason in reasons.items())
+        )
     child = os.environ | environment(possible[0]) | {BEFORE: machine()}
-    files = [str(TESTS / "support/another_machine.py"), *map(str, NUMERICAL if ALL else SAMPLE)]
-    lines = [["pytest", "-p", "no:cacheprovider", *(("-n", "2") if ALL else ("-p", "no:xdist")), *files]]
+    files = [
+        str(TESTS / "support/another_machine.py"),
+        *map(str, NUMERICAL if ALL else SAMPLE),
+    ]
+    lines = [
+        [
+            "pytest",
+            "-p",
+            "no:cacheprovider",
+            *(("-n", "2") if ALL else ("-p", "no:xdist")),
+            *files,
+        ]
+    ]
     if ALL:
-        lines.append(["validation", "run", "--against", "accepted", "--out", str(tmp_path)])
+        lines.append(
+            ["validation", "run", "--against", "accepted", "--out", str(tmp_path)]
+        )
     for line in lines:
         done = subprocess.run(
-            [sys.executable, "-m", *line], cwd=ROOT, env=child, capture_output=True, text=True, check=False
+            [sys.executable, "-m", *line],
+            cwd=ROOT,
+            env=child,
+            capture_output=True,
+            text=True,
+            check=False,
         )
-        assert done.returncode == 0, f"{machine(possible[0])}\n{done.stdout}{done.stderr}"
+        assert done.returncode == 0, (
+            f"{machine(possible[0])}\n{done.stdout}{done.stderr}"
+        )

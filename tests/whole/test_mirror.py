@@ -87,7 +87,11 @@ def listed() -> dict[str, str]:
             folder, _, names = group.strip().partition(": ")
             if names == "*":  # all that have none of their own
                 top, _, inner = folder.partition("/")
-                paths = [path for path in (SOURCES[top] / inner).glob("*.py") if not path.name.startswith("__")]
+                paths = [
+                    path
+                    for path in (SOURCES[top] / inner).glob("*.py")
+                    if not path.name.startswith("__")
+                ]
                 names = " ".join(path.stem for path in paths if not own_test(path, top))
             tests_of |= {f"{folder}/{name}.py": test for name in names.split()}
     return tests_of
@@ -96,14 +100,22 @@ def listed() -> dict[str, str]:
 def own_test(path: Path, top: str) -> bool:
     """Whether a module has a test of its name."""
     folder = ROOT / "tests" / top / path.parent.relative_to(SOURCES[top])
-    return any([*folder.glob(f"test_{path.stem}.py"), *folder.glob(f"test_{path.stem}_*.py")])
+    return any(
+        [*folder.glob(f"test_{path.stem}.py"), *folder.glob(f"test_{path.stem}_*.py")]
+    )
 
 
 @pytest.mark.parametrize("top", SOURCES)
 def test_every_module_has_a_test_or_is_listed(top: str) -> None:
-    paths = [path for path in SOURCES[top].rglob("*.py") if not path.name.startswith("__")]
+    paths = [
+        path for path in SOURCES[top].rglob("*.py") if not path.name.startswith("__")
+    ]
     assert paths
-    without = {f"{top}/{path.relative_to(SOURCES[top]).as_posix()}" for path in paths if not own_test(path, top)}
+    without = {
+        f"{top}/{path.relative_to(SOURCES[top]).as_posix()}"
+        for path in paths
+        if not own_test(path, top)
+    }
     of_top = {name for name in listed() if name.partition("/")[0] == top}
     assert without == of_top
 
@@ -118,4 +130,6 @@ def test_every_test_has_the_name_of_a_module_or_folder(top: str) -> None:
         folder = SOURCES[top] / test.parent.relative_to(ROOT / "tests" / top)
         names = {folder.name, *(entry.stem for entry in folder.iterdir())}
         name = test.stem.removeprefix("test_")
-        assert any(name == module or name.startswith(f"{module}_") for module in names), test
+        assert any(
+            name == module or name.startswith(f"{module}_") for module in names
+        ), test

@@ -46,7 +46,9 @@ omega_2 = "1 rad/s"
 """
 
 
-def without(library: str, folder: Path, *arguments: str, **settings: str) -> subprocess.CompletedProcess[str]:
+def without(
+    library: str, folder: Path, *arguments: str, **settings: str
+) -> subprocess.CompletedProcess[str]:
     """`python -m validation run` where a library cannot be imported."""
     (folder / "sitecustomize.py").write_text(BLOCKER)
     (folder / "scene.toml").write_text(SCENE)
@@ -67,7 +69,13 @@ def without(library: str, folder: Path, *arguments: str, **settings: str) -> sub
             *arguments,
         ],
         cwd=folder,
-        env={**os.environ, "PYTHONPATH": paths, "BLOCKED": f"{library} {NEVER}", "COLUMNS": "200", **settings},
+        env={
+            **os.environ,
+            "PYTHONPATH": paths,
+            "BLOCKED": f"{library} {NEVER}",
+            "COLUMNS": "200",
+            **settings,
+        },
         capture_output=True,
         text=True,
         check=False,
@@ -75,13 +83,17 @@ def without(library: str, folder: Path, *arguments: str, **settings: str) -> sub
 
 
 @pytest.mark.parametrize("library", ENGINES)
-def test_the_others_run_and_the_missing_named_with_the_reason(library: str, tmp_path: Path) -> None:
+def test_the_others_run_and_the_missing_named_with_the_reason(
+    library: str, tmp_path: Path
+) -> None:
     done = without(library, tmp_path)
     reason = f'{library} is not installed: pip install ".[validation]" in the checkout'
     with (tmp_path / "out" / "results.csv").open() as table:
         rows = list(csv.DictReader(table))
     assert {row["engine"] for row in rows} == {"formulas", *(ALL - ENGINES[library])}
-    assert "fails" not in {row["verdict"] for row in rows}  # MuJoCo refuses bars without mass
+    assert "fails" not in {
+        row["verdict"] for row in rows
+    }  # MuJoCo refuses bars without mass
     for name in ENGINES[library]:
         assert f"Not run: {name}: {reason}" in done.stdout
         assert f"Not run: {name}: " in (tmp_path / "out" / "report.html").read_text()
@@ -102,5 +114,8 @@ def test_requested_by_name_nothing_is_run(tmp_path: Path) -> None:
 def test_an_engine_that_is_there_and_does_not_load_is_one_line(tmp_path: Path) -> None:
     done = without("pinocchio", tmp_path, "--engines", "pinocchio-inverse", BROKEN="1")
     what = "ImportError: libboost.so: cannot open shared object file"
-    assert done.stderr.strip() == f"error: pinocchio-inverse: pinocchio is installed, but does not load: {what}"
+    assert (
+        done.stderr.strip()
+        == f"error: pinocchio-inverse: pinocchio is installed, but does not load: {what}"
+    )
     assert done.returncode == 3 and not (tmp_path / "out").exists()

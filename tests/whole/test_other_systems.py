@@ -19,7 +19,12 @@ from fourbar_validation.cli import status as harness
 from tests.support.another_machine import ROOT
 from tests.support.scenes import crank_rocker
 
-HOSTILE = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0", "PYTHONIOENCODING": ""}
+HOSTILE = {
+    "LC_ALL": "C",
+    "PYTHONUTF8": "0",
+    "PYTHONCOERCECLOCALE": "0",
+    "PYTHONIOENCODING": "",
+}
 OURS = [str(ROOT / "fourbar"), str(ROOT / "validation")]
 BEGIN = "import os, sys; vars(os).pop('fork', None); from {module} import status; sys.exit(status(sys.argv[1:]))"
 
@@ -42,28 +47,48 @@ def folder(tmp_path: Path) -> Path:
         ("fourbar.cli", "mjcf scène.toml -o model.xml"),
         ("fourbar.cli", "animate scène.toml -o page.html"),
         ("fourbar.cli", "plot scène.toml -o plot.svg"),
-        ("fourbar_validation.cli", "run scène.toml --workers 2 --engines free-body --out results"),
+        (
+            "fourbar_validation.cli",
+            "run scène.toml --workers 2 --engines free-body --out results",
+        ),
         ("fourbar_validation.cli", "check-mjcf scène.toml {models}/crank_rocker.xml"),
     ],
 )
-def test_commands_need_neither_fork_nor_utf_8(module: str, line: str, folder: Path) -> None:
+def test_commands_need_neither_fork_nor_utf_8(
+    module: str, line: str, folder: Path
+) -> None:
     if "mjcf" in line:
         pytest.importorskip("mujoco")
     path = {"PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "validation")])}
     arguments = line.format(models=ROOT / "models").split()
     done = subprocess.run(
-        [sys.executable, "-X", "warn_default_encoding", "-c", BEGIN.format(module=module), *arguments],
+        [
+            sys.executable,
+            "-X",
+            "warn_default_encoding",
+            "-c",
+            BEGIN.format(module=module),
+            *arguments,
+        ],
         cwd=folder,
         env=os.environ | HOSTILE | path,
         capture_output=True,
         check=False,
     )
     said = done.stderr.decode(errors="replace")
-    assert done.returncode == (1 if "check-mjcf" in line else HOLDS), said  # the other model is another one
-    assert not [line for line in said.splitlines() if "EncodingWarning" in line and line.startswith(tuple(OURS))]
+    assert done.returncode == (1 if "check-mjcf" in line else HOLDS), (
+        said
+    )  # the other model is another one
+    assert not [
+        line
+        for line in said.splitlines()
+        if "EncodingWarning" in line and line.startswith(tuple(OURS))
+    ]
 
 
-def test_line_ends_of_windows_are_read(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_line_ends_of_windows_are_read(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     scene, table = folder / "scène.toml", folder / "table.csv"
     assert status(["analyze", str(scene), "--csv", "-o", str(table)]) == HOLDS
     before = fourbar.load(scene)

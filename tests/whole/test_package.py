@@ -31,9 +31,11 @@ ROOT = Path(__file__).parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
 PYTHONS = ("3.11", "3.12", "3.13", "3.14")
 MODELS = "fourbar_validation.models"
-MODULE_OF = {"python-flint": "flint", "pin": "pinocchio", "imageio-ffmpeg": "imageio_ffmpeg"} | {
-    "array-api-compat": "array_api_compat"
-}
+MODULE_OF = {
+    "python-flint": "flint",
+    "pin": "pinocchio",
+    "imageio-ffmpeg": "imageio_ffmpeg",
+} | {"array-api-compat": "array_api_compat"}
 """Libraries that are imported under another name than they are installed by."""
 
 
@@ -44,12 +46,20 @@ def libraries(requirements: list[str]) -> set[str]:
 
 @pytest.mark.parametrize(
     ("package", "folder"),
-    [("fourbar", "fourbar"), ("fourbar_validation", "validation/fourbar_validation"), (MODELS, "models")],
+    [
+        ("fourbar", "fourbar"),
+        ("fourbar_validation", "validation/fourbar_validation"),
+        (MODELS, "models"),
+    ],
 )
 def test_every_file_of_the_package_is_shipped(package: str, folder: str) -> None:
     patterns = PROJECT["tool"]["setuptools"]["package-data"][package]
     for path in (ROOT / folder).rglob("*"):
-        if path.is_file() and path.suffix != ".py" and path.parent.name != "__pycache__":
+        if (
+            path.is_file()
+            and path.suffix != ".py"
+            and path.parent.name != "__pycache__"
+        ):
             name = path.relative_to(ROOT / folder).as_posix()
             patterns_of = [pattern.removeprefix("**/") for pattern in patterns]
             assert any(fnmatch.fnmatch(name, pattern) for pattern in patterns_of), name
@@ -61,7 +71,9 @@ def test_the_source_archive_has_the_package_that_lies_elsewhere() -> None:
     """The wheel is built from the archive, which has no module of a package that is mapped to another folder."""
     for package in PROJECT["tool"]["setuptools"]["package-dir"]:
         module = f"validation/{package.replace('.', '/')}/__init__.py"
-        assert (ROOT / module).is_file() and f"include {module}\n" in (ROOT / "MANIFEST.in").read_text(encoding="utf-8")
+        assert (ROOT / module).is_file() and f"include {module}\n" in (
+            ROOT / "MANIFEST.in"
+        ).read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("line", ["write", "problems"])
@@ -85,7 +97,10 @@ def test_the_harness_lists_a_command_whose_library_is_missing(
     assert "flint is not installed" in capsys.readouterr().out
     assert harness(["run", "scene.toml", "--out", "results"]) == BROKEN
     complained = capsys.readouterr().err
-    assert complained.count("\n") == 1 and "flint is not installed: pip install" in complained
+    assert (
+        complained.count("\n") == 1
+        and "flint is not installed: pip install" in complained
+    )
 
 
 def test_extras_of_extras_are_named_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -93,18 +108,27 @@ def test_extras_of_extras_are_named_one_by_one(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr("fourbar.errors.__file__", "/nowhere/fourbar/errors.py")
     for extra in ("validation", "all"):
         line = say_install(extra)
-        assert "fourbar" not in line and all(name in line for name in ("mujoco>=", "pin>=", "python-flint>="))
+        assert "fourbar" not in line and all(
+            name in line for name in ("mujoco>=", "pin>=", "python-flint>=")
+        )
 
 
-def test_another_interpreter_finds_the_code_of_a_wheel_and_no_library_of_it(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_another_interpreter_finds_the_code_of_a_wheel_and_no_library_of_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setattr("fourbar_validation.places.CHECKOUT", None)
     monkeypatch.delenv("PYTHONPATH", raising=False)
     with import_path() as path:
-        assert sorted(entry.name for entry in Path(path).iterdir()) == ["fourbar", "fourbar_validation"]
+        assert sorted(entry.name for entry in Path(path).iterdir()) == [
+            "fourbar",
+            "fourbar_validation",
+        ]
     assert not Path(path).exists()
 
 
-def test_a_wheel_in_a_folder_of_another_project_takes_that_for_no_checkout(tmp_path: Path) -> None:
+def test_a_wheel_in_a_folder_of_another_project_takes_that_for_no_checkout(
+    tmp_path: Path,
+) -> None:
     """`pip install --target vendor` at the top of a project."""
     package = tmp_path / "vendor" / "fourbar_validation"
     shutil.copytree(ROOT / "models", package / "models")
@@ -117,14 +141,26 @@ def test_a_wheel_in_a_folder_of_another_project_takes_that_for_no_checkout(tmp_p
 def test_every_library_that_fourbar_imports_is_declared() -> None:
     project = PROJECT["project"]
     declared = libraries(project["dependencies"]) | libraries(
-        [requirement for extra in project["optional-dependencies"].values() for requirement in extra]
+        [
+            requirement
+            for extra in project["optional-dependencies"].values()
+            for requirement in extra
+        ]
     )
     for path in (ROOT / "fourbar").rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text())):
-            names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+            names = (
+                [alias.name for alias in node.names]
+                if isinstance(node, ast.Import)
+                else []
+            )
             names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
             for name in (name.partition(".")[0] for name in names):
-                assert name == "fourbar" or name in sys.stdlib_module_names or name in declared, f"{path}: {name}"
+                assert (
+                    name == "fourbar"
+                    or name in sys.stdlib_module_names
+                    or name in declared
+                ), f"{path}: {name}"
 
 
 @pytest.mark.parametrize(
@@ -148,7 +184,10 @@ def test_an_extra_that_is_missing_is_one_line(
 
     monkeypatch.chdir(tmp_path)
     save(crank_rocker(), "scene.toml")
-    save(crank_rocker(motion=fourbar.Motion(0.5, 0.0, free=fourbar.Free(0.5, 4))), "free.toml")
+    save(
+        crank_rocker(motion=fourbar.Motion(0.5, 0.0, free=fourbar.Free(0.5, 4))),
+        "free.toml",
+    )
     for name in [name for name in sys.modules if name.partition(".")[0] == library]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, library, None)
@@ -175,36 +214,81 @@ def built(folder: Path) -> tuple[Path, Path]:
     subprocess.run([sys.executable, "-m", "venv", folder / "builder"], check=True)
     python = folder / "builder" / "bin" / "python"
     subprocess.run([python, "-m", "pip", "install", "-q", "build"], check=True)
-    subprocess.run([python, "-m", "build", "-o", folder / "dist", tree], check=True, capture_output=True)
-    (wheel,), (archive,) = (folder / "dist").glob("*.whl"), (folder / "dist").glob("*.tar.gz")
+    subprocess.run(
+        [python, "-m", "build", "-o", folder / "dist", tree],
+        check=True,
+        capture_output=True,
+    )
+    (wheel,), (archive,) = (
+        (folder / "dist").glob("*.whl"),
+        (folder / "dist").glob("*.tar.gz"),
+    )
     return wheel, archive
 
 
 def lowest(requirements: list[str]) -> list[str]:
     """The lowest versions that are declared: the constraints of an installation."""
-    return [re.sub(r">=([0-9.]+).*", r"==\1.*", requirement) for requirement in requirements]
+    return [
+        re.sub(r">=([0-9.]+).*", r"==\1.*", requirement) for requirement in requirements
+    ]
 
 
-def installed_works(python: str, package: Path, folder: Path, constraints: list[str]) -> None:
+def installed_works(
+    python: str, package: Path, folder: Path, constraints: list[str]
+) -> None:
     """Install afresh, outside the tree; then version, numbers, a page, and the one line of a missing extra."""
     subprocess.run([python, "-m", "venv", folder], check=True)
     its_python = folder / "bin" / "python"
     (folder / "constraints.txt").write_text("\n".join(constraints))
-    subprocess.run([its_python, "-m", "pip", "install", "-q", package, "-c", folder / "constraints.txt"], check=True)
-    environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    subprocess.run(
+        [
+            its_python,
+            "-m",
+            "pip",
+            "install",
+            "-q",
+            package,
+            "-c",
+            folder / "constraints.txt",
+        ],
+        check=True,
+    )
+    environment = {
+        name: value for name, value in os.environ.items() if name != "PYTHONPATH"
+    }
 
-    def run(*arguments: str, program: str = "fourbar") -> subprocess.CompletedProcess[str]:
+    def run(
+        *arguments: str, program: str = "fourbar"
+    ) -> subprocess.CompletedProcess[str]:
         command = [str(folder / "bin" / program), *arguments]
-        return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
+        return subprocess.run(
+            command,
+            cwd=folder,
+            env=environment,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
 
-    assert run("--version").stdout == f"fourbar, version {PROJECT['project']['version']}\n"
-    assert run("new", "a.toml", "--lengths", "300mm", "10 cm", "0.25m", "22cm").returncode == 0
+    assert (
+        run("--version").stdout == f"fourbar, version {PROJECT['project']['version']}\n"
+    )
+    assert (
+        run("new", "a.toml", "--lengths", "300mm", "10 cm", "0.25m", "22cm").returncode
+        == 0
+    )
     block = run("analyze", "a.toml", "--units", "imperial")
-    assert block.returncode == 0 and "input turns fully" in block.stdout and "lbf in" in block.stdout, block.stderr
+    assert (
+        block.returncode == 0
+        and "input turns fully" in block.stdout
+        and "lbf in" in block.stdout
+    ), block.stderr
     table = run("analyze", "a.toml", "--table")
     assert table.returncode == 0 and table.stdout.count("\n") > 20, table.stderr
     page = run("animate", "a.toml", "-o", "a.html")
-    assert page.returncode == 0 and (folder / "a.html").stat().st_size > 50_000, page.stderr
+    assert page.returncode == 0 and (folder / "a.html").stat().st_size > 50_000, (
+        page.stderr
+    )
     listed = run("--help", program="fourbar-validation")
     assert listed.returncode == 0 and "published" in listed.stdout, listed.stderr
     missing = run("plot", "a.toml", "-o", "a.svg")
@@ -212,7 +296,10 @@ def installed_works(python: str, package: Path, folder: Path, constraints: list[
     assert 'pip install "matplotlib>=' in missing.stderr
 
 
-@pytest.mark.skipif(os.environ.get("PACKAGE") != "all", reason="PACKAGE=all builds and installs wheel and archive")
+@pytest.mark.skipif(
+    os.environ.get("PACKAGE") != "all",
+    reason="PACKAGE=all builds and installs wheel and archive",
+)
 @pytest.mark.timeout(1800)
 def test_wheel_and_archive_install_on_every_python(tmp_path: Path) -> None:
     wheel, archive = built(tmp_path)
@@ -222,7 +309,10 @@ def test_wheel_and_archive_install_on_every_python(tmp_path: Path) -> None:
         "fourbar_validation",
         f"{wheel.name.split('-py3')[0]}.dist-info",
     }
-    assert {"fourbar/show/page/page.js", "fourbar_validation/models/thesis.toml"} <= names
+    assert {
+        "fourbar/show/page/page.js",
+        "fourbar_validation/models/thesis.toml",
+    } <= names
     assert "fourbar_validation/regression/accepted/results.csv" in names
     with tarfile.open(archive) as packed:
         inner = {name.partition("/")[2] for name in packed.getnames()}
@@ -233,8 +323,21 @@ def test_wheel_and_archive_install_on_every_python(tmp_path: Path) -> None:
         "models/thesis.toml",
     } <= inner
     here = f"{sys.version_info.major}.{sys.version_info.minor}"
-    pythons = {version: shutil.which(f"python{version}") for version in PYTHONS} | {here: sys.executable}
+    pythons = {version: shutil.which(f"python{version}") for version in PYTHONS} | {
+        here: sys.executable
+    }
     for version, python in pythons.items():
-        if python and subprocess.run([python, "--version"], capture_output=True, check=False).returncode == 0:
+        if (
+            python
+            and subprocess.run(
+                [python, "--version"], capture_output=True, check=False
+            ).returncode
+            == 0
+        ):
             installed_works(python, wheel, tmp_path / version, [])
-    installed_works(sys.executable, archive, tmp_path / "lowest", lowest(PROJECT["project"]["dependencies"]))
+    installed_works(
+        sys.executable,
+        archive,
+        tmp_path / "lowest",
+        lowest(PROJECT["project"]["dependencies"]),
+    )

@@ -17,7 +17,10 @@ from fourbar_validation.compare.rows import COLUMNS
 
 KEPT = Path(__file__).with_name("public.txt")
 API = Path(__file__).parents[2] / "docs" / "api.py"
-GROUPS = {"fourbar": fourbar.cli.group, "fourbar-validation": fourbar_validation.cli.group}
+GROUPS = {
+    "fourbar": fourbar.cli.group,
+    "fourbar-validation": fourbar_validation.cli.group,
+}
 
 
 def of_commands() -> Iterator[str]:
@@ -27,18 +30,34 @@ def of_commands() -> Iterator[str]:
             command = group.get_command(context, name)
             assert command is not None
             for option in sorted(command.params, key=lambda param: param.opts[0]):
-                chosen = f" {'|'.join(option.type.choices)}" if isinstance(option.type, click.Choice) else ""
+                chosen = (
+                    f" {'|'.join(option.type.choices)}"
+                    if isinstance(option.type, click.Choice)
+                    else ""
+                )
                 yield f"{program} {name}: {' '.join(sorted([*option.opts, *option.secondary_opts]))}{chosen}"
 
 
 def of_python() -> Iterator[str]:
     page = runpy.run_path(str(API))
-    public = {name: getattr(fourbar, name) for name in fourbar.__all__ if name != "__version__"}
+    public = {
+        name: getattr(fourbar, name)
+        for name in fourbar.__all__
+        if name != "__version__"
+    }
     functions = [name for name, thing in public.items() if not inspect.isclass(thing)]
     returned = page["results"](functions, list(public))
-    for name, thing in {**public, **returned, "fourbar_validation.Answer": Answer}.items():
+    for name, thing in {
+        **public,
+        **returned,
+        "fourbar_validation.Answer": Answer,
+    }.items():
         error = inspect.isclass(thing) and issubclass(thing, Exception)
-        yield f"{name}({thing.__base__.__name__})" if error else f"{name}{page['signature'](thing)}"
+        yield (
+            f"{name}({thing.__base__.__name__})"
+            if error
+            else f"{name}{page['signature'](thing)}"
+        )
         for method in page["METHODS"].get(name, ()):
             yield f"{name}.{method}{page['signature'](getattr(thing, method))}"
 
@@ -46,9 +65,13 @@ def of_python() -> Iterator[str]:
 def public() -> str:
     """One line a name: of Python, of commands and their options, exit statuses, quantities, columns of results."""
     lines = [*of_python(), *of_commands()]
-    lines += [f"exit status {name}: {getattr(errors, name)}" for name in ("HOLDS", "FAILED", "BAD_INPUT", "BROKEN")]
     lines += [
-        f"quantity {quantity.name}: {quantity.unit}, {quantity.stage}, {quantity.kind}" for quantity in QUANTITIES
+        f"exit status {name}: {getattr(errors, name)}"
+        for name in ("HOLDS", "FAILED", "BAD_INPUT", "BROKEN")
+    ]
+    lines += [
+        f"quantity {quantity.name}: {quantity.unit}, {quantity.stage}, {quantity.kind}"
+        for quantity in QUANTITIES
     ]
     return "\n".join([*lines, f"columns of results: {', '.join(COLUMNS)}"]) + "\n"
 
@@ -56,9 +79,12 @@ def public() -> str:
 def test_nothing_public_changes_unnoticed() -> None:
     kept, current = KEPT.read_text(encoding="utf-8").splitlines(), public().splitlines()
     gone, new = (
-        "\n".join(line for line in one if line not in other) for one, other in ((kept, current), (current, kept))
+        "\n".join(line for line in one if line not in other)
+        for one, other in ((kept, current), (current, kept))
     )
-    assert kept == current, f"gone:\n{gone}\nnew:\n{new}\npython -m tests.whole.test_public keeps it"
+    assert kept == current, (
+        f"gone:\n{gone}\nnew:\n{new}\npython -m tests.whole.test_public keeps it"
+    )
 
 
 def test_all_is_what_dir_shows() -> None:

@@ -10,14 +10,26 @@ import pytest
 from fourbar import Motion, Scene, Sweep, command, solve, uniform
 from fourbar.effects import PinFriction
 from fourbar.formulas.pin_forces import PinForces
-from fourbar.quantities import FORCES, LINE_QUANTITIES, PIN_FORCES, QUANTITIES, STAGES, UNKNOWNS
+from fourbar.quantities import (
+    FORCES,
+    LINE_QUANTITIES,
+    PIN_FORCES,
+    QUANTITIES,
+    STAGES,
+    UNKNOWNS,
+)
 from fourbar.solution import Solution
 from fourbar_validation.cli import status
 from fourbar_validation.compare.columns import read_columns
 from fourbar_validation.compare.rows import COLUMNS, FORMULAS, IDENTITIES, Row
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.mujoco.shipped import QUANTITY as SHIPPED
-from fourbar_validation.engines.registry import ENGINES, HARD_ENGINES, WORK, load_further
+from fourbar_validation.engines.registry import (
+    ENGINES,
+    HARD_ENGINES,
+    WORK,
+    load_further,
+)
 from fourbar_validation.regression.change import WHOLE
 from fourbar_validation.regression.record import ACCEPTED, find_baseline
 from fourbar_validation.run.answers import check_statements
@@ -32,7 +44,16 @@ from tests.support.scenes import crank_rocker
 
 PAGE = (Path(__file__).parents[2] / "docs" / "results.md").read_text()
 NOT_QUANTITIES = (
-    *("title", "drive", "drive_bar", "status_code", "branch", "ground", "stopped_at", "at"),
+    *(
+        "title",
+        "drive",
+        "drive_bar",
+        "status_code",
+        "branch",
+        "ground",
+        "stopped_at",
+        "at",
+    ),
     *("points", "velocity", "acceleration"),
 )
 OF_A_SCENE = ("assembled", "undecided", "torque_inertia", "drive_force_inertia")
@@ -47,14 +68,23 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
     with pytest.MonkeyPatch.context() as monkeypatch:
         judge_here(monkeypatch)
         options = RunOptions(workers=1, drawn=False)
-        run(Random(8, 1, tuple(DrawnType)), folder / "results", choose_engines("free-body"), options)
+        run(
+            Random(8, 1, tuple(DrawnType)),
+            folder / "results",
+            choose_engines("free-body"),
+            options,
+        )
     return folder
 
 
 def test_every_column_is_described_with_its_type() -> None:
-    described = dict(re.findall(r"^\| `(\w+)` \| (string|double|boolean) \|", PAGE, re.MULTILINE))
+    described = dict(
+        re.findall(r"^\| `(\w+)` \| (string|double|boolean) \|", PAGE, re.MULTILINE)
+    )
     assert tuple(described) == COLUMNS
-    assert {field.name: field.type for field in dataclasses.fields(Row)} == {k: TYPES[t] for k, t in described.items()}
+    assert {field.name: field.type for field in dataclasses.fields(Row)} == {
+        k: TYPES[t] for k, t in described.items()
+    }
 
 
 def test_every_quantity_stands_in_the_row_of_its_stage_with_its_unit() -> None:
@@ -65,8 +95,13 @@ def test_every_quantity_stands_in_the_row_of_its_stage_with_its_unit() -> None:
         for names, unit in re.findall(r"((?:`\w+`(?:, )?)+) ([^`;]+)", groups)
         for name in re.findall(r"`(\w+)`", names)
     }
-    units = {q.name: f"{q.unit}, vector" if q.kind == "vector" else q.unit for q in QUANTITIES}
-    assert described == {(q.stage or "commanded", q.name, units[q.name]) for q in QUANTITIES}
+    units = {
+        q.name: f"{q.unit}, vector" if q.kind == "vector" else q.unit
+        for q in QUANTITIES
+    }
+    assert described == {
+        (q.stage or "commanded", q.name, units[q.name]) for q in QUANTITIES
+    }
 
 
 def test_every_engine_is_described() -> None:
@@ -83,21 +118,43 @@ def test_every_quantity_of_a_scene_is_described(results: Path) -> None:
     described = re.findall(r"^\| `([\w ]+)` \| [^|]+ \| .+ \|$", table, re.MULTILINE)
     linkage = uniform(2.0, 1.0, 2.0, 1.0)  # with change points
     scene, engine = Scene(linkage, Motion(Sweep(0.3, 1.0, 3), 1.0)), FreeBody()
-    stated = {row.quantity for row in check_statements("", scene, engine, engine.answer(scene, command(scene)))}
+    stated = {
+        row.quantity
+        for row in check_statements(
+            "", scene, engine, engine.answer(scene, command(scene))
+        )
+    }
     of_positions = {q.name for q in QUANTITIES}
-    assert set(described) == ({*IDENTITIES, *WHOLE, *FULL, *stated, SHIPPED, *OF_A_SCENE}) - of_positions
-    shipped = {check.make_rows.__name__ for check in CHECKS if check.shipped}  # each judges quantities of its own
-    rows = (row for file in (results / "results", SHIPPED_RUN) for row in read_columns(file / "results.csv"))
+    assert (
+        set(described)
+        == ({*IDENTITIES, *WHOLE, *FULL, *stated, SHIPPED, *OF_A_SCENE}) - of_positions
+    )
+    shipped = {
+        check.make_rows.__name__ for check in CHECKS if check.shipped
+    }  # each judges quantities of its own
+    rows = (
+        row
+        for file in (results / "results", SHIPPED_RUN)
+        for row in read_columns(file / "results.csv")
+    )
     seen = {row.quantity for row in rows if row.engine not in shipped}
     assert stated - {"through"} <= seen <= {*described, *of_positions}
 
 
 def test_the_fields_of_a_solution_are_the_rows_of_the_table() -> None:
     fields = [field.name for field in dataclasses.fields(Solution)]
-    assert [name for name in fields if name not in NOT_QUANTITIES] == [q.name for q in QUANTITIES]
+    assert [name for name in fields if name not in NOT_QUANTITIES] == [
+        q.name for q in QUANTITIES
+    ]
     assert set(NOT_QUANTITIES) <= set(fields)
     assert {q.kind for q in QUANTITIES} == {"scalar", "vector"}
-    assert {q.group for q in QUANTITIES} == {"", "unknown", "dry friction", "pin loads", "linear drive"}
+    assert {q.group for q in QUANTITIES} == {
+        "",
+        "unknown",
+        "dry friction",
+        "pin loads",
+        "linear drive",
+    }
     assert STAGES == ("position", "velocity", "acceleration", "force", "error")
 
 
@@ -106,12 +163,16 @@ def test_a_solution_has_the_shapes_of_the_table_and_no_other_quantity() -> None:
     for q in QUANTITIES:
         values = getattr(solution, q.name)
         assert (values is None) == (q.name == "time" or q.name in LINE_QUANTITIES)
-        assert values is None or values.shape == ((len(solution), 2) if q.kind == "vector" else (len(solution),))
+        assert values is None or values.shape == (
+            (len(solution), 2) if q.kind == "vector" else (len(solution),)
+        )
 
 
 def test_the_formulas_name_the_pin_forces_as_the_table_does() -> None:
     assert PinForces._fields == PIN_FORCES == ("F12", "F32", "F43", "F14")
-    assert tuple(name for name in UNKNOWNS if name not in FORCES) + FORCES[:5] == UNKNOWNS
+    assert (
+        tuple(name for name in UNKNOWNS if name not in FORCES) + FORCES[:5] == UNKNOWNS
+    )
     assert FORCES[5:] == ("drive_force", "power")
 
 
@@ -124,7 +185,9 @@ def test_the_parquet_file_holds_the_rows_of_the_table(results: Path) -> None:
     table = list(read_columns(results / "results" / "results.csv"))
     assert len(kept) == len(table)
     for one, other in zip(kept, table, strict=True):
-        for ours, theirs in zip(dataclasses.astuple(one), dataclasses.astuple(other), strict=True):
+        for ours, theirs in zip(
+            dataclasses.astuple(one), dataclasses.astuple(other), strict=True
+        ):
             assert ours == theirs or (math.isnan(ours) and math.isnan(theirs))
 
 
@@ -140,7 +203,11 @@ def test_the_pandas_snippet_runs(
     assert "free-body" in printed and "0 of " in printed
     names: dict[str, object] = {}
     exec(accepted, names)
-    assert "free-body" in capsys.readouterr().out and not len(names["failing"]) and len(names["times"])  # type: ignore[arg-type]
+    assert (
+        "free-body" in capsys.readouterr().out
+        and not len(names["failing"])
+        and len(names["times"])
+    )  # type: ignore[arg-type]
 
 
 def test_the_sql_runs(results: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -149,4 +216,7 @@ def test_the_sql_runs(results: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert status(["accept", "results"]) == 0
     rows, accepted = re.findall("```sql\n(.*?)```", PAGE, re.DOTALL)
     assert ("free-body", "torque") in {row[:2] for row in duckdb.sql(rows).fetchall()}
-    assert len(duckdb.sql(accepted.replace("mujoco-simulated", "free-body")).fetchall()) == 1
+    assert (
+        len(duckdb.sql(accepted.replace("mujoco-simulated", "free-body")).fetchall())
+        == 1
+    )

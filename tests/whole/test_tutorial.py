@@ -20,9 +20,14 @@ SESSION = re.compile(r"^\$ (.*)\n((?:(?!\$ ).*\n)*)", re.MULTILINE)
 
 @pytest.mark.parametrize("page", ["tutorial", "thesis"])
 def test_a_page_does_and_prints_what_it_says(
-    page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    page: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
-    pytest.importorskip("pandas", reason="the tutorial makes a table of pandas: pip install pandas")
+    pytest.importorskip(
+        "pandas", reason="the tutorial makes a table of pandas: pip install pandas"
+    )
     monkeypatch.chdir(tmp_path)
     (tmp_path / "models").symlink_to(ROOT / "models")
     names: dict[str, object] = {}
@@ -43,9 +48,16 @@ def test_a_page_does_and_prints_what_it_says(
                 program, *arguments = shlex.split(command)
                 assert program == "fourbar"
                 assert status(arguments) == 0, command
-                shown_lines = ".*".join(re.escape(lines) for lines in re.split(r"(?m)^\.\.\.\n", shown))
-                assert re.fullmatch(shown_lines, capsys.readouterr().out, re.DOTALL), command
+                shown_lines = ".*".join(
+                    re.escape(lines) for lines in re.split(r"(?m)^\.\.\.\n", shown)
+                )
+                assert re.fullmatch(shown_lines, capsys.readouterr().out, re.DOTALL), (
+                    command
+                )
                 for file in re.findall(r"-o (\S+)", command):
                     assert (tmp_path / file).stat().st_size > 100, command
     languages = [language for language, _ in blocks]
-    assert languages.count("console") >= 2 and languages.count("python") == languages.count("text") >= 1
+    assert (
+        languages.count("console") >= 2
+        and languages.count("python") == languages.count("text") >= 1
+    )

@@ -24,7 +24,11 @@ from fourbar_validation.engines.guests import NOT_FOUND, adjust_engines, hash_fi
 from fourbar_validation.engines.registry import BALLS, ENGINES, load_further
 from fourbar_validation.report.machine import DISTRIBUTIONS
 
-ALL_BUT_CYLINDER = (*(getattr(effects, name).key for name in effects.FILE_OF), "loads", "drive")
+ALL_BUT_CYLINDER = (
+    *(getattr(effects, name).key for name in effects.FILE_OF),
+    "loads",
+    "drive",
+)
 OURS = frozenset(sys.modules)
 """Modules that were imported before those of the engine."""
 Factory = Callable[..., Any]
@@ -68,8 +72,14 @@ def open_engine(entry: str) -> tuple[Factory, dict[str, Any]]:
 def _apply_setting(engine: Any, setting: dict[str, Any], names: Sequence[str]) -> Any:
     """Return the engine with a setting; one that knows none has no timestep, and no error but round-off."""
     if "name" in setting and setting["name"] not in names:
-        raise LimitError(f"it has no setting {setting['name']!r}; it has: {', '.join(names) or 'none'}")
-    return engine.at_setting(**setting) if setting and hasattr(engine, "at_setting") else engine
+        raise LimitError(
+            f"it has no setting {setting['name']!r}; it has: {', '.join(names) or 'none'}"
+        )
+    return (
+        engine.at_setting(**setting)
+        if setting and hasattr(engine, "at_setting")
+        else engine
+    )
 
 
 def _open_class(entry: str) -> tuple[Factory, dict[str, Any]]:
@@ -86,7 +96,10 @@ def _open_class(entry: str) -> tuple[Factory, dict[str, Any]]:
         "engine": getattr(served, "name", None),
         "answers": getattr(served, "quantities", UNKNOWNS),
         "commands": getattr(served, "commands", ("theta_2",)),
-        "effects": [*getattr(served, "effects", ALL_BUT_CYLINDER), *(["release"] * hasattr(served, "release"))],
+        "effects": [
+            *getattr(served, "effects", ALL_BUT_CYLINDER),
+            *(["release"] * hasattr(served, "release")),
+        ],
         "tolerance": getattr(served, "tolerance", "equivalence"),
         "version": str(getattr(served, "version", "")),
         "code": hash_code(module),
@@ -96,41 +109,64 @@ def _open_class(entry: str) -> tuple[Factory, dict[str, Any]]:
     }
 
     def make(step: float | None = None, **setting: Any) -> Any:
-        return _apply_setting(served() if step is None else served(step), setting, hello["settings"])
+        return _apply_setting(
+            served() if step is None else served(step), setting, hello["settings"]
+        )
 
     return make, hello
 
 
 def hash_code(module: str) -> str:
     """Hash of the modules imported with a class, of the others in its folder, and of what is installed."""
-    files = {getattr(loaded, "__file__", None) for name, loaded in list(sys.modules.items()) if name not in OURS}
+    files = {
+        getattr(loaded, "__file__", None)
+        for name, loaded in list(sys.modules.items())
+        if name not in OURS
+    }
     if file := sys.modules[module].__file__:
         files |= {str(path) for path in Path(file).parent.glob("*.py")}
-    present = sorted(file for file in files if file and os.path.isfile(file))  # modules made by code may name none
-    return hash_files(present, repr(sorted(f"{package.name} {package.version}" for package in distributions())))
+    present = sorted(
+        file for file in files if file and os.path.isfile(file)
+    )  # modules made by code may name none
+    return hash_files(
+        present,
+        repr(
+            sorted(f"{package.name} {package.version}" for package in distributions())
+        ),
+    )
 
 
 def answer(make: Factory, question: dict[str, Any]) -> dict[str, Any]:
     """Answer one question."""
     scene = protocol.scene_from_json(question["scene"])
     if question["ask"] == "release":
-        scene = protocol.release_from_json(scene, question["command"], question["times"])
+        scene = protocol.release_from_json(
+            scene, question["command"], question["times"]
+        )
         step = {"step": float(question["step"])} if "step" in question else {}
-        return protocol.released_to_json(make(**step).release(scene, np.array(question["times"])))
+        return protocol.released_to_json(
+            make(**step).release(scene, np.array(question["times"]))
+        )
     scene, command = protocol.command_from_json(scene, question["command"])
     try:
         engine = make(**protocol.read_setting(question.get("setting")))
     except LimitError as limit:
         return {"refusal": str(limit)}
     if question["ask"] == "slopes":
-        return {"slopes": engine.slopes(scene)} if hasattr(engine, "slopes") else {"refusal": "it has no derivatives"}
+        return (
+            {"slopes": engine.slopes(scene)}
+            if hasattr(engine, "slopes")
+            else {"refusal": "it has no derivatives"}
+        )
     if not hasattr(engine, "answer"):
         return {"refusal": "it integrates released motions alone"}
     if refusal := explain_refusal(engine, command):
         return {"refusal": refusal}
     reply = engine.answer(scene, command)
     if not isinstance(reply, Answer):
-        raise TypeError(f"the answer is a {type(reply).__name__}, not a fourbar_validation.Answer")
+        raise TypeError(
+            f"the answer is a {type(reply).__name__}, not a fourbar_validation.Answer"
+        )
     return protocol.answer_to_json(scene, command, reply)
 
 

@@ -22,7 +22,9 @@ PROGRAM = "fourbar-validation" if CHECKOUT is None else "python -m validation"
 def find_checkout(what: str) -> Path:
     """Return the checkout; FourBarError, which says what needs one, where there is none."""
     if CHECKOUT is None:
-        raise FourBarError(f"{what} needs a checkout of the repository; this is the installed package")
+        raise FourBarError(
+            f"{what} needs a checkout of the repository; this is the installed package"
+        )
     return CHECKOUT
 
 
@@ -31,9 +33,15 @@ def import_path() -> Iterator[str]:
     """Return PYTHONPATH for another interpreter: it finds this code there, and no library of this environment."""
     rest = filter(None, [os.environ.get("PYTHONPATH")])
     if CHECKOUT is not None:
-        yield os.pathsep.join([str(CHECKOUT), str(PACKAGE.parent), str(CHECKOUT / "lab"), *rest])
+        yield os.pathsep.join(
+            [str(CHECKOUT), str(PACKAGE.parent), str(CHECKOUT / "lab"), *rest]
+        )
         return
     with TemporaryDirectory(prefix="fourbar-") as folder:
         for package in (FORMULAS, PACKAGE):
-            copytree(package, Path(folder) / package.name, ignore=ignore_patterns("__pycache__"))
+            copytree(
+                package,
+                Path(folder) / package.name,
+                ignore=ignore_patterns("__pycache__"),
+            )
         yield os.pathsep.join([folder, *rest])

@@ -47,7 +47,9 @@ OUTLIER = 3.0
 CLIPPED = 1.6
 """A clipped axis ends at this multiple of the ordinary size."""
 Indices = NDArray[np.intp]
-WORKS: tuple[tuple[str, Any], ...] = tuple((FORCE_COLOURS[name], FORCE_DASHES[name]) for name in PIN_FORCES)
+WORKS: tuple[tuple[str, Any], ...] = tuple(
+    (FORCE_COLOURS[name], FORCE_DASHES[name]) for name in PIN_FORCES
+)
 BINDING = re.compile(r" (?==)|(?<==) |(?<=[\d]) (?=[A-Za-zµ])|(?<=N) (?=m\b)")
 POLE_REASON = {2: "bars 3 and 4 collinear", 3: "ω₃ = 0", 4: "ω₄ = 0"}
 
@@ -66,11 +68,15 @@ def draw_axes(axes: "Axes", view: View) -> Array:
     axes.set_xlim(low, high)
     if axis.unit == "°":
         set_degree_ticks(axes.xaxis, high - low)
-    closed = np.flatnonzero(np.diff(np.concatenate([[False], ~view.sweep.assembled, [False]]).astype(int)))
+    closed = np.flatnonzero(
+        np.diff(np.concatenate([[False], ~view.sweep.assembled, [False]]).astype(int))
+    )
     for first, after in closed.reshape(-1, 2):
         start = low if first == 0 else 0.5 * (over[first - 1] + over[first])
         stop = high if after == len(over) else 0.5 * (over[after - 1] + over[after])
-        axes.axvspan(start, stop, fc="#f1f1f1", ec=FAINT, hatch="////", lw=0.0, zorder=0)
+        axes.axvspan(
+            start, stop, fc="#f1f1f1", ec=FAINT, hatch="////", lw=0.0, zorder=0
+        )
     if closed.size:
         note(view, "Hatched: the linkage does not assemble.")
     if low < here < high:
@@ -95,7 +101,11 @@ def find_poles(view: View) -> Indices:
         with np.errstate(all="ignore"):
             sine = view.scene.drive.leverage(state, case.sines(state.position))[0]
         return np.flatnonzero(sine[:-1] * sine[1:] <= 0.0)
-    pair = {2: (s.theta_4, s.theta_3), 3: (s.theta_4, s.theta_2), 4: (s.theta_3, s.theta_2)}[view.scene.drive_bar]
+    pair = {
+        2: (s.theta_4, s.theta_3),
+        3: (s.theta_4, s.theta_2),
+        4: (s.theta_3, s.theta_2),
+    }[view.scene.drive_bar]
     sine = np.sin(pair[0] - pair[1])
     return np.flatnonzero(sine[:-1] * sine[1:] <= 0.0)
 
@@ -113,10 +123,21 @@ def choose_limit(values: list[Array]) -> float | None:
     if size.size == 0:
         return None
     ordinary = float(np.percentile(size, ORDINARY))
-    return CLIPPED * ordinary if ordinary > 0.0 and size.max() > OUTLIER * ordinary else None
+    return (
+        CLIPPED * ordinary
+        if ordinary > 0.0 and size.max() > OUTLIER * ordinary
+        else None
+    )
 
 
-def clip(axes: "Axes", view: View, curves: dict[str, Array], limit: float | None, what: str, unit: str) -> None:
+def clip(
+    axes: "Axes",
+    view: View,
+    curves: dict[str, Array],
+    limit: float | None,
+    what: str,
+    unit: str,
+) -> None:
     """End the axis short of what diverges, and say so; `unit` is that of SI."""
     if limit is None:
         return
@@ -127,7 +148,11 @@ def clip(axes: "Axes", view: View, curves: dict[str, Array], limit: float | None
     index = int(np.nanargmax(np.where(np.isfinite(worst), np.abs(worst), np.nan)))
     if abs(worst[index]) <= limit:
         return
-    words = view.axis.words(view.sweep.at.places[index], 5) if view.time is None else f"t = {view.time[index]:.4g} s"
+    words = (
+        view.axis.words(view.sweep.at.places[index], 5)
+        if view.time is None
+        else f"t = {view.time[index]:.4g} s"
+    )
     note(
         view,
         f"{what} clipped at {write_number(limit * factor)} {name_of_unit}; the largest evaluated, {name} = "
@@ -138,44 +163,98 @@ def clip(axes: "Axes", view: View, curves: dict[str, Array], limit: float | None
 def draw_angles(axes: "Axes", view: View) -> None:
     """Draw the angles of the bars that are not the axis."""
     over = draw_axes(axes, view)
-    bars = [bar for bar in MOVING_BARS if view.time is not None or f"theta_{bar}" != view.sweep.commanded]
+    bars = [
+        bar
+        for bar in MOVING_BARS
+        if view.time is not None or f"theta_{bar}" != view.sweep.commanded
+    ]
     for bar in bars:
         values = np.degrees(getattr(view.sweep, f"theta_{bar}"))
-        axes.plot(over, values, color=BAR_COLOURS[bar], ls=BAR_DASHES[bar], label=rf"$\theta_{bar}$")
-    shown = np.concatenate([np.degrees(getattr(branch.sweep, f"theta_{bar}")) for branch in view.alike for bar in bars])
-    set_degree_ticks(axes.yaxis, 1.3 * float(np.nanmax(shown) - np.nanmin(shown)) + 1e-9)
+        axes.plot(
+            over,
+            values,
+            color=BAR_COLOURS[bar],
+            ls=BAR_DASHES[bar],
+            label=rf"$\theta_{bar}$",
+        )
+    shown = np.concatenate(
+        [
+            np.degrees(getattr(branch.sweep, f"theta_{bar}"))
+            for branch in view.alike
+            for bar in bars
+        ]
+    )
+    set_degree_ticks(
+        axes.yaxis, 1.3 * float(np.nanmax(shown) - np.nanmin(shown)) + 1e-9
+    )
     if len(bars) > 2:
         axes.set(ylabel=r"$\theta$ (°)", title="Angles of the bars")
     else:
         ylabel = ",\\ ".join(rf"\theta_{bar}" for bar in bars)
-        axes.set(ylabel=f"${ylabel}$ (°)", title=f"Angles of {' and '.join(BAR_NAMES[bar] for bar in bars)}")
+        axes.set(
+            ylabel=f"${ylabel}$ (°)",
+            title=f"Angles of {' and '.join(BAR_NAMES[bar] for bar in bars)}",
+        )
     place_legend(axes)
 
 
-def _draw_rates(axes: "Axes", view: View, letter: str, unit: str, title: str, what: str) -> None:
+def _draw_rates(
+    axes: "Axes", view: View, letter: str, unit: str, title: str, what: str
+) -> None:
     """Draw the rates of the commanded bar (where they are not zero) and of the other two bars."""
     over, driven = draw_axes(axes, view), view.sweep.at.bar
     name = {"omega": "ω", "alpha": "α"}[letter]
-    digits, others = {2: "₂", 3: "₃", 4: "₄"}, [bar for bar in MOVING_BARS if bar != driven]
-    curves = {name + digits[bar]: getattr(view.sweep, f"{letter}_{bar}") for bar in others}
+    digits, others = (
+        {2: "₂", 3: "₃", 4: "₄"},
+        [bar for bar in MOVING_BARS if bar != driven],
+    )
+    curves = {
+        name + digits[bar]: getattr(view.sweep, f"{letter}_{bar}") for bar in others
+    }
     factor, shown_unit = choose_unit(0.0, unit, view.units)
     command = getattr(view.sweep, f"{letter}_{driven}")
     if np.any(command):
-        axes.plot(over, factor * command, color=BAR_COLOURS[driven], lw=1.0, label=rf"$\{letter}_{driven}$")
+        axes.plot(
+            over,
+            factor * command,
+            color=BAR_COLOURS[driven],
+            lw=1.0,
+            label=rf"$\{letter}_{driven}$",
+        )
     for bar, values in zip(others, curves.values(), strict=True):
-        axes.plot(over, factor * values, color=BAR_COLOURS[bar], ls=BAR_DASHES[bar], label=rf"$\{letter}_{bar}$")
+        axes.plot(
+            over,
+            factor * values,
+            color=BAR_COLOURS[bar],
+            ls=BAR_DASHES[bar],
+            label=rf"$\{letter}_{bar}$",
+        )
     axes.axhline(0.0, color=INK, lw=0.6, zorder=1)
     axes.set(ylabel=rf"$\{letter}$ ({shown_unit})", title=title)
-    limit = choose_limit([getattr(branch.sweep, f"{letter}_{bar}") for branch in view.alike for bar in others])
+    limit = choose_limit(
+        [
+            getattr(branch.sweep, f"{letter}_{bar}")
+            for branch in view.alike
+            for bar in others
+        ]
+    )
     clip(axes, view, curves, limit, what, unit)
     place_legend(axes)
 
 
 draw_velocities = partial(
-    _draw_rates, letter="omega", unit="rad/s", title="Angular velocities", what="Angular velocity"
+    _draw_rates,
+    letter="omega",
+    unit="rad/s",
+    title="Angular velocities",
+    what="Angular velocity",
 )
 draw_accelerations = partial(
-    _draw_rates, letter="alpha", unit="rad/s^2", title="Angular accelerations", what="Angular acceleration"
+    _draw_rates,
+    letter="alpha",
+    unit="rad/s^2",
+    title="Angular accelerations",
+    what="Angular acceleration",
 )
 
 
@@ -183,14 +262,35 @@ def _draw_points(axes: "Axes", view: View, letter: str, unit: str, title: str) -
     """Draw the sizes at A, B, the mass centres and the scene's own points."""
     over = draw_axes(axes, view)
     curves = {
-        name: np.hypot(*vector.T) for name, vector in collect_point_vectors(view.scene, view.sweep, letter).items()
+        name: np.hypot(*vector.T)
+        for name, vector in collect_point_vectors(
+            view.scene, view.sweep, letter
+        ).items()
     }
     limit = choose_limit(list(curves.values()))
-    factor, shown_unit = choose_unit(limit or find_greatest(*curves.values()), unit, view.units)
-    looks = {"A": BAR_COLOURS[2], "B": BAR_COLOURS[4], **{f"G{bar}": BAR_COLOURS[bar] for bar in MOVING_BARS}}
-    for (name, values), dashes in zip(curves.items(), cycle(("-", "--", "-.", ":")), strict=False):
-        colour, width = looks.get(name, FORCE_COLOURS["F43"]), 2.0 if name in view.sweep.points else 1.2
-        axes.plot(over, factor * values, color=colour, ls=":" if name[0] == "G" else dashes, label=name, lw=width)
+    factor, shown_unit = choose_unit(
+        limit or find_greatest(*curves.values()), unit, view.units
+    )
+    looks = {
+        "A": BAR_COLOURS[2],
+        "B": BAR_COLOURS[4],
+        **{f"G{bar}": BAR_COLOURS[bar] for bar in MOVING_BARS},
+    }
+    for (name, values), dashes in zip(
+        curves.items(), cycle(("-", "--", "-.", ":")), strict=False
+    ):
+        colour, width = (
+            looks.get(name, FORCE_COLOURS["F43"]),
+            2.0 if name in view.sweep.points else 1.2,
+        )
+        axes.plot(
+            over,
+            factor * values,
+            color=colour,
+            ls=":" if name[0] == "G" else dashes,
+            label=name,
+            lw=width,
+        )
     axes.set_ylim(bottom=0.0)
     axes.set(ylabel=f"$|{letter}|$ ({shown_unit})", title=title)
     clip(axes, view, curves, limit, title, unit)
@@ -198,25 +298,58 @@ def _draw_points(axes: "Axes", view: View, letter: str, unit: str, title: str) -
 
 
 draw_speeds = partial(_draw_points, letter="v", unit="m/s", title="Speeds of points")
-draw_point_accelerations = partial(_draw_points, letter="a", unit="m/s^2", title="Accelerations of points")
+draw_point_accelerations = partial(
+    _draw_points, letter="a", unit="m/s^2", title="Accelerations of points"
+)
 
 
-def _draw_drive(axes: "Axes", view: View, name: str, letter: str, unit: str, what: str) -> None:
+def _draw_drive(
+    axes: "Axes", view: View, name: str, letter: str, unit: str, what: str
+) -> None:
     """Draw a quantity of the drive, with its poles."""
     over, bar, poles = draw_axes(axes, view), view.scene.drive_bar, find_poles(view)
-    values, everywhere = getattr(view.sweep, name), [getattr(branch.sweep, name) for branch in view.alike]
+    values, everywhere = (
+        getattr(view.sweep, name),
+        [getattr(branch.sweep, name) for branch in view.alike],
+    )
     limit = choose_limit(everywhere)
-    factor, shown_unit = choose_unit(limit or find_greatest(*everywhere), unit, view.units)
+    factor, shown_unit = choose_unit(
+        limit or find_greatest(*everywhere), unit, view.units
+    )
     symbol = f"${letter}_{bar}$" if bar else f"${letter}$"
-    axes.plot(break_at_poles(over, poles), factor * break_at_poles(values, poles), color=INK, label=symbol)
+    axes.plot(
+        break_at_poles(over, poles),
+        factor * break_at_poles(values, poles),
+        color=INK,
+        label=symbol,
+    )
     for index in poles:
-        axes.axvline(0.5 * float(over[index] + over[index + 1]), color=MUTED, lw=0.9, ls=(0, (1, 1.5)))
+        axes.axvline(
+            0.5 * float(over[index] + over[index + 1]),
+            color=MUTED,
+            lw=0.9,
+            ls=(0, (1, 1.5)),
+        )
     if poles.size:
-        poles_of = f"torque on bar {bar} ({POLE_REASON[bar]})" if bar else "drive's force (its line has no lever)"
+        poles_of = (
+            f"torque on bar {bar} ({POLE_REASON[bar]})"
+            if bar
+            else "drive's force (its line has no lever)"
+        )
         note(view, f"Dotted: poles of the {poles_of}.")
     axes.axhline(0.0, color=INK, lw=0.6, zorder=1)
-    axes.set(ylabel=f"{symbol} ({shown_unit})", title=f"{what} of the drive{f' on bar {bar}' if bar else ''}")
-    clip(axes, view, {f"{letter}{'₂₃₄'[bar - 2]}" if bar else letter: values}, limit, what, unit)
+    axes.set(
+        ylabel=f"{symbol} ({shown_unit})",
+        title=f"{what} of the drive{f' on bar {bar}' if bar else ''}",
+    )
+    clip(
+        axes,
+        view,
+        {f"{letter}{'₂₃₄'[bar - 2]}" if bar else letter: values},
+        limit,
+        what,
+        unit,
+    )
 
 
 def draw_drive(axes: "Axes", view: View) -> None:
@@ -239,7 +372,11 @@ def draw_stroke(axes: "Axes", view: View) -> None:
 
 def list_force_sizes(view: View, names: Iterable[str] = FORCE_COLOURS) -> list[Array]:
     """List the magnitudes of pin forces, of every branch that shares the scales."""
-    return [np.hypot(*getattr(branch.sweep, name).T) for branch in view.alike for name in names]
+    return [
+        np.hypot(*getattr(branch.sweep, name).T)
+        for branch in view.alike
+        for name in names
+    ]
 
 
 def draw_forces(axes: "Axes", view: View) -> None:
@@ -251,7 +388,11 @@ def draw_forces(axes: "Axes", view: View) -> None:
     factor, unit = choose_unit(limit or find_greatest(*everywhere), "N", view.units)
     poles = find_poles(view)
     for name, values in sizes.items():
-        axes.plot(break_at_poles(over, poles), factor * break_at_poles(values, poles), **choose_force_line(name))
+        axes.plot(
+            break_at_poles(over, poles),
+            factor * break_at_poles(values, poles),
+            **choose_force_line(name),
+        )
     axes.set_ylim(bottom=0.0)
     axes.set(ylabel=f"$|F|$ ({unit})", title="Pin forces")
     clip(axes, view, sizes, limit, "Pin forces", "N")
@@ -262,16 +403,33 @@ def draw_energy(axes: "Axes", view: View) -> None:
     """Draw the kinetic energy of a free motion, and the work that made it."""
     over = draw_axes(axes, view)
     energies = compute_energies(view.scene, view.sweep)
-    shared = [compute_energies(branch.scene, branch.sweep) for branch in view.others] + [energies]
-    most = find_greatest(*(values for energy in shared for values in (energy.kinetic, *energy.work.values())))
+    shared = [
+        compute_energies(branch.scene, branch.sweep) for branch in view.others
+    ] + [energies]
+    most = find_greatest(
+        *(
+            values
+            for energy in shared
+            for values in (energy.kinetic, *energy.work.values())
+        )
+    )
     factor, unit = choose_unit(most, "J", view.units)
-    axes.plot(over, factor * energies.kinetic, color=INK, lw=2.2, label="kinetic energy")
-    for (name, values), (colour, dashes) in zip(energies.work.items(), cycle(WORKS), strict=False):
-        axes.plot(over, factor * values, color=colour, ls=dashes, label=name.replace("_", " "))
+    axes.plot(
+        over, factor * energies.kinetic, color=INK, lw=2.2, label="kinetic energy"
+    )
+    for (name, values), (colour, dashes) in zip(
+        energies.work.items(), cycle(WORKS), strict=False
+    ):
+        axes.plot(
+            over, factor * values, color=colour, ls=dashes, label=name.replace("_", " ")
+        )
     axes.axhline(0.0, color=INK, lw=0.6, zorder=1)
     axes.set(ylabel=f"energy ({unit})", title="Kinetic energy, and the work done")
     place_legend(axes, 3)
-    note(view, "The kinetic energy has grown by the work that loads and effects have done since the release.")
+    note(
+        view,
+        "The kinetic energy has grown by the work that loads and effects have done since the release.",
+    )
 
 
 RECOMMENDED = 40.0
@@ -284,16 +442,34 @@ def draw_transmission(axes: "Axes", view: View) -> None:
     """Draw the acute angle between coupler and output, with limit and dead-centre positions."""
     over = draw_axes(axes, view)
     sweep = view.sweep
-    mu = np.degrees(np.arctan2(np.abs(sweep.sin_mu), np.abs(np.cos(sweep.theta_4 - sweep.theta_3))))
+    mu = np.degrees(
+        np.arctan2(np.abs(sweep.sin_mu), np.abs(np.cos(sweep.theta_4 - sweep.theta_3)))
+    )
     axes.plot(over, mu, color=INK)
     axes.axhline(RECOMMENDED, color=MUTED, lw=0.9, ls=(0, (4, 2)))
     place = find_free_place(mu)
     corner = (over[0] + place * (over[-1] - over[0]), RECOMMENDED)
-    look: dict[str, Any] = {"textcoords": "offset points", "ha": "center", "size": 7.0, "color": MUTED}
+    look: dict[str, Any] = {
+        "textcoords": "offset points",
+        "ha": "center",
+        "size": 7.0,
+        "color": MUTED,
+    }
     axes.annotate(f"{RECOMMENDED:g}° recommended", corner, xytext=(0, 2), **look)
     axes.set(ylim=(0.0, 96.0), yticks=range(0, 91, 15))
     for theta, height, marker, name in _list_marked(view):
-        axes.plot(theta, height, marker, ms=6.0, mew=1.1, ls="none", label=name, clip_on=False, zorder=5, **OPEN)
+        axes.plot(
+            theta,
+            height,
+            marker,
+            ms=6.0,
+            mew=1.1,
+            ls="none",
+            label=name,
+            clip_on=False,
+            zorder=5,
+            **OPEN,
+        )
     axes.set(ylabel=r"transmission angle $\mu$ (°)", title="Transmission angle")
     if view.time is None:
         place_legend(axes, 2)
@@ -304,8 +480,12 @@ def find_free_place(mu: Array) -> float:
     half = REMARK / 2.0
     best, clearance = 1.0 - half, -1.0
     for place in np.linspace(1.0 - half, half, 25):
-        part = mu[int((place - half) * len(mu)) : max(1, math.ceil((place + half) * len(mu)))]
-        away = np.abs(part[np.isfinite(part)] - RECOMMENDED - 3.0)  # the remark stands on the line
+        part = mu[
+            int((place - half) * len(mu)) : max(1, math.ceil((place + half) * len(mu)))
+        ]
+        away = np.abs(
+            part[np.isfinite(part)] - RECOMMENDED - 3.0
+        )  # the remark stands on the line
         if away.size and away.min() > clearance:
             best, clearance = float(place), float(away.min())
     return best
@@ -318,7 +498,9 @@ def _list_marked(view: View) -> list[tuple[list[float], list[float], str, str]]:
     positions, marked = view.sweep.at, list[tuple[list[float], list[float], str, str]]()
     degrees = np.degrees(positions.angle)
     order = np.argsort(degrees)
-    margin = 1.5 * float(np.median(np.abs(np.diff(degrees)))) if len(degrees) > 1 else 0.0
+    margin = (
+        1.5 * float(np.median(np.abs(np.diff(degrees)))) if len(degrees) > 1 else 0.0
+    )
     one, follower = (bar for bar in MOVING_BARS if bar != positions.bar)
     for bar in sorted({2, 4, positions.bar}, key=lambda bar: bar != positions.bar):
         turned, heights = list[float](), list[float]()
@@ -326,11 +508,24 @@ def _list_marked(view: View) -> list[tuple[list[float], list[float], str, str]]:
             theta = {2: limit.theta_2, 3: limit.theta_3, 4: limit.theta_4}
             sign = math.copysign(1.0, math.sin(theta[follower] - theta[one]))
             difference = limit.theta_4 - limit.theta_3
-            for place in _list_inside(degrees, theta[positions.bar], margin if bar == positions.bar else 0.0):
-                if bar == positions.bar or positions.branch[np.argmin(np.abs(degrees - place))] == sign:
+            for place in _list_inside(
+                degrees, theta[positions.bar], margin if bar == positions.bar else 0.0
+            ):
+                if (
+                    bar == positions.bar
+                    or positions.branch[np.argmin(np.abs(degrees - place))] == sign
+                ):
                     turned.append(place)
-                    heights.append(math.degrees(math.atan2(abs(math.sin(difference)), abs(math.cos(difference)))))
-        if positions.stroke is not None:  # over which its bar's angle rises or falls throughout
+                    heights.append(
+                        math.degrees(
+                            math.atan2(
+                                abs(math.sin(difference)), abs(math.cos(difference))
+                            )
+                        )
+                    )
+        if (
+            positions.stroke is not None
+        ):  # over which its bar's angle rises or falls throughout
             turned = np.interp(turned, degrees[order], view.axis.values[order]).tolist()
         pair = ", ".join(str(number) for number in MOVING_BARS if number != bar)
         mark, what = ("s", "limit") if bar == positions.bar else ("D", "dead centre")
@@ -343,7 +538,9 @@ def _list_inside(angles: Array, angle: float, margin: float) -> list[float]:
     low, high = float(angles.min()) - margin, float(angles.max()) + margin
     start = math.degrees(angle)
     first = math.ceil((low - start) / 360.0)
-    return [start + 360.0 * k for k in range(first, math.floor((high - start) / 360.0) + 1)]
+    return [
+        start + 360.0 * k for k in range(first, math.floor((high - start) / 360.0) + 1)
+    ]
 
 
 EVERY = 60.0
@@ -374,13 +571,33 @@ def draw_hodograph(axes: "PolarAxes", view: View, name: str) -> None:
     free = _find_free_direction(direction[finite])
     direction[finite] = np.unwrap(direction[finite])
     size = np.where(size_here <= top, size_here, np.nan) if limit else size_here
-    axes.plot(break_at_poles(direction, poles), factor * break_at_poles(size, poles), **look)
-    axes.plot(direction[dots], factor * size[dots], "o", ms=2.8, color=look["color"], ls="none")
+    axes.plot(
+        break_at_poles(direction, poles), factor * break_at_poles(size, poles), **look
+    )
+    axes.plot(
+        direction[dots],
+        factor * size[dots],
+        "o",
+        ms=2.8,
+        color=look["color"],
+        ls="none",
+    )
     first = int(np.argmax(np.isfinite(size)))
     start = {**OPEN, "mec": look["color"]}
-    axes.plot(direction[[first]], factor * size[[first]], "o", ms=4.6, mew=1.1, zorder=5, **start)
+    axes.plot(
+        direction[[first]],
+        factor * size[[first]],
+        "o",
+        ms=4.6,
+        mew=1.1,
+        zorder=5,
+        **start,
+    )
     if limit and find_greatest(size_here) > limit:
-        note(view, f"Hodographs of {name} clipped at {write_number(factor * top)} {unit}.")
+        note(
+            view,
+            f"Hodographs of {name} clipped at {write_number(factor * top)} {unit}.",
+        )
     axes.set_rlim(0.0, factor * top)
     axes.set_thetagrids(range(0, 360, 45))
     axes.tick_params(pad=0.5)
@@ -390,7 +607,10 @@ def draw_hodograph(axes: "PolarAxes", view: View, name: str) -> None:
     axes.set_rlabel_position(free)
     axes.tick_params(axis="y", labelsize=6.5, labelcolor=MUTED)
     axes.set_title(f"{look['label']} ({unit})", pad=12)
-    note(view, f"Hodographs: open dot at the start, dots every {apart}; angles are directions in the x-y plane.")
+    note(
+        view,
+        f"Hodographs: open dot at the start, dots every {apart}; angles are directions in the x-y plane.",
+    )
 
 
 def _choose_spacing(view: View) -> tuple[float, str]:
@@ -400,12 +620,18 @@ def _choose_spacing(view: View) -> tuple[float, str]:
         return EVERY, f"{EVERY:g}° of {axis.symbol}"
     duration = float(axis.values[-1] - axis.values[0]) or 1.0
     step = 10.0 ** math.floor(math.log10(duration))
-    every = next(share * step for share in (0.1, 0.2, 0.5, 1.0) if duration <= MOST_DOTS * share * step)
+    every = next(
+        share * step
+        for share in (0.1, 0.2, 0.5, 1.0)
+        if duration <= MOST_DOTS * share * step
+    )
     return every, f"{every:g}{axis.unit}"
 
 
 def _find_free_direction(directions: Array) -> float:
     """Find the multiple of 22.5 deg that lies furthest from the curve."""
     candidates = np.radians(np.arange(16) * 22.5)
-    away = np.abs(np.angle(np.exp(1j * (directions - candidates[:, None])))).min(axis=1, initial=math.pi)
+    away = np.abs(np.angle(np.exp(1j * (directions - candidates[:, None])))).min(
+        axis=1, initial=math.pi
+    )
     return float(np.degrees(candidates[int(np.argmax(away))]))

@@ -15,8 +15,21 @@ from fourbar.show.block import explain_static
 from fourbar.show.plot import curves, freebody, linkage, studies
 from fourbar.show.plot.curves import draw_transmission
 from fourbar.show.plot.labels import Labels
-from fourbar.show.plot.style import CAPTION, TITLE, Drawing, apply_style, format_of, shorten_text
-from fourbar.show.plot.view import View, choose_common_position, is_over_time, make_view, set_branch
+from fourbar.show.plot.style import (
+    CAPTION,
+    TITLE,
+    Drawing,
+    apply_style,
+    format_of,
+    shorten_text,
+)
+from fourbar.show.plot.view import (
+    View,
+    choose_common_position,
+    is_over_time,
+    make_view,
+    set_branch,
+)
 from fourbar.show.summary import locate_between
 from fourbar.solution import SI, Conversion, require_units
 
@@ -30,7 +43,9 @@ Painter = Callable[["SubFigure", View, Labels], None]
 
 def _draw_overview(figure: "SubFigure", shown: View, labels: Labels) -> None:
     if not shown.moves:
-        panels = figure.subplot_mosaic([["linkage", "angles"], ["linkage", "mu"]], width_ratios=[1.15, 1.0])
+        panels = figure.subplot_mosaic(
+            [["linkage", "angles"], ["linkage", "mu"]], width_ratios=[1.15, 1.0]
+        )
         linkage.draw_linkage(panels["linkage"], shown, labels)
         curves.draw_angles(panels["angles"], shown)
         draw_transmission(panels["mu"], shown)
@@ -58,14 +73,20 @@ def _draw_overview(figure: "SubFigure", shown: View, labels: Labels) -> None:
 
 def _draw_kinematics(figure: "SubFigure", shown: View, labels: Labels) -> None:
     panels = figure.subplots(3 if shown.moves else 1, 1, squeeze=False)[:, 0]
-    painters: tuple[Any, ...] = (curves.draw_angles, curves.draw_velocities, curves.draw_accelerations)
+    painters: tuple[Any, ...] = (
+        curves.draw_angles,
+        curves.draw_velocities,
+        curves.draw_accelerations,
+    )
     for axes, paint in zip(panels, painters, strict=False):
         paint(axes, shown)
 
 
 def _draw_points(figure: "SubFigure", shown: View, labels: Labels) -> None:
     """Draw paths, speeds and accelerations of points."""
-    panels = figure.subplot_mosaic([["linkage", "speeds"], ["linkage", "accelerations"]], width_ratios=[1.15, 1.0])
+    panels = figure.subplot_mosaic(
+        [["linkage", "speeds"], ["linkage", "accelerations"]], width_ratios=[1.15, 1.0]
+    )
     linkage.draw_linkage(panels["linkage"], shown, labels, moving=True)
     curves.draw_speeds(panels["speeds"], shown)
     curves.draw_point_accelerations(panels["accelerations"], shown)
@@ -83,8 +104,16 @@ def _draw_hodographs(figure: "SubFigure", shown: View, labels: Labels) -> None:
 
 FIGURES: dict[str, tuple[Painter, tuple[float, float], bool]] = {
     "overview": (_draw_overview, (11.7, 8.3), False),
-    "linkage": (lambda figure, *of: linkage.draw_linkage(figure.subplots(), *of), (5.6, 5.2), False),
-    "coupler": (lambda figure, *of: linkage.draw_coupler_curves(figure.subplots(), *of), (5.6, 5.4), False),
+    "linkage": (
+        lambda figure, *of: linkage.draw_linkage(figure.subplots(), *of),
+        (5.6, 5.2),
+        False,
+    ),
+    "coupler": (
+        lambda figure, *of: linkage.draw_coupler_curves(figure.subplots(), *of),
+        (5.6, 5.4),
+        False,
+    ),
     "kinematics": (_draw_kinematics, (5.6, 6.8), False),
     "points": (_draw_points, (11.0, 5.6), True),
     "torque": (_draw_single(curves.draw_drive), (5.6, 3.2), True),
@@ -99,28 +128,45 @@ FIGURES: dict[str, tuple[Painter, tuple[float, float], bool]] = {
 }
 """Each figure: its painter, the size of one branch in inches, and whether it needs omega_2."""
 TAKERS = {
-    "position": tuple(name for name in FIGURES if name not in ("hodograph", "bars", "sensitivity")),
+    "position": tuple(
+        name for name in FIGURES if name not in ("hodograph", "bars", "sensitivity")
+    ),
     "dimensions": ("overview", "linkage", "points"),
 }
 """Figures in which one position is marked, and in which bars are numbered."""
 
 
-def _choose_painter(scene: Scene, figure: str, branches: str) -> tuple[Painter, tuple[float, float]]:
+def _choose_painter(
+    scene: Scene, figure: str, branches: str
+) -> tuple[Painter, tuple[float, float]]:
     """Choose the painter and the size of a figure, where the scene has what it shows."""
-    for key, value, allowed in (("figure", figure, tuple(FIGURES)), ("branches", branches, BRANCHES)):
+    for key, value, allowed in (
+        ("figure", figure, tuple(FIGURES)),
+        ("branches", branches, BRANCHES),
+    ):
         if not isinstance(value, str) or value not in allowed:
             raise InputError(key, value, "must be one of " + ", ".join(allowed))
     painter, size, dynamic = FIGURES[figure]
     if dynamic and scene.motion.speed is None and not is_over_time(scene):
         raise InputError(
-            f"motion.{scene.motion.names[1]}", None, f"is needed for the figure {figure!r}; {explain_static(scene)}"
+            f"motion.{scene.motion.names[1]}",
+            None,
+            f"is needed for the figure {figure!r}; {explain_static(scene)}",
         )
     if figure == "stroke" and (scene.drive is None or scene.motion.stroke is not None):
-        raise InputError("figure", figure, "needs a linear drive (drive.from, drive.to) whose stroke is not commanded")
+        raise InputError(
+            "figure",
+            figure,
+            "needs a linear drive (drive.from, drive.to) whose stroke is not commanded",
+        )
     if figure == "energy" and scene.motion.free is None:
         raise InputError("figure", figure, "needs a free motion: motion.free")
     if figure == "torque" and scene.motion.free is not None:
-        raise InputError("figure", figure, "a free motion has no driving torque; energy shows what moves it")
+        raise InputError(
+            "figure",
+            figure,
+            "a free motion has no driving torque; energy shows what moves it",
+        )
     return painter, size
 
 
@@ -138,10 +184,18 @@ def draw_figure(
     require_units(units)
     for key, value in (("position", position), ("dimensions", dimensions or None)):
         if value is not None and figure not in TAKERS[key]:
-            raise InputError(key, value, f"must be left out of {figure}; it shows in {', '.join(TAKERS[key])}")
+            raise InputError(
+                key,
+                value,
+                f"must be left out of {figure}; it shows in {', '.join(TAKERS[key])}",
+            )
     position = None if position is None else require("position", position)
     with apply_style():
-        scenes = [set_branch(scene, sign) for sign in (1, -1)] if branches == "both" else [scene]
+        scenes = (
+            [set_branch(scene, sign) for sign in (1, -1)]
+            if branches == "both"
+            else [scene]
+        )
         if position is None and len(scenes) > 1:
             position = choose_common_position(scenes)
         views = [make_view(branch, position) for branch in scenes]
@@ -158,19 +212,28 @@ def _look_between(shown: View) -> None:
     shown.sweep = between.solution
     if between.reversals:
         axis = shown.axis
-        places = ", ".join(f"{axis.factor * place:.4g}{axis.unit} ({pin})" for place, pin in between.reversals)
+        places = ", ".join(
+            f"{axis.factor * place:.4g}{axis.unit} ({pin})"
+            for place, pin in between.reversals
+        )
         shown.notes.append(
-            f"Dry friction reverses, and the pin forces jump, at {axis.symbol} = {places}.".replace("-", "−")
+            f"Dry friction reverses, and the pin forces jump, at {axis.symbol} = {places}.".replace(
+                "-", "−"
+            )
         )
 
 
-def draw(scene: Scene, path: str | Path, figure: str = "overview", **options: Any) -> None:
+def draw(
+    scene: Scene, path: str | Path, figure: str = "overview", **options: Any
+) -> None:
     """Draw a figure of a scene, as `draw_figure` does, into a file; the same scene gives the same bytes."""
     format_of(path)
     draw_figure(scene, figure, **options).save(path)
 
 
-def _compose(painter: Painter, size: tuple[float, float], views: list[View]) -> "Figure":
+def _compose(
+    painter: Painter, size: tuple[float, float], views: list[View]
+) -> "Figure":
     """Compose the figure itself, laid out and labelled."""
     from matplotlib.figure import Figure
 
@@ -182,7 +245,10 @@ def _compose(painter: Painter, size: tuple[float, float], views: list[View]) -> 
     for part, shown in zip(parts, views, strict=True):
         painter(part, shown, labels)
         heading = shorten_text(shown.scene.title, 90) or "Four-bar linkage"
-        part.suptitle(f"{heading} ({shown.branch_name} branch)" if len(views) > 1 else heading, **TITLE)
+        part.suptitle(
+            f"{heading} ({shown.branch_name} branch)" if len(views) > 1 else heading,
+            **TITLE,
+        )
         if caption := textwrap.fill(" ".join(shown.notes), int(size[0] * 18.5)):
             part.supxlabel(caption, linespacing=1.35, **CAPTION)
     _share_limits([part.axes for part in parts])
@@ -195,7 +261,9 @@ def _share_limits(columns: "list[list[Axes]]") -> None:
     for panels in zip(*columns, strict=True):
         if len(panels) == 1 or panels[0].name == "polar" or not panels[0].axison:
             continue
-        if panels[0].get_aspect() == 1.0:  # to scale: the data, not the limits, say what has to fit
+        if (
+            panels[0].get_aspect() == 1.0
+        ):  # to scale: the data, not the limits, say what has to fit
             corners = np.concatenate([axes.dataLim.get_points() for axes in panels])
             for axes in panels:
                 axes.update_datalim(corners)
@@ -204,4 +272,6 @@ def _share_limits(columns: "list[list[Axes]]") -> None:
         for limits in ("xlim", "ylim"):
             ends = [getattr(axes, f"get_{limits}")() for axes in panels]
             for axes in panels:
-                getattr(axes, f"set_{limits}")(min(low for low, _ in ends), max(high for _, high in ends))
+                getattr(axes, f"set_{limits}")(
+                    min(low for low, _ in ends), max(high for _, high in ends)
+                )

@@ -13,7 +13,12 @@ from fourbar.errors import DependencyError, InputError
 from fourbar.scene import Scene
 from fourbar.show.plot import symbols
 from fourbar.show.plot.labels import Labels
-from fourbar.show.plot.linkage import draw_mechanism, draw_paths, scale_of, write_path_legend
+from fourbar.show.plot.linkage import (
+    draw_mechanism,
+    draw_paths,
+    scale_of,
+    write_path_legend,
+)
 from fourbar.show.plot.style import TITLE, apply_style, shorten_text
 from fourbar.show.plot.view import View, make_view
 from fourbar.show.tables import show_running
@@ -45,18 +50,32 @@ def _find_ffmpeg() -> str:
         return str(get_ffmpeg_exe())
     except (ImportError, RuntimeError):
         wanted = "the program ffmpeg (or pip install imageio-ffmpeg)"
-        raise DependencyError(f"an .mp4 film needs {wanted}; .gif and .html do not") from None
+        raise DependencyError(
+            f"an .mp4 film needs {wanted}; .gif and .html do not"
+        ) from None
 
 
 def write_film(
-    scene: Scene, path: Path, kind: str, seconds: float | None, units: Conversion = SI, *, moving: bool = False
+    scene: Scene,
+    path: Path,
+    kind: str,
+    seconds: float | None,
+    units: Conversion = SI,
+    *,
+    moving: bool = False,
 ) -> None:
     """Film one sweep; where the input does not turn fully, there and back. A motion through time is shown as it is.
 
     Raises DependencyError where matplotlib or, for MP4, ffmpeg with its H.264 encoder is missing.
     """
-    if seconds is not None and not (math.isfinite(seconds) and 0.0 < seconds * FRAMES_PER_SECOND <= MAX_FRAMES):
-        raise InputError("seconds", seconds, f"must be more than 0 and at most {MAX_FRAMES // FRAMES_PER_SECOND}")
+    if seconds is not None and not (
+        math.isfinite(seconds) and 0.0 < seconds * FRAMES_PER_SECOND <= MAX_FRAMES
+    ):
+        raise InputError(
+            "seconds",
+            seconds,
+            f"must be more than 0 and at most {MAX_FRAMES // FRAMES_PER_SECOND}",
+        )
     with apply_style():
         import matplotlib as mpl
         from matplotlib.animation import FFMpegWriter, FuncAnimation, PillowWriter
@@ -75,16 +94,28 @@ def write_film(
         writer: Any = PillowWriter(fps=FRAMES_PER_SECOND)
         if kind == "mp4":
             # yuv420p needs even pixel numbers and is what browsers and slides play
-            writer = FFMpegWriter(fps=FRAMES_PER_SECOND, codec="h264", extra_args=["-pix_fmt", "yuv420p"])
+            writer = FFMpegWriter(
+                fps=FRAMES_PER_SECOND, codec="h264", extra_args=["-pix_fmt", "yuv420p"]
+            )
         with tempfile.TemporaryDirectory() as folder:
             draft = Path(folder) / f"film.{kind}"
             try:
                 with show_running(f"{len(order)} frames are drawn") as progress:
-                    told = None if progress is None else lambda done, count: progress(done / count)
-                    film = FuncAnimation(figure, move, frames=order, cache_frame_data=False)
-                    film.save(str(draft), writer=writer, dpi=DPI, progress_callback=told)
+                    told = (
+                        None
+                        if progress is None
+                        else lambda done, count: progress(done / count)
+                    )
+                    film = FuncAnimation(
+                        figure, move, frames=order, cache_frame_data=False
+                    )
+                    film.save(
+                        str(draft), writer=writer, dpi=DPI, progress_callback=told
+                    )
             except (subprocess.CalledProcessError, BrokenPipeError):
-                raise DependencyError("this ffmpeg cannot encode H.264 (libx264); .gif and .html need none") from None
+                raise DependencyError(
+                    "this ffmpeg cannot encode H.264 (libx264); .gif and .html need none"
+                ) from None
             write_bytes(path, draft.read_bytes())
 
 
@@ -93,7 +124,10 @@ def choose_frames(shown: View, count: int) -> list[int]:
     closes, positions = shown.sweep.assembled, shown.sweep.at
     here = int(np.argmin(np.abs(positions.places - shown.here.at.places[0])))
     gaps = np.flatnonzero(~closes)
-    first, last = max(gaps[gaps < here], default=-1) + 1, min(gaps[gaps > here], default=len(closes)) - 1
+    first, last = (
+        max(gaps[gaps < here], default=-1) + 1,
+        min(gaps[gaps > here], default=len(closes)) - 1,
+    )
     if shown.time is not None:
         return [round(i) for i in np.linspace(first, last, count)]
     if abs(positions.angle[last] - positions.angle[first] - math.tau) < 1e-6:
@@ -112,7 +146,11 @@ def _make_stage(shown: View, moving: bool) -> tuple["Figure", Any]:
     axes = figure.subplots()
     figure.suptitle(shorten_text(shown.scene.title, 70), **TITLE)
     draw_paths(axes, shown, Labels())
-    move_vectors = symbols.draw_vectors(axes, shown, sweep, factor, size) if moving and shown.moves else None
+    move_vectors = (
+        symbols.draw_vectors(axes, shown, sweep, factor, size)
+        if moving and shown.moves
+        else None
+    )
     passing: list[Any] = []
 
     def put(index: int) -> Labels:
@@ -125,7 +163,9 @@ def _make_stage(shown: View, moving: bool) -> tuple["Figure", Any]:
         return labels
 
     closes = np.flatnonzero(sweep.assembled)
-    for index in closes[:: max(1, len(closes) // WINDOW)]:  # the window holds what acts at every position
+    for index in closes[
+        :: max(1, len(closes) // WINDOW)
+    ]:  # the window holds what acts at every position
         for _, line, _ in put(int(index)).lines:
             axes.update_datalim(line)
     axes.autoscale_view()

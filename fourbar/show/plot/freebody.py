@@ -72,14 +72,26 @@ class Couple:
 
 def list_actions(view: View, bar: int) -> tuple[list[Arrow], list[Couple]]:
     """List every force and couple on a bar at the position drawn, d'Alembert's included: together they vanish."""
-    pins, turned = place_of(view.scene.linkage, view.here, 0, 1.0).pins, view.state().direction(bar)
+    pins, turned = (
+        place_of(view.scene.linkage, view.here, 0, 1.0).pins,
+        view.state().direction(bar),
+    )
     arrows: list[Arrow] = []
     couples: list[Couple] = []
     for pin in ENDS[bar]:
         name = PIN_FORCE[pin]
-        onto, shown = (1.0, name) if name[2] == str(bar) else (-1.0, f"F{name[2]}{name[1]}")
+        onto, shown = (
+            (1.0, name) if name[2] == str(bar) else (-1.0, f"F{name[2]}{name[1]}")
+        )
         force = onto * complex(*getattr(view.here, name)[0])
-        arrows.append(Arrow(write_force_name(shown), pins[pin] - pins[FIRST_PIN[bar]], force, FORCE_COLOURS[name]))
+        arrows.append(
+            Arrow(
+                write_force_name(shown),
+                pins[pin] - pins[FIRST_PIN[bar]],
+                force,
+                FORCE_COLOURS[name],
+            )
+        )
     if view.scene.drive_bar == bar and view.scene.motion.free is None:
         couples.append(Couple(f"$T_{bar}$", float(view.here.torque[0])))  # type: ignore[index]
     recorder = _record_actions(view)
@@ -87,11 +99,21 @@ def list_actions(view: View, bar: int) -> tuple[list[Arrow], list[Couple]]:
     couples += recorder.turns[bar]
     described = view.scene.linkage.bar(bar)
     inertia = -described.mass * complex(*getattr(view.here, f"a_G{bar}")[0])
-    arrows.append(Arrow(rf"$-m_{bar}\,a_{{G{bar}}}$", take_one(described.to_centre * turned), inertia, INK, True))
+    arrows.append(
+        Arrow(
+            rf"$-m_{bar}\,a_{{G{bar}}}$",
+            take_one(described.to_centre * turned),
+            inertia,
+            INK,
+            True,
+        )
+    )
     alpha = float(getattr(view.here, f"alpha_{bar}")[0])
     carried = list_bodies(view.scene.linkage, view.scene.effects)[bar - 2]
     couples.append(Couple(rf"$-I_{bar}\,\alpha_{bar}$", -carried.I * alpha))
-    return [a for a in arrows if a.force != 0.0], [c for c in couples if c.moment != 0.0]
+    return [a for a in arrows if a.force != 0.0], [
+        c for c in couples if c.moment != 0.0
+    ]
 
 
 class Recorder(Actions):
@@ -104,10 +126,14 @@ class Recorder(Actions):
         self.arrows: dict[int, list[Arrow]] = {bar: [] for bar in BAR_NAMES}
         self.turns: dict[int, list[Couple]] = {bar: [] for bar in BAR_NAMES}
 
-    def force(self, bar: int, force: Number, point: Number = 0.0j, beyond: Number = None) -> None:
+    def force(
+        self, bar: int, force: Number, point: Number = 0.0j, beyond: Number = None
+    ) -> None:
         """Add a force on a bar, applied at a point of its frame, or `beyond` it in world axes."""
         arm = point * self.state.direction(bar) + (0.0j if beyond is None else beyond)
-        self.arrows[bar].append(Arrow(self.name.replace("#", str(bar)), take_one(arm), take_one(force), INK))
+        self.arrows[bar].append(
+            Arrow(self.name.replace("#", str(bar)), take_one(arm), take_one(force), INK)
+        )
 
     def pull(self, start: Any, end: Any, force: Number) -> None:
         """Add both forces, between neighbours too: a freed bar shows each where it acts."""
@@ -115,7 +141,9 @@ class Recorder(Actions):
 
     def moment(self, bar: int, moment: Number) -> None:
         """Add a pure couple on a bar."""
-        self.turns[bar].append(Couple(self.name.replace("#", str(bar)), take_one(moment).real))
+        self.turns[bar].append(
+            Couple(self.name.replace("#", str(bar)), take_one(moment).real)
+        )
 
     def couple(self, pin: str, couple: Number) -> None:
         """Add a couple on the second of the two bars that meet at a pin, and its opposite on the first."""
@@ -140,9 +168,13 @@ def _record_actions(view: View) -> Recorder:
         recorder.name = f"load {count}"
         load.act(recorder, state)
     for effect in scene.effects:
-        recorder.name = r"$m_#\,g$" if effect.key == "gravity" else effect.key.replace("_", " ")
+        recorder.name = (
+            r"$m_#\,g$" if effect.key == "gravity" else effect.key.replace("_", " ")
+        )
         effect.act(recorder, state)
-        effect.act_known(recorder, {name: getattr(view.here, name) for name in PIN_FORCE.values()})
+        effect.act_known(
+            recorder, {name: getattr(view.here, name) for name in PIN_FORCE.values()}
+        )
     return recorder
 
 
@@ -151,15 +183,26 @@ def draw_free_bodies(figure: "SubFigure", view: View, labels: Labels) -> None:
     if not np.isfinite(view.here.F12).all():  # type: ignore[arg-type]
         reason = f"needs forces, which have no value at {where_in_words(view.here)}: {view.here.status[0]}"
         raise InputError("figure", "freebody", reason)
-    freed = [(v, bar, *list_actions(v, bar)) for v in view.alike for bar in MOVING_BARS]  # those of this view first
-    panels, below = figure.subplots(2, 3, height_ratios=[PANEL, LINE * max(len(couples) for *_, couples in freed)])
-    biggest = max((abs(arrow.force) for *_, arrows, _ in freed for arrow in arrows), default=0.0)
+    freed = [
+        (v, bar, *list_actions(v, bar)) for v in view.alike for bar in MOVING_BARS
+    ]  # those of this view first
+    panels, below = figure.subplots(
+        2, 3, height_ratios=[PANEL, LINE * max(len(couples) for *_, couples in freed)]
+    )
+    biggest = max(
+        (abs(arrow.force) for *_, arrows, _ in freed for arrow in arrows), default=0.0
+    )
     longest = max(view.scene.linkage.bar(bar).length for bar in MOVING_BARS)
     scale = 0.75 * longest / biggest if biggest > 0.0 else 0.0
     # one window size: the bars, too, are to one scale
-    span = WINDOW * max(float(np.ptp(_reach(v, bar, arrows, scale), axis=0).max()) for v, bar, arrows, _ in freed)
+    span = WINDOW * max(
+        float(np.ptp(_reach(v, bar, arrows, scale), axis=0).max())
+        for v, bar, arrows, _ in freed
+    )
     note(view, f"At {view.at}.")
-    for axes, text, (_, bar, arrows, couples) in zip(panels, below, freed, strict=False):
+    for axes, text, (_, bar, arrows, couples) in zip(
+        panels, below, freed, strict=False
+    ):
         _draw_one(axes, view, bar, arrows, scale, biggest, labels, span)
         _write_couples(text, view, couples)
     _scale_bar(panels[0], scale, biggest, view.units)
@@ -181,20 +224,30 @@ def draw_internal_forces(figure: "SubFigure", view: View, labels: Labels) -> Non
         forces = internal_forces(view.scene, worst.solution, bar, x)
         factor, unit = choose_unit(float(x[-1]), "m", view.units)
         place = view.axis.words(float(worst.solution.at.places[worst.row]))
-        for axes, (name, si) in zip(column, {"N": "N", "V": "N", "M": "N m"}.items(), strict=True):
+        for axes, (name, si) in zip(
+            column, {"N": "N", "V": "N", "M": "N m"}.items(), strict=True
+        ):
             curve = getattr(forces, name)[worst.row]
             scale, shown = choose_unit(find_greatest(curve), si, view.units)
             axes.plot(factor * x, scale * curve, color=BAR_COLOURS[bar])
-            axes.fill_between(factor * x, scale * curve, color=BAR_COLOURS[bar], alpha=0.15, lw=0.0)
+            axes.fill_between(
+                factor * x, scale * curve, color=BAR_COLOURS[bar], alpha=0.15, lw=0.0
+            )
             axes.axhline(0.0, color=INK, lw=0.6)
             axes.set_ylabel(f"${name}$ ({shown})")
         column[0].set_title(f"Bar {bar} ({BAR_NAMES[bar]})\n{place}")
         column[2].set_xlabel(f"$x$ from ${pin_name(ENDS[bar][0]).strip('$')}$ ({unit})")
         largest = write_quantity(worst.peak.value, "N m", view.units)
         foot = write_quantity(worst.x, "m", view.units)
-        spread = "weight and inertia as a uniform bar's" if forces.uniform else "weight and inertia at G"
+        spread = (
+            "weight and inertia as a uniform bar's"
+            if forces.uniform
+            else "weight and inertia at G"
+        )
         note(view, f"Bar {bar}: largest |M| = {largest} at x = {foot}, {spread}.")
-    note(view, "x runs along the line between the pins, y to its left; N > 0 is tension.")
+    note(
+        view, "x runs along the line between the pins, y to its left; N > 0 is tension."
+    )
 
 
 def _reach(view: View, bar: int, arrows: list[Arrow], scale: float) -> Points:
@@ -207,13 +260,27 @@ def _reach(view: View, bar: int, arrows: list[Arrow], scale: float) -> Points:
 
 
 def _draw_one(
-    axes: "Axes", view: View, bar: int, arrows: list[Arrow], scale: float, biggest: float, labels: Labels, span: float
+    axes: "Axes",
+    view: View,
+    bar: int,
+    arrows: list[Arrow],
+    scale: float,
+    biggest: float,
+    labels: Labels,
+    span: float,
 ) -> None:
     pins = place_of(view.scene.linkage, view.here, 0, 1.0).pins
     along = pins[ENDS[bar][1]] - pins[ENDS[bar][0]]
     end, middle = split_components(along), split_components(0.5 * along)
     line = ([0.0, end[0]], [0.0, end[1]])
-    axes.plot(*line, color=BAR_COLOURS[bar], lw=5.0, alpha=0.45, solid_capstyle="round", zorder=2)
+    axes.plot(
+        *line,
+        color=BAR_COLOURS[bar],
+        lw=5.0,
+        alpha=0.45,
+        solid_capstyle="round",
+        zorder=2,
+    )
     labels.keep_off(axes, (0.0, 0.0), end, width=5.0)
     for name, (x, y) in zip(ENDS[bar], ((0.0, 0.0), end), strict=True):
         axes.plot([x], [y], "o", ms=5.5, mew=1.1, zorder=6, **OPEN)
@@ -222,15 +289,36 @@ def _draw_one(
     for arrow in arrows:
         size = abs(arrow.force)
         if size < SHOWN * biggest:
-            plain = re.sub(r"[$_{}]", "", arrow.text.replace("\\,", " ")).replace("-", "−")
+            plain = re.sub(r"[$_{}]", "", arrow.text.replace("\\,", " ")).replace(
+                "-", "−"
+            )
             short.append(f"{plain} = {write_quantity(size, 'N', view.units)}")
             continue
         draw_plate(axes, bar, (0.0j, arrow.at, along), labels)
-        foot, tip = split_components(arrow.at), split_components(arrow.at + scale * arrow.force)
-        look = {**HEADED, "color": arrow.colour, "mutation_scale": 9, "ls": "--" if arrow.dashed else "-"}
-        axes.annotate("", xy=tip, xytext=foot, arrowprops=look, zorder=5, annotation_clip=False)
+        foot, tip = (
+            split_components(arrow.at),
+            split_components(arrow.at + scale * arrow.force),
+        )
+        look = {
+            **HEADED,
+            "color": arrow.colour,
+            "mutation_scale": 9,
+            "ls": "--" if arrow.dashed else "-",
+        }
+        axes.annotate(
+            "", xy=tip, xytext=foot, arrowprops=look, zorder=5, annotation_clip=False
+        )
         labels.keep_off(axes, foot, tip)
-        labels.add(Label(axes, f"{arrow.text} = {write_quantity(size, 'N', view.units)}", tip, foot, arrow.colour, 7.5))
+        labels.add(
+            Label(
+                axes,
+                f"{arrow.text} = {write_quantity(size, 'N', view.units)}",
+                tip,
+                foot,
+                arrow.colour,
+                7.5,
+            )
+        )
     if short:
         note(view, f"Too short to draw on bar {bar}: {', '.join(short)}.")
     centre = view.scene.linkage.bar(bar)
@@ -256,8 +344,15 @@ def _write_couples(axes: "Axes", view: View, couples: list[Couple]) -> None:
         size = write_quantity(abs(couple.moment), "N m", view.units)
         lines.append(f"{'↺' if couple.moment > 0.0 else '↻'} {couple.text} = {size}")
     axes.set_axis_off()
-    look: dict[str, Any] = {"va": "top", "size": 7.5, "linespacing": 1.45, "color": INK if lines else MUTED}
-    axes.text(0.0, 1.0, "\n".join(lines) or "no couples", transform=axes.transAxes, **look)
+    look: dict[str, Any] = {
+        "va": "top",
+        "size": 7.5,
+        "linespacing": 1.45,
+        "color": INK if lines else MUTED,
+    }
+    axes.text(
+        0.0, 1.0, "\n".join(lines) or "no couples", transform=axes.transAxes, **look
+    )
 
 
 def _scale_bar(axes: "Axes", scale: float, biggest: float, units: Conversion) -> None:
@@ -266,8 +361,29 @@ def _scale_bar(axes: "Axes", scale: float, biggest: float, units: Conversion) ->
         return
     factor, unit = choose_unit(biggest, "N", units)
     step = 10.0 ** math.floor(math.log10(factor * biggest))
-    round_force = next(m * step for m in (5.0, 2.0, 1.0) if 2.0 * m * step <= factor * biggest or m == 1.0) / factor
+    round_force = (
+        next(
+            m * step
+            for m in (5.0, 2.0, 1.0)
+            if 2.0 * m * step <= factor * biggest or m == 1.0
+        )
+        / factor
+    )
     x, y = axes.get_xlim()[0], axes.get_ylim()[0]
-    axes.plot([x, x + scale * round_force], [y, y], color=INK, lw=2.0, solid_capstyle="butt", clip_on=False)
+    axes.plot(
+        [x, x + scale * round_force],
+        [y, y],
+        color=INK,
+        lw=2.0,
+        solid_capstyle="butt",
+        clip_on=False,
+    )
     text = f"{factor * round_force:g} {unit}"
-    axes.annotate(text, (x, y), xytext=(0, 4), textcoords="offset points", size=7.5, annotation_clip=False)
+    axes.annotate(
+        text,
+        (x, y),
+        xytext=(0, 4),
+        textcoords="offset points",
+        size=7.5,
+        annotation_clip=False,
+    )

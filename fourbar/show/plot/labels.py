@@ -76,17 +76,35 @@ class Labels:
 
         renderer = FigureCanvasAgg(figure).get_renderer()  # type: ignore[no-untyped-call]
         figure.draw_without_rendering()
-        figure.set_layout_engine(None)  # labels must not move what they were measured against
+        figure.set_layout_engine(
+            None
+        )  # labels must not move what they were measured against
         per_point = figure.dpi / 72.0
-        texts = [(axes, text) for axes in figure.findobj(Axes) for text in axes.texts if text.get_text()]
-        taken: list[tuple[Axes, Box]] = [(axes, text.get_window_extent(renderer).extents) for axes, text in texts]
+        texts = [
+            (axes, text)
+            for axes in figure.findobj(Axes)
+            for text in axes.texts
+            if text.get_text()
+        ]
+        taken: list[tuple[Axes, Box]] = [
+            (axes, text.get_window_extent(renderer).extents) for axes, text in texts
+        ]
         samples: dict[int, list[np.ndarray]] = {}
         for axes, points, width in self.lines:
             dots = _sample_line(axes.transData.transform(points), per_point)
-            samples.setdefault(id(axes), []).append(np.column_stack([dots, np.full(len(dots), width)]))
+            samples.setdefault(id(axes), []).append(
+                np.column_stack([dots, np.full(len(dots), width)])
+            )
         for label in self.wanted:
             axes = label.axes
-            text = axes.text(*label.at, label.text, color=label.colour, size=label.size, ha="center", va="center")
+            text = axes.text(
+                *label.at,
+                label.text,
+                color=label.colour,
+                size=label.size,
+                ha="center",
+                va="center",
+            )
             text.set_zorder(9)
             text.set_clip_on(False)
             extent = text.get_window_extent(renderer)
@@ -94,22 +112,49 @@ class Labels:
             x, y = axes.transData.transform(label.at)
             sx, sy = axes.transData.transform(label.shun)
             away = math.atan2(y - sy, x - sx) if (x, y) != (sx, sy) else math.pi / 2
-            dots = np.concatenate(samples[id(axes)]) if id(axes) in samples else np.empty((0, 3))
+            dots = (
+                np.concatenate(samples[id(axes)])
+                if id(axes) in samples
+                else np.empty((0, 3))
+            )
             boxes = [box for owner, box in taken if owner is axes]
             panel = axes.get_window_extent().extents
-            centre = _choose_spot((x, y), away, half, dots, boxes, per_point, label.dots_clear, panel)
-            taken.append((axes, (centre[0] - half[0], centre[1] - half[1], centre[0] + half[0], centre[1] + half[1])))
+            centre = _choose_spot(
+                (x, y), away, half, dots, boxes, per_point, label.dots_clear, panel
+            )
+            taken.append(
+                (
+                    axes,
+                    (
+                        centre[0] - half[0],
+                        centre[1] - half[1],
+                        centre[0] + half[0],
+                        centre[1] + half[1],
+                    ),
+                )
+            )
             to_data = axes.transData.inverted().transform
             text.set_position(tuple(to_data(centre)))
             edge = np.clip((x, y), *np.reshape(taken[-1][1], (2, 2)))
             if math.dist(edge, (x, y)) > (LED + label.dots_clear) * per_point:
-                look: dict[str, Any] = {"scalex": False, "scaley": False}  # what was measured stays
-                axes.plot(*zip(label.at, to_data(edge), strict=True), color=label.colour, lw=0.5, zorder=8.5, **look)
+                look: dict[str, Any] = {
+                    "scalex": False,
+                    "scaley": False,
+                }  # what was measured stays
+                axes.plot(
+                    *zip(label.at, to_data(edge), strict=True),
+                    color=label.colour,
+                    lw=0.5,
+                    zorder=8.5,
+                    **look,
+                )
 
 
 STEP, MARK = 3.0, 4.5
 """Distance of the points along a line, and radius of a mark, typographic points."""
-RING = np.array([(math.cos(k * math.tau / 12), math.sin(k * math.tau / 12)) for k in range(12)])
+RING = np.array(
+    [(math.cos(k * math.tau / 12), math.sin(k * math.tau / 12)) for k in range(12)]
+)
 
 
 def _sample_line(points: np.ndarray, per_point: float) -> np.ndarray:
@@ -142,13 +187,24 @@ def _choose_spot(
             angle = away + (k + 1) // 2 * (1 if k % 2 else -1) * math.tau / DIRECTIONS
             cosine, sine = math.cos(angle), math.sin(angle)
             gap = (reach + mark) * per_point
-            x, y = point[0] + cosine * (gap + half[0]), point[1] + sine * (gap + half[1])
-            hit = (np.abs(dots[:, 0] - x) < half[0] + edge) & (np.abs(dots[:, 1] - y) < half[1] + edge)
+            x, y = (
+                point[0] + cosine * (gap + half[0]),
+                point[1] + sine * (gap + half[1]),
+            )
+            hit = (np.abs(dots[:, 0] - x) < half[0] + edge) & (
+                np.abs(dots[:, 1] - y) < half[1] + edge
+            )
             clashes = sum(abs(x - 0.5 * (b[0] + b[2])) < half[0] + 0.5 * (b[2] - b[0]) and
                           abs(y - 0.5 * (b[1] + b[3])) < half[1] + 0.5 * (b[3] - b[1]) for b in boxes)  # fmt: skip
             outside = x - half[0] < inside[0] or x + half[0] > inside[2]
             outside = outside or y - half[1] < inside[1] or y + half[1] > inside[3]
-            cost = 100.0 * clashes + 30.0 * outside + float(hit @ dots[:, 2]) + 0.04 * reach + 0.05 * k
+            cost = (
+                100.0 * clashes
+                + 30.0 * outside
+                + float(hit @ dots[:, 2])
+                + 0.04 * reach
+                + 0.05 * k
+            )
             if cost < best_cost:
                 best, best_cost = (x, y), cost
     return best

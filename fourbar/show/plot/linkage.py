@@ -11,8 +11,22 @@ import numpy as np
 from fourbar.linkage import ENDS, MOVING_BARS
 from fourbar.show.plot import symbols
 from fourbar.show.plot.labels import Label, Labels
-from fourbar.show.plot.style import BAR_COLOURS, INK, MUTED, OPEN, POINT, find_greatest, write_quantity
-from fourbar.show.plot.symbols import Place, draw_vectors, list_acting, place_of, split_components
+from fourbar.show.plot.style import (
+    BAR_COLOURS,
+    INK,
+    MUTED,
+    OPEN,
+    POINT,
+    find_greatest,
+    write_quantity,
+)
+from fourbar.show.plot.symbols import (
+    Place,
+    draw_vectors,
+    list_acting,
+    place_of,
+    split_components,
+)
 from fourbar.show.plot.view import View
 from fourbar.show.units import choose_unit
 from fourbar.solution import Array, Solution
@@ -33,7 +47,9 @@ def locate_pins(view: View, factor: float = 1.0) -> dict[str, Point]:
     return {name: split_components(pin) for name, pin in place.pins.items()}
 
 
-def draw_mechanism(axes: "Axes", view: View, solution: Solution, index: int, labels: Labels) -> list[Any]:
+def draw_mechanism(
+    axes: "Axes", view: View, solution: Solution, index: int, labels: Labels
+) -> list[Any]:
     """Draw bars, pins, mass centres, own points and what acts at a position of a solution; return what was drawn.
 
     Labels are asked for, each away from what it names; whoever calls places them.
@@ -41,7 +57,9 @@ def draw_mechanism(axes: "Axes", view: View, solution: Solution, index: int, lab
     factor, _, size = scale_of(view)
     place = place_of(view.scene.linkage, solution, index, factor)
     if view.sweep.stroke is not None:
-        place = place._replace(barrel=symbols.BARREL * factor * float(np.nanmin(view.sweep.stroke)))
+        place = place._replace(
+            barrel=symbols.BARREL * factor * float(np.nanmin(view.sweep.stroke))
+        )
     pins = {name: split_components(pin) for name, pin in place.pins.items()}
     centre = sum(place.pins.values()) / 4.0
     middle, drawn = split_components(centre), []
@@ -49,13 +67,32 @@ def draw_mechanism(axes: "Axes", view: View, solution: Solution, index: int, lab
         (x, y), colour = zip(pins[start], pins[stop], strict=True), BAR_COLOURS[number]
         drawn += axes.plot(x, y, color=colour, lw=4.5, solid_capstyle="round", zorder=4)
         labels.keep_off(axes, pins[start], pins[stop], width=4.5)
-        labels.add(Label(axes, write_bar_name(view, number), (0.5 * sum(x), 0.5 * sum(y)), middle, colour, 9.0, 2.0))
+        labels.add(
+            Label(
+                axes,
+                write_bar_name(view, number),
+                (0.5 * sum(x), 0.5 * sum(y)),
+                middle,
+                colour,
+                9.0,
+                2.0,
+            )
+        )
     for name, point in pins.items():
-        drawn += axes.plot(*[[v] for v in point], "o", ms=6.0, mew=1.2, zorder=6, **OPEN)
+        drawn += axes.plot(
+            *[[v] for v in point], "o", ms=6.0, mew=1.2, zorder=6, **OPEN
+        )
         labels.add(Label(axes, pin_name(name), point, middle, INK, 9.0, 2.5))
     for name, path in solution.points.items():
         here = split_components(factor * complex(*path[index]))
-        drawn += axes.plot(*[[v] for v in here], "D", ms=4.5, mew=1.2, zorder=8, **{**OPEN, "mec": POINT})
+        drawn += axes.plot(
+            *[[v] for v in here],
+            "D",
+            ms=4.5,
+            mew=1.2,
+            zorder=8,
+            **{**OPEN, "mec": POINT},
+        )
         labels.keep_off(axes, here, here)
         labels.add(Label(axes, name, here, middle, POINT, 8.5, 2.5))
     for carrier, corner in _list_carried(view, place):
@@ -77,8 +114,21 @@ def draw_mechanism(axes: "Axes", view: View, solution: Solution, index: int, lab
         for line in shown.lines:
             labels.keep_off(axes, *line)
         if shown.label is not None:
-            away = split_components(complex(*shown.label) - shown.away) if shown.away else middle
-            labels.add(Label(axes, shown.text, shown.label, away, symbols.COLOURS[symbol.kind], 8.0))
+            away = (
+                split_components(complex(*shown.label) - shown.away)
+                if shown.away
+                else middle
+            )
+            labels.add(
+                Label(
+                    axes,
+                    shown.text,
+                    shown.label,
+                    away,
+                    symbols.COLOURS[symbol.kind],
+                    8.0,
+                )
+            )
     return drawn
 
 
@@ -96,7 +146,9 @@ def _list_carried(view: View, place: Place) -> Iterator[tuple[int, complex]]:
             yield symbol.end[0], place.point(*symbol.end)
 
 
-def draw_plate(axes: "Axes", bar: int, corners: tuple[complex, complex, complex], labels: Labels) -> list[Any]:
+def draw_plate(
+    axes: "Axes", bar: int, corners: tuple[complex, complex, complex], labels: Labels
+) -> list[Any]:
     """Join a point to its bar, from pin to point to pin, as a plate; nothing where it lies on the bar."""
     from matplotlib.colors import to_rgba
     from matplotlib.patches import Polygon
@@ -105,10 +157,19 @@ def draw_plate(axes: "Axes", bar: int, corners: tuple[complex, complex, complex]
     along = (point - first) / (last - first)
     if abs(along.imag) < ON_BAR and -ON_BAR < along.real < 1.0 + ON_BAR:
         return []
-    shape, colour = [split_components(corner) for corner in corners], BAR_COLOURS.get(bar, MUTED)
+    shape, colour = (
+        [split_components(corner) for corner in corners],
+        BAR_COLOURS.get(bar, MUTED),
+    )
     labels.keep_off(axes, *shape)
     shade = to_rgba(colour, 0.08 if bar > 1 else 0.0)
-    return [axes.add_patch(Polygon(shape, closed=False, fc=shade, ec=colour, lw=0.8, ls=":", zorder=1.5))]
+    return [
+        axes.add_patch(
+            Polygon(
+                shape, closed=False, fc=shade, ec=colour, lw=0.8, ls=":", zorder=1.5
+            )
+        )
+    ]
 
 
 def draw_mass_centre(axes: "Axes", point: Point, ms: float = 7.0) -> "list[Line2D]":
@@ -118,7 +179,9 @@ def draw_mass_centre(axes: "Axes", point: Point, ms: float = 7.0) -> "list[Line2
     x, y = point
     marks = axes.plot([x], [y], "o", ms=ms, mfc="white", mec=INK, mew=0.8, zorder=7)
     for quarter in ((0, 90), (180, 270)):
-        marks += axes.plot([x], [y], marker=Path.wedge(*quarter), ms=ms, mfc=INK, mec="none", zorder=7)
+        marks += axes.plot(
+            [x], [y], marker=Path.wedge(*quarter), ms=ms, mfc=INK, mec="none", zorder=7
+        )
     return marks
 
 
@@ -129,14 +192,25 @@ def draw_support(axes: "Axes", pin: Point, size: float, labels: Labels) -> None:
     (x, y), wide = pin, 1.7 * size
     foot = y - wide
     axes.add_patch(
-        Polygon([pin, (x - size, foot), (x + size, foot)], closed=True, fc="white", ec=INK, lw=1.0, zorder=3)
+        Polygon(
+            [pin, (x - size, foot), (x + size, foot)],
+            closed=True,
+            fc="white",
+            ec=INK,
+            lw=1.0,
+            zorder=3,
+        )
     )
     strip = ((x - wide, foot - 0.8 * size), 2.0 * wide, 0.8 * size)
-    axes.add_patch(Rectangle(*strip, fc="none", ec=INK, lw=0.0, hatch="//////", zorder=2))
+    axes.add_patch(
+        Rectangle(*strip, fc="none", ec=INK, lw=0.0, hatch="//////", zorder=2)
+    )
     axes.plot([x - wide, x + wide], [foot, foot], color=INK, lw=1.0, zorder=3)
     for share in (0.5, 1.0, 1.7, 2.1, 2.5):
         half = size * (share / 1.7 if share <= 1.7 else 1.7)
-        labels.keep_off(axes, (x - half, y - share * size), (x + half, y - share * size))
+        labels.keep_off(
+            axes, (x - half, y - share * size), (x + half, y - share * size)
+        )
 
 
 def write_bar_name(view: View, number: int) -> str:
@@ -148,12 +222,29 @@ def write_bar_name(view: View, number: int) -> str:
 def scale_of(view: View) -> tuple[float, str, float]:
     """Choose the factor to the unit of length, the same for both branches; that unit; the size of a support."""
     most = max(
-        find_greatest(v.sweep.A, v.sweep.B, v.sweep.G3, *np.array(list(locate_pins(v).values()))) for v in view.alike
+        find_greatest(
+            v.sweep.A, v.sweep.B, v.sweep.G3, *np.array(list(locate_pins(v).values()))
+        )
+        for v in view.alike
     )
     factor, unit = choose_unit(most, "m", view.units)
     sweep = view.sweep
-    reached = np.concatenate([sweep.A, sweep.B, sweep.G3, *sweep.points.values(), list(locate_pins(view).values())])
-    return factor, unit, 0.03 * factor * float(np.max(np.nanmax(reached, axis=0) - np.nanmin(reached, axis=0)))
+    reached = np.concatenate(
+        [
+            sweep.A,
+            sweep.B,
+            sweep.G3,
+            *sweep.points.values(),
+            list(locate_pins(view).values()),
+        ]
+    )
+    return (
+        factor,
+        unit,
+        0.03
+        * factor
+        * float(np.max(np.nanmax(reached, axis=0) - np.nanmin(reached, axis=0))),
+    )
 
 
 def pin_name(name: str) -> str:
@@ -162,20 +253,37 @@ def pin_name(name: str) -> str:
 
 
 COUPLER_CURVES: tuple[tuple[str, Any], ...] = (
-    *((colour, "-") for colour in ("#0072B2", "#56A0C8", "#D55E00", "#5FA48B", "#007A5A")),
+    *(
+        (colour, "-")
+        for colour in ("#0072B2", "#56A0C8", "#D55E00", "#5FA48B", "#007A5A")
+    ),
     *(("#8A3B78", dashes) for dashes in ((0, (5, 1.5)), (0, (1.4, 1.4)))),
 )
 """Colours and dashes, one after the other."""
 
 
-def draw_linkage(axes: "Axes", view: View, labels: Labels, *, moving: bool = False) -> None:
+def draw_linkage(
+    axes: "Axes", view: View, labels: Labels, *, moving: bool = False
+) -> None:
     """Draw the linkage at the position drawn, over the paths of its points; with velocities where it is `moving`."""
     factor, unit, size = scale_of(view)
     pins = locate_pins(view, factor)
     draw_paths(axes, view, labels)
     if view.dimensions:
-        middle = tuple(0.5 * (a + b) for a, b in zip(pins["O2"], pins["O4"], strict=True))
-        labels.add(Label(axes, write_bar_name(view, 1), (middle[0], middle[1]), pins["B"], MUTED, 9.0, 2.0))
+        middle = tuple(
+            0.5 * (a + b) for a, b in zip(pins["O2"], pins["O4"], strict=True)
+        )
+        labels.add(
+            Label(
+                axes,
+                write_bar_name(view, 1),
+                (middle[0], middle[1]),
+                pins["B"],
+                MUTED,
+                9.0,
+                2.0,
+            )
+        )
     draw_mechanism(axes, view, view.here, 0, labels)
     if moving:
         draw_vectors(axes, view, view.here, factor, size)
@@ -192,10 +300,15 @@ def draw_paths(axes: "Axes", view: View, labels: Labels) -> None:
     for path, colour, dashes, name in list_paths(view):
         scaled = factor * path
         axes.plot(*scaled.T, color=colour, lw=1.0, ls=dashes, zorder=2, label=name)
-        labels.keep_off(axes, *[(float(x), float(y)) for x, y in scaled[:: max(1, len(scaled) // 120)]])
+        labels.keep_off(
+            axes,
+            *[(float(x), float(y)) for x, y in scaled[:: max(1, len(scaled) // 120)]],
+        )
     pins = locate_pins(view, factor)
     O2, O4 = pins["O2"], pins["O4"]
-    axes.plot(*zip(O2, O4, strict=True), color=MUTED, lw=1.0, ls=(0, (8, 3, 2, 3)), zorder=1)
+    axes.plot(
+        *zip(O2, O4, strict=True), color=MUTED, lw=1.0, ls=(0, (8, 3, 2, 3)), zorder=1
+    )
     labels.keep_off(axes, O2, O4)
     for pin in (O2, O4):
         draw_support(axes, pin, size, labels)
@@ -217,29 +330,56 @@ def list_paths(view: View) -> list[tuple[Array, str, Any, str]]:
     paths: list[tuple[Array, str, Any, str]] = [
         (sweep.A, BAR_COLOURS[2], (0, (1, 2)), "path of $A$"),
         (sweep.B, BAR_COLOURS[4], (0, (1, 2)), "path of $B$"),
-        (middle, BAR_COLOURS[3], (0, (4, 1.5)), "coupler curve of " + ("$G_3$" if massive else "its mid-point")),
+        (
+            middle,
+            BAR_COLOURS[3],
+            (0, (4, 1.5)),
+            "coupler curve of " + ("$G_3$" if massive else "its mid-point"),
+        ),
     ]
     for bar, centre in ((2, sweep.G2), (4, sweep.G4)):
         if view.scene.linkage.bar(bar).mass > 0.0:
-            paths.append((centre, BAR_COLOURS[bar], (0, (6, 2, 1, 2)), f"path of $G_{bar}$"))
-    paths += [(path, POINT, (0, (3, 1, 1, 1)), f"path of {name}") for name, path in sweep.points.items()]
+            paths.append(
+                (centre, BAR_COLOURS[bar], (0, (6, 2, 1, 2)), f"path of $G_{bar}$")
+            )
+    paths += [
+        (path, POINT, (0, (3, 1, 1, 1)), f"path of {name}")
+        for name, path in sweep.points.items()
+    ]
     closes = sweep.assembled[:, None]
-    return [(np.where(closes, path, np.nan), colour, dashes, name) for path, colour, dashes, name in paths]
+    return [
+        (np.where(closes, path, np.nan), colour, dashes, name)
+        for path, colour, dashes, name in paths
+    ]
 
 
 def draw_coupler_curves(axes: "Axes", view: View, labels: Labels) -> None:
     """Draw the paths of the scene's points of the coupler; where it has none, of points along its line and off it."""
     factor, unit, _ = scale_of(view)
-    pins, names = locate_pins(view, factor), [point.name for point in view.scene.points if point.bar == 3]
-    for (name, path), (colour, dashes) in zip(_list_coupler_points(view, names), cycle(COUPLER_CURVES), strict=False):
+    pins, names = (
+        locate_pins(view, factor),
+        [point.name for point in view.scene.points if point.bar == 3],
+    )
+    for (name, path), (colour, dashes) in zip(
+        _list_coupler_points(view, names), cycle(COUPLER_CURVES), strict=False
+    ):
         lw = 1.8 if name in (*names, "0.5") else 1.1
-        axes.plot(*(factor * path).T, color=colour, lw=lw, ls=dashes, label=name, zorder=3)
-    faint: dict[str, Any] = {"color": MUTED, "alpha": 0.55, "solid_capstyle": "round", "zorder": 2}
+        axes.plot(
+            *(factor * path).T, color=colour, lw=lw, ls=dashes, label=name, zorder=3
+        )
+    faint: dict[str, Any] = {
+        "color": MUTED,
+        "alpha": 0.55,
+        "solid_capstyle": "round",
+        "zorder": 2,
+    }
     for ends in ENDS.values():
         axes.plot(*zip(*(pins[end] for end in ends), strict=True), lw=2.5, **faint)
     for name in names:
         x, y = (float(x) for x in factor * view.here.points[name][0])
-        axes.plot(*zip(pins["A"], (x, y), pins["B"], strict=True), lw=0.8, ls=":", **faint)
+        axes.plot(
+            *zip(pins["A"], (x, y), pins["B"], strict=True), lw=0.8, ls=":", **faint
+        )
         axes.plot([x], [y], "D", ms=4.5, mew=1.2, zorder=8, **{**OPEN, "mec": POINT})
         labels.keep_off(axes, pins["A"], (x, y), pins["B"])
         labels.add(Label(axes, name, (x, y), pins["A"], POINT, 8.5, 2.5))
@@ -251,8 +391,18 @@ def draw_coupler_curves(axes: "Axes", view: View, labels: Labels) -> None:
     axes.set_aspect("equal", adjustable="datalim")
     title = f"Coupler curves, {view.branch_name} branch"
     axes.set(xlabel=f"$x$ ({unit})", ylabel=f"$y$ ({unit})", title=title)
-    heading = "point of the coupler" if names else "point along AB (and off it), in lengths of the coupler"
-    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=4, title=heading, title_fontsize=7.5)
+    heading = (
+        "point of the coupler"
+        if names
+        else "point along AB (and off it), in lengths of the coupler"
+    )
+    axes.legend(
+        loc="upper center",
+        bbox_to_anchor=(0.5, -0.14),
+        ncols=4,
+        title=heading,
+        title_fontsize=7.5,
+    )
     view.notes.append(f"The linkage is drawn at {view.at}.")
 
 
@@ -262,8 +412,24 @@ def _list_coupler_points(view: View, names: list[str]) -> Iterator[tuple[str, Ar
     along = sweep.B - sweep.A
     across = np.stack([-along[:, 1], along[:, 0]], axis=1)
     if names:
-        yield from (("$A$", sweep.A), ("$B$", sweep.B), *((name, sweep.points[name]) for name in names))
+        yield from (
+            ("$A$", sweep.A),
+            ("$B$", sweep.B),
+            *((name, sweep.points[name]) for name in names),
+        )
         return
-    for u, v in ((0.0, 0.0), (0.25, 0.0), (0.5, 0.0), (0.75, 0.0), (1.0, 0.0), (0.5, 0.5), (0.5, -0.5)):
-        name = {0.0: "$A$", 1.0: "$B$"}.get(u, f"{u:g}") if v == 0.0 else f"{u:g}, {v:+g}".replace("-", "−")
+    for u, v in (
+        (0.0, 0.0),
+        (0.25, 0.0),
+        (0.5, 0.0),
+        (0.75, 0.0),
+        (1.0, 0.0),
+        (0.5, 0.5),
+        (0.5, -0.5),
+    ):
+        name = (
+            {0.0: "$A$", 1.0: "$B$"}.get(u, f"{u:g}")
+            if v == 0.0
+            else f"{u:g}, {v:+g}".replace("-", "−")
+        )
         yield name, sweep.A + u * along + v * across

@@ -49,7 +49,9 @@ MOST_PANELS = 6
 """Torque, the four pin forces, and a point."""
 
 
-def draw_tolerances(spreads: Tolerances, path: str | Path, units: Conversion = SI) -> None:
+def draw_tolerances(
+    spreads: Tolerances, path: str | Path, units: Conversion = SI
+) -> None:
     """Draw the deviations from the nominal with their bands into a file, whole or not at all.
 
     Raises InputError for another ending than of svg, png, pdf, or a single position; DependencyError without
@@ -57,7 +59,11 @@ def draw_tolerances(spreads: Tolerances, path: str | Path, units: Conversion = S
     """
     format_of(path)
     if len(spreads.theta_2) < 2:
-        raise InputError(f"motion.{spreads.scene.motion.commanded}", "one position", "a picture of bands needs a sweep")
+        raise InputError(
+            f"motion.{spreads.scene.motion.commanded}",
+            "one position",
+            "a picture of bands needs a sweep",
+        )
     with apply_style():
         from matplotlib.figure import Figure
 
@@ -71,13 +77,20 @@ def draw_tolerances(spreads: Tolerances, path: str | Path, units: Conversion = S
             axes.set_axis_off()
         _draw_shares(panels[len(parts)], spreads, parts[0], units)
         title = shorten_text(spreads.scene.title, 80) or "Four-bar linkage"
-        figure.suptitle(f"{title}: what the tolerances do ({spreads.samples} samples)", **TITLE)
+        figure.suptitle(
+            f"{title}: what the tolerances do ({spreads.samples} samples)", **TITLE
+        )
         caption = (
             f"Deviation from the nominal. Filled: {BAND[0]:g} to {BAND[1]:g} % of the samples; thin: least and "
             "greatest sampled; dashed: first-order worst case."
         )
-        lines = [caption, *(line for part in parts if (line := describe_parted(spreads, part)))]
-        figure.supxlabel("\n".join(textwrap.fill(line, 52 * columns) for line in lines), **CAPTION)
+        lines = [
+            caption,
+            *(line for part in parts if (line := describe_parted(spreads, part))),
+        ]
+        figure.supxlabel(
+            "\n".join(textwrap.fill(line, 52 * columns) for line in lines), **CAPTION
+        )
         Drawing(figure).save(path)
 
 
@@ -99,7 +112,9 @@ def _draw_band(axes: "Axes", spreads: Tolerances, part: str, units: Conversion) 
     most = 1.1 * float(np.percentile(sizes, OFF_SCALE)) if sizes.size else 0.0
     factor, unit = choose_unit(most, find_part_unit(part), units)
     colour = FORCE_COLOURS.get(part.strip("|"), INK)
-    axes.fill_between(over, factor * away[0], factor * away[1], color=colour, alpha=0.35, lw=0.0)
+    axes.fill_between(
+        over, factor * away[0], factor * away[1], color=colour, alpha=0.35, lw=0.0
+    )
     for line in away[2:]:
         axes.plot(over, factor * line, color=colour, lw=0.7)
     for sign in (1.0, -1.0):
@@ -110,7 +125,9 @@ def _draw_band(axes: "Axes", spreads: Tolerances, part: str, units: Conversion) 
     axes.set(ylabel=f"deviation ({unit})", title=part)
 
 
-def _draw_shares(axes: "Axes", spreads: Tolerances, part: str, units: Conversion) -> None:
+def _draw_shares(
+    axes: "Axes", spreads: Tolerances, part: str, units: Conversion
+) -> None:
     from matplotlib.transforms import offset_copy
 
     spread, over = spreads.spreads[part], _list_positions(axes, spreads, units)
@@ -123,11 +140,21 @@ def _draw_shares(axes: "Axes", spreads: Tolerances, part: str, units: Conversion
         rows.append(shares[order[MOST_SHARES:]].sum(axis=0))
         names = [*names[:MOST_SHARES], "the others"]
     axes.stackplot(over, rows, colors=SHADES[: len(rows)], labels=names, lw=0.0)
-    axes.set(ylim=(0.0, 100.0), ylabel="share of the variance (%)", title=f"{part}: from which dimension")
+    axes.set(
+        ylim=(0.0, 100.0),
+        ylabel="share of the variance (%)",
+        title=f"{part}: from which dimension",
+    )
     below = offset_copy(
         axes.transAxes, axes.get_figure(root=True), y=-BELOW, units="points"
     )  # of the axis and its name
-    axes.legend(loc="upper left", bbox_to_anchor=(0.0, 0.0), bbox_transform=below, borderaxespad=0.0, fontsize=6.5)
+    axes.legend(
+        loc="upper left",
+        bbox_to_anchor=(0.0, 0.0),
+        bbox_transform=below,
+        borderaxespad=0.0,
+        fontsize=6.5,
+    )
 
 
 def draw_influences(figure: "SubFigure", shown: View, labels: Labels) -> None:
@@ -140,14 +167,33 @@ def draw_influences(figure: "SubFigure", shown: View, labels: Labels) -> None:
         changes = {row.key: abs(row.change) for row in derivatives.influences(name)}
         sizes = np.array([changes.get(key, 0.0) for key in keys])
         factor, unit = choose_unit(sizes.max(initial=0.0), find_unit(name), shown.units)
-        axes.barh(range(len(keys)), factor * sizes, height=0.62, color=FORCE_COLOURS.get(name, INK))
-        axes.set_yticks(range(len(keys)), keys if axes is panels[0] else [""] * len(keys), size=6.8)
-        axes.set(ylim=(-0.6, len(keys) - 0.4), title=shorten_text(name, 12), xlabel=unit)
+        axes.barh(
+            range(len(keys)),
+            factor * sizes,
+            height=0.62,
+            color=FORCE_COLOURS.get(name, INK),
+        )
+        axes.set_yticks(
+            range(len(keys)), keys if axes is panels[0] else [""] * len(keys), size=6.8
+        )
+        axes.set(
+            ylim=(-0.6, len(keys) - 0.4), title=shorten_text(name, 12), xlabel=unit
+        )
         axes.grid(False, axis="y")
         axes.locator_params(axis="x", nbins=3)
-        most, own_unit = choose_unit(find_largest(derivatives, name), find_unit(name), shown.units)
+        most, own_unit = choose_unit(
+            find_largest(derivatives, name), find_unit(name), shown.units
+        )
         text = f"largest\n{most * find_largest(derivatives, name):.3g} {own_unit}"
-        axes.text(0.98, 0.02, text, transform=axes.transAxes, ha="right", va="bottom", size=6.8)
+        axes.text(
+            0.98,
+            0.02,
+            text,
+            transform=axes.transAxes,
+            ha="right",
+            va="bottom",
+            size=6.8,
+        )
     shown.notes.append(
         "Bars: the largest change over the sweep by 1 % of a number, of an angle by 1°; pin forces by their magnitude."
     )

@@ -26,9 +26,15 @@ POINT = "#8A3B78"
 # Okabe and Ito's palette: distinguished by colour-blind readers, and by lightness and dashes in grey
 BAR_COLOURS = {2: "#0072B2", 3: "#D55E00", 4: "#007A5A"}
 BAR_DASHES: dict[int, Any] = {2: "-", 3: (0, (5, 1.6)), 4: (0, (7, 1.6, 1.4, 1.6))}
-FORCE_COLOURS = dict(zip(PIN_FORCES, ("#0072B2", "#D55E00", "#8A3B78", "#007A5A"), strict=True))
+FORCE_COLOURS = dict(
+    zip(PIN_FORCES, ("#0072B2", "#D55E00", "#8A3B78", "#007A5A"), strict=True)
+)
 FORCE_DASHES: dict[str, Any] = dict(
-    zip(PIN_FORCES, ("-", (0, (5, 1.6)), (0, (1.4, 1.4)), (0, (7, 1.6, 1.4, 1.6))), strict=True)
+    zip(
+        PIN_FORCES,
+        ("-", (0, (5, 1.6)), (0, (1.4, 1.4)), (0, (7, 1.6, 1.4, 1.6))),
+        strict=True,
+    )
 )
 FORCE_WIDTHS = dict(zip(PIN_FORCES, (2.6, 2.0, 1.6, 1.1), strict=True))
 """Thick beneath thin: forces that are equal still show all four lines."""
@@ -36,7 +42,11 @@ FORCE_WIDTHS = dict(zip(PIN_FORCES, (2.6, 2.0, 1.6, 1.1), strict=True))
 
 def choose_force_line(name: str) -> dict[str, Any]:
     """Return the style and the label of the curve of a pin force."""
-    look = {"color": FORCE_COLOURS[name], "ls": FORCE_DASHES[name], "lw": FORCE_WIDTHS[name]}
+    look = {
+        "color": FORCE_COLOURS[name],
+        "ls": FORCE_DASHES[name],
+        "lw": FORCE_WIDTHS[name],
+    }
     return {**look, "label": write_force_name(name)}
 
 
@@ -45,12 +55,29 @@ def write_force_name(name: str) -> str:
     return f"$F_{{{name[1:]}}}$"
 
 
-TITLE: dict[str, Any] = {"parse_math": False, "size": 10.5, "weight": "bold", "x": 0.012, "ha": "left"}
-CAPTION: dict[str, Any] = {"parse_math": False, "size": 6.8, "color": MUTED, "x": 0.012, "ha": "left"}
+TITLE: dict[str, Any] = {
+    "parse_math": False,
+    "size": 10.5,
+    "weight": "bold",
+    "x": 0.012,
+    "ha": "left",
+}
+CAPTION: dict[str, Any] = {
+    "parse_math": False,
+    "size": 6.8,
+    "color": MUTED,
+    "x": 0.012,
+    "ha": "left",
+}
 """Styles of the texts of a whole figure, above and below its panels."""
 OPEN: dict[str, Any] = {"mfc": "white", "mec": INK}
 """A mark that is a ring."""
-HEADED: dict[str, Any] = {"arrowstyle": "-|>", "lw": 1.5, "shrinkA": 0.0, "shrinkB": 0.0}
+HEADED: dict[str, Any] = {
+    "arrowstyle": "-|>",
+    "lw": 1.5,
+    "shrinkA": 0.0,
+    "shrinkB": 0.0,
+}
 """An arrow from end to end."""
 STYLE = Path(__file__).with_name("fourbar.mplstyle")
 DPI = 200
@@ -70,7 +97,9 @@ def apply_style() -> Iterator[None]:
     try:
         import matplotlib as mpl
     except ImportError:
-        raise DependencyError(f"drawing needs matplotlib: {say_install('plot')}") from None
+        raise DependencyError(
+            f"drawing needs matplotlib: {say_install('plot')}"
+        ) from None
     with _ONE_AT_A_TIME, mpl.rc_context():
         mpl.rcdefaults()  # a user's matplotlibrc does not change a published figure
         mpl.rcParams.update(mpl.rc_params_from_file(STYLE, use_default_template=False))
@@ -82,7 +111,11 @@ def format_of(path: str | Path, formats: tuple[str, ...] = FORMATS) -> str:
     expect("path", path, str, Path)
     kind = Path(path).suffix.removeprefix(".").lower()
     if kind not in formats:
-        raise InputError("output", str(path), "must end in one of " + ", ".join(f".{end}" for end in formats))
+        raise InputError(
+            "output",
+            str(path),
+            "must end in one of " + ", ".join(f".{end}" for end in formats),
+        )
     return kind
 
 
@@ -111,7 +144,9 @@ class Drawing:
     def _render(self, file_format: str) -> bytes:
         buffer = io.BytesIO()
         with apply_style():
-            self.figure.savefig(buffer, format=file_format, dpi=DPI, metadata=METADATA[file_format])
+            self.figure.savefig(
+                buffer, format=file_format, dpi=DPI, metadata=METADATA[file_format]
+            )
         return buffer.getvalue()
 
 

@@ -27,13 +27,32 @@ if TYPE_CHECKING:
 Point = tuple[float, float]
 LOAD, SPRING, PIN = "#8A3B78", "#6b5b00", "#4d5b70"
 COLOURS = {
-    **{"force": LOAD, "moment": LOAD, "drive": INK, "gravity": MUTED, "spring": SPRING, "torsion": SPRING},
-    **{"cylinder": INK, "flywheel": MUTED, "viscous": PIN, "friction": PIN, "pin_friction": PIN},
+    **{
+        "force": LOAD,
+        "moment": LOAD,
+        "drive": INK,
+        "gravity": MUTED,
+        "spring": SPRING,
+        "torsion": SPRING,
+    },
+    **{
+        "cylinder": INK,
+        "flywheel": MUTED,
+        "viscous": PIN,
+        "friction": PIN,
+        "pin_friction": PIN,
+    },
 }
 LENGTHS = {"force": 7.0, "moment": 2.6, "drive": 3.2, "flywheel": 4.0, "torsion": 2.2}
 """Length of an arrow and radii, in sizes of a support; other rings around pins have RING."""
 RING = {"viscous": 1.5, "friction": 1.8, "pin_friction": 1.8}
-NAMED_AT = {"viscous": -0.4, "friction": 0.4, "pin_friction": 0.9, "flywheel": -1.0, "torsion": 0.0}
+NAMED_AT = {
+    "viscous": -0.4,
+    "friction": 0.4,
+    "pin_friction": 0.9,
+    "flywheel": -1.0,
+    "torsion": 0.0,
+}
 """Angle around its ring at which a name stands, rad, so that several at one pin do not meet."""
 SMALLEST, SHARE = 0.5, 0.12
 """A symbol at a pin is as large as this share of the shortest bar there lets it be, and no smaller than half."""
@@ -86,23 +105,57 @@ def list_acting(scene: Scene) -> list[Symbol]:
     if scene.drive is not None and scene.motion.free is None:
         symbols.append(_join_ends("cylinder", "F", scene.drive))
     elif scene.motion.free is None:
-        symbols.append(Symbol("drive", f"T{scene.drive_bar}", scene.drive_bar, pin=FIRST_PIN[scene.drive_bar]))
+        symbols.append(
+            Symbol(
+                "drive",
+                f"T{scene.drive_bar}",
+                scene.drive_bar,
+                pin=FIRST_PIN[scene.drive_bar],
+            )
+        )
     for number, load in enumerate(scene.loads, 1):
         foot, turns = scene.linkage.bar(load.bar).to_centre, load.frame == "bar"
         if load.force is not None and load.force[0] != 0.0:
             beyond, force = cmath.rect(*load.at), cmath.rect(*load.force)
-            symbols.append(Symbol("force", f"load {number}", load.bar, foot, beyond, force, turns, table=load.table))
+            symbols.append(
+                Symbol(
+                    "force",
+                    f"load {number}",
+                    load.bar,
+                    foot,
+                    beyond,
+                    force,
+                    turns,
+                    table=load.table,
+                )
+            )
         if load.moment != 0.0:
-            symbols.append(Symbol("moment", f"load {number}", load.bar, foot, moment=load.moment, table=load.table))
+            symbols.append(
+                Symbol(
+                    "moment",
+                    f"load {number}",
+                    load.bar,
+                    foot,
+                    moment=load.moment,
+                    table=load.table,
+                )
+            )
     for effect in scene.effects:
         if isinstance(effect, PinRows):
-            symbols += [Symbol(effect.key, effect.key.replace("_", " "), pin=pin) for pin, *_ in effect.rows]
+            symbols += [
+                Symbol(effect.key, effect.key.replace("_", " "), pin=pin)
+                for pin, *_ in effect.rows
+            ]
         elif isinstance(effect, Gravity):
             symbols.append(Symbol("gravity", "g", vector=complex(*effect.vector)))
         elif isinstance(effect, Flywheel):
-            symbols.append(Symbol("flywheel", "flywheel", effect.bar, pin=FIRST_PIN[effect.bar]))
+            symbols.append(
+                Symbol("flywheel", "flywheel", effect.bar, pin=FIRST_PIN[effect.bar])
+            )
         elif isinstance(effect, Springs):
-            symbols += [_join_ends("spring", "spring", spring) for spring in effect.springs]
+            symbols += [
+                _join_ends("spring", "spring", spring) for spring in effect.springs
+            ]
     return symbols
 
 
@@ -142,7 +195,9 @@ class Place(NamedTuple):
 
     def tail(self, symbol: Symbol) -> complex:
         """Place the foot of a load's arrow."""
-        return self.point(symbol.bar, symbol.at) + self.factor * symbol.beyond * self.direction(symbol)
+        return self.point(
+            symbol.bar, symbol.at
+        ) + self.factor * symbol.beyond * self.direction(symbol)
 
     def direction(self, symbol: Symbol) -> complex:
         """Return the axes in which a load's force is stated."""
@@ -168,7 +223,10 @@ def place_of(linkage: FourBar, solution: Solution, index: int, factor: float) ->
     A, B = (factor * complex(*point[index]) for point in (solution.A, solution.B))
     O4 = factor * cmath.rect(linkage.ground, linkage.ground_angle)
     angles = {k: float(getattr(solution, f"theta_{k}")[index]) for k in (2, 3, 4)}
-    u = {1: cmath.rect(1.0, linkage.ground_angle), **{k: cmath.rect(1.0, angle) for k, angle in angles.items()}}
+    u = {
+        1: cmath.rect(1.0, linkage.ground_angle),
+        **{k: cmath.rect(1.0, angle) for k, angle in angles.items()},
+    }
     torque = float("nan") if solution.torque is None else float(solution.torque[index])
     pins = {"O2": 0.0j, "A": A, "B": B, "O4": O4}
     return Place({1: 0.0j, 2: 0.0j, 3: A, 4: O4}, u, pins, factor, angles[2], torque)
@@ -186,7 +244,13 @@ def draw(axes: "Axes", symbol: Symbol, place: Place, size: float) -> DrawnSymbol
         else:
             along = (end - start) / abs(end - start)
             _draw_line(axes, drawn, np.array([start, end]), colour, 1.2)
-            _draw_line(axes, drawn, start + np.array([0.1, 1.0]) * place.barrel * along, colour, 4.5)
+            _draw_line(
+                axes,
+                drawn,
+                start + np.array([0.1, 1.0]) * place.barrel * along,
+                colour,
+                4.5,
+            )
             drawn.text, drawn.away = f"${symbol.name}$", 1j * along
             drawn.label = split_components(start + 0.5 * place.barrel * along)
         x, y = zip(*map(split_components, (start, end)), strict=True)
@@ -197,7 +261,11 @@ def draw(axes: "Axes", symbol: Symbol, place: Place, size: float) -> DrawnSymbol
         centre = place.point(symbol.bar, symbol.at)
         turn = math.copysign(1.0, symbol.moment) * symbol.sign(place.theta_2)
         if symbol.kind == "drive":
-            centre = 0.5 * (place.pins["A"] + place.pins["B"]) if symbol.bar == 3 else place.pins[symbol.pin]
+            centre = (
+                0.5 * (place.pins["A"] + place.pins["B"])
+                if symbol.bar == 3
+                else place.pins[symbol.pin]
+            )
             turn = 1.0 if math.isnan(place.torque) else float(np.sign(place.torque))
             drawn.text = f"$T_{symbol.bar}$"
         size = place.small(symbol.pin or FIRST_PIN[symbol.bar], size)
@@ -208,7 +276,13 @@ def draw(axes: "Axes", symbol: Symbol, place: Place, size: float) -> DrawnSymbol
         spiral = symbol.kind == "torsion"
         turned = np.linspace(0.0, (2.5 if spiral else 1.0) * math.tau, 90)
         radii = np.linspace(0.3 * radius, radius, 90) if spiral else radius
-        _draw_line(axes, drawn, centre + radii * np.exp(1j * turned), colour, 2.2 if symbol.kind == "flywheel" else 1.2)
+        _draw_line(
+            axes,
+            drawn,
+            centre + radii * np.exp(1j * turned),
+            colour,
+            2.2 if symbol.kind == "flywheel" else 1.2,
+        )
         drawn.away = cmath.rect(1.0, NAMED_AT[symbol.kind])
         drawn.label = split_components(centre + radius * drawn.away)
     return drawn
@@ -219,41 +293,72 @@ def split_components(z: complex) -> Point:
     return (z.real, z.imag)
 
 
-def _draw_line(axes: "Axes", drawn: DrawnSymbol, points: Any, colour: str, width: float) -> None:
+def _draw_line(
+    axes: "Axes", drawn: DrawnSymbol, points: Any, colour: str, width: float
+) -> None:
     x, y = np.real(points), np.imag(points)
-    drawn.artists += axes.plot(x, y, color=colour, lw=width, zorder=3.5)  # over supports, under the bars
+    drawn.artists += axes.plot(
+        x, y, color=colour, lw=width, zorder=3.5
+    )  # over supports, under the bars
     drawn.lines.append([(float(a), float(b)) for a, b in zip(x, y, strict=True)])
 
 
-def _draw_arrow(axes: "Axes", tail: complex, tip: complex, colour: str, drawn: DrawnSymbol) -> None:
+def _draw_arrow(
+    axes: "Axes", tail: complex, tip: complex, colour: str, drawn: DrawnSymbol
+) -> None:
     from matplotlib.patches import FancyArrowPatch
 
     arrow = FancyArrowPatch(
-        split_components(tail), split_components(tip), zorder=8, color=colour, mutation_scale=10.0, **HEADED
+        split_components(tail),
+        split_components(tip),
+        zorder=8,
+        color=colour,
+        mutation_scale=10.0,
+        **HEADED,
     )
     drawn.artists.append(axes.add_patch(arrow))
     axes.update_datalim([split_components(tail), split_components(tip)])
     drawn.lines.append([split_components(tail), split_components(tip)])
 
 
-def _draw_force(axes: "Axes", symbol: Symbol, place: Place, size: float, drawn: DrawnSymbol) -> None:
+def _draw_force(
+    axes: "Axes", symbol: Symbol, place: Place, size: float, drawn: DrawnSymbol
+) -> None:
     tail, sign = place.tail(symbol), symbol.sign(place.theta_2)
     if sign == 0.0:
         return
-    tip = tail + sign * LENGTHS["force"] * size * place.direction(symbol) * symbol.vector / abs(symbol.vector)
+    tip = tail + sign * LENGTHS["force"] * size * place.direction(
+        symbol
+    ) * symbol.vector / abs(symbol.vector)
     _draw_arrow(axes, tail, tip, COLOURS["force"], drawn)
     drawn.label, drawn.away = split_components(tip), (tip - tail) / abs(tip - tail)
 
 
-def _turn(axes: "Axes", centre: complex, radius: float, turn: float, colour: str, drawn: DrawnSymbol) -> None:
+def _turn(
+    axes: "Axes",
+    centre: complex,
+    radius: float,
+    turn: float,
+    colour: str,
+    drawn: DrawnSymbol,
+) -> None:
     """Draw an arc with a head, counter-clockwise where turn > 0; none where nothing turns."""
     if turn == 0.0:
         return
     angles = math.radians(-35.0) * turn + turn * np.linspace(0.0, OPENING, 40)
     points = centre + radius * np.exp(1j * angles)
     _draw_line(axes, drawn, points, colour, 1.5)
-    _draw_arrow(axes, complex(points[-2]), complex(points[-1] + 2.0 * (points[-1] - points[-2])), colour, drawn)
-    drawn.label, drawn.away = split_components(complex(points[20])), complex(points[20] - centre) / radius
+    _draw_arrow(
+        axes,
+        complex(points[-2]),
+        complex(points[-1] + 2.0 * (points[-1] - points[-2])),
+        colour,
+        drawn,
+    )
+    drawn.label, drawn.away = (
+        split_components(complex(points[20])),
+        complex(points[20] - centre) / radius,
+    )
 
 
 def _draw_zigzag(start: complex, end: complex, width: float) -> Any:
@@ -261,7 +366,10 @@ def _draw_zigzag(start: complex, end: complex, width: float) -> Any:
     along = end - start
     across = 1j * along / abs(along) * width if along else 0.0
     teeth = [start, start + 0.15 * along]
-    teeth += [start + (0.15 + 0.7 * (k + 0.5) / COILS) * along + (-1) ** k * across for k in range(COILS)]
+    teeth += [
+        start + (0.15 + 0.7 * (k + 0.5) / COILS) * along + (-1) ** k * across
+        for k in range(COILS)
+    ]
     return np.array([*teeth, start + 0.85 * along, end])
 
 
@@ -272,37 +380,77 @@ def _draw_gravity(axes: "Axes", symbol: Symbol, drawn: DrawnSymbol) -> None:
         return
     x, y = (24.0 * part / size for part in (symbol.vector.real, symbol.vector.imag))
     style = {**HEADED, "color": COLOURS["gravity"], "lw": 1.3}
-    corner: dict[str, Any] = {"xycoords": "axes fraction", "textcoords": "offset points", "annotation_clip": False}
+    corner: dict[str, Any] = {
+        "xycoords": "axes fraction",
+        "textcoords": "offset points",
+        "annotation_clip": False,
+    }
     middle = (0.95, 0.9)
     drawn.artists += [
         axes.annotate("", xy=middle, xytext=(-x, -y), arrowprops=style, **corner),
-        axes.annotate("$g$", xy=middle, xytext=(-x - 8.0, -y), color=COLOURS["gravity"], size=9.0, **corner),
+        axes.annotate(
+            "$g$",
+            xy=middle,
+            xytext=(-x - 8.0, -y),
+            color=COLOURS["gravity"],
+            size=9.0,
+            **corner,
+        ),
     ]
 
 
-def draw_vectors(axes: "Axes", view: View, solution: Solution, factor: float, size: float) -> Callable[[int], None]:
+def draw_vectors(
+    axes: "Axes", view: View, solution: Solution, factor: float, size: float
+) -> Callable[[int], None]:
     """Draw the arrows of a solution's first position, each kind to one scale of the sweep.
 
     Returns the function that moves them to another position.
     """
     drawn = []
     for letter, (colour, label) in ARROWS.items():
-        sizes = [np.hypot(*values.T) for values in collect_point_vectors(view.scene, view.sweep, letter).values()]
+        sizes = [
+            np.hypot(*values.T)
+            for values in collect_point_vectors(view.scene, view.sweep, letter).values()
+        ]
         if not (top := choose_limit(sizes) or find_greatest(*sizes)):
             continue
         vectors = collect_point_vectors(view.scene, solution, letter)
-        feet = [solution.points[name] if name in solution.points else getattr(solution, name) for name in vectors]
-        shafts = [LONGEST * size * v / np.maximum(np.hypot(*v.T), top)[:, None] for v in vectors.values()]
-        tips = np.concatenate([factor * foot + shaft for foot, shaft in zip(feet, shafts, strict=True)])
+        feet = [
+            solution.points[name]
+            if name in solution.points
+            else getattr(solution, name)
+            for name in vectors
+        ]
+        shafts = [
+            LONGEST * size * v / np.maximum(np.hypot(*v.T), top)[:, None]
+            for v in vectors.values()
+        ]
+        tips = np.concatenate(
+            [factor * foot + shaft for foot, shaft in zip(feet, shafts, strict=True)]
+        )
         axes.update_datalim(tips[np.isfinite(tips).all(axis=1)])
-        look: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "scale": 1.0, "width": 0.0045, "zorder": 7}
+        look: dict[str, Any] = {
+            "angles": "xy",
+            "scale_units": "xy",
+            "scale": 1.0,
+            "width": 0.0045,
+            "zorder": 7,
+        }
         start = np.zeros((2, len(vectors)))
-        drawn.append((axes.quiver(*start, *start, color=colour, label=label, **look), feet, shafts))
+        drawn.append(
+            (
+                axes.quiver(*start, *start, color=colour, label=label, **look),
+                feet,
+                shafts,
+            )
+        )
 
     def move(index: int) -> None:
         for arrows, feet, shafts in drawn:
             arrows.set_offsets(factor * np.array([foot[index] for foot in feet]))
-            arrows.set_UVC(*np.nan_to_num(np.array([shaft[index] for shaft in shafts])).T)
+            arrows.set_UVC(
+                *np.nan_to_num(np.array([shaft[index] for shaft in shafts])).T
+            )
 
     move(0)
     return move

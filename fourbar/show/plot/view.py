@@ -49,7 +49,9 @@ class View:
     def axis(self) -> "Axis":
         """Quantity on the horizontal axis: time, or the commanded quantity."""
         if self.time is not None:
-            longest = max(float(view.time[-1]) for view in self.alike if view.time is not None)
+            longest = max(
+                float(view.time[-1]) for view in self.alike if view.time is not None
+            )
             factor, unit = (1.0, "s") if longest >= 1.0 else choose_unit(longest, "s")
             return Axis("t", "$t$", f" {unit}", factor, factor * self.time)
         return axis_of(self.scene, self.sweep.at, self.units)
@@ -76,7 +78,13 @@ class View:
     def branch_name(self) -> str:
         """Return "open", "crossed", or "both signs" where the motion follows a smooth path through change points."""
         branch = self.sweep.at.branch
-        return "open" if np.all(branch == 1) else "crossed" if np.all(branch == -1) else "both signs"
+        return (
+            "open"
+            if np.all(branch == 1)
+            else "crossed"
+            if np.all(branch == -1)
+            else "both signs"
+        )
 
     def state(self) -> State:
         """Return the kinematics at the position drawn."""
@@ -97,7 +105,9 @@ class Axis(NamedTuple):
 
     def words(self, place: float, digits: int = 4) -> str:
         """Say a place, which is in SI."""
-        return f"{self.symbol} = {self.factor * place:.{digits}g}{self.unit}".replace("-", "−")
+        return f"{self.symbol} = {self.factor * place:.{digits}g}{self.unit}".replace(
+            "-", "−"
+        )
 
 
 def axis_of(scene: Scene, positions: Command, units: Conversion) -> Axis:
@@ -106,7 +116,11 @@ def axis_of(scene: Scene, positions: Command, units: Conversion) -> Axis:
         factor, unit = choose_unit(max(scene.linkage.lengths), "m", units)
         return Axis("stroke", "stroke", f" {unit}", factor, factor * positions.stroke)
     return Axis(
-        f"θ{'₀₁₂₃₄'[positions.bar]}", rf"$\{positions.commanded}$", "°", math.degrees(1.0), np.degrees(positions.angle)
+        f"θ{'₀₁₂₃₄'[positions.bar]}",
+        rf"$\{positions.commanded}$",
+        "°",
+        math.degrees(1.0),
+        np.degrees(positions.angle),
     )
 
 
@@ -116,9 +130,15 @@ def where_in_words(solution: Solution) -> str:
     return f"{solution.commanded} = {f'{angle:.6g} deg' if stroke is None else f'{stroke[0]:.6g} m'}"
 
 
-def collect_point_vectors(scene: Scene, solution: Solution, letter: str) -> dict[str, Array]:
+def collect_point_vectors(
+    scene: Scene, solution: Solution, letter: str
+) -> dict[str, Array]:
     """Collect velocities ("v") or accelerations ("a") of A, B, mass centres of bars that have mass, and own points."""
-    drawn = ("A", "B", *(f"G{bar}" for bar in MOVING_BARS if scene.linkage.bar(bar).mass > 0.0))
+    drawn = (
+        "A",
+        "B",
+        *(f"G{bar}" for bar in MOVING_BARS if scene.linkage.bar(bar).mass > 0.0),
+    )
     vectors = {name: getattr(solution, f"{letter}_{name}") for name in drawn}
     vectors |= solution.velocity if letter == "v" else solution.acceleration
     return {name: values for name, values in vectors.items() if values is not None}
@@ -137,15 +157,25 @@ def list_sweep(scene: Scene) -> Command:
     wide = command_at(scene, default_places(scene, float(stated.angle[0])))
     # the same position may lie whole turns away from the default range
     turns = (
-        np.round((0.5 * (wide.angle[0] + wide.angle[-1]) - stated.angle) / math.tau) if stated.stroke is None else 0.0
+        np.round((0.5 * (wide.angle[0] + wide.angle[-1]) - stated.angle) / math.tau)
+        if stated.stroke is None
+        else 0.0
     )
-    places, first = np.unique(np.concatenate([wide.places, stated.places + turns * math.tau]), return_index=True)
-    return command_at(scene, places, np.concatenate([wide.branch, stated.branch])[first])
+    places, first = np.unique(
+        np.concatenate([wide.places, stated.places + turns * math.tau]),
+        return_index=True,
+    )
+    return command_at(
+        scene, places, np.concatenate([wide.branch, stated.branch])[first]
+    )
 
 
 def choose_common_position(scenes: "list[Scene]") -> float | None:
     """Choose a position that shows each of several scenes over the same range; None where each has its own."""
-    if any(is_over_time(scene) for scene in scenes) or len(command(scenes[0]).angle) == 1:
+    if (
+        any(is_over_time(scene) for scene in scenes)
+        or len(command(scenes[0]).angle) == 1
+    ):
         return None
     sweeps = [solve(scene, at=list_sweep(scene)) for scene in scenes]
     sweeps = [sweep for sweep in sweeps if sweep.assembled.any()]
@@ -177,17 +207,27 @@ def make_view(scene: Scene, position: float | None = None) -> View:
     _require_assembled(sweep)
     stated = command(scene)
     if position is None:
-        position = float(stated.places[0]) if len(stated.angle) == 1 else choose_position([sweep])
+        position = (
+            float(stated.places[0])
+            if len(stated.angle) == 1
+            else choose_position([sweep])
+        )
     branch = positions.branch[[np.argmin(np.abs(positions.places - position))]]
-    shown = View(scene, sweep, solve(scene, at=command_at(scene, np.array([position]), branch)))
+    shown = View(
+        scene, sweep, solve(scene, at=command_at(scene, np.array([position]), branch))
+    )
     if not shown.here.assembled[0]:
-        raise NotAssembledError(f"the linkage does not assemble at {where_in_words(shown.here)}")
+        raise NotAssembledError(
+            f"the linkage does not assemble at {where_in_words(shown.here)}"
+        )
     return shown
 
 
 def _require_assembled(sweep: Solution) -> None:
     if not sweep.assembled.any():
-        raise NotAssembledError("nothing to draw: the linkage assembles at none of the scene's positions")
+        raise NotAssembledError(
+            "nothing to draw: the linkage assembles at none of the scene's positions"
+        )
 
 
 def _view_motion(scene: Scene, position: float | None) -> View:
@@ -207,13 +247,17 @@ def _view_motion(scene: Scene, position: float | None) -> View:
         index = int(np.argmin(np.abs(angle - position)))
     shown = View(scene, sweep, solve(scene, at=sweep.at.part(slice(index, index + 1))))
     if sweep.stopped_at is not None:
-        shown.notes.append(f"The linkage stops at a limit position at t = {sweep.stopped_at:.4g} s.")
+        shown.notes.append(
+            f"The linkage stops at a limit position at t = {sweep.stopped_at:.4g} s."
+        )
     return shown
 
 
 def choose_position(sweeps: "list[Solution]") -> float:
     """Choose a position, the same for all sweeps, that shows the bars apart; well conditioned where one is."""
-    ends = np.flatnonzero(np.diff(np.concatenate([[False], sweeps[0].assembled, [False]]).astype(int))).reshape(-1, 2)
+    ends = np.flatnonzero(
+        np.diff(np.concatenate([[False], sweeps[0].assembled, [False]]).astype(int))
+    ).reshape(-1, 2)
     run = slice(*ends[int(np.argmax(ends[:, 1] - ends[:, 0]))])
     places = sweeps[0].at.places[run]
     lead = LEAD if sweeps[0].at.stroke is None else math.inf

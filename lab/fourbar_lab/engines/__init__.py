@@ -18,8 +18,21 @@ def _hash_adapters() -> str:
 
 
 _exact: Callable[..., Engine] = partial(
-    Engine, tolerance=EQUIVALENCE, predictor=predict_in_world_axes, code=_hash_adapters()
+    Engine,
+    tolerance=EQUIVALENCE,
+    predictor=predict_in_world_axes,
+    code=_hash_adapters(),
 )
-EXUDYN = _exact("exudyn-constraints", Later("fourbar_lab.engines.exudyn:ExudynConstraints"), library="exudyn")
-OPENSIM = _exact("opensim-constraints", Later("fourbar_lab.engines.opensim:OpenSimConstraints"), library="opensim")
-DRAKE = _exact("drake-inverse", Later("fourbar_lab.engines.drake:DrakeInverse"), library="pydrake")
+EXUDYN = _exact(
+    "exudyn-constraints",
+    Later("fourbar_lab.engines.exudyn:ExudynConstraints"),
+    library="exudyn",
+)
+OPENSIM = _exact(
+    "opensim-constraints",
+    Later("fourbar_lab.engines.opensim:OpenSimConstraints"),
+    library="opensim",
+)
+DRAKE = _exact(
+    "drake-inverse", Later("fourbar_lab.engines.drake:DrakeInverse"), library="pydrake"
+)

@@ -21,7 +21,12 @@ from pydrake.multibody.tree import (
 from fourbar.errors import LimitError
 from fourbar.scene import Scene
 from fourbar_validation.compare.answer import Array
-from fourbar_validation.engines.description import FIRST_PIN, about_first_pin, find_unknown, list_parts
+from fourbar_validation.engines.description import (
+    FIRST_PIN,
+    about_first_pin,
+    find_unknown,
+    list_parts,
+)
 from fourbar_validation.engines.effects import TERM_OF, list_acting
 from fourbar_validation.engines.loop import Exact
 from fourbar_validation.engines.tree import Tree
@@ -55,13 +60,23 @@ class DrakeTree(Tree):
         self.local: dict[str, tuple[Any, Array]] = {}
         for part in list_parts(scene.linkage):
             about_g = RotationalInertia(*[part.inertia] * 3)
-            inertia = SpatialInertia.MakeFromCentralInertia(part.mass, np.array([*part.centre, 0.0]), about_g)
+            inertia = SpatialInertia.MakeFromCentralInertia(
+                part.mass, np.array([*part.centre, 0.0]), about_g
+            )
             body = self.body[part.bar] = plant.AddRigidBody(f"bar{part.bar}", inertia)
-            joint_frame, bearer = RigidTransform(np.array([*part.first_pin, 0.0])), self.body[part.bearer].body_frame()
-            frame = plant.AddFrame(FixedOffsetFrame(f"first_pin{part.bar}", bearer, joint_frame))
+            joint_frame, bearer = (
+                RigidTransform(np.array([*part.first_pin, 0.0])),
+                self.body[part.bearer].body_frame(),
+            )
+            frame = plant.AddFrame(
+                FixedOffsetFrame(f"first_pin{part.bar}", bearer, joint_frame)
+            )
             joint = RevoluteJoint(FIRST_PIN[part.bar], frame, body.body_frame(), UP)
             self.joint[part.bar] = plant.AddJoint(joint)
-            self.local |= {name: (body.body_frame(), np.array([*place, 0.0])) for name, place in part.points.items()}
+            self.local |= {
+                name: (body.body_frame(), np.array([*place, 0.0]))
+                for name, place in part.points.items()
+            }
         plant.Finalize()
         self.context, self.world = plant.CreateDefaultContext(), plant.world_frame()
         self.ready(scene, list_acting(scene, self))
@@ -73,7 +88,11 @@ class DrakeTree(Tree):
 
     def point(self, name: str) -> Array:
         """Return a point fixed in a body."""
-        return np.array(self.plant.CalcPointsPositions(self.context, *self.local[name], self.world)[:2, 0])
+        return np.array(
+            self.plant.CalcPointsPositions(self.context, *self.local[name], self.world)[
+                :2, 0
+            ]
+        )
 
     def rotation(self, bar: int) -> Array:
         """Return that of the body."""
@@ -83,12 +102,20 @@ class DrakeTree(Tree):
     def point_jacobian(self, name: str) -> Array:
         """Return that of the translational velocity."""
         arguments = (*self.local[name], self.world, self.world)
-        return np.asarray(self.plant.CalcJacobianTranslationalVelocity(self.context, BY_SPEEDS, *arguments)[:2])
+        return np.asarray(
+            self.plant.CalcJacobianTranslationalVelocity(
+                self.context, BY_SPEEDS, *arguments
+            )[:2]
+        )
 
     def turn(self, bar: int) -> Array:
         """Return the last row of the angular velocity's Jacobian."""
         arguments = (self.body[bar].body_frame(), self.world, self.world)
-        return np.array(self.plant.CalcJacobianAngularVelocity(self.context, BY_SPEEDS, *arguments)[2])
+        return np.array(
+            self.plant.CalcJacobianAngularVelocity(self.context, BY_SPEEDS, *arguments)[
+                2
+            ]
+        )
 
     def set_motion(self, v: Array, a: Array) -> None:
         """Set the speeds; accelerations come with each request."""
@@ -97,16 +124,22 @@ class DrakeTree(Tree):
     def acceleration(self, name: str) -> Array:
         """Return J a + (dJ/dt) v of a point."""
         arguments = (*self.local[name], self.world, self.world)
-        bias = self.plant.CalcBiasTranslationalAcceleration(self.context, BY_SPEEDS, *arguments)
+        bias = self.plant.CalcBiasTranslationalAcceleration(
+            self.context, BY_SPEEDS, *arguments
+        )
         return np.asarray(self.point_jacobian(name) @ self.a + bias[:2, 0])
 
-    def needed(self, field: tuple[float, float], wrenches: dict[int, list[float]]) -> Array:
+    def needed(
+        self, field: tuple[float, float], wrenches: dict[int, list[float]]
+    ) -> Array:
         """Compute the inverse dynamics with gravity as a force element and what acts on the bars as external forces."""
         forces = MultibodyForces(self.plant)
         if any(field):
             self.plant.CalcForceElementsContribution(self.context, forces)
         for bar, wrench in wrenches.items():
-            self.body[bar].AddInForceInWorld(self.context, _make_spatial(wrench), forces)
+            self.body[bar].AddInForceInWorld(
+                self.context, _make_spatial(wrench), forces
+            )
         return np.array(self.plant.CalcInverseDynamics(self.context, self.a, forces))
 
     def carried(self) -> dict[int, Array]:
@@ -114,12 +147,18 @@ class DrakeTree(Tree):
         applied = []
         for bar, wrench in self.wrenches.items():
             force = ExternallyAppliedSpatialForce()
-            force.body_index, force.F_Bq_W = self.body[bar].index(), _make_spatial(wrench)
+            force.body_index, force.F_Bq_W = (
+                self.body[bar].index(),
+                _make_spatial(wrench),
+            )
             applied.append(force)
         port = self.plant.get_applied_spatial_force_input_port()
         port.FixValue(self.context, Value[list[ExternallyAppliedSpatialForce]](applied))
         borne = self.plant.get_reaction_forces_output_port().Eval(self.context)
-        return {b: self.rotation(b) @ borne[int(joint.index())].translational()[:2] for b, joint in self.joint.items()}
+        return {
+            b: self.rotation(b) @ borne[int(joint.index())].translational()[:2]
+            for b, joint in self.joint.items()
+        }
 
 
 DrakeInverse = partial(Exact, "drake-inverse", DrakeTree)

@@ -31,7 +31,14 @@ from fourbar.linkage import MOVING_BARS, PIN_FORCE
 from fourbar.scene import Scene
 from fourbar_lab.engines.exudyn_elements import ELEMENT_OF, Bodies
 from fourbar_validation.compare.answer import Array
-from fourbar_validation.engines.description import ON_BARS, POINTS, find_unknown, list_parts, place, reduce_angle
+from fourbar_validation.engines.description import (
+    ON_BARS,
+    POINTS,
+    find_unknown,
+    list_parts,
+    place,
+    reduce_angle,
+)
 from fourbar_validation.engines.effects import TERM_OF, list_acting
 from fourbar_validation.engines.loaded import Loaded, Values
 from fourbar_validation.engines.loop import Exact
@@ -62,7 +69,11 @@ class ExudynBars(Loaded):
         bodies = Bodies(mbs, scene.linkage)
         self.body = bodies.body
         of_bar = {part.bar: part for part in list_parts(scene.linkage)}
-        self.local = {name: (part.bar, [*xy, 0.0]) for part in of_bar.values() for name, xy in part.points.items()}
+        self.local = {
+            name: (part.bar, [*xy, 0.0])
+            for part in of_bar.values()
+            for name, xy in part.points.items()
+        }
         end = {bar: part.points[f"end{bar}"] for bar, part in of_bar.items()}
         pin_places = {
             "O2": ((0.0, 0.0), (0.0, 0.0)),
@@ -71,14 +82,20 @@ class ExudynBars(Loaded):
             "O4": (of_bar[4].first_pin, (0.0, 0.0)),
         }
         for pin, bars in JOINTS.items():
-            markers = [bodies.point(bar, *place) for bar, place in zip(bars, pin_places[pin], strict=True)]
+            markers = [
+                bodies.point(bar, *place)
+                for bar, place in zip(bars, pin_places[pin], strict=True)
+            ]
             mbs.AddObject(ObjectJointRevolute2D(markerNumbers=markers))
         if scene.drive is None:
             markers = [bodies.direction(bar) for bar in (1, scene.drive_bar)]
             self.drive = mbs.AddObject(ObjectConnectorCoordinate(markerNumbers=markers))
         else:
             ends = (scene.drive.start, scene.drive.end)
-            markers = [bodies.point(end.bar, *place(end, scene.linkage.ground_angle)) for end in ends]
+            markers = [
+                bodies.point(end.bar, *place(end, scene.linkage.ground_angle))
+                for end in ends
+            ]
             mbs.AddObject(
                 ObjectConnectorDistance(markerNumbers=markers, distance=1.0)
             )  # any: what is asked is its rate
@@ -89,10 +106,13 @@ class ExudynBars(Loaded):
         self.load = {}
         for bar in MOVING_BARS:
             mass = mbs.AddMarker(MarkerBodyMass(bodyNumber=self.body[bar]))
-            mbs.AddLoad(LoadMassProportional(markerNumber=mass, loadVector=[*self.field, 0.0]))
+            mbs.AddLoad(
+                LoadMassProportional(markerNumber=mass, loadVector=[*self.field, 0.0])
+            )
             first_pin = bodies.axes(bar)
             self.load[bar] = tuple(
-                mbs.AddLoad(kind(markerNumber=first_pin)) for kind in (LoadForceVector, LoadTorqueVector)
+                mbs.AddLoad(kind(markerNumber=first_pin))
+                for kind in (LoadForceVector, LoadTorqueVector)
             )
         mbs.Assemble()
         self.state = mbs.systemData
@@ -100,7 +120,9 @@ class ExudynBars(Loaded):
         settings.solution.file.write = False
         self.solver = exu.MainSolverImplicitSecondOrder()
         self.solver.InitializeSolver(mbs, settings)
-        self.turn = {bar: self.state.GetObjectLTGODE2(self.body[bar])[2] for bar in MOVING_BARS}
+        self.turn = {
+            bar: self.state.GetObjectLTGODE2(self.body[bar])[2] for bar in MOVING_BARS
+        }
         self.shifts = [i for i in range(SIZE) if i not in self.turn.values()]
 
     def place(self, q: Sequence[float]) -> None:
@@ -108,11 +130,15 @@ class ExudynBars(Loaded):
         of_3_to_2, theta_4 = q[1:]
         theta_2 = reduce_angle(q[0])
         coordinates = np.zeros(SIZE)
-        for bar, angle in zip(MOVING_BARS, (theta_2, theta_2 + of_3_to_2, theta_4), strict=True):
+        for bar, angle in zip(
+            MOVING_BARS, (theta_2, theta_2 + of_3_to_2, theta_4), strict=True
+        ):
             coordinates[self.turn[bar]] = angle
         self.state.SetODE2Coordinates(coordinates)
         jacobian, gap = self._read_constraint_jacobian(), self._read_constraint_gap()
-        coordinates[self.shifts] = np.linalg.solve(jacobian[OTHER_ROWS][:, self.shifts], -gap[OTHER_ROWS])
+        coordinates[self.shifts] = np.linalg.solve(
+            jacobian[OTHER_ROWS][:, self.shifts], -gap[OTHER_ROWS]
+        )
         self.state.SetODE2Coordinates(coordinates)
         self.q, self.jacobians = coordinates, jacobian
 
@@ -121,9 +147,15 @@ class ExudynBars(Loaded):
         return np.array(self.solver.GetSystemResidual())[SIZE:]
 
     def _read_constraint_jacobian(self) -> Array:
-        self.solver.SetSystemJacobian(np.zeros((2 * SIZE, 2 * SIZE)))  # the computed values are added to it
+        self.solver.SetSystemJacobian(
+            np.zeros((2 * SIZE, 2 * SIZE))
+        )  # the computed values are added to it
         self.solver.ComputeJacobianAE(
-            self.mbs, scalarFactor_ODE2=1.0, scalarFactor_ODE2_t=0.0, scalarFactor_ODE1=0.0, velocityLevel=False
+            self.mbs,
+            scalarFactor_ODE2=1.0,
+            scalarFactor_ODE2_t=0.0,
+            scalarFactor_ODE1=0.0,
+            velocityLevel=False,
         )
         return np.array(self.solver.GetSystemJacobian())[SIZE:, :SIZE]
 
@@ -134,14 +166,22 @@ class ExudynBars(Loaded):
 
     def jacobian(self) -> Array:
         """Return the derivative of the gap by the joint angles, pins O2, A and O4 kept closed."""
-        turns, pins, b = list(self.turn.values()), self.jacobians[OTHER_ROWS], self.jacobians[B_ROWS]
+        turns, pins, b = (
+            list(self.turn.values()),
+            self.jacobians[OTHER_ROWS],
+            self.jacobians[B_ROWS],
+        )
         shifts = np.linalg.solve(pins[:, self.shifts], -pins[:, turns])
         by_angle = b[:, turns] + b[:, self.shifts] @ shifts
         return np.column_stack((by_angle[:, 0] + by_angle[:, 1], by_angle[:, 1:]))
 
     def angle(self, bar: int) -> float:
         """Read its coordinate, within half a turn; the ground's line as described."""
-        return self.ground_angle if bar == 1 else math.remainder(self.q[self.turn[bar]], math.tau)
+        return (
+            self.ground_angle
+            if bar == 1
+            else math.remainder(self.q[self.turn[bar]], math.tau)
+        )
 
     def _read_output(self, kind: Any, name: str) -> Array:
         bar, local = self.local[name]
@@ -157,7 +197,9 @@ class ExudynBars(Loaded):
 
     def rotation(self, bar: int) -> Array:
         """Return that of the body."""
-        matrix = self.mbs.GetObjectOutputBody(self.body[bar], exu.OutputVariableType.RotationMatrix, [0.0, 0.0, 0.0])
+        matrix = self.mbs.GetObjectOutputBody(
+            self.body[bar], exu.OutputVariableType.RotationMatrix, [0.0, 0.0, 0.0]
+        )
         return np.reshape(matrix, (3, 3))[:2, :2]
 
     def velocity(self, bar: int) -> float:
@@ -174,32 +216,46 @@ class ExudynBars(Loaded):
 
     def move(self, bar: int, speed: float, acceleration: float) -> Values:
         """Return speeds, accelerations and multipliers; nothing where a toggle leaves them 0/0."""
-        of_drive, commanded = self._read_constraint_jacobian(), np.eye(SIZE)[-1]  # a cylinder's is that of closed pins
+        of_drive, commanded = (
+            self._read_constraint_jacobian(),
+            np.eye(SIZE)[-1],
+        )  # a cylinder's is that of closed pins
         jacobian = np.vstack((of_drive[:-1], np.eye(SIZE)[self.turn[bar]]))
         try:
             self.v = v = np.linalg.solve(jacobian, commanded * speed)
             self.state.SetODE2Coordinates_t(v)
             self.state.SetODE2Coordinates_tt(np.zeros(SIZE))
             at_b = self.acceleration("end3") - self.acceleration("end4")
-            drift = np.concatenate((np.zeros(2), self.acceleration("end2"), at_b, np.zeros(3)))
+            drift = np.concatenate(
+                (np.zeros(2), self.acceleration("end2"), at_b, np.zeros(3))
+            )
             self.a = a = np.linalg.solve(jacobian, commanded * acceleration - drift)
         except np.linalg.LinAlgError:
             return {}
         self.state.SetODE2Coordinates_tt(a)
-        values: Values = {f"a_{name}": self.acceleration(point) for name, point in ON_BARS.items()}
+        values: Values = {
+            f"a_{name}": self.acceleration(point) for name, point in ON_BARS.items()
+        }
         for moving in MOVING_BARS:
-            values[f"omega_{moving}"], values[f"alpha_{moving}"] = self.velocity(moving), self.alpha(moving)
+            values[f"omega_{moving}"], values[f"alpha_{moving}"] = (
+                self.velocity(moving),
+                self.alpha(moving),
+            )
         self.solver.ComputeMassMatrix(self.mbs)
         inertial = np.array(self.solver.GetSystemMassMatrix()) @ a
 
         def balanced() -> dict[str, Any]:
             unknowns = np.linalg.solve(of_drive.T, inertial - self._sum_applied())
             pins = zip(JOINTS, unknowns[:-1].reshape(4, 2), strict=True)
-            return {PIN_FORCE[pin]: force for pin, force in pins} | {self.driving: unknowns[-1]}
+            return {PIN_FORCE[pin]: force for pin, force in pins} | {
+                self.driving: unknowns[-1]
+            }
 
         try:
             return values | self.settled(balanced)
-        except np.linalg.LinAlgError:  # no torque or force of the drive balances the linkage here
+        except (
+            np.linalg.LinAlgError
+        ):  # no torque or force of the drive balances the linkage here
             return values
 
     def _sum_applied(self) -> Array:

@@ -22,7 +22,12 @@ from exudyn.itemInterface import (
 )
 
 from fourbar.linkage import FourBar
-from fourbar_validation.engines.description import PINS, about_first_pin, list_parts, place
+from fourbar_validation.engines.description import (
+    PINS,
+    about_first_pin,
+    list_parts,
+    place,
+)
 
 
 class Bodies:
@@ -35,29 +40,51 @@ class Bodies:
         for part in list_parts(linkage):
             self.node[part.bar] = node = mbs.AddNode(NodeRigidBody2D())
             inertia = about_first_pin(linkage.bar(part.bar))
-            body = ObjectRigidBody2D(mass=part.mass, inertia=inertia, centerOfMass=part.centre, nodeNumber=node)
+            body = ObjectRigidBody2D(
+                mass=part.mass,
+                inertia=inertia,
+                centerOfMass=part.centre,
+                nodeNumber=node,
+            )
             self.body[part.bar] = mbs.AddObject(body)
 
     def point(self, bar: int, x: float = 0.0, y: float = 0.0) -> Any:
         """Mark a point of a bar, along and across its line from its first pin; of the ground in world axes."""
-        return self.mbs.AddMarker(MarkerBodyPosition(bodyNumber=self.body[bar], localPosition=[x, y, 0.0]))
+        return self.mbs.AddMarker(
+            MarkerBodyPosition(bodyNumber=self.body[bar], localPosition=[x, y, 0.0])
+        )
 
     def direction(self, bar: int) -> Any:
         """Mark the direction of a bar as a coordinate; of the ground a zero."""
-        return self.mbs.AddMarker(MarkerNodeCoordinate(nodeNumber=self.node[bar], coordinate=0 if bar == 1 else 2))
+        return self.mbs.AddMarker(
+            MarkerNodeCoordinate(
+                nodeNumber=self.node[bar], coordinate=0 if bar == 1 else 2
+            )
+        )
 
     def axes(self, bar: int, turn: float = 0.0) -> Any:
         """Mark axes fixed in a bar at its first pin, rotated by an angle from its line."""
         cos, sin = math.cos(turn), math.sin(turn)
-        frame = [[cos, -sin, 0.0, 0.0], [sin, cos, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]]
-        return self.mbs.AddMarker(MarkerBodyRigid(bodyNumber=self.body[bar], localHT=frame))
+        frame = [
+            [cos, -sin, 0.0, 0.0],
+            [sin, cos, 0.0, 0.0],
+            [0.0, 0.0, 1.0, 0.0],
+            [0.0, 0.0, 0.0, 1.0],
+        ]
+        return self.mbs.AddMarker(
+            MarkerBodyRigid(bodyNumber=self.body[bar], localHT=frame)
+        )
 
 
 def _add_viscous(effect: Any, bodies: Bodies) -> None:
     """Add a `CoordinateSpringDamper` between the two directions."""
     for pin, damping in effect.coefficients:
         markers = [bodies.direction(bar) for bar in PINS[pin]]
-        bodies.mbs.AddObject(ObjectConnectorCoordinateSpringDamper(markerNumbers=markers, damping=damping))
+        bodies.mbs.AddObject(
+            ObjectConnectorCoordinateSpringDamper(
+                markerNumbers=markers, damping=damping
+            )
+        )
 
 
 def _add_torsion(effect: Any, bodies: Bodies) -> None:
@@ -66,7 +93,9 @@ def _add_torsion(effect: Any, bodies: Bodies) -> None:
         first, second = PINS[pin]
         line = bodies.ground_angle if first == 1 else 0.0
         markers = [bodies.axes(first, line + rest), bodies.axes(second)]
-        spring = ObjectConnectorTorsionalSpringDamper(markerNumbers=markers, stiffness=stiffness, torque=preload)
+        spring = ObjectConnectorTorsionalSpringDamper(
+            markerNumbers=markers, stiffness=stiffness, torque=preload
+        )
         bodies.mbs.AddObject(spring)
 
 
@@ -76,7 +105,10 @@ def _add_springs(effect: Any, bodies: Bodies) -> None:
         ends = (spring.start, spring.end)
         bodies.mbs.AddObject(
             ObjectConnectorSpringDamper(
-                markerNumbers=[bodies.point(point.bar, *place(point, bodies.ground_angle)) for point in ends],
+                markerNumbers=[
+                    bodies.point(point.bar, *place(point, bodies.ground_angle))
+                    for point in ends
+                ],
                 referenceLength=spring.length,
                 stiffness=spring.stiffness,
                 force=spring.preload,

@@ -32,7 +32,11 @@ from fourbar_validation.engines.loop import Exact
 
 ZERO = (0.0, 0.0, 0.0)
 """Zero vector."""
-PER_COORDINATE = {2: np.array([1.0, 0.0, 0.0]), 3: np.array([0.0, 1.0, 1.0]), 4: np.array([0.0, 1.0, 0.0])}
+PER_COORDINATE = {
+    2: np.array([1.0, 0.0, 0.0]),
+    3: np.array([0.0, 1.0, 1.0]),
+    4: np.array([0.0, 1.0, 0.0]),
+}
 """Derivative of each bar's direction by the coordinates."""
 PASSES = 50
 """Number of passes; each leaves a millionth to a tenth of the previous pass's multipliers, down to rounding."""
@@ -51,7 +55,11 @@ def find_refusal(scene: Scene) -> str:
     for number in MOVING_BARS:
         if scene.linkage.bar(number).mass == 0.0:
             return f"bar {number} has no mass; OpenSim takes no such body at the end of a chain, and drops its inertia"
-    return "" if about_first_pin(scene.linkage.input) else "bar 2 has no inertia about O2; Simbody divides by it"
+    return (
+        ""
+        if about_first_pin(scene.linkage.input)
+        else "bar 2 has no inertia about O2; Simbody divides by it"
+    )
 
 
 class OpenSimBars(Loaded):
@@ -76,22 +84,42 @@ class OpenSimBars(Loaded):
         self.part = {part.bar: part for part in list_parts(linkage)}
         for bar, part in self.part.items():
             about_z = osim.Inertia(*[part.inertia] * 3, *ZERO)
-            self.body[bar] = osim.Body(f"bar{bar}", part.mass, make_vec(*part.centre), about_z)
+            self.body[bar] = osim.Body(
+                f"bar{bar}", part.mass, make_vec(*part.centre), about_z
+            )
             model.addBody(self.body[bar])
-        self.local = {name: (part.bar, place) for part in self.part.values() for name, place in part.points.items()}
-        self.ends = (("start", scene.drive.start), ("end", scene.drive.end)) if scene.drive else ()
-        self.local |= {name: (end.bar, resolve(end.distance, end.angle)) for name, end in self.ends}
+        self.local = {
+            name: (part.bar, place)
+            for part in self.part.values()
+            for name, place in part.points.items()
+        }
+        self.ends = (
+            (("start", scene.drive.start), ("end", scene.drive.end))
+            if scene.drive
+            else ()
+        )
+        self.local |= {
+            name: (end.bar, resolve(end.distance, end.angle)) for name, end in self.ends
+        }
         self.length = {bar: part.length for bar, part in self.part.items()}
         self.joint = {
             "O2": self._make_joint("O2", 1, ZERO, 2, ZERO),
             "O4": self._make_joint("O4", 1, self.part[4].first_pin, 4, ZERO),
-            "B": self._make_joint("B", 4, (self.length[4], 0.0, 0.0), 3, (self.length[3], 0.0, 0.0)),
+            "B": self._make_joint(
+                "B", 4, (self.length[4], 0.0, 0.0), 3, (self.length[3], 0.0, 0.0)
+            ),
         }
-        self.pin_a = osim.PointConstraint(self.body[2], make_vec(self.length[2]), self.body[3], make_vec())
-        self.pin_a.set_isEnforced(False)  # until a position is found: OpenSim would assemble it at angles of its own
+        self.pin_a = osim.PointConstraint(
+            self.body[2], make_vec(self.length[2]), self.body[3], make_vec()
+        )
+        self.pin_a.set_isEnforced(
+            False
+        )  # until a position is found: OpenSim would assemble it at angles of its own
         model.addConstraint(self.pin_a)
         for pin in TURNING.values():
-            self.joint[pin].updCoordinate().setPrescribedFunction(osim.PolynomialFunction(make_vector(TIME_IS_ALPHA)))
+            self.joint[pin].updCoordinate().setPrescribedFunction(
+                osim.PolynomialFunction(make_vector(TIME_IS_ALPHA))
+            )
             self.joint[pin].updCoordinate().setDefaultIsPrescribed(pin == "O2")
         self.commanded = 2
         self.applied = {bar: self._add_at_first_pin(bar) for bar in MOVING_BARS}
@@ -110,9 +138,17 @@ class OpenSimBars(Loaded):
             f"below {LEAST_CONDITIONED:g} it takes constraints for dependent, and drops them"
         )
 
-    def _make_joint(self, name: str, parent: int, on_parent: Any, child: int, on_child: Any) -> Any:
+    def _make_joint(
+        self, name: str, parent: int, on_parent: Any, child: int, on_child: Any
+    ) -> Any:
         joint = osim.PinJoint(
-            name, self.body[parent], make_vec(*on_parent), make_vec(), self.body[child], make_vec(*on_child), make_vec()
+            name,
+            self.body[parent],
+            make_vec(*on_parent),
+            make_vec(),
+            self.body[child],
+            make_vec(*on_child),
+            make_vec(),
         )
         self.model.addJoint(joint)
         return joint
@@ -126,7 +162,10 @@ class OpenSimBars(Loaded):
         element.setTorqueFunctions(*_make_constants())
         self.model.addForce(element)
         force, torque = element.updForceFunctions(), element.updTorqueFunctions()
-        return [osim.Constant.safeDownCast(x) for x in (force.get(0), force.get(1), torque.get(2))]
+        return [
+            osim.Constant.safeDownCast(x)
+            for x in (force.get(0), force.get(1), torque.get(2))
+        ]
 
     def place(self, q: Sequence[float]) -> None:
         """Set the bars' angles, at rest: Simbody forms its matrices by differences from the present motion."""
@@ -140,7 +179,11 @@ class OpenSimBars(Loaded):
     def point(self, name: str) -> Array:
         """Return a station of a body."""
         bar, place = self.local[name]
-        return np.array(self.body[bar].findStationLocationInGround(self.state, make_vec(*place)).to_numpy()[:2])
+        return np.array(
+            self.body[bar]
+            .findStationLocationInGround(self.state, make_vec(*place))
+            .to_numpy()[:2]
+        )
 
     def gap(self) -> tuple[float, float]:
         """Return A on bar 2 minus A on bar 3, which opens as B would."""
@@ -149,12 +192,18 @@ class OpenSimBars(Loaded):
 
     def jacobian(self) -> Array:
         """Return the derivative of the gap by the angles of bar 2, of bar 3 against bar 2, and of bar 4."""
-        by_own = self._compute_station_jacobian("end2") - self._compute_station_jacobian("first_pin3")
-        return np.column_stack((by_own[:, 0] + by_own[:, 2], by_own[:, 2], by_own[:, 1] - by_own[:, 2]))
+        by_own = self._compute_station_jacobian(
+            "end2"
+        ) - self._compute_station_jacobian("first_pin3")
+        return np.column_stack(
+            (by_own[:, 0] + by_own[:, 2], by_own[:, 2], by_own[:, 1] - by_own[:, 2])
+        )
 
     def _compute_station_jacobian(self, name: str) -> Array:
         (bar, place), matrix = self.local[name], osim.Matrix()
-        self.matter.calcStationJacobian(self.state, self.body[bar].getMobilizedBodyIndex(), make_vec(*place), matrix)
+        self.matter.calcStationJacobian(
+            self.state, self.body[bar].getMobilizedBodyIndex(), make_vec(*place), matrix
+        )
         return np.array(matrix.to_numpy())[:2]
 
     def rotation(self, bar: int) -> Array:
@@ -171,7 +220,9 @@ class OpenSimBars(Loaded):
         if bar != self.commanded:
             self.commanded, q = bar, self.state.getQ().to_numpy()
             for moving, pin in TURNING.items():
-                self.joint[pin].updCoordinate().setIsPrescribed(self.state, moving == bar)
+                self.joint[pin].updCoordinate().setIsPrescribed(
+                    self.state, moving == bar
+                )
             self.state.setQ(make_vector(q))
             self.model.realizePosition(self.state)
         try:
@@ -181,14 +232,18 @@ class OpenSimBars(Loaded):
         self.a = accelerations
         leverage = float(self._drive_column() @ turns)
         # without leverage nothing that the drive does moves that bar
-        return self._motion() | ({} if leverage == 0.0 else self.settled(lambda: self._forces(leverage)))
+        return self._motion() | (
+            {} if leverage == 0.0 else self.settled(lambda: self._forces(leverage))
+        )
 
     def _drive_column(self) -> Array:
         """Differentiate the driven bar's direction, or the stroke of a linear drive, by the coordinates, (3,)."""
         if self.linear is None:
             return PER_COORDINATE[self.drive_bar]
         start, end = (
-            np.zeros((2, 3)) if spring_end.bar == 1 else self._compute_station_jacobian(name)
+            np.zeros((2, 3))
+            if spring_end.bar == 1
+            else self._compute_station_jacobian(name)
             for name, spring_end in self.ends
         )
         return np.asarray(self.line()[2] @ (end - start))
@@ -204,19 +259,26 @@ class OpenSimBars(Loaded):
         self.matter.calcBiasForAccelerationConstraints(self.state, bias)
         self.matter.calcProjectedMInv(self.state, matrix)
         sizes = np.linalg.svd(np.array(matrix.to_numpy())[:3, :3], compute_uv=False)
-        self.least_conditioned = min(self.least_conditioned, float(sizes[-1] / sizes[0]))
+        self.least_conditioned = min(
+            self.least_conditioned, float(sizes[-1] / sizes[0])
+        )
         return turns, np.linalg.solve(equations, -np.array(bias.to_numpy())[:3])
 
     def _motion(self) -> Values:
         values: Values = {}
         for bar in MOVING_BARS:
-            values[f"omega_{bar}"], values[f"alpha_{bar}"] = self.velocity(bar), self.alpha(bar)
+            values[f"omega_{bar}"], values[f"alpha_{bar}"] = (
+                self.velocity(bar),
+                self.alpha(bar),
+            )
         for name, point in ON_BARS.items():
             bar, place = self.local[point]
             drift = self.matter.calcBiasForStationJacobian(
                 self.state, self.body[bar].getMobilizedBodyIndex(), make_vec(*place)
             )
-            values[f"a_{name}"] = self._compute_station_jacobian(point) @ self.a + np.array(drift.to_numpy()[:2])
+            values[f"a_{name}"] = self._compute_station_jacobian(
+                point
+            ) @ self.a + np.array(drift.to_numpy()[:2])
         return values
 
     def _forces(self, leverage: float) -> dict[str, Any]:
@@ -226,13 +288,20 @@ class OpenSimBars(Loaded):
         finds is given back as forces and found anew, until its multipliers hold nothing but rounding.
         """
         self.act()
-        pin_a, drive, closing, before = self.point("end2"), 0.0, np.zeros(2), (math.inf, math.inf)
+        pin_a, drive, closing, before = (
+            self.point("end2"),
+            0.0,
+            np.zeros(2),
+            (math.inf, math.inf),
+        )
         seen: set[tuple[float, float]] = set()
         for number in range(PASSES):
             for bar, wrench in self.wrenches.items():
                 for function, value in zip(self.applied[bar], wrench, strict=True):
                     function.setValue(value)
-            self.state.setTime(self.state.getTime())  # Simbody computes again what depends on it
+            self.state.setTime(
+                self.state.getTime()
+            )  # Simbody computes again what depends on it
             self.model.realizeAcceleration(self.state)
             couple, force = self._couple_of_command(), self._compute_closing_force()
             drive, closing = drive + couple / leverage, closing + force
@@ -240,12 +309,19 @@ class OpenSimBars(Loaded):
             self.push(2, force, pin_a)
             self.push(3, -force, pin_a)
             size = abs(couple), math.hypot(*force)
-            falls = size[0] < before[0] or size[1] < before[1]  # torque, then force, come first
-            if size in seen or (number > 1 and not falls):  # rounding may go round in a circle
+            falls = (
+                size[0] < before[0] or size[1] < before[1]
+            )  # torque, then force, come first
+            if size in seen or (
+                number > 1 and not falls
+            ):  # rounding may go round in a circle
                 break
             before = size
             seen.add(size)
-        reactions = {name: self._read_reaction(pin) for pin, name in {"O2": "F12", "B": "F43", "O4": "F14"}.items()}
+        reactions = {
+            name: self._read_reaction(pin)
+            for pin, name in {"O2": "F12", "B": "F43", "O4": "F14"}.items()
+        }
         return {**reactions, "F32": closing, self.driving: drive}
 
     def _differentiate_constraints(self) -> Array:
@@ -256,28 +332,46 @@ class OpenSimBars(Loaded):
 
     def velocity(self, bar: int) -> float:
         """Read that of a body; the ground has none."""
-        return 0.0 if bar == 1 else float(self.body[bar].getAngularVelocityInGround(self.state).get(2))
+        return (
+            0.0
+            if bar == 1
+            else float(self.body[bar].getAngularVelocityInGround(self.state).get(2))
+        )
 
     def alpha(self, bar: int) -> float:
         """Read it from the accelerations of the coordinates."""
         return float(PER_COORDINATE[bar] @ self.a)
 
     def _read_reaction(self, pin: str) -> Array:
-        return np.array(self.joint[pin].calcReactionOnChildExpressedInGround(self.state).get(1).to_numpy()[:2])
+        return np.array(
+            self.joint[pin]
+            .calcReactionOnChildExpressedInGround(self.state)
+            .get(1)
+            .to_numpy()[:2]
+        )
 
     def _couple_of_command(self) -> float:
-        return float(self.joint[TURNING[self.commanded]].calcReactionOnChildExpressedInGround(self.state).get(0).get(2))
+        return float(
+            self.joint[TURNING[self.commanded]]
+            .calcReactionOnChildExpressedInGround(self.state)
+            .get(0)
+            .get(2)
+        )
 
     def _compute_closing_force(self) -> Array:
         """Compute the force of bar 3 on bar 2 from the constraint's multipliers; on bodies it is -G^T lambda."""
         on_bodies, on_mobilities = osim.VectorOfSpatialVec(), osim.Vector()
         multipliers = self.state.getMultipliers()
-        self.matter.calcConstraintForcesFromMultipliers(self.state, multipliers, on_bodies, on_mobilities)
+        self.matter.calcConstraintForcesFromMultipliers(
+            self.state, multipliers, on_bodies, on_mobilities
+        )
         force = on_bodies.get(int(self.body[2].getMobilizedBodyIndex())).get(1)
         return np.array([-force.get(0), -force.get(1)])
 
 
-OpenSimConstraints = partial(Exact, "opensim-constraints", OpenSimBars, ("theta_2", "theta_4", "stroke"))
+OpenSimConstraints = partial(
+    Exact, "opensim-constraints", OpenSimBars, ("theta_2", "theta_4", "stroke")
+)
 
 
 def make_vec(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Any:

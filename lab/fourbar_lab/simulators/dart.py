@@ -8,7 +8,16 @@ import numpy as np
 
 from fourbar.mjcf import size_flywheel
 from fourbar.scene import Scene
-from fourbar_lab.simulators.motion import LIGHT, Course, Instant, Readings, Simulator, find_gravity, run_through, start
+from fourbar_lab.simulators.motion import (
+    LIGHT,
+    Course,
+    Instant,
+    Readings,
+    Simulator,
+    find_gravity,
+    run_through,
+    start,
+)
 from fourbar_validation.engines.description import list_parts, rotate
 
 
@@ -25,8 +34,12 @@ class Dart(Simulator):
         begin, inertia = start(scene), size_flywheel(scene, LIGHT)
         world, linkage = dartpy.simulation.World(), dartpy.dynamics.Skeleton("four_bar")
         bodies: dict[int, Any] = {}
-        for part, angle, speed in zip(list_parts(scene.linkage), begin.qpos, begin.qvel, strict=True):
-            joint, body = linkage.createRevoluteJointAndBodyNodePair(bodies.get(part.bearer))
+        for part, angle, speed in zip(
+            list_parts(scene.linkage), begin.qpos, begin.qvel, strict=True
+        ):
+            joint, body = linkage.createRevoluteJointAndBodyNodePair(
+                bodies.get(part.bearer)
+            )
             joint.setAxis([0.0, 0.0, 1.0])
             place = dartpy.math.Isometry3()
             place.set_translation([*part.first_pin, 0.0])
@@ -45,13 +58,18 @@ class Dart(Simulator):
         world.setTimeStep(course.timestep)
         length = scene.linkage.coupler.length
         end = bodies[3].getWorldTransform().multiply([length, 0.0, 0.0])
-        world.getConstraintSolver().addConstraint(dartpy.constraint.BallJointConstraint(bodies[3], bodies[4], end))
+        world.getConstraintSolver().addConstraint(
+            dartpy.constraint.BallJointConstraint(bodies[3], bodies[4], end)
+        )
         joints = [linkage.getJoint(number) for number in range(3)]
 
         def advance(steps: int) -> tuple[Any, float]:
             for _ in range(steps - 1):
                 world.step()
-            q, speed = np.array(linkage.getPositions()), float(linkage.getVelocities()[0])
+            q, speed = (
+                np.array(linkage.getPositions()),
+                float(linkage.getVelocities()[0]),
+            )
             world.step()
             return q, speed
 
@@ -59,8 +77,19 @@ class Dart(Simulator):
             q, speed = before
             theta = (q[0], q[0] + q[1], q[2])
             alpha = (float(linkage.getVelocities()[0]) - speed) / course.timestep
-            wrenches = [joint.getWrenchToChildBodyNode()[3:5] for joint in joints]  # by the child, in its axes
-            F21, F32, F41 = (np.array(rotate(angle, *w)) for angle, w in zip(theta, wrenches, strict=True))
-            return Instant(theta, speed, alpha, -inertia * alpha, {"F12": -F21, "F32": F32, "F14": -F41})
+            wrenches = [
+                joint.getWrenchToChildBodyNode()[3:5] for joint in joints
+            ]  # by the child, in its axes
+            F21, F32, F41 = (
+                np.array(rotate(angle, *w))
+                for angle, w in zip(theta, wrenches, strict=True)
+            )
+            return Instant(
+                theta,
+                speed,
+                alpha,
+                -inertia * alpha,
+                {"F12": -F21, "F32": F32, "F14": -F41},
+            )
 
         return run_through(scene, course, advance, read)

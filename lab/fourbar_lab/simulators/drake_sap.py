@@ -11,7 +11,16 @@ from pydrake.systems import analysis
 from fourbar.mjcf import size_flywheel
 from fourbar.mjcf.assembly import write_sdf
 from fourbar.scene import Scene
-from fourbar_lab.simulators.motion import LIGHT, Course, Instant, Readings, Simulator, find_gravity, run_through, start
+from fourbar_lab.simulators.motion import (
+    LIGHT,
+    Course,
+    Instant,
+    Readings,
+    Simulator,
+    find_gravity,
+    run_through,
+    start,
+)
 from fourbar_validation.engines.description import FIRST_PIN, rotate
 
 
@@ -24,10 +33,21 @@ class DrakeSap(Simulator):
         "stands in for the fourth (its force is not offered in Python); SetEnableLoopTopology(True), from 1.57 on, "
         "takes the SDF of four joints"
     )
-    quantities = ("theta_3", "theta_4", "torque", "F12", "F32", "F14")  # F43 where the loop has its fourth joint
+    quantities = (
+        "theta_3",
+        "theta_4",
+        "torque",
+        "F12",
+        "F32",
+        "F14",
+    )  # F43 where the loop has its fourth joint
     settings: ClassVar[dict[str, str]] = {
         "ball constraint": "drake",
-        **({"four joints": "gazebo"} if hasattr(MultibodyPlant, "SetEnableLoopTopology") else {}),
+        **(
+            {"four joints": "gazebo"}
+            if hasattr(MultibodyPlant, "SetEnableLoopTopology")
+            else {}
+        ),
     }
     """Simulator for which the SDF is written; Gazebo's SDF has the fourth joint."""
 
@@ -52,20 +72,35 @@ class DrakeSap(Simulator):
         )  # also one of every other joint
         for joint, speed in zip(joints, begin.qvel, strict=True):
             joint.set_angular_rate(context, speed)
-        closing = plant.GetJointByName("B") if written_for == "gazebo" else None  # bar 3 on bar 4
+        closing = (
+            plant.GetJointByName("B") if written_for == "gazebo" else None
+        )  # bar 3 on bar 4
         if closing is not None:
-            closing.set_angular_rate(context, begin.qvel[0] + begin.qvel[1] - begin.qvel[2])
+            closing.set_angular_rate(
+                context, begin.qvel[0] + begin.qvel[1] - begin.qvel[2]
+            )
         simulator = analysis.Simulator(plant, context)
         done = 0
 
         def advance(steps: int) -> tuple[list[float], float, dict[str, Any]]:
             nonlocal done
             simulator.AdvanceTo((done + steps - 1) * timestep)
-            angles = [joint.get_angle(context) + q for joint, q in zip(joints, begin.qpos, strict=True)]
-            theta, speed = [angles[0], angles[0] + angles[1], angles[2]], joints[0].get_angular_rate(context)
+            angles = [
+                joint.get_angle(context) + q
+                for joint, q in zip(joints, begin.qpos, strict=True)
+            ]
+            theta, speed = (
+                [angles[0], angles[0] + angles[1], angles[2]],
+                joints[0].get_angular_rate(context),
+            )
             reactions = plant.get_reaction_forces_output_port().Eval(context)
-            on_child = (reactions[int(joint.index())].translational()[:2] for joint in joints)
-            O2, A, O4 = (np.array(rotate(angle, *force)) for angle, force in zip(theta, on_child, strict=True))
+            on_child = (
+                reactions[int(joint.index())].translational()[:2] for joint in joints
+            )
+            O2, A, O4 = (
+                np.array(rotate(angle, *force))
+                for angle, force in zip(theta, on_child, strict=True)
+            )
             forces = {"F12": O2, "F32": -A, "F14": O4}
             if closing is not None:
                 on_coupler = reactions[int(closing.index())].translational()[:2]

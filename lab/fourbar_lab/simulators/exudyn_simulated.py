@@ -29,14 +29,22 @@ class ExudynIntegrators(Simulator):
         """Run through a course; multipliers, speeds and accelerations are all of the end of a step."""
         begin, bars = start(scene), ExudynBars(scene)
         if bars.terms:
-            raise LimitError("Exudyn's own simulation has gravity, viscous pins and springs alone")
+            raise LimitError(
+                "Exudyn's own simulation has gravity, viscous pins and springs alone"
+            )
         mbs, state = bars.mbs, bars.state
         theta_2, omega_2 = begin.qpos[0], begin.qvel[0]
         bars.place(begin.qpos)
         speeds = np.linalg.solve(bars.jacobians, omega_2 * np.eye(SIZE)[-1])
         initial = exu.ConfigurationType.Initial
-        mbs.SetObjectParameter(bars.drive, "offsetUserFunction", lambda _, t, __, ___: theta_2 + omega_2 * t)
-        mbs.SetObjectParameter(bars.drive, "offsetUserFunction_t", lambda _, t, __, ___: omega_2)
+        mbs.SetObjectParameter(
+            bars.drive,
+            "offsetUserFunction",
+            lambda _, t, __, ___: theta_2 + omega_2 * t,
+        )
+        mbs.SetObjectParameter(
+            bars.drive, "offsetUserFunction_t", lambda _, t, __, ___: omega_2
+        )
         state.SetODE2Coordinates(bars.q, configuration=initial)
         state.SetODE2Coordinates_t(speeds, configuration=initial)
         readings, done = Readings(), 0
@@ -47,10 +55,20 @@ class ExudynIntegrators(Simulator):
             if done in course.stops:
                 q, v, a = (np.array(get()) for get in (state.GetODE2Coordinates, state.GetODE2Coordinates_t,
                                                        state.GetODE2Coordinates_tt))  # fmt: skip
-                exerted = -np.array(state.GetAECoordinates())  # its multipliers stand on the other side of M a = f
-                forces = {PIN_FORCE[pin]: exerted[2 * number : 2 * number + 2] for number, pin in enumerate(JOINTS)}
+                exerted = -np.array(
+                    state.GetAECoordinates()
+                )  # its multipliers stand on the other side of M a = f
+                forces = {
+                    PIN_FORCE[pin]: exerted[2 * number : 2 * number + 2]
+                    for number, pin in enumerate(JOINTS)
+                }
                 theta = [q[turn] for turn in bars.turn.values()]
-                readings.read(scene, Instant(theta, v[bars.turn[2]], a[bars.turn[2]], exerted[-1], forces))
+                readings.read(
+                    scene,
+                    Instant(
+                        theta, v[bars.turn[2]], a[bars.turn[2]], exerted[-1], forces
+                    ),
+                )
             return True
 
         mbs.SetPostStepUserFunction(read)

@@ -52,9 +52,15 @@ def read_outcome(done: Ended) -> str:
 
 def read(script: Path) -> Reproduction:
     """Read the docstring of a script."""
-    sentence, _, rest = (ast.get_docstring(ast.parse(script.read_text(encoding="utf-8"))) or "").partition("\n")
-    stated = re.findall(rf"^({'|'.join(FIELDS)}): (.*(?:\n  .*)*)", dedent(rest), re.MULTILINE)
-    return Reproduction(script, sentence, {name: " ".join(text.split()) for name, text in stated})
+    sentence, _, rest = (
+        ast.get_docstring(ast.parse(script.read_text(encoding="utf-8"))) or ""
+    ).partition("\n")
+    stated = re.findall(
+        rf"^({'|'.join(FIELDS)}): (.*(?:\n  .*)*)", dedent(rest), re.MULTILINE
+    )
+    return Reproduction(
+        script, sentence, {name: " ".join(text.split()) for name, text in stated}
+    )
 
 
 def read_findings() -> list[Reproduction]:
@@ -78,36 +84,58 @@ def _list_interpreters(name: str) -> Iterator[str]:
     """List this interpreter, and those of the engines that require a package, which pip installs for the first."""
     yield sys.executable
     for entry in read_engines([]).values():
-        if any(re.match(r"[\w.-]+", requirement)[0] == name for requirement in entry.requires):  # type: ignore[index]
+        if any(
+            re.match(r"[\w.-]+", requirement)[0] == name  # type: ignore[index]
+            for requirement in entry.requires
+        ):
             try:
                 yield make_environment(entry)
             except DependencyError as error:
                 click.echo(str(error), err=True)
 
 
-def run_findings(findings: list[Reproduction], seconds: float) -> list[tuple[Reproduction, str]]:
+def run_findings(
+    findings: list[Reproduction], seconds: float
+) -> list[tuple[Reproduction, str]]:
     """Run each finding where its engine is: what came of it, in words."""
     outcomes = []
     for finding in findings:
         place = find_interpreter(finding)
         if place is None:
-            outcomes.append((finding, f"not run: {finding.engine[0]} is not installed, and no engine requires it"))
+            outcomes.append(
+                (
+                    finding,
+                    f"not run: {finding.engine[0]} is not installed, and no engine requires it",
+                )
+            )
         else:
-            outcomes.append((finding, f"{finding.run(place[0], seconds)} in {place[1]}"))
+            outcomes.append(
+                (finding, f"{finding.run(place[0], seconds)} in {place[1]}")
+            )
     return outcomes
 
 
 @click.command()
-@click.argument("scripts", nargs=-1, type=click.Path(exists=True, dir_okay=False, path_type=Path))
-@click.option("--time-limit", default=600.0, show_default=True, help="Seconds for each script.")
+@click.argument(
+    "scripts", nargs=-1, type=click.Path(exists=True, dir_okay=False, path_type=Path)
+)
+@click.option(
+    "--time-limit", default=600.0, show_default=True, help="Seconds for each script."
+)
 def command(scripts: tuple[Path, ...], time_limit: float) -> None:
     """Run the scripts of docs/findings where their simulators are: here, or in environments of engines.toml."""
     chosen = [read(script) for script in scripts] or read_findings()
     for finding in chosen:
         if "Engine" not in finding.fields:
-            raise InputError("SCRIPT", str(finding.script), "has no line 'Engine: NAME (MODULE)' in its docstring")
+            raise InputError(
+                "SCRIPT",
+                str(finding.script),
+                "has no line 'Engine: NAME (MODULE)' in its docstring",
+            )
     outcomes = run_findings(chosen, time_limit)
     for finding, state in outcomes:
         click.echo(f"{finding.script.name}: {state}")
     if all(state.startswith("not run") for _, state in outcomes):
-        raise DependencyError("no finding's simulator is installed here or required by an engine of engines.toml")
+        raise DependencyError(
+            "no finding's simulator is installed here or required by an engine of engines.toml"
+        )

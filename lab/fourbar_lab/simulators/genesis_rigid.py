@@ -23,7 +23,11 @@ from fourbar_lab.simulators.mujoco_c import text
 FLYWHEEL = 1e5
 """Inertia of the flywheel relative to the linkage's; beside 1e8 its solver leaves gravity to itself unless it is set to
 MuJoCo's tolerance."""
-genesis.init(backend=genesis.gpu if torch.cuda.is_available() else genesis.cpu, precision="64", logging_level="error")
+genesis.init(
+    backend=genesis.gpu if torch.cuda.is_available() else genesis.cpu,
+    precision="64",
+    logging_level="error",
+)
 
 
 class GenesisRigid(Simulator):
@@ -51,7 +55,9 @@ class GenesisRigid(Simulator):
             ),
             show_viewer=False,
         )
-        with write_temp(text(scene, course.steps, "genesis", flywheel=FLYWHEEL), "four_bar.xml") as file:
+        with write_temp(
+            text(scene, course.steps, "genesis", flywheel=FLYWHEEL), "four_bar.xml"
+        ) as file:
             bars = world.add_entity(genesis.morphs.MJCF(file=file, **of_morph))
             world.build()
         world.step()  # compiled before the clock runs
@@ -62,7 +68,10 @@ class GenesisRigid(Simulator):
         def advance(steps: int) -> tuple[Any, float]:
             for _ in range(steps - 1):
                 world.step()
-            q, speed = bars.get_qpos().cpu().numpy().copy(), float(bars.get_dofs_velocity()[0])
+            q, speed = (
+                bars.get_qpos().cpu().numpy().copy(),
+                float(bars.get_dofs_velocity()[0]),
+            )
             world.step()
             return q, speed
 
@@ -70,6 +79,12 @@ class GenesisRigid(Simulator):
             q, speed = before
             alpha = float(solver.get_dofs_acc().cpu().numpy().ravel()[0])
             closing = solver.constraint_solver.efc_force.to_numpy()[:2].ravel()
-            return Instant((q[0], q[0] + q[1], q[2]), speed, alpha, -armature * alpha, {"F43": closing})
+            return Instant(
+                (q[0], q[0] + q[1], q[2]),
+                speed,
+                alpha,
+                -armature * alpha,
+                {"F43": closing},
+            )
 
         return run_through(scene, course, advance, read)

@@ -46,7 +46,9 @@ def list_keys(scene: Scene) -> tuple[str, ...]:
     return ("lengths.coupler", "bars.coupler.mass", command_key(scene))
 
 
-def assemble_either_side(scene: Scene, theta_2: float, key: str, reader: str) -> list[ClosedState]:
+def assemble_either_side(
+    scene: Scene, theta_2: float, key: str, reader: str
+) -> list[ClosedState]:
     """Assemble the scene with a number a little greater, and a little less."""
     sides = []
     for step in (DIFFERENCE, -DIFFERENCE):
@@ -54,13 +56,17 @@ def assemble_either_side(scene: Scene, theta_2: float, key: str, reader: str) ->
             sides.append(assemble(scene, theta_2 + step, reader))
         else:
             number = float(read_place(scene, list_entries(scene)[key].place)) + step
-            sides.append(assemble(replace_numbers(scene, {key: number}), theta_2, reader))
+            sides.append(
+                assemble(replace_numbers(scene, {key: number}), theta_2, reader)
+            )
     return sides
 
 
 def change(more: Any, less: Any) -> Any:
     """Differentiate numbers by what the two sides differ in."""
-    return (np.asarray(more, dtype=float) - np.asarray(less, dtype=float)) / (2.0 * DIFFERENCE)
+    return (np.asarray(more, dtype=float) - np.asarray(less, dtype=float)) / (
+        2.0 * DIFFERENCE
+    )
 
 
 def choose_quarter(scene: Scene) -> tuple[float, float]:
@@ -69,7 +75,9 @@ def choose_quarter(scene: Scene) -> tuple[float, float]:
     return begin, begin + 0.5 * np.pi * float(np.sign(scene.motion.omega_2 or 1.0))
 
 
-def collect_answer(scene: Scene, how: str, state: tuple[Any, Any, Any, Any], by: dict[str, Any]) -> dict[str, Any]:
+def collect_answer(
+    scene: Scene, how: str, state: tuple[Any, Any, Any, Any], by: dict[str, Any]
+) -> dict[str, Any]:
     """Put together theta_2, omega_2, alpha_2 and torque of a state, and the torque's derivatives, as plain numbers."""
     names = (*scene.motion.names, "torque")
     return {"how": how, "by": {key: float(x) for key, x in by.items()}} | {

@@ -73,8 +73,14 @@ class Readings:
     def read(self, scene: Scene, now: Instant) -> None:
         """Add a reading, as a copy: a simulator may hand out views of its state."""
         theta = (float(now.theta[0]), float(now.theta[1]), float(now.theta[2]))
-        forces = {name: np.array(force[:2], float) for name, force in now.forces.items()}
-        self.instants.append(Instant(theta, float(now.omega_2), float(now.alpha_2), float(now.torque), forces))
+        forces = {
+            name: np.array(force[:2], float) for name, force in now.forces.items()
+        }
+        self.instants.append(
+            Instant(
+                theta, float(now.omega_2), float(now.alpha_2), float(now.torque), forces
+            )
+        )
         gap = compute_gap(scene, theta)
         self.gap = float(np.maximum(self.gap, gap))  # NaN stays NaN
 
@@ -97,16 +103,25 @@ class Simulator:
     """True if `states` evaluates positions that are set one by one."""
 
     def __init__(self) -> None:
-        self.setting, self.steps = next(iter(self.settings)), None if self.single_states else STEPS
+        self.setting, self.steps = (
+            next(iter(self.settings)),
+            None if self.single_states else STEPS,
+        )
 
     def at_setting(
-        self, name: str | None = None, steps_per_turn: int | None = None, error: float | None = None
+        self,
+        name: str | None = None,
+        steps_per_turn: int | None = None,
+        error: float | None = None,
     ) -> "Simulator":
         """Return the simulator with a setting, in so many steps a turn."""
         if error is not None:
             raise LimitError("it knows no law of its error: ask for steps_per_turn")
         chosen = copy.copy(self)
-        chosen.setting, chosen.steps = name or self.setting, steps_per_turn or self.steps
+        chosen.setting, chosen.steps = (
+            name or self.setting,
+            steps_per_turn or self.steps,
+        )
         return chosen
 
     def through(self, scene: Scene, course: Course) -> Readings:
@@ -131,19 +146,32 @@ class Simulator:
             else:
                 led, course = lay_out(scene, command, steps)
                 rows, readings = course.rows, self.through(led, course)
-        except (InputError, LimitError) as limit:  # InputError: a scene that no file for this simulator can hold
+        except (
+            InputError,
+            LimitError,
+        ) as limit:  # InputError: a scene that no file for this simulator can hold
             return Answer(self.name, setting, refusal=str(limit))
         if len(readings.instants) != len(set(rows.tolist())):
-            raise NotAssembledError(f"{len(readings.instants)} of {len(set(rows.tolist()))} positions were read")
+            raise NotAssembledError(
+                f"{len(readings.instants)} of {len(set(rows.tolist()))} positions were read"
+            )
         read = [readings.instants[row] for row in rows]
         theta = np.array([instant.theta for instant in read])
-        moved = [np.array([getattr(instant, name) for instant in read]) for name in ("omega_2", "alpha_2")]
+        moved = [
+            np.array([getattr(instant, name) for instant in read])
+            for name in ("omega_2", "alpha_2")
+        ]
         if not (np.isfinite(theta).all() and np.isfinite(moved).all()):
             raise ArithmeticError("the simulation diverged")
         values = {"theta_3": theta[:, 1], "theta_4": theta[:, 2]}
         values["torque"] = np.array([instant.torque for instant in read])
-        values |= {name: np.array([instant.forces[name] for instant in read]) for name in read[0].forces}
-        turned = np.remainder(theta[:, 0] - command.theta_2 + np.pi, 2.0 * np.pi) - np.pi
+        values |= {
+            name: np.array([instant.forces[name] for instant in read])
+            for name in read[0].forces
+        }
+        turned = (
+            np.remainder(theta[:, 0] - command.theta_2 + np.pi, 2.0 * np.pi) - np.pi
+        )
         made = Command(command.theta_2 + turned, command.branch, moved[0], moved[1])
         gap = readings.gap / max(scene.linkage.lengths)
         return Answer(self.name, setting, made, np.ones(n, bool), values, evidence={"gap": gap},
@@ -153,9 +181,16 @@ class Simulator:
 def refuse_what_no_simulator_holds(scene: Scene, command: Command) -> None:
     """Raise LimitError for a motion other than omega_2 on one branch, and for loads."""
     speed, acceleration = list_speeds(command)
-    steady = command.speed is not None and speed[0] != 0.0 and np.ptp(speed) == 0.0 and not acceleration.any()
+    steady = (
+        command.speed is not None
+        and speed[0] != 0.0
+        and np.ptp(speed) == 0.0
+        and not acceleration.any()
+    )
     if not steady or scene.loads or scene.motion.through != "sign":
-        raise LimitError("a simulator runs at one speed omega_2, without loads, on one branch")
+        raise LimitError(
+            "a simulator runs at one speed omega_2, without loads, on one branch"
+        )
 
 
 def lay_out(scene: Scene, command: Command, steps: int) -> tuple[Scene, Course]:
@@ -163,19 +198,40 @@ def lay_out(scene: Scene, command: Command, steps: int) -> tuple[Scene, Course]:
     refuse_what_no_simulator_holds(scene, command)
     sense = math.copysign(1.0, scene.motion.omega_2 or 0.0)
     first = float((sense * command.theta_2).min()) * sense
-    lead = next((lead for lead in LEADS if _closes(scene, np.linspace(first - sense * lead, first, 50))), 0.0)
+    lead = next(
+        (
+            lead
+            for lead in LEADS
+            if _closes(scene, np.linspace(first - sense * lead, first, 50))
+        ),
+        0.0,
+    )
     progress = sense * (command.theta_2 - first) + lead
-    stops, rows = np.unique(np.maximum(1, np.rint(progress / math.tau * steps).astype(int)), return_inverse=True)
+    stops, rows = np.unique(
+        np.maximum(1, np.rint(progress / math.tau * steps).astype(int)),
+        return_inverse=True,
+    )
     if len(stops) < len(np.unique(progress)):
         raise LimitError("its positions lie closer together than the steps")
-    motion = scene.motion.replace(angle=np.array([first - sense * lead, *command.theta_2]))
-    return replace(scene, motion=motion), Course(find_timestep(scene, steps), steps, stops.tolist(), rows)
+    motion = scene.motion.replace(
+        angle=np.array([first - sense * lead, *command.theta_2])
+    )
+    return replace(scene, motion=motion), Course(
+        find_timestep(scene, steps), steps, stops.tolist(), rows
+    )
 
 
 def _closes(scene: Scene, theta_2: Array) -> bool:
     """Tell whether the linkage closes at all these angles, and far from a toggle."""
-    closed = close(scene.linkage, theta_2, np.full(len(theta_2), scene.motion.branch, dtype=np.int8))
-    return bool(closed.assembled.all() and np.abs(np.sin(closed.theta[1] - closed.theta[0])).min() > FROM_TOGGLE)
+    closed = close(
+        scene.linkage,
+        theta_2,
+        np.full(len(theta_2), scene.motion.branch, dtype=np.int8),
+    )
+    return bool(
+        closed.assembled.all()
+        and np.abs(np.sin(closed.theta[1] - closed.theta[0])).min() > FROM_TOGGLE
+    )
 
 
 def find_timestep(scene: Scene, steps: int) -> float:
@@ -214,18 +270,28 @@ def start(scene: Scene) -> Start:
     closed = close(scene.linkage, commanded.theta_2, commanded.branch)
     usable = np.flatnonzero(closed.assembled)
     if not len(usable):
-        raise NotAssembledError("the linkage closes at none of the scene's positions: there is nothing to start from")
+        raise NotAssembledError(
+            "the linkage closes at none of the scene's positions: there is nothing to start from"
+        )
     theta_2 = commanded.theta_2[usable]
     first = usable[[np.argmin(theta_2) if omega_2 >= 0.0 else np.argmax(theta_2)]]
     theta = (commanded.theta_2[first], *closed.theta[:, first])
-    omega = move(scene.linkage, theta[0], np.array([omega_2]), np.zeros(1), *theta[1:]).omega
+    omega = move(
+        scene.linkage, theta[0], np.array([omega_2]), np.zeros(1), *theta[1:]
+    ).omega
     q, v = [float(x[0]) for x in theta], [float(omega[bar][0]) for bar in (2, 3, 4)]
-    return Start((q[0], q[1] - q[0], q[2]), (v[0], v[1] - v[0], v[2]), choose_run(theta_2, omega_2, 0.0))
+    return Start(
+        (q[0], q[1] - q[0], q[2]),
+        (v[0], v[1] - v[0], v[2]),
+        choose_run(theta_2, omega_2, 0.0),
+    )
 
 
 def find_gravity(scene: Scene) -> tuple[float, float, float]:
     """Return the field of gravity, m/s^2."""
-    fields = [find_field(effect) for effect in scene.effects if isinstance(effect, Gravity)]
+    fields = [
+        find_field(effect) for effect in scene.effects if isinstance(effect, Gravity)
+    ]
     return (*fields[0], 0.0) if fields else (0.0, 0.0, 0.0)
 
 
@@ -243,6 +309,8 @@ def compute_gap(scene: Scene, theta: tuple[float, float, float]) -> float:
     linkage = scene.linkage
     a, b, c = (
         bar.length * np.exp(1j * angle)
-        for bar, angle in zip((linkage.input, linkage.coupler, linkage.output), theta, strict=True)
+        for bar, angle in zip(
+            (linkage.input, linkage.coupler, linkage.output), theta, strict=True
+        )
     )
     return float(abs(a + b - c - linkage.ground * np.exp(1j * linkage.ground_angle)))

@@ -8,13 +8,25 @@ import mujoco
 
 from fourbar.mjcf import SIMULATORS, write_mjcf
 from fourbar.scene import Scene, command
-from fourbar_lab.simulators.motion import STEPS, Course, Instant, Readings, Simulator, find_timestep, run_through, start
+from fourbar_lab.simulators.motion import (
+    STEPS,
+    Course,
+    Instant,
+    Readings,
+    Simulator,
+    find_timestep,
+    run_through,
+    start,
+)
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.engines.loop import Assembler
 from fourbar_validation.engines.mujoco.closed_loop import ClosedLoop, open_model
 from fourbar_validation.engines.mujoco.drives import remove_attributes
 
-BY_DEFAULT = {"option": ("integrator", "solver", "tolerance", "iterations"), "equality/connect": ("solref", "solimp")}
+BY_DEFAULT = {
+    "option": ("integrator", "solver", "tolerance", "iterations"),
+    "equality/connect": ("solref", "solimp"),
+}
 """Attributes that "its defaults" leaves to MuJoCo."""
 
 
@@ -24,19 +36,29 @@ def text(scene: Scene, steps: int, simulator: str | None, **settings: Any) -> st
     Without a simulator's name all that the solver is set to goes; `settings`: others than those of the simulator.
     """
     reader = simulator or "warp"  # without pads
-    changed = replace(SIMULATORS[reader], timestep=find_timestep(scene, steps), **settings)
+    changed = replace(
+        SIMULATORS[reader], timestep=find_timestep(scene, steps), **settings
+    )
     written = write_mjcf(scene, changed, reader, start=start(scene))
     return written if simulator is not None else remove_attributes(written, BY_DEFAULT)
 
 
-def reading(model: Any, q: Any, v: Any, a: Any, drive: float, closing: Any, borne: Any) -> Instant:
+def reading(
+    model: Any, q: Any, v: Any, a: Any, drive: float, closing: Any, borne: Any
+) -> Instant:
     """Read as the comment in the file says; q, v, a in the joints' coordinates.
 
     `borne`: cfrc_int of input, coupler and output, whose last three numbers are the force of the parent on the body.
     """
     torque = drive - model.dof_armature[0] * a[0]
     F12, F23, F14 = (wrench[3:5] for wrench in borne)
-    return Instant((q[0], q[0] + q[1], q[2]), v[0], a[0], torque, {"F12": F12, "F32": -F23, "F43": closing, "F14": F14})
+    return Instant(
+        (q[0], q[0] + q[1], q[2]),
+        v[0],
+        a[0],
+        torque,
+        {"F12": F12, "F32": -F23, "F43": closing, "F14": F14},
+    )
 
 
 def find_bars(model: Any) -> list[int]:
@@ -59,8 +81,13 @@ class MujocoFile(Simulator):
     """MuJoCo with the generated file."""
 
     name, version = "MuJoCo", mujoco.__version__
-    changed = "nothing; the softness of its default constraints is deliberate, and documented"
-    settings: ClassVar[dict[str, str | None]] = {"generated file": "mujoco", "its defaults": None}
+    changed = (
+        "nothing; the softness of its default constraints is deliberate, and documented"
+    )
+    settings: ClassVar[dict[str, str | None]] = {
+        "generated file": "mujoco",
+        "its defaults": None,
+    }
     single_states = True
 
     def through(self, scene: Scene, course: Course) -> Readings:
@@ -83,4 +110,12 @@ def _evaluated(model: Any, data: Any) -> Instant:
     mujoco.mj_forward(model, data)
     mujoco.mj_rnePostConstraint(model, data)
     drive = data.actuator_force[model.actuator("drive").id]
-    return reading(model, data.qpos, data.qvel, data.qacc, drive, data.efc_force[:2], data.cfrc_int[find_bars(model)])
+    return reading(
+        model,
+        data.qpos,
+        data.qvel,
+        data.qacc,
+        drive,
+        data.efc_force[:2],
+        data.cfrc_int[find_bars(model)],
+    )

@@ -11,7 +11,14 @@ from mujoco import mjx
 
 from fourbar.scene import Scene
 from fourbar_lab.simulators import gradients
-from fourbar_lab.simulators.motion import STEPS, Course, Instant, Readings, Simulator, run_through
+from fourbar_lab.simulators.motion import (
+    STEPS,
+    Course,
+    Instant,
+    Readings,
+    Simulator,
+    run_through,
+)
 from fourbar_lab.simulators.mujoco_c import find_bars, reading, states_of, text
 from fourbar_validation.engines.mujoco.closed_loop import open_model
 
@@ -34,9 +41,14 @@ class MujocoMjx(Simulator):
     """MJX in JAX, which takes a GPU where it has one."""
 
     name, version = "MJX-JAX", version("mujoco-mjx")
-    device = "CPU" if jax.default_backend() == "cpu" else str(jax.devices()[0].device_kind)
+    device = (
+        "CPU" if jax.default_backend() == "cpu" else str(jax.devices()[0].device_kind)
+    )
     changed = "a closure of two timesteps (--for mjx), and jax_enable_x64"
-    settings: ClassVar[dict[str, str]] = {"written for MJX": "mjx", "as for MuJoCo": "mujoco"}
+    settings: ClassVar[dict[str, str]] = {
+        "written for MJX": "mjx",
+        "as for MuJoCo": "mujoco",
+    }
     """The file written for MJX yields within two timesteps, which makes up for the term that MJX leaves out."""
     single_states = True
 
@@ -44,20 +56,28 @@ class MujocoMjx(Simulator):
         """Run through a course."""
         model, data = open_model(text(scene, course.steps, self.settings[self.setting]))
         theirs, state = mjx.put_model(model), mjx.put_data(model, data)
-        jax.block_until_ready(advance(theirs, state, 1))  # compiled before the clock runs
+        jax.block_until_ready(
+            advance(theirs, state, 1)
+        )  # compiled before the clock runs
 
         def further(steps: int) -> Any:
             nonlocal state
             state = jax.block_until_ready(advance(theirs, state, steps))
             return state
 
-        return run_through(scene, course, further, lambda now: _evaluated(model, forward(theirs, now)))
+        return run_through(
+            scene, course, further, lambda now: _evaluated(model, forward(theirs, now))
+        )
 
     def states(self, scene: Scene) -> Readings:
         """Evaluate single states, each set by itself."""
         written = text(scene, STEPS, self.settings[self.setting])
         model, data = open_model(written)
-        theirs, state, readings = mjx.put_model(model), mjx.put_data(model, data), Readings()
+        theirs, state, readings = (
+            mjx.put_model(model),
+            mjx.put_data(model, data),
+            Readings(),
+        )
         for q, v in states_of(written, scene):
             placed = state.replace(qpos=jax.numpy.array(q), qvel=jax.numpy.array(v))
             readings.read(scene, _evaluated(model, forward(theirs, placed)))
@@ -66,26 +86,51 @@ class MujocoMjx(Simulator):
     def slopes(self, scene: Scene) -> list[dict[str, Any]]:
         """Differentiate the driving torque forwards, at a set state and through a quarter turn, and backwards."""
         begin, end = gradients.choose_quarter(scene)
-        ways = [("jax.jvp at a set state", end, 0), ("jax.jvp through a quarter turn", begin, gradients.STEPS // 4)]
-        ways_tried = [_slopes(scene, how, state, partial(_forwards, steps=steps)) for how, state, steps in ways]
+        ways = [
+            ("jax.jvp at a set state", end, 0),
+            ("jax.jvp through a quarter turn", begin, gradients.STEPS // 4),
+        ]
+        ways_tried = [
+            _slopes(scene, how, state, partial(_forwards, steps=steps))
+            for how, state, steps in ways
+        ]
         try:
-            ways_tried.append(_slopes(scene, "jax.grad at a set state", end, _backwards))
+            ways_tried.append(
+                _slopes(scene, "jax.grad at a set state", end, _backwards)
+            )
         except ValueError as error:
             ways_tried.append({"how": f"jax.grad: {error}"})
         return [
             *ways_tried,
-            _slopes(scene, 'jax.grad at a set state, iterations="1"', end, partial(_backwards, iterations=1)),
+            _slopes(
+                scene,
+                'jax.grad at a set state, iterations="1"',
+                end,
+                partial(_backwards, iterations=1),
+            ),
         ]
 
 
 def _evaluated(model: Any, state: Any) -> Instant:
-    q, v, a, drive = (np.array(x) for x in (state.qpos, state.qvel, state.qacc, state.actuator_force))
+    q, v, a, drive = (
+        np.array(x) for x in (state.qpos, state.qvel, state.qacc, state.actuator_force)
+    )
     inner = getattr(state, "_impl", state)
     closing, on_bodies = np.array(inner.efc_force)[:2], np.array(inner.cfrc_int)
-    return reading(model, q, v, a, drive[model.actuator("drive").id], closing, on_bodies[find_bars(model)])
+    return reading(
+        model,
+        q,
+        v,
+        a,
+        drive[model.actuator("drive").id],
+        closing,
+        on_bodies[find_bars(model)],
+    )
 
 
-def _slopes(scene: Scene, how: str, theta_2: float, differentiate: Callable[..., Any]) -> dict[str, Any]:
+def _slopes(
+    scene: Scene, how: str, theta_2: float, differentiate: Callable[..., Any]
+) -> dict[str, Any]:
     """Differentiate along the changes of model and state, which as trees differ in what is no number of theirs."""
     model, data, q, v = gradients.assemble(scene, theta_2, "mjx")
     inputs, by, state = (mjx.put_model(model), q, v), {}, (0.0,) * 4
@@ -99,10 +144,15 @@ def _slopes(scene: Scene, how: str, theta_2: float, differentiate: Callable[...,
     return gradients.collect_answer(scene, how, state, by)
 
 
-def _torque(part: Any, inputs: Any, moves: Any, data: Any, steps: Any) -> tuple[Any, Any]:
+def _torque(
+    part: Any, inputs: Any, moves: Any, data: Any, steps: Any
+) -> tuple[Any, Any]:
     """Evaluate the torque where so much of the moves is added to what is given, and the state it is of."""
     leaves, tree = jax.tree.flatten(inputs)
-    moved = [x + part * y if jax.numpy.issubdtype(x.dtype, float) else x for x, y in zip(leaves, moves, strict=True)]
+    moved = [
+        x + part * y if jax.numpy.issubdtype(x.dtype, float) else x
+        for x, y in zip(leaves, moves, strict=True)
+    ]
     model, q, v = jax.tree.unflatten(tree, moved)
     now = data.replace(qpos=q, qvel=v)
     now = mjx.forward(model, now if steps is None else advance(model, now, steps))
@@ -112,7 +162,12 @@ def _torque(part: Any, inputs: Any, moves: Any, data: Any, steps: Any) -> tuple[
 
 @jax.jit  # type: ignore[untyped-decorator]
 def _forwards(inputs: Any, moves: Any, data: Any, steps: int) -> Any:
-    _, slope, state = jax.jvp(lambda part: _torque(part, inputs, moves, data, steps), (0.0,), (1.0,), has_aux=True)
+    _, slope, state = jax.jvp(
+        lambda part: _torque(part, inputs, moves, data, steps),
+        (0.0,),
+        (1.0,),
+        has_aux=True,
+    )
     return slope, state
 
 
@@ -120,4 +175,6 @@ def _forwards(inputs: Any, moves: Any, data: Any, steps: int) -> Any:
 def _backwards(inputs: Any, moves: Any, data: Any, iterations: int = 10) -> Any:
     model, *state = inputs
     once = (model.tree_replace({"opt.iterations": iterations}), *state)
-    return jax.grad(lambda part: _torque(part, once, moves, data, None), has_aux=True)(0.0)
+    return jax.grad(lambda part: _torque(part, once, moves, data, None), has_aux=True)(
+        0.0
+    )

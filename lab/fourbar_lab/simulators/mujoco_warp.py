@@ -9,7 +9,14 @@ import warp
 
 from fourbar.scene import Scene
 from fourbar_lab.simulators import gradients
-from fourbar_lab.simulators.motion import STEPS, Course, Instant, Readings, Simulator, run_through
+from fourbar_lab.simulators.motion import (
+    STEPS,
+    Course,
+    Instant,
+    Readings,
+    Simulator,
+    run_through,
+)
 from fourbar_lab.simulators.mujoco_c import find_bars, reading, states_of, text
 from fourbar_validation.engines.mujoco.closed_loop import open_model
 
@@ -28,7 +35,11 @@ class MujocoWarp(Simulator):
     settings: ClassVar[dict[str, tuple[int, int]]] = {
         "forward twice": (2, 1),
         "forward once": (1, 1),
-        **({f"forward twice, {worlds} worlds": (2, worlds) for worlds in (64, 4096)} if ON_GPU else {}),
+        **(
+            {f"forward twice, {worlds} worlds": (2, worlds) for worlds in (64, 4096)}
+            if ON_GPU
+            else {}
+        ),
     }
     """Number of evaluations of a state and of simulated worlds; the last world is read."""
     single_states = True
@@ -38,7 +49,9 @@ class MujocoWarp(Simulator):
         model, data = open_model(text(scene, course.steps, "warp"))
         times, worlds = self.settings[self.setting]
         theirs, state = mjw.put_model(model), mjw.put_data(model, data, nworld=worlds)
-        mjw.step(theirs, mjw.put_data(model, data, nworld=worlds))  # compiled before the clock runs
+        mjw.step(
+            theirs, mjw.put_data(model, data, nworld=worlds)
+        )  # compiled before the clock runs
 
         def advance(steps: int) -> None:
             for _ in range(steps):
@@ -46,7 +59,13 @@ class MujocoWarp(Simulator):
             warp.synchronize()
 
         clock = time.perf_counter if ON_GPU else time.process_time
-        readings = run_through(scene, course, advance, lambda _: _evaluated(model, theirs, state, times), clock)
+        readings = run_through(
+            scene,
+            course,
+            advance,
+            lambda _: _evaluated(model, theirs, state, times),
+            clock,
+        )
         readings.seconds /= worlds
         return readings
 
@@ -54,11 +73,17 @@ class MujocoWarp(Simulator):
         """Evaluate single states, each set by itself."""
         written = text(scene, STEPS, "warp")
         model, data = open_model(written)
-        theirs, state, readings = mjw.put_model(model), mjw.put_data(model, data), Readings()
+        theirs, state, readings = (
+            mjw.put_model(model),
+            mjw.put_data(model, data),
+            Readings(),
+        )
         for q, v in states_of(written, scene):
             state.qpos.assign(np.array([q], dtype=np.float32))
             state.qvel.assign(np.array([v], dtype=np.float32))
-            readings.read(scene, _evaluated(model, theirs, state, self.settings[self.setting][0]))
+            readings.read(
+                scene, _evaluated(model, theirs, state, self.settings[self.setting][0])
+            )
         return readings
 
     def slopes(self, scene: Scene) -> list[dict[str, Any]]:
@@ -68,28 +93,39 @@ class MujocoWarp(Simulator):
         theirs, state = mjw.put_model(model), mjw.put_data(model, data)
         state.qpos.assign(np.array([q], dtype=np.float32))
         state.qvel.assign(np.array([v], dtype=np.float32))
-        inputs = {name: getattr(theirs, name) for name in NUMBERS} | {"qpos": state.qpos, "qvel": state.qvel}
+        inputs = {name: getattr(theirs, name) for name in NUMBERS} | {
+            "qpos": state.qpos,
+            "qvel": state.qvel,
+        }
         for array in (*inputs.values(), state.qacc, state.actuator_force):
             array.requires_grad = True
         with warp.Tape() as tape:
             now = _evaluated(model, theirs, state, 2)
         drive = warp.full_like(state.actuator_force, 1.0)
         tape.backward(
-            grads={state.actuator_force: drive, state.qacc: warp.full_like(state.qacc, -model.dof_armature[0])}
+            grads={
+                state.actuator_force: drive,
+                state.qacc: warp.full_like(state.qacc, -model.dof_armature[0]),
+            }
         )
         by = {}
         for key in gradients.list_keys(scene):
             more, less = (
-                {name: getattr(side.model, name) for name in NUMBERS} | {"qpos": side.qpos, "qvel": side.qvel}
+                {name: getattr(side.model, name) for name in NUMBERS}
+                | {"qpos": side.qpos, "qvel": side.qvel}
                 for side in gradients.assemble_either_side(scene, theta_2, key, "warp")
             )
             by[key] = sum(
-                np.sum(array.grad.numpy() * gradients.change(more[name], less[name])) for name, array in inputs.items()
+                np.sum(array.grad.numpy() * gradients.change(more[name], less[name]))
+                for name, array in inputs.items()
             )
         here = (now.theta[0], now.omega_2, now.alpha_2, now.torque)
         return [
             gradients.collect_answer(
-                scene, "warp.Tape at a set state; it warns that its modules have no backward pass", here, by
+                scene,
+                "warp.Tape at a set state; it warns that its modules have no backward pass",
+                here,
+                by,
             )
         ]
 
@@ -101,4 +137,12 @@ def _evaluated(model: Any, theirs: Any, state: Any, times: int) -> Instant:
     arrays = (state.qpos, state.qvel, state.qacc, state.actuator_force, state.cfrc_int)
     q, v, a, drive, on_bodies = (x.numpy()[-1].astype(float) for x in arrays)
     closing = state.efc.force.numpy()[-1, :2].astype(float)
-    return reading(model, q, v, a, drive[model.actuator("drive").id], closing, on_bodies[find_bars(model)])
+    return reading(
+        model,
+        q,
+        v,
+        a,
+        drive[model.actuator("drive").id],
+        closing,
+        on_bodies[find_bars(model)],
+    )

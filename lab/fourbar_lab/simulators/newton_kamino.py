@@ -12,7 +12,16 @@ from fourbar.effects import Flywheel
 from fourbar.mjcf import size_flywheel
 from fourbar.mjcf.assembly import write_usd
 from fourbar.scene import Scene
-from fourbar_lab.simulators.motion import LIGHT, Course, Instant, Readings, Simulator, run_through, start, write_temp
+from fourbar_lab.simulators.motion import (
+    LIGHT,
+    Course,
+    Instant,
+    Readings,
+    Simulator,
+    run_through,
+    start,
+    write_temp,
+)
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.engines.description import rotate
 
@@ -30,7 +39,10 @@ class NewtonKamino(Simulator):
     changed = "USD with a fourth revolute joint; a light flywheel on the input; multipliers from the solver's own data"
     settings: ClassVar[dict[str, dict[str, Any]]] = {
         "its defaults": {},
-        "PADMM to 1e-9 in 2000 iterations": {"max_iterations": 2000, **dict.fromkeys(TOLERANCES, 1e-9)},
+        "PADMM to 1e-9 in 2000 iterations": {
+            "max_iterations": 2000,
+            **dict.fromkeys(TOLERANCES, 1e-9),
+        },
     }
     """Settings of the PADMM solver (200 iterations, 1e-6 by default)."""
     tolerance = (0.2, "single precision and first order in the timestep")
@@ -71,11 +83,22 @@ class NewtonKamino(Simulator):
         def read(before: tuple[Array, float]) -> Instant:
             theta, speed = before
             alpha = (float(now.joint_qd.numpy()[0]) - speed) / course.timestep
-            rows = solver._solver_kamino.data.joints.lambda_kin_j.numpy().astype(float).reshape(4, 5)[:, 1:3]
+            rows = (
+                solver._solver_kamino.data.joints.lambda_kin_j.numpy()
+                .astype(float)
+                .reshape(4, 5)[:, 1:3]
+            )
             forces = {}
             for row, (pin, parent) in zip(rows, PARENTS.items(), strict=True):
-                forces[pin] = np.array(rotate(laid[pin] + (0.0 if parent is None else theta[parent]), *row))
-            on_pins = {"F12": forces["O2"], "F32": -forces["A"], "F43": forces["B"], "F14": forces["O4"]}
+                forces[pin] = np.array(
+                    rotate(laid[pin] + (0.0 if parent is None else theta[parent]), *row)
+                )
+            on_pins = {
+                "F12": forces["O2"],
+                "F32": -forces["A"],
+                "F43": forces["B"],
+                "F14": forces["O4"],
+            }
             return Instant(theta.tolist(), speed, alpha, -inertia * alpha, on_pins)
 
         return run_through(scene, course, advance, read)

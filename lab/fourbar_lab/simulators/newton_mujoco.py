@@ -44,8 +44,14 @@ class NewtonMujoco(Simulator):
         newton.solvers.SolverMuJoCo(model).step(
             now, then, control, None, course.timestep
         )  # compiled before the clock runs
-        names = [solver.mj_model.body(number).name for number in range(solver.mj_model.nbody)]
-        assert [name.rpartition("_")[2] for name in names[2:]] == ["input", "coupler", "output"]
+        names = [
+            solver.mj_model.body(number).name for number in range(solver.mj_model.nbody)
+        ]
+        assert [name.rpartition("_")[2] for name in names[2:]] == [
+            "input",
+            "coupler",
+            "output",
+        ]
 
         def advance(steps: int) -> None:
             nonlocal now, then
@@ -58,7 +64,13 @@ class NewtonMujoco(Simulator):
             for _again in range(2):
                 mjw.forward(solver.mjw_model, data)
             mjw.rne_postconstraint(solver.mjw_model, data)
-            arrays = (data.qpos, data.qvel, data.qacc, data.actuator_force, data.cfrc_int)
+            arrays = (
+                data.qpos,
+                data.qvel,
+                data.qacc,
+                data.actuator_force,
+                data.cfrc_int,
+            )
             q, v, a, drive, on_bodies = (x.numpy()[0].astype(float) for x in arrays)
             closing = data.efc.force.numpy()[0, :2].astype(float)
             return reading(solver.mj_model, q, v, a, drive[0], closing, on_bodies[2:5])

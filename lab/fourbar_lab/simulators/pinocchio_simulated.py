@@ -41,11 +41,22 @@ class LoopConstrained(ClosedTree):
 
     def acceleration(self, q: Array, v: Array, tau: Array) -> Any:
         """Accelerate the closed loop."""
-        return pin.lcaba(self.tree.model, self.data, q, v, tau, self.models, self.closure_data, self.proximal).copy()
+        return pin.lcaba(
+            self.tree.model,
+            self.data,
+            q,
+            v,
+            tau,
+            self.models,
+            self.closure_data,
+            self.proximal,
+        ).copy()
 
     def loop_force(self) -> Array:
         """Return F43: lcaba leaves the force on bar 4, in the axes of bar 3, whatever frame the closure was given."""
-        return np.array(-self.tree.rotation(3) @ self.closure_data[0].contact_force.linear[:2])
+        return np.array(
+            -self.tree.rotation(3) @ self.closure_data[0].contact_force.linear[:2]
+        )
 
 
 class Impulses:
@@ -57,12 +68,20 @@ class Impulses:
     def __init__(self, tree: PinocchioTree, timestep: float, solver: str) -> None:
         self.tree, self.h = tree, timestep
         self.model, self.data = tree.model, tree.model.createData()
-        ends = [(tree.joint[bar], self.model.frames[tree.frame[f"end{bar}"]].placement) for bar in (3, 4)]
-        self.closure = pin.ConstraintModel(pin.PointAnchorConstraintModel(self.model, *ends[0], *ends[1]))
+        ends = [
+            (tree.joint[bar], self.model.frames[tree.frame[f"end{bar}"]].placement)
+            for bar in (3, 4)
+        ]
+        self.closure = pin.ConstraintModel(
+            pin.PointAnchorConstraintModel(self.model, *ends[0], *ends[1])
+        )
         self.models, self.closure_data = [self.closure], [self.closure.createData()]
         self.cholesky: Any = None
         self.solver = getattr(pin, f"{solver}ConstraintSolver")()
-        self.settings, self.result = getattr(pin, f"{solver}SolverSettings")(), getattr(pin, f"{solver}SolverResult")()
+        self.settings, self.result = (
+            getattr(pin, f"{solver}SolverSettings")(),
+            getattr(pin, f"{solver}SolverResult")(),
+        )
         self.settings.max_iterations = 10000
         for kind in ("absolute_feasibility", "relative_feasibility", "absolute_complementarity",
                      "relative_complementarity"):  # fmt: skip
@@ -75,15 +94,24 @@ class Impulses:
         free = v + h * pin.aba(model, data, q, v, none)
         self.closure.calc(model, data, self.closure_data[0])
         if self.cholesky is None:
-            self.cholesky = pin.ConstraintCholeskyDecomposition(model, data, self.models, self.closure_data)
+            self.cholesky = pin.ConstraintCholeskyDecomposition(
+                model, data, self.models, self.closure_data
+            )
         self.cholesky.compute(model, data, self.models, self.closure_data, PROXIMAL)
-        jacobian = pin.getConstraintsJacobian(model, data, self.models, self.closure_data)
-        g = jacobian @ free + self.closure_data[0].extract().constraint_position_error / h
+        jacobian = pin.getConstraintsJacobian(
+            model, data, self.models, self.closure_data
+        )
+        g = (
+            jacobian @ free
+            + self.closure_data[0].extract().constraint_position_error / h
+        )
         self.solver.solve(self.cholesky.getDelassusOperatorCholeskyExpression(), g, self.models, self.closure_data,
                           self.settings, self.result)  # fmt: skip
         force = np.array(self.result.retrieveConstraintImpulses()) / h
         self.tree.place(q.tolist())
-        return v + h * pin.aba(model, data, q, v, jacobian.T @ force), -self.tree.rotation(3) @ force[:2]
+        return v + h * pin.aba(
+            model, data, q, v, jacobian.T @ force
+        ), -self.tree.rotation(3) @ force[:2]
 
 
 class PinocchioSolvers(Simulator):
@@ -104,9 +132,15 @@ class PinocchioSolvers(Simulator):
 
     def through(self, scene: Scene, course: Course) -> Readings:
         """Run through a course, carried by a flywheel."""
-        solver, begin, tree = self.settings[self.setting], start(scene), PinocchioTree(scene)
+        solver, begin, tree = (
+            self.settings[self.setting],
+            start(scene),
+            PinocchioTree(scene),
+        )
         if isinstance(solver, str):
-            return _run_by_impulses(scene, course, Impulses(tree, course.timestep, solver))
+            return _run_by_impulses(
+                scene, course, Impulses(tree, course.timestep, solver)
+            )
         q, v, inertia = np.array(begin.qpos), np.array(begin.qvel), size_flywheel(scene)
         loop = solver(tree, SOFTNESS_STEPS * course.timestep)
 
@@ -114,10 +148,20 @@ class PinocchioSolvers(Simulator):
             nonlocal q, v
             tree.model.armature = np.array([inertia, 0.0, 0.0])
             for _ in range(steps):
-                q, v = make_step(lambda q, v: loop.acceleration(q, v, np.zeros(3)), q, v, course.timestep)
+                q, v = make_step(
+                    lambda q, v: loop.acceleration(q, v, np.zeros(3)),
+                    q,
+                    v,
+                    course.timestep,
+                )
             return q, v
 
-        return run_through(scene, course, advance, lambda state: _evaluated(tree, loop, inertia, *state))
+        return run_through(
+            scene,
+            course,
+            advance,
+            lambda state: _evaluated(tree, loop, inertia, *state),
+        )
 
     def states(self, scene: Scene) -> Readings:
         """Evaluate single states; the impulse solvers have none: a step sees (dJ/dt) v in the step before."""
@@ -128,7 +172,9 @@ class PinocchioSolvers(Simulator):
         loop = solver(tree, SOFTNESS_STEPS * find_timestep(scene, STEPS))
         tree.model.armature = np.array([inertia, 0.0, 0.0])
         for theta_2 in list_positions(scene).theta_2.tolist():
-            state = loop.start(theta_2, scene.motion.branch, scene.motion.omega_2 or 0.0)
+            state = loop.start(
+                theta_2, scene.motion.branch, scene.motion.omega_2 or 0.0
+            )
             if state is not None:
                 readings.read(scene, _evaluated(tree, loop, inertia, *state))
         return readings
@@ -148,17 +194,23 @@ def _run_by_impulses(scene: Scene, course: Course, loop: Impulses) -> Readings:
             q = q + loop.h * v
         return *before, (v - before[1]) / loop.h, force
 
-    return run_through(scene, course, advance, lambda ended: _read(loop.tree, inertia, *ended))
+    return run_through(
+        scene, course, advance, lambda ended: _read(loop.tree, inertia, *ended)
+    )
 
 
-def _evaluated(tree: PinocchioTree, loop: ClosedTree, inertia: float, q: Array, v: Array) -> Instant:
+def _evaluated(
+    tree: PinocchioTree, loop: ClosedTree, inertia: float, q: Array, v: Array
+) -> Instant:
     tree.model.armature = np.array([inertia, 0.0, 0.0])
     a = loop.acceleration(q, v, np.zeros(3))
     tree.place(q.tolist())
     return _read(tree, inertia, q, v, a, loop.loop_force())
 
 
-def _read(tree: PinocchioTree, inertia: float, q: Array, v: Array, a: Array, loop_force: Array) -> Instant:
+def _read(
+    tree: PinocchioTree, inertia: float, q: Array, v: Array, a: Array, loop_force: Array
+) -> Instant:
     """Read what Pinocchio's recursive Newton-Euler says the joints carry under its own closing force."""
     tree.model.armature = np.zeros(3)
     tree.place(q.tolist())
@@ -166,5 +218,9 @@ def _read(tree: PinocchioTree, inertia: float, q: Array, v: Array, a: Array, loo
     tree.torques()
     torque = float(-inertia * a[0])
     return Instant(
-        (q[0], q[0] + q[1], q[2]), v[0], a[0], torque, {"F43": loop_force, **tree.forces(loop_force, torque)}
+        (q[0], q[0] + q[1], q[2]),
+        v[0],
+        a[0],
+        torque,
+        {"F43": loop_force, **tree.forces(loop_force, torque)},
     )

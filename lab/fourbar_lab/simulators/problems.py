@@ -44,36 +44,61 @@ def collect_problem(name: str) -> dict[str, Any]:
     scene = fourbar.load(PROBLEMS / f"{name}.toml")
     solution = fourbar.solve(scene, "error")
     if scene.motion.free is None:
-        asked: dict[str, Any] = {"command": protocol.command_to_json(scene, list_positions(scene))}
+        asked: dict[str, Any] = {
+            "command": protocol.command_to_json(scene, list_positions(scene))
+        }
         answers, errors = collect_answers(solution)
     else:
         asked = protocol.release_to_json(scene)
         answers, errors = _answer_released(solution)
     return {
-        **{"schema": SCHEMA, "title": scene.title, "source": scene.source, "conventions": CONVENTIONS},
+        **{
+            "schema": SCHEMA,
+            "title": scene.title,
+            "source": scene.source,
+            "conventions": CONVENTIONS,
+        },
         "mechanism": "four-bar",
         "ask": "answer" if scene.motion.free is None else "release",
         "scene": protocol.scene_to_json(scene),
         **asked,
-        "answers": {quantity: np.asarray(values).tolist() for quantity, values in answers.items()},
-        "errors": {quantity: np.asarray(values).tolist() for quantity, values in errors.items()},
+        "answers": {
+            quantity: np.asarray(values).tolist()
+            for quantity, values in answers.items()
+        },
+        "errors": {
+            quantity: np.asarray(values).tolist() for quantity, values in errors.items()
+        },
         "units": {quantity: UNITS.get(quantity, "Hz") for quantity in answers},
     }
 
 
 def list_problems() -> list[str]:
     """List the names of all problems, in order."""
-    return sorted([file.stem for file in PROBLEMS.glob("*.toml")] + list(slider_crank.SLIDER_CRANKS))
+    return sorted(
+        [file.stem for file in PROBLEMS.glob("*.toml")]
+        + list(slider_crank.SLIDER_CRANKS)
+    )
 
 
 def _answer_released(solution: Solution) -> tuple[dict[str, Any], dict[str, Any]]:
     """Answer a released motion: it errs as a time that is off; angle, speed and forces with it."""
     time, omega, alpha = solution.time, solution.omega_2, solution.alpha_2
-    assert time is not None and omega is not None and alpha is not None and solution.force_error is not None
+    assert (
+        time is not None
+        and omega is not None
+        and alpha is not None
+        and solution.force_error is not None
+    )
     angle = PROMISED * max(1.0, float(time[-1] - time[0]) / PROMISED_FOR)
     late, n = angle / float(np.abs(omega).max()), len(time)
-    answers: dict[str, Any] = {name: getattr(solution, name) for name in ("theta_2", "omega_2", *PIN_FORCES)}
-    errors: dict[str, Any] = {"theta_2": np.full(n, angle), "omega_2": np.full(n, late * float(np.abs(alpha).max()))}
+    answers: dict[str, Any] = {
+        name: getattr(solution, name) for name in ("theta_2", "omega_2", *PIN_FORCES)
+    }
+    errors: dict[str, Any] = {
+        "theta_2": np.full(n, angle),
+        "omega_2": np.full(n, late * float(np.abs(alpha).max())),
+    }
     for name in PIN_FORCES:
         rate = float(np.hypot(*np.gradient(answers[name], time, axis=0).T).max())
         errors[name] = SAFE * solution.force_error + rate * late
@@ -82,7 +107,9 @@ def _answer_released(solution: Solution) -> tuple[dict[str, Any], dict[str, Any]
     return answers, errors
 
 
-def _measure_period(time: Array, theta: Array, omega: Array, alpha: Array) -> float | None:
+def _measure_period(
+    time: Array, theta: Array, omega: Array, alpha: Array
+) -> float | None:
     """Measure the time between upward passages through mid-swing, s; None where it does not swing."""
     from scipy.interpolate import BPoly
 
@@ -103,7 +130,11 @@ def _measure_period(time: Array, theta: Array, omega: Array, alpha: Array) -> fl
 
 
 @click.command()
-@click.option("--archive", type=click.Path(path_type=Path, dir_okay=False), help="Pack the set into this file instead.")
+@click.option(
+    "--archive",
+    type=click.Path(path_type=Path, dir_okay=False),
+    help="Pack the set into this file instead.",
+)
 def command(archive: Path | None) -> None:
     """Write the problems of models/problems and their answers as JSON."""
     checkout = find_checkout("problems")
@@ -112,19 +143,31 @@ def command(archive: Path | None) -> None:
         click.echo(f"wrote {archive}")
         return
     for name in list_problems():
-        write_text((PROBLEMS / name).with_suffix(".json"), write_json(collect_problem(name)))
+        write_text(
+            (PROBLEMS / name).with_suffix(".json"), write_json(collect_problem(name))
+        )
         click.echo(f"wrote {name}.json")
 
 
 def write_archive(checkout: Path, archive: Path) -> None:
     """Pack the problems with their page, figures, schema, licence and citation, the same bytes each time."""
     files = sorted(PROBLEMS.iterdir())
-    files += [checkout / name for name in ("docs/benchmark.md", "docs/protocol.md", "docs/protocol.schema.json")]
+    files += [
+        checkout / name
+        for name in (
+            "docs/benchmark.md",
+            "docs/protocol.md",
+            "docs/protocol.schema.json",
+        )
+    ]
     files += [checkout / name for name in ("LICENSE", "CITATION.cff")]
     files += sorted((checkout / "docs" / "benchmark").glob("*.svg"))
     with ZipFile(archive, "w", ZIP_DEFLATED) as packed:
         for file in files:
-            entry = ZipInfo(f"{ARCHIVE}/{file.relative_to(checkout)}", date_time=(1980, 1, 1, 0, 0, 0))
+            entry = ZipInfo(
+                f"{ARCHIVE}/{file.relative_to(checkout)}",
+                date_time=(1980, 1, 1, 0, 0, 0),
+            )
             entry.compress_type = ZIP_DEFLATED
             packed.writestr(entry, file.read_bytes())
 
@@ -134,7 +177,10 @@ def write_json(problem: dict[str, Any]) -> str:
     lines = []
     for key, value in problem.items():
         if key in ("answers", "errors"):
-            rows = ",\n".join(f"  {json.dumps(name)}: {json.dumps(entry)}" for name, entry in value.items())
+            rows = ",\n".join(
+                f"  {json.dumps(name)}: {json.dumps(entry)}"
+                for name, entry in value.items()
+            )
             lines.append(f" {json.dumps(key)}: {{\n{rows}\n }}")
         else:
             lines.append(f" {json.dumps(key)}: {json.dumps(value, ensure_ascii=False)}")

@@ -27,7 +27,9 @@ def write_urdf(scene: Scene) -> str:
     """Build the tree: bars 2 and 3 in series, bar 4 on the ground; each link's frame lies in its mass centre."""
     links = ['<robot name="four_bar"><link name="ground"/>']
     for part in list_parts(scene.linkage):
-        turned = " ".join(f'{axes}="{part.inertia!r}"' for axes in ("ixx", "iyy", "izz"))
+        turned = " ".join(
+            f'{axes}="{part.inertia!r}"' for axes in ("ixx", "iyy", "izz")
+        )
         links.append(
             f'<link name="{BAR_NAMES[part.bar]}"><inertial><origin xyz="{part.centre[0]!r} {part.centre[1]!r} 0"/>'
             f'<mass value="{part.mass!r}"/><inertia {turned} ixy="0" ixz="0" iyz="0"/></inertial></link>'
@@ -55,21 +57,36 @@ class PyBullet(Simulator):
         try:
             with write_temp(write_urdf(scene), "four_bar.urdf") as file:
                 flags = bullet.URDF_USE_INERTIA_FROM_FILE
-                body = bullet.loadURDF(file, useFixedBase=True, flags=flags, physicsClientId=client)
-            bullet.setPhysicsEngineParameter(fixedTimeStep=course.timestep, **self.settings[self.setting])
+                body = bullet.loadURDF(
+                    file, useFixedBase=True, flags=flags, physicsClientId=client
+                )
+            bullet.setPhysicsEngineParameter(
+                fixedTimeStep=course.timestep, **self.settings[self.setting]
+            )
             bullet.setGravity(*find_gravity(scene))
-            for joint, (angle, speed) in enumerate(zip(begin.qpos, begin.qvel, strict=True)):
-                bullet.changeDynamics(body, joint, linearDamping=0.0, angularDamping=0.0, jointDamping=0.0)
+            for joint, (angle, speed) in enumerate(
+                zip(begin.qpos, begin.qvel, strict=True)
+            ):
+                bullet.changeDynamics(
+                    body, joint, linearDamping=0.0, angularDamping=0.0, jointDamping=0.0
+                )
                 bullet.resetJointState(body, joint, angle, speed)
-                bullet.setJointMotorControl2(body, joint, bullet.VELOCITY_CONTROL, force=0.0)
+                bullet.setJointMotorControl2(
+                    body, joint, bullet.VELOCITY_CONTROL, force=0.0
+                )
                 bullet.enableJointForceTorqueSensor(body, joint, True)
             bullet.changeDynamics(body, -1, linearDamping=0.0, angularDamping=0.0)
             drive = {"targetVelocity": begin.qvel[0], "force": STRONG}
             bullet.setJointMotorControl2(body, 0, bullet.VELOCITY_CONTROL, **drive)
             _, three, four = list_parts(scene.linkage)
-            frames = [[part.length - part.centre[0], -part.centre[1], 0.0] for part in (three, four)]
+            frames = [
+                [part.length - part.centre[0], -part.centre[1], 0.0]
+                for part in (three, four)
+            ]
             none = [0.0, 0.0, 0.0]
-            ball = bullet.createConstraint(body, 1, body, 2, bullet.JOINT_POINT2POINT, none, *frames)
+            ball = bullet.createConstraint(
+                body, 1, body, 2, bullet.JOINT_POINT2POINT, none, *frames
+            )
             bullet.changeConstraint(ball, maxForce=STRONG)
 
             def advance(steps: int) -> list[Any]:
@@ -80,15 +97,26 @@ class PyBullet(Simulator):
                 return before
 
             def read(before: list[Any]) -> Instant:
-                after, q, speed = bullet.getJointState(body, 0), [state[0] for state in before], before[0][1]
-                force = [-part for part in bullet.getConstraintState(ball)[:2]]  # it speaks of the force on the child
+                after, q, speed = (
+                    bullet.getJointState(body, 0),
+                    [state[0] for state in before],
+                    before[0][1],
+                )
+                force = [
+                    -part for part in bullet.getConstraintState(ball)[:2]
+                ]  # it speaks of the force on the child
                 theta = (q[0], q[0] + q[1], q[2])
                 wrenches = [
                     bullet.getJointState(body, joint)[2] for joint in range(3)
                 ]  # by the parent, in the link's axes
-                F12, F23, F14 = (rotate(angle, *wrench[:2]) for angle, wrench in zip(theta, wrenches, strict=True))
+                F12, F23, F14 = (
+                    rotate(angle, *wrench[:2])
+                    for angle, wrench in zip(theta, wrenches, strict=True)
+                )
                 pins = {"F12": F12, "F32": (-F23[0], -F23[1]), "F43": force, "F14": F14}
-                return Instant(theta, speed, (after[1] - speed) / course.timestep, after[3], pins)
+                return Instant(
+                    theta, speed, (after[1] - speed) / course.timestep, after[3], pins
+                )
 
             return run_through(scene, course, advance, read)
         finally:

@@ -27,7 +27,11 @@ SLIDER_CRANKS: dict[str, dict[str, Any]] = {
         "PMKSWeb issue 42, mujoco_warp issue 1487, newton issue 3745.",
         "scene": {
             "lengths": {"crank": 0.05, "rod": 0.2, "offset": 0.0},
-            "bars": {"crank": {"mass": 0.3}, "rod": {"mass": 0.5, "centre": [0.08, 0.0]}, "slider": {"mass": 0.4}},
+            "bars": {
+                "crank": {"mass": 0.3},
+                "rod": {"mass": 0.5, "centre": [0.08, 0.0]},
+                "slider": {"mass": 0.4},
+            },
             "effects": {"gravity": [9.81, -0.5 * math.pi]},
         },
         "command": {"theta_2": TURN, "omega_2": 20.0, "alpha_2": 0.0, "branch": 1},
@@ -67,19 +71,25 @@ def make_problem(name: str) -> dict[str, Any]:
             "errors": errors, "units": UNITS}  # fmt: skip
 
 
-def solve(scene: dict[str, Any], theta_2: float, omega_2: float, alpha_2: float, branch: int) -> dict[str, Any]:
+def solve(
+    scene: dict[str, Any], theta_2: float, omega_2: float, alpha_2: float, branch: int
+) -> dict[str, Any]:
     """Solve the eight equations of the three free bodies at one position."""
     from mpmath import mp, mpc, mpf
 
     with mp.workdps(DIGITS):
-        a, b, offset = (mpf(scene["lengths"][name]) for name in ("crank", "rod", "offset"))
+        a, b, offset = (
+            mpf(scene["lengths"][name]) for name in ("crank", "rod", "offset")
+        )
         g = _direct(*scene.get("effects", {}).get("gravity", (0.0, 0.0)))
         theta, omega, alpha = mpf(theta_2), mpf(omega_2), mpf(alpha_2)
         sine = (offset - a * mp.sin(theta)) / b
         cosine = branch * mp.sqrt(1 - sine * sine)
         crank, rod = a * mp.expj(theta), b * mpc(cosine, sine)
         omega_3 = -omega * crank.real / rod.real
-        alpha_3 = (omega**2 * crank.imag - alpha * crank.real + omega_3**2 * rod.imag) / rod.real
+        alpha_3 = (
+            omega**2 * crank.imag - alpha * crank.real + omega_3**2 * rod.imag
+        ) / rod.real
         at_A = (1j * alpha - omega**2) * crank
         at_B = at_A + (1j * alpha_3 - omega_3**2) * rod
         forces, moments, arms = [], [], []
@@ -95,7 +105,10 @@ def solve(scene: dict[str, Any], theta_2: float, omega_2: float, alpha_2: float,
             arms.append(arm)
         for load in scene.get("loads", ()):  # at the mass centre
             forces[load["bar"] - 2] -= _direct(*load["force"])
-        A, y = mp.zeros(8, 8), mp.zeros(8, 1)  # F12 x y, F32 x y, F43 x y, guide, torque
+        A, y = (
+            mp.zeros(8, 8),
+            mp.zeros(8, 1),
+        )  # F12 x y, F32 x y, F43 x y, guide, torque
         for row, terms in enumerate((
             {0: 1, 2: 1}, {1: 1, 3: 1}, {2: -1, 4: 1}, {3: -1, 5: 1}, {4: -1}, {5: -1, 6: 1},
         )):  # fmt: skip

@@ -49,7 +49,9 @@ class CutLoop(Protocol):
         """Return what ground bears on the crank, the crank on the rod and the guide on the slider (2,) each."""
 
 
-def describe(scene: dict[str, Any]) -> tuple[list[SliderBar], tuple[float, float, float], Array, Array]:
+def describe(
+    scene: dict[str, Any],
+) -> tuple[list[SliderBar], tuple[float, float, float], Array, Array]:
     """Return the bodies, (crank, rod, offset), the field of gravity and the force on the slider."""
     lengths, bodies = scene["lengths"], []
     for name in ("crank", "rod", "slider"):
@@ -57,14 +59,23 @@ def describe(scene: dict[str, Any]) -> tuple[list[SliderBar], tuple[float, float
         mass = bar.get("mass", 0.0)
         r, phi = bar.get("centre", (0.5 * length, 0.0))
         bodies.append(
-            SliderBar(mass, bar.get("inertia", mass * length**2 / 12.0), (r * math.cos(phi), r * math.sin(phi)))
+            SliderBar(
+                mass,
+                bar.get("inertia", mass * length**2 / 12.0),
+                (r * math.cos(phi), r * math.sin(phi)),
+            )
         )
     field = _direct(*scene.get("effects", {}).get("gravity", (0.0, 0.0)))
     loads = scene.get("loads", ())
     if any(load["bar"] != 4 or "table" in load or load.get("moment") for load in loads):
         raise LimitError("a force on the slider is the only load here")
     push = sum((_direct(*load["force"]) for load in loads), np.zeros(2))
-    return bodies, (lengths["crank"], lengths["rod"], lengths.get("offset", 0.0)), field, push
+    return (
+        bodies,
+        (lengths["crank"], lengths["rod"], lengths.get("offset", 0.0)),
+        field,
+        push,
+    )
 
 
 def _direct(size: float, angle: float) -> Array:
@@ -81,7 +92,13 @@ def answer(make: Callable[..., CutLoop], question: dict[str, Any]) -> dict[str, 
     rates = [np.broadcast_to(command.get(name, default), n) for name, default in
              (("omega_2", 0.0), ("alpha_2", 0.0), ("branch", 1))]  # fmt: skip
     for theta, omega, alpha, branch in zip(command["theta_2"], *rates, strict=True):
-        q = np.array([theta, (0.0 if branch > 0 else math.pi) - theta, crank * math.cos(theta) + branch * rod])
+        q = np.array(
+            [
+                theta,
+                (0.0 if branch > 0 else math.pi) - theta,
+                crank * math.cos(theta) + branch * rod,
+            ]
+        )
         for _ in range(STEPS):
             tree.set(q, np.zeros(3))
             apart, J, _ = tree.gap()
@@ -95,12 +112,24 @@ def answer(make: Callable[..., CutLoop], question: dict[str, Any]) -> dict[str, 
         tree.set(q, v)
         _, J, drift = tree.gap()
         a = np.array([alpha, *np.linalg.solve(J[:, 1:], -J[:, 0] * alpha - drift)])
-        *closing, torque = np.linalg.solve(np.column_stack([J.T, [1.0, 0.0, 0.0]]), tree.inverse(a))
+        *closing, torque = np.linalg.solve(
+            np.column_stack([J.T, [1.0, 0.0, 0.0]]), tree.inverse(a)
+        )
         F12, F23, guide = tree.borne(a, np.array(closing))
-        values = (math.remainder(q[0] + q[1], math.tau), q[2], torque, F12.tolist(), (-F23).tolist(), closing, guide[1])
+        values = (
+            math.remainder(q[0] + q[1], math.tau),
+            q[2],
+            torque,
+            F12.tolist(),
+            (-F23).tolist(),
+            closing,
+            guide[1],
+        )
         for name, value in zip(ANSWERS, values, strict=True):
             rows[name].append(value)
-    return {"answers": {name: np.array(values).tolist() for name, values in rows.items()}}
+    return {
+        "answers": {name: np.array(values).tolist() for name, values in rows.items()}
+    }
 
 
 def serve(
@@ -121,7 +150,10 @@ def serve(
                 reply = {"error": say_error(error)}
         elif question["ask"] != "hello":
             reply = {"refusal": f"{question['ask']} is not answered here"}
-        replies.write(json.dumps({"id": question["id"], **reply}, allow_nan=False).encode() + b"\n")
+        replies.write(
+            json.dumps({"id": question["id"], **reply}, allow_nan=False).encode()
+            + b"\n"
+        )
         replies.flush()
 
 

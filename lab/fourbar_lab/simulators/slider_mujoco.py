@@ -12,11 +12,19 @@ VERSION = mujoco.__version__
 class MujocoSlider:
     """The tree, with sites at the rod's end and the slider."""
 
-    def __init__(self, bodies: list[SliderBar], lengths: tuple[float, float, float], field: Array, push: Array) -> None:
+    def __init__(
+        self,
+        bodies: list[SliderBar],
+        lengths: tuple[float, float, float],
+        field: Array,
+        push: Array,
+    ) -> None:
         crank, rod, offset = lengths
         inertials = [
             f'<inertial pos="{b.centre[0]!r} {b.centre[1]!r} 0" mass="{b.mass!r}" diaginertia="{i!r} {i!r} {i!r}"/>'
-            for b, i in ((body, body.inertia or 1e-12) for body in bodies)  # the slider does not turn
+            for b, i in (
+                (body, body.inertia or 1e-12) for body in bodies
+            )  # the slider does not turn
         ]
         hinge = '<joint type="hinge" axis="0 0 1"/>'
         self.model = mujoco.MjModel.from_xml_string(
@@ -42,9 +50,15 @@ class MujocoSlider:
         for slope, rate, site in zip(slopes, rates, self.sites, strict=True):
             mujoco.mj_jacSite(self.model, self.data, slope, None, site)
             body = self.model.site_bodyid[site]
-            mujoco.mj_jacDot(self.model, self.data, rate, None, self.data.site_xpos[site], body)
+            mujoco.mj_jacDot(
+                self.model, self.data, rate, None, self.data.site_xpos[site], body
+            )
         end, slider = (self.data.site_xpos[site][:2] for site in self.sites)
-        return end - slider, (slopes[0] - slopes[1])[:2], (rates[0] - rates[1])[:2] @ self.data.qvel
+        return (
+            end - slider,
+            (slopes[0] - slopes[1])[:2],
+            (rates[0] - rates[1])[:2] @ self.data.qvel,
+        )
 
     def inverse(self, a: Array) -> Array:
         """Return the joint forces of accelerations a, without the closing force."""
@@ -56,8 +70,13 @@ class MujocoSlider:
 
     def borne(self, a: Array, closing: Array) -> tuple[Array, Array, Array]:
         """Return what ground bears on the crank, the crank on the rod and the guide on the slider."""
-        for body, force, site in zip(self.bodies[1:], (closing, self.push - closing), self.sites, strict=True):
-            arm, pull = self.data.site_xpos[site] - self.data.xipos[body], np.array([*force, 0.0])
+        for body, force, site in zip(
+            self.bodies[1:], (closing, self.push - closing), self.sites, strict=True
+        ):
+            arm, pull = (
+                self.data.site_xpos[site] - self.data.xipos[body],
+                np.array([*force, 0.0]),
+            )
             self.data.xfrc_applied[body] = [*pull, *np.cross(arm, pull)]
         self.data.qacc[:] = a
         mujoco.mj_rnePostConstraint(self.model, self.data)

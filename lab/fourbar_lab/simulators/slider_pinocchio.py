@@ -12,20 +12,32 @@ VERSION = pin.__version__
 class PinocchioSlider:
     """The tree, with frames at the rod's end and the slider."""
 
-    def __init__(self, bodies: list[SliderBar], lengths: tuple[float, float, float], field: Array, push: Array) -> None:
+    def __init__(
+        self,
+        bodies: list[SliderBar],
+        lengths: tuple[float, float, float],
+        field: Array,
+        push: Array,
+    ) -> None:
         crank, rod, offset = lengths
         self.model, self.push = pin.Model(), push
         self.model.gravity = pin.Motion(np.array([*field, 0.0, 0.0, 0.0, 0.0]))
         joints = (pin.JointModelRZ(), 0, (0.0, 0.0)), (pin.JointModelRZ(), 1, (crank, 0.0)), (
             pin.JointModelPX(), 0, (0.0, offset))  # fmt: skip
-        for number, ((joint, parent, place), body) in enumerate(zip(joints, bodies, strict=True), 1):
+        for number, ((joint, parent, place), body) in enumerate(
+            zip(joints, bodies, strict=True), 1
+        ):
             placement = pin.SE3(np.eye(3), np.array([*place, 0.0]))
             self.model.addJoint(parent, joint, placement, f"joint {number}")
-            inertia = pin.Inertia(body.mass, np.array([*body.centre, 0.0]), np.diag([body.inertia] * 3))
+            inertia = pin.Inertia(
+                body.mass, np.array([*body.centre, 0.0]), np.diag([body.inertia] * 3)
+            )
             self.model.appendBodyToJoint(number, inertia, pin.SE3.Identity())
         end = pin.SE3(np.eye(3), np.array([rod, 0.0, 0.0]))
         self.frames = [
-            self.model.addFrame(pin.Frame(f"B{joint}", joint, 0, place, pin.FrameType.OP_FRAME))
+            self.model.addFrame(
+                pin.Frame(f"B{joint}", joint, 0, place, pin.FrameType.OP_FRAME)
+            )
             for joint, place in ((2, end), (3, pin.SE3.Identity()))
         ]
         self.data = self.model.createData()
@@ -41,9 +53,15 @@ class PinocchioSlider:
         """Return the rod's end less the slider, its Jacobian, and its acceleration at none of q."""
         axes = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
         places = [self.data.oMf[frame].translation[:2] for frame in self.frames]
-        slopes = [pin.getFrameJacobian(self.model, self.data, frame, axes)[:2] for frame in self.frames]
+        slopes = [
+            pin.getFrameJacobian(self.model, self.data, frame, axes)[:2]
+            for frame in self.frames
+        ]
         drifts = [
-            pin.getFrameClassicalAcceleration(self.model, self.data, frame, axes).linear[:2] for frame in self.frames
+            pin.getFrameClassicalAcceleration(
+                self.model, self.data, frame, axes
+            ).linear[:2]
+            for frame in self.frames
         ]
         return places[0] - places[1], slopes[0] - slopes[1], drifts[0] - drifts[1]
 
@@ -54,13 +72,19 @@ class PinocchioSlider:
     def borne(self, a: Array, closing: Array) -> tuple[Array, Array, Array]:
         """Return what ground bears on the crank, the crank on the rod and the guide on the slider."""
         self._solve(a, closing)
-        forces = [(self.data.oMi[joint].rotation @ self.data.f[joint].linear)[:2] for joint in (1, 2, 3)]
+        forces = [
+            (self.data.oMi[joint].rotation @ self.data.f[joint].linear)[:2]
+            for joint in (1, 2, 3)
+        ]
         return forces[0], forces[1], forces[2]
 
     def _solve(self, a: Array, closing: Array) -> Array:
         """Solve the inverse dynamics with the force on the rod's end, its opposite and the load on the slider."""
         outside = [pin.Force.Zero() for _ in range(4)]
-        for joint, force, frame in ((2, closing, self.frames[0]), (3, self.push - closing, self.frames[1])):
+        for joint, force, frame in (
+            (2, closing, self.frames[0]),
+            (3, self.push - closing, self.frames[1]),
+        ):
             turned = self.data.oMi[joint].rotation.T @ np.array([*force, 0.0])
             arm = self.model.frames[frame].placement.translation
             outside[joint] = pin.Force(turned, np.cross(arm, turned))

@@ -76,8 +76,12 @@ def test_json_has_every_key_and_every_digit(name: str, run: Fourbar) -> None:
     assert set(CONTRACT) <= set(document)
     for quantity in solution.evaluated():
         assert same(document[quantity], getattr(solution, quantity)), quantity
-    assert document["status"] == solution.status and document["assembled"] == [True] * len(solution)
-    assert document["drive_bar"] == solution.drive_bar and document["branch"] == [1] * len(solution)
+    assert document["status"] == solution.status and document["assembled"] == [
+        True
+    ] * len(solution)
+    assert document["drive_bar"] == solution.drive_bar and document["branch"] == [
+        1
+    ] * len(solution)
     assert document["title"] == solution.title and document["angle_unit"] == "rad"
     assert "time" not in document
 
@@ -93,8 +97,20 @@ def test_null_where_there_is_no_value(tmp_path: Path, run: Fourbar) -> None:
     save(crank_rocker(linkage=thesis().linkage, motion=sweep), tmp_path / "scene.toml")
     code, out, _ = run("analyze", tmp_path / "scene.toml", "--json")
     document = strict(out)
-    assert code == HOLDS and document["status"] == ["not_assembled", "ok"] and document["assembled"] == [False, True]
-    for quantity in set(UNITS) & set(CONTRACT) - {"theta_2", "omega_2", "alpha_2", "A", "G2", "a_A", "a_G2"}:
+    assert (
+        code == HOLDS
+        and document["status"] == ["not_assembled", "ok"]
+        and document["assembled"] == [False, True]
+    )
+    for quantity in set(UNITS) & set(CONTRACT) - {
+        "theta_2",
+        "omega_2",
+        "alpha_2",
+        "A",
+        "G2",
+        "a_A",
+        "a_G2",
+    }:
         first, second = document[quantity]  # type: ignore[misc]
         nothing = [None, None] if quantity in VECTORS else None
         assert first == nothing and second not in (None, [None, None]), quantity
@@ -104,26 +120,46 @@ def test_positions_only(tmp_path: Path, run: Fourbar) -> None:
     save(crank_rocker(motion=fourbar.Motion(1.0)), tmp_path / "scene.toml")
     document = strict(run("analyze", tmp_path / "scene.toml", "--json")[1])
     assert document["theta_3"] is not None and set(CONTRACT) <= set(document)
-    assert document["torque"] is None and document["F12"] is None and document["omega_2"] is None
+    assert (
+        document["torque"] is None
+        and document["F12"] is None
+        and document["omega_2"] is None
+    )
     code, out, _ = run("analyze", tmp_path / "scene.toml")
     assert code == HOLDS and "theta_3" in out and "N m" not in out
-    rows = list(csv.DictReader(io.StringIO(run("analyze", tmp_path / "scene.toml", "--csv")[1])))
+    rows = list(
+        csv.DictReader(io.StringIO(run("analyze", tmp_path / "scene.toml", "--csv")[1]))
+    )
     assert rows[0]["torque"] == "" and rows[0]["theta_2"] == "1.0"
 
 
 def test_a_free_motion_has_time_and_no_drive(tmp_path: Path, run: Fourbar) -> None:
     released = fourbar.Motion(0.5, 0.0, free=fourbar.Free(0.5, 4))
     save(crank_rocker(motion=released), tmp_path / "scene.toml")
-    assert strict(run("analyze", tmp_path / "scene.toml", "--json")[1])["time"] == [0.0, 0.125, 0.25, 0.375, 0.5]
+    assert strict(run("analyze", tmp_path / "scene.toml", "--json")[1])["time"] == [
+        0.0,
+        0.125,
+        0.25,
+        0.375,
+        0.5,
+    ]
     out = run("analyze", tmp_path / "scene.toml")[1]
-    assert "released for 0.5 s, without a drive" in out and " at t = " in out and "torque" not in out
+    assert (
+        "released for 0.5 s, without a drive" in out
+        and " at t = " in out
+        and "torque" not in out
+    )
 
 
 @pytest.mark.parametrize("ending", ["csv", "json", "txt"])
 def test_a_file_holds_what_would_be_printed_and_its_name_asks_for_the_form(
     ending: str, tmp_path: Path, run: Fourbar
 ) -> None:
-    scene, named, asked = tmp_path / "scene.toml", tmp_path / f"named.{ending}", tmp_path / "asked"
+    scene, named, asked = (
+        tmp_path / "scene.toml",
+        tmp_path / f"named.{ending}",
+        tmp_path / "asked",
+    )
     save(crank_rocker(), scene)
     form = () if ending == "txt" else (f"--{ending}",)
     printed = run("analyze", scene, *form)[1]
@@ -131,7 +167,11 @@ def test_a_file_holds_what_would_be_printed_and_its_name_asks_for_the_form(
         assert run("analyze", scene, "-o", *options) == (HOLDS, "", "")
         assert options[0].read_text() == printed
     if ending == "json":
-        assert run("classify", 4, 2, 3, 3, "-o", named)[0] == 0 == run("classify", 4, 2, 3, 3, "--json", "-o", asked)[0]
+        assert (
+            run("classify", 4, 2, 3, 3, "-o", named)[0]
+            == 0
+            == run("classify", 4, 2, 3, 3, "--json", "-o", asked)[0]
+        )
         assert named.read_bytes() == asked.read_bytes()
 
 
@@ -148,7 +188,12 @@ def test_text_is_not_written_under_a_name_whose_readers_refuse_it(
     command: str, name: str, written: str, tmp_path: Path, run: Fourbar
 ) -> None:
     code, _, err = run(command, MODELS / "crank_rocker.toml", "-o", tmp_path / name)
-    assert code == BAD_INPUT and err.count("\n") == 1 and written in err and "no ending" in err
+    assert (
+        code == BAD_INPUT
+        and err.count("\n") == 1
+        and written in err
+        and "no ending" in err
+    )
     assert not (tmp_path / name).exists()
 
 
@@ -158,35 +203,62 @@ def test_csv_has_the_same_numbers(run: Fourbar) -> None:
     rows, solution = list(csv.DictReader(io.StringIO(out))), fourbar.solve(load(file))
     assert (code, err, len(rows)) == (HOLDS, "", 361)
     for quantity in solution.evaluated():
-        names = [f"{quantity}_x", f"{quantity}_y"] if quantity in VECTORS else [quantity]
+        names = (
+            [f"{quantity}_x", f"{quantity}_y"] if quantity in VECTORS else [quantity]
+        )
         printed = np.array([[float(row[name]) for name in names] for row in rows])
-        assert np.array_equal(printed, getattr(solution, quantity).reshape(printed.shape)), quantity
-    assert {row["status"] for row in rows} == {"ok"} and {row["drive_bar"] for row in rows} == {"2"}
+        assert np.array_equal(
+            printed, getattr(solution, quantity).reshape(printed.shape)
+        ), quantity
+    assert {row["status"] for row in rows} == {"ok"} and {
+        row["drive_bar"] for row in rows
+    } == {"2"}
 
 
-@pytest.mark.parametrize("name", ["=cmd|'calc'!A0", "+1", "-A1", "@SUM(A1)", "P,=1+1", "P\n=1+1"])
-def test_a_heading_of_csv_is_a_word_and_no_formula(name: str, tmp_path: Path, run: Fourbar) -> None:
+@pytest.mark.parametrize(
+    "name", ["=cmd|'calc'!A0", "+1", "-A1", "@SUM(A1)", "P,=1+1", "P\n=1+1"]
+)
+def test_a_heading_of_csv_is_a_word_and_no_formula(
+    name: str, tmp_path: Path, run: Fourbar
+) -> None:
     """A spreadsheet calculates a cell that begins with =, and a point's name heads its columns."""
-    save(crank_rocker(points=(fourbar.Point("P", 3, (0.1, 0.7)),)), tmp_path / "scene.toml")
+    save(
+        crank_rocker(points=(fourbar.Point("P", 3, (0.1, 0.7)),)),
+        tmp_path / "scene.toml",
+    )
     header = run("analyze", tmp_path / "scene.toml", "--csv")[1].splitlines()[0]
-    assert "P_x" in header and all(cell.strip("|").isidentifier() for cell in header.split(","))
+    assert "P_x" in header and all(
+        cell.strip("|").isidentifier() for cell in header.split(",")
+    )
     text = (tmp_path / "scene.toml").read_text()
-    (tmp_path / "scene.toml").write_text(text.replace("P = ", f"{json.dumps(name)} = ", 1))
+    (tmp_path / "scene.toml").write_text(
+        text.replace("P = ", f"{json.dumps(name)} = ", 1)
+    )
     code, out, err = run("analyze", tmp_path / "scene.toml", "--csv")
     assert (code, out) == (BAD_INPUT, "") and "must be a word of letters" in err
 
 
 def test_degrees_are_of_angles_alone_and_named(run: Fourbar) -> None:
     file = MODELS / "crank_rocker.toml"
-    plain, turned = (strict(run("analyze", file, "--json", *more)[1]) for more in ((), ("--degrees",)))
+    plain, turned = (
+        strict(run("analyze", file, "--json", *more)[1])
+        for more in ((), ("--degrees",))
+    )
     assert turned["angle_unit"] == "deg"
     for key in CONTRACT[1:]:
         if key in ("theta_2", "theta_3", "theta_4"):
-            assert np.allclose(turned[key], np.degrees(plain[key]), rtol=1e-15, atol=0.0)  # type: ignore[arg-type]
+            assert np.allclose(
+                turned[key], np.degrees(plain[key]), rtol=1e-15, atol=0.0
+            )  # type: ignore[arg-type]
         else:
             assert turned[key] == plain[key], key
-    rows = list(csv.DictReader(io.StringIO(run("analyze", file, "--csv", "--degrees")[1])))
-    assert float(rows[90]["theta_2 [deg]"]) == pytest.approx(90.0, rel=1e-15) and "theta_2" not in rows[0]
+    rows = list(
+        csv.DictReader(io.StringIO(run("analyze", file, "--csv", "--degrees")[1]))
+    )
+    assert (
+        float(rows[90]["theta_2 [deg]"]) == pytest.approx(90.0, rel=1e-15)
+        and "theta_2" not in rows[0]
+    )
 
 
 def test_the_table_of_positions_says_in_what_units(run: Fourbar) -> None:
@@ -194,27 +266,42 @@ def test_the_table_of_positions_says_in_what_units(run: Fourbar) -> None:
     assert (code, err) == (HOLDS, "")
     lines = out.split("\n")
     assert lines[0] == "Thesis model mechanism"
-    heading = next(index for index, line in enumerate(lines) if "theta_2 " in line and "T4" in line)
+    heading = next(
+        index for index, line in enumerate(lines) if "theta_2 " in line and "T4" in line
+    )
     assert lines[heading + 1].split()[:3] == ["deg", "N", "m"]
     assert "…" not in out and len([line for line in lines if line.strip()]) > 361
-    radians = run("analyze", MODELS / "thesis.toml", "--table", "--radians")[1].split("\n")
+    radians = run("analyze", MODELS / "thesis.toml", "--table", "--radians")[1].split(
+        "\n"
+    )
     assert radians[heading + 1].split()[0] == "rad"
 
 
 def test_a_terminal_gets_some_forty_rows() -> None:
     lines = tables_text(load(MODELS / "crank_rocker.toml"), 80).splitlines()
     rows = [line for line in lines if re.match(r" *\d+\.\d{4} ", line)]
-    assert len(rows) == 37 and rows[1].split()[0] == "10.0000" and rows[-1].split()[0] == "360.0000"
-    assert lines.index(rows[-1]) < lines.index("shown: every 10th of the 361 positions; --all shows each")
+    assert (
+        len(rows) == 37
+        and rows[1].split()[0] == "10.0000"
+        and rows[-1].split()[0] == "360.0000"
+    )
+    assert lines.index(rows[-1]) < lines.index(
+        "shown: every 10th of the 361 positions; --all shows each"
+    )
     assert max(map(len, lines)) <= 80
 
 
 @pytest.mark.slow
 def test_every_thins_the_table_and_keeps_its_last_position(run: Fourbar) -> None:
-    thinned = run("analyze", MODELS / "crank_rocker.toml", "--every", 100)[1].splitlines()
+    thinned = run("analyze", MODELS / "crank_rocker.toml", "--every", 100)[
+        1
+    ].splitlines()
     rows = [line.split()[0] for line in thinned if re.match(r" *\d+\.\d{4} ", line)]
     assert rows == ["0.0000", "100.0000", "200.0000", "300.0000", "360.0000"]
-    every = [run("analyze", MODELS / "crank_rocker.toml", form)[1] for form in ("--all", "--table")]
+    every = [
+        run("analyze", MODELS / "crank_rocker.toml", form)[1]
+        for form in ("--all", "--table")
+    ]
     assert every[0] == every[1] and every[0].count("\n") > 361
 
 
@@ -223,10 +310,27 @@ def test_every_thins_the_table_and_keeps_its_last_position(run: Fourbar) -> None
     [
         (("analyze", "x.toml", "--json", "--csv"), "give one of them"),
         (("analyze", "x.toml", "--json", "--every", 2), "hold every position"),
-        (("analyze", MODELS / "crank_rocker.toml", "--pressure", "210 bar"), "needs a cylinder"),
-        (("analyze", MODELS / "gallery" / "excavator_bucket.toml", "--pressure", 210), 'did you mean "210 bar"?'),
-        (("plot", MODELS / "crank_rocker.toml", "-o", "a.svg", "--position", "12"), 'did you mean "12 deg"?'),
-        (("plot", STROKE, "-o", "a.svg", "--position", "350"), 'did you mean "350 mm"?'),
+        (
+            ("analyze", MODELS / "crank_rocker.toml", "--pressure", "210 bar"),
+            "needs a cylinder",
+        ),
+        (
+            (
+                "analyze",
+                MODELS / "gallery" / "excavator_bucket.toml",
+                "--pressure",
+                210,
+            ),
+            'did you mean "210 bar"?',
+        ),
+        (
+            ("plot", MODELS / "crank_rocker.toml", "-o", "a.svg", "--position", "12"),
+            'did you mean "12 deg"?',
+        ),
+        (
+            ("plot", STROKE, "-o", "a.svg", "--position", "350"),
+            'did you mean "350 mm"?',
+        ),
         (("new", "--lengths", 3, 1, 2, 2), "name the new file once"),
     ],
 )
@@ -237,13 +341,17 @@ def test_what_contradicts_itself_or_lacks_a_unit_is_refused(
     assert (code, out) == (2, "") and words in err and err.count("\n") == 1
 
 
-def test_no_command_is_a_question_for_help(run: Fourbar, capsys: pytest.CaptureFixture[str]) -> None:
+def test_no_command_is_a_question_for_help(
+    run: Fourbar, capsys: pytest.CaptureFixture[str]
+) -> None:
     code, out, err = run()
     assert (code, err) == (HOLDS, "") and out == run("-h")[1] and "analyze" in out
     described = out[out.index("Begin:") :].split()
     for command in group.commands.values():  # each whole, in the lines of 80 columns
         words = [command.name, *command.get_short_help_str(limit=1000).split()]
-        assert any(described[i : i + len(words)] == words for i in range(len(described))), command.name
+        assert any(
+            described[i : i + len(words)] == words for i in range(len(described))
+        ), command.name
     assert max(map(len, out.splitlines())) <= 80
     assert run("-V")[1] == f"fourbar, version {fourbar.__version__}\n"
     harness = import_module("fourbar_validation.cli").status([])
@@ -256,11 +364,20 @@ def test_the_shell_completes(run: Fourbar, monkeypatch: pytest.MonkeyPatch) -> N
     assert code == HOLDS and "compdef" in out
 
 
-def test_a_narrow_terminal_gets_whole_columns_and_the_names_of_what_is_missing() -> None:
+def test_a_narrow_terminal_gets_whole_columns_and_the_names_of_what_is_missing() -> (
+    None
+):
     scene = crank_rocker()
     for width in (40, 80, 120):
         text = tables_text(scene, width)
-        assert max(len(line) for line in text.split("\n") if not line.startswith("not shown")) <= width
+        assert (
+            max(
+                len(line)
+                for line in text.split("\n")
+                if not line.startswith("not shown")
+            )
+            <= width
+        )
         assert "…" not in text and "not shown: " in text and "T2" in text
     assert "not shown" not in tables_text(scene, 400)
 
@@ -272,11 +389,19 @@ def tables_text(scene: fourbar.Scene, width: int) -> str:
 def test_the_digits_of_the_torque() -> None:
     solution = fourbar.solve(crank_rocker(), "error")
     assert solution.torque is not None and solution.torque_error is not None
-    column = next(cells for name, cells in tables.list_columns(solution).items() if "digits" in name)
-    for cell, torque, error in zip(column, solution.torque, solution.torque_error, strict=True):
+    column = next(
+        cells
+        for name, cells in tables.list_columns(solution).items()
+        if "digits" in name
+    )
+    for cell, torque, error in zip(
+        column, solution.torque, solution.torque_error, strict=True
+    ):
         digits = int(cell)
         assert error <= abs(torque) * 10.0**-digits or digits == 0
-        assert digits == tables.MOST_DIGITS or error > abs(torque) * 10.0 ** -(digits + 1)
+        assert digits == tables.MOST_DIGITS or error > abs(torque) * 10.0 ** -(
+            digits + 1
+        )
 
 
 CLASSES = [
@@ -285,7 +410,10 @@ CLASSES = [
     ("0.3 0.24 0.1 0.22", "double rocker"),
     ("0.3 0.22 0.25 0.1", "rocker-crank"),
     ("20cm 48cm 55cm 20cm", "triple rocker"),
-    ("0.3 0.1 0.2 0.2", "change-point crank-rocker"),  # 0.3 + 0.1 and 0.2 + 0.2 differ as doubles
+    (
+        "0.3 0.1 0.2 0.2",
+        "change-point crank-rocker",
+    ),  # 0.3 + 0.1 and 0.2 + 0.2 differ as doubles
     ("0.1 0.3 0.1 0.3", "parallelogram"),
 ]
 
@@ -297,21 +425,51 @@ def test_classify(lengths: str, name: str, run: Fourbar) -> None:
 
 
 def test_what_is_printed_can_be_written(tmp_path: Path, run: Fourbar) -> None:
-    assert run("classify", 3, 1, 2.5, 2.2, "-o", tmp_path / "type.txt") == (HOLDS, "", "")
+    assert run("classify", 3, 1, 2.5, 2.2, "-o", tmp_path / "type.txt") == (
+        HOLDS,
+        "",
+        "",
+    )
     assert (tmp_path / "type.txt").read_text() == run("classify", 3, 1, 2.5, 2.2)[1]
-    assert run("new", "-o", tmp_path / "a.toml", "--lengths", 300, 100, "25cm", 220, "--unit", "mm")[0] == HOLDS
+    assert (
+        run(
+            "new",
+            "-o",
+            tmp_path / "a.toml",
+            "--lengths",
+            300,
+            100,
+            "25cm",
+            220,
+            "--unit",
+            "mm",
+        )[0]
+        == HOLDS
+    )
     assert load(tmp_path / "a.toml").linkage.lengths == (0.3, 0.1, 0.25, 0.22)
     for name, command in group.commands.items():
-        wanted = "--exports" if name == "edit" else "--out"  # the workbench writes what its page asks for
+        wanted = (
+            "--exports" if name == "edit" else "--out"
+        )  # the workbench writes what its page asks for
         assert any(wanted in option.opts for option in command.params), name
 
 
-def test_a_length_that_is_written_to_a_file_has_a_unit(tmp_path: Path, run: Fourbar) -> None:
+def test_a_length_that_is_written_to_a_file_has_a_unit(
+    tmp_path: Path, run: Fourbar
+) -> None:
     code, _, err = run("new", tmp_path / "a.toml", "--lengths", 300, 100, 250, 220)
-    assert code == BAD_INPUT and "--unit mm" in err and not (tmp_path / "a.toml").exists()
+    assert (
+        code == BAD_INPUT and "--unit mm" in err and not (tmp_path / "a.toml").exists()
+    )
     assert "s + l = 400 < p + q = 470\n" in run("classify", 300, 100, 250, 220)[1]
-    assert "s + l = 400 mm < p + q = 470 mm\n" in run("classify", "30cm", "100mm", "25cm", "0.22m")[1]
-    assert "s + l = 40 in < p + q = 47 in\n" in run("classify", "30in", "10in", "25in", "22in")[1]
+    assert (
+        "s + l = 400 mm < p + q = 470 mm\n"
+        in run("classify", "30cm", "100mm", "25cm", "0.22m")[1]
+    )
+    assert (
+        "s + l = 40 in < p + q = 47 in\n"
+        in run("classify", "30in", "10in", "25in", "22in")[1]
+    )
     assert run("classify", "30cm", 100, 250, 220)[0] == BAD_INPUT
 
 
@@ -319,19 +477,29 @@ def test_classify_says_what_turns_and_how_far(run: Fourbar) -> None:
     """Numbers by the law of cosines in the triangles that the bars make where two of them are in line."""
 
     def angle(opposite: float, first: float, second: float) -> float:
-        return math.degrees(math.acos((first**2 + second**2 - opposite**2) / (2.0 * first * second)))
+        return math.degrees(
+            math.acos((first**2 + second**2 - opposite**2) / (2.0 * first * second))
+        )
 
     d, a, b, c = 0.3, 0.1, 0.25, 0.22
     lines = run("classify", d, a, b, c)[1].splitlines()
     stretched, folded = angle(c, d, b + a), 180.0 + angle(c, d, b - a)
     row = next(
-        line.split() for line in lines if line.startswith("  output: input, coupler stretched") and "open" in line
+        line.split()
+        for line in lines
+        if line.startswith("  output: input, coupler stretched") and "open" in line
     )
     assert [float(cell) for cell in row[4:7]] == pytest.approx(
         [stretched, stretched, 180.0 - angle(a + b, d, c)], abs=6e-5
     )
-    row = next(line.split() for line in lines if line.startswith("  output: input, coupler folded") and "open" in line)
-    assert [float(cell) for cell in row[4:6]] == pytest.approx([folded, folded - 180.0], abs=6e-5)
+    row = next(
+        line.split()
+        for line in lines
+        if line.startswith("  output: input, coupler folded") and "open" in line
+    )
+    assert [float(cell) for cell in row[4:6]] == pytest.approx(
+        [folded, folded - 180.0], abs=6e-5
+    )
     least, greatest = angle(d - a, b, c), angle(d + a, b, c)
     swung = angle(b - a, d, c) - angle(b + a, d, c)
     one_stroke = folded - stretched
@@ -348,10 +516,20 @@ def test_classify_says_what_turns_and_how_far(run: Fourbar) -> None:
     assert f"output {abs(swung):.4f} deg" in lines[3]
     assert not any(line.startswith("  coupler:") for line in lines)
     every = run("classify", d, a, b, c, "--all")[1].splitlines()
-    assert sum(line.startswith("  coupler:") for line in every) == 4 and set(lines) <= set(every)
-    assert "change points: theta_2 = 0.0000 deg and 180.0000 deg" in run("classify", 2, 1, 2, 1)[1]
-    assert "are in line at change points alone:\n    ground + input = 3 = coupler" in run("classify", 2, 1, 2, 1)[1]
-    assert len(run("classify", 3, 1, 1, 1)[1].splitlines()) == 3  # a structure does not move
+    assert sum(line.startswith("  coupler:") for line in every) == 4 and set(
+        lines
+    ) <= set(every)
+    assert (
+        "change points: theta_2 = 0.0000 deg and 180.0000 deg"
+        in run("classify", 2, 1, 2, 1)[1]
+    )
+    assert (
+        "are in line at change points alone:\n    ground + input = 3 = coupler"
+        in run("classify", 2, 1, 2, 1)[1]
+    )
+    assert (
+        len(run("classify", 3, 1, 1, 1)[1].splitlines()) == 3
+    )  # a structure does not move
 
 
 def test_mjcf_of_a_scene_and_of_bare_lengths(tmp_path: Path, run: Fourbar) -> None:
@@ -360,14 +538,25 @@ def test_mjcf_of_a_scene_and_of_bare_lengths(tmp_path: Path, run: Fourbar) -> No
 
     code, out, err = run("mjcf", MODELS / "crank_rocker.toml", "-o", tmp_path / "a.xml")
     assert (code, out, err) == (HOLDS, "", "")
-    assert (tmp_path / "a.xml").read_text() == write_mjcf_for(load(MODELS / "crank_rocker.toml"))
+    assert (tmp_path / "a.xml").read_text() == write_mjcf_for(
+        load(MODELS / "crank_rocker.toml")
+    )
     lengths = ["--lengths", 0.3, "10 cm", "250 mm", 0.22]
-    code, out, err = run("mjcf", *lengths, "--omega", "60 rpm", "-o", tmp_path / "b.xml")
+    code, out, err = run(
+        "mjcf", *lengths, "--omega", "60 rpm", "-o", tmp_path / "b.xml"
+    )
     scene = make_scene(0.3, 0.1, 0.25, 0.22, omega=2.0 * math.pi)
     assert (code, err) == (HOLDS, "") and out.splitlines() == list_defaults(scene)
     assert (tmp_path / "b.xml").read_text() == write_mjcf_for(scene)
-    assert run("mjcf", MODELS / "thesis.toml", "--drive", "motor", "-o", tmp_path / "c.xml")[0] == HOLDS
-    assert (tmp_path / "c.xml").read_text() == write_mjcf_for(load(MODELS / "thesis.toml"), drive="motor")
+    assert (
+        run(
+            "mjcf", MODELS / "thesis.toml", "--drive", "motor", "-o", tmp_path / "c.xml"
+        )[0]
+        == HOLDS
+    )
+    assert (tmp_path / "c.xml").read_text() == write_mjcf_for(
+        load(MODELS / "thesis.toml"), drive="motor"
+    )
 
 
 def test_the_command_that_new_names_can_be_copied(tmp_path: Path, run: Fourbar) -> None:
@@ -377,17 +566,32 @@ def test_the_command_that_new_names_can_be_copied(tmp_path: Path, run: Fourbar) 
 
 
 @pytest.mark.parametrize("form", ["sdf", "usd"])
-def test_sdf_and_usd_name_the_loads_that_they_leave_out(form: str, tmp_path: Path, run: Fourbar) -> None:
+def test_sdf_and_usd_name_the_loads_that_they_leave_out(
+    form: str, tmp_path: Path, run: Fourbar
+) -> None:
     code, _, err = run(form, MODELS / "crank_rocker.toml", "-o", tmp_path / "a")
-    assert code == BAD_INPUT and "loads (here on bar 3, bar 4)" in err and "--without-loads" in err
-    assert run(form, MODELS / "crank_rocker.toml", "--without-loads", "-o", tmp_path / "a")[0] == HOLDS
+    assert (
+        code == BAD_INPUT
+        and "loads (here on bar 3, bar 4)" in err
+        and "--without-loads" in err
+    )
+    assert (
+        run(
+            form, MODELS / "crank_rocker.toml", "--without-loads", "-o", tmp_path / "a"
+        )[0]
+        == HOLDS
+    )
 
 
 @pytest.mark.slow
-def test_plot_and_animate_write_what_their_ending_says(tmp_path: Path, run: Fourbar) -> None:
+def test_plot_and_animate_write_what_their_ending_says(
+    tmp_path: Path, run: Fourbar
+) -> None:
     file = MODELS / "crank_rocker.toml"
     drawn = tmp_path / "a.svg"
-    assert run("plot", file, "-o", drawn, "--figure", "linkage", "--position", "30 deg") == (HOLDS, "", "")
+    assert run(
+        "plot", file, "-o", drawn, "--figure", "linkage", "--position", "30 deg"
+    ) == (HOLDS, "", "")
     assert "<svg" in drawn.read_text()
     assert run("animate", file, "-o", tmp_path / "a.html") == (HOLDS, "", "")
     assert "<html" in (tmp_path / "a.html").read_text()
@@ -405,46 +609,72 @@ def test_plot_and_animate_write_what_their_ending_says(tmp_path: Path, run: Four
     ],
 )
 def test_what_goes_wrong_is_one_line_and_a_status(
-    error: BaseException, code: int, run: Fourbar, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    error: BaseException,
+    code: int,
+    run: Fourbar,
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
 ) -> None:
     def broken(*_: object) -> None:
         raise error
 
     monkeypatch.setattr(Case, "of", broken)
     monkeypatch.delenv("FOURBAR_TRACEBACK", raising=False)
-    exit_status, out, err = run("analyze", MODELS / "thesis.toml", "--json", "-o", tmp_path / "out")
+    exit_status, out, err = run(
+        "analyze", MODELS / "thesis.toml", "--json", "-o", tmp_path / "out"
+    )
     # after an interrupt click ends the line that the terminal has started with ^C
-    assert (exit_status, out, err.strip().count("\n")) == (code, "", 0) and not list(tmp_path.iterdir())
+    assert (exit_status, out, err.strip().count("\n")) == (code, "", 0) and not list(
+        tmp_path.iterdir()
+    )
     if isinstance(error, RuntimeError):
         monkeypatch.setenv("FOURBAR_TRACEBACK", "1")
         with pytest.raises(RuntimeError):
             run("analyze", MODELS / "thesis.toml")
 
 
-def test_a_full_disk_leaves_the_old_file(run: Fourbar, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_a_full_disk_leaves_the_old_file(
+    run: Fourbar, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     def full(_: int) -> None:
         raise OSError(28, "No space left on device")
 
     (tmp_path / "out").write_text("old")
     monkeypatch.setattr("os.fsync", full)
-    code, _, err = run("analyze", MODELS / "thesis.toml", "--json", "-o", tmp_path / "out")
+    code, _, err = run(
+        "analyze", MODELS / "thesis.toml", "--json", "-o", tmp_path / "out"
+    )
     assert code == BROKEN and "No space left" in err and err.count("\n") == 1
-    assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [("out", "old")]
+    assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [
+        ("out", "old")
+    ]
 
 
 @pytest.mark.parametrize(
-    ("out", "why"), [("no/out", "no such folder"), (".", "a file, not a folder"), ("a", "is read here")]
+    ("out", "why"),
+    [
+        ("no/out", "no such folder"),
+        (".", "a file, not a folder"),
+        ("a", "is read here"),
+    ],
 )
 @pytest.mark.parametrize("command", ["analyze", "mjcf"])
 def test_an_output_that_cannot_be_is_refused_before_anything_is_solved(
-    run: Fourbar, command: str, out: str, why: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    run: Fourbar,
+    command: str,
+    out: str,
+    why: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(Case, "of", None)
     text = (MODELS / "thesis.toml").read_text()
     (tmp_path / "a").write_text(text)
     code, _, err = run(command, tmp_path / "a", "-o", tmp_path / out)
     assert code == BAD_INPUT and why in err and err.count("\n") == 1
-    assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [("a", text)]
+    assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [
+        ("a", text)
+    ]
 
 
 @pytest.mark.posix
@@ -454,7 +684,9 @@ def test_a_device_is_written_to_and_stays_one(run: Fourbar, tmp_path: Path) -> N
     reader = os.open(pipe, os.O_RDWR | os.O_NONBLOCK)
     try:
         assert run("mjcf", "--lengths", 0.3, 0.1, 0.25, 0.22, "-o", pipe)[0] == HOLDS
-        assert b"</mujoco>" in os.read(reader, 60_000) and stat.S_ISFIFO(pipe.stat().st_mode)
+        assert b"</mujoco>" in os.read(reader, 60_000) and stat.S_ISFIFO(
+            pipe.stat().st_mode
+        )
     finally:
         os.close(reader)
 
@@ -463,12 +695,24 @@ def test_a_title_does_not_steer_the_terminal(tmp_path: Path, run: Fourbar) -> No
     title = "\x1b[2J\x1b]0;x\x07\r\n[bold]name"
     save(crank_rocker(title=title), tmp_path / "scene.toml")
     out = run("analyze", tmp_path / "scene.toml")[1]
-    assert "\x1b" not in out and "\x07" not in out and out.startswith('Crank-rocker "[2J ]0;x [bold]name", open')
-    assert strict(run("analyze", tmp_path / "scene.toml", "--json")[1])["title"] == title
+    assert (
+        "\x1b" not in out
+        and "\x07" not in out
+        and out.startswith('Crank-rocker "[2J ]0;x [bold]name", open')
+    )
+    assert (
+        strict(run("analyze", tmp_path / "scene.toml", "--json")[1])["title"] == title
+    )
 
 
 def child(*arguments: str) -> "subprocess.CompletedProcess[str]":
-    return subprocess.run([sys.executable, *arguments], cwd=ROOT, text=True, capture_output=True, check=False)
+    return subprocess.run(
+        [sys.executable, *arguments],
+        cwd=ROOT,
+        text=True,
+        capture_output=True,
+        check=False,
+    )
 
 
 @pytest.mark.slow
@@ -477,26 +721,44 @@ def test_the_command_line_starts_light() -> None:
     code = f"import sys, fourbar.cli; print([m for m in {heavy.split()!r} if m in sys.modules])"
     assert child("-c", code).stdout == "[]\n"
     done = child("-m", "fourbar", "--version")
-    assert (done.returncode, done.stdout) == (0, f"fourbar, version {fourbar.__version__}\n")
+    assert (done.returncode, done.stdout) == (
+        0,
+        f"fourbar, version {fourbar.__version__}\n",
+    )
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("arguments", [("classify", "3", "1", "2", "3"), ("analyze", "models/thesis.toml", "--json")])
+@pytest.mark.parametrize(
+    "arguments",
+    [("classify", "3", "1", "2", "3"), ("analyze", "models/thesis.toml", "--json")],
+)
 def test_a_reader_that_leaves_early_is_no_error(arguments: tuple[str, ...]) -> None:
     reading, writing = os.pipe()
     os.close(reading)
     command = [sys.executable, "-m", "fourbar", *arguments]
-    done = subprocess.run(command, cwd=ROOT, stdout=writing, stderr=subprocess.PIPE, text=True, check=False)
+    done = subprocess.run(
+        command,
+        cwd=ROOT,
+        stdout=writing,
+        stderr=subprocess.PIPE,
+        text=True,
+        check=False,
+    )
     os.close(writing)
     assert (done.returncode, done.stderr) == (HOLDS, "")
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not Path("/dev/full").exists(), reason="only Linux has a device that is always full")
+@pytest.mark.skipif(
+    not Path("/dev/full").exists(), reason="only Linux has a device that is always full"
+)
 def test_standard_output_that_is_full() -> None:
     with Path("/dev/full").open("w") as full:
         done = subprocess.run(
             [sys.executable, "-m", "fourbar", "analyze", "models/thesis.toml"],
             cwd=ROOT, stdout=full, stderr=subprocess.PIPE, text=True, check=False,
         )  # fmt: skip
-    assert (done.returncode, done.stderr.count("\n")) == (BROKEN, 1) and "No space left" in done.stderr
+    assert (done.returncode, done.stderr.count("\n")) == (
+        BROKEN,
+        1,
+    ) and "No space left" in done.stderr

@@ -18,14 +18,24 @@ from pathlib import Path
 
 import pytest
 
-pytest.importorskip("tornado", reason="the workbench is served by tornado: pip install tornado")
-pytest.importorskip("tomlkit", reason="the workbench edits scene files by tomlkit: pip install tomlkit")
+pytest.importorskip(
+    "tornado", reason="the workbench is served by tornado: pip install tornado"
+)
+pytest.importorskip(
+    "tomlkit", reason="the workbench edits scene files by tomlkit: pip install tomlkit"
+)
 from tornado.httpclient import AsyncHTTPClient, HTTPRequest
 from tornado.websocket import websocket_connect
 
 from fourbar.edit import exports, server
 from fourbar.edit.redirect import ENDING, Redirect
-from fourbar.edit.server import GONE, LARGEST_REQUEST, MOST_CONNECTIONS, MOST_WAITING, Workbench
+from fourbar.edit.server import (
+    GONE,
+    LARGEST_REQUEST,
+    MOST_CONNECTIONS,
+    MOST_WAITING,
+    Workbench,
+)
 from fourbar.edit.session import Session
 from fourbar.errors import InputError
 
@@ -76,7 +86,9 @@ def bench(path: Path, monkeypatch: pytest.MonkeyPatch, capsys):
                     OPEN.pop().close()
                 await asyncio.sleep(0.05)
 
-        with warnings.catch_warnings():  # tornado's client keeps the sockets of lines that the server has closed
+        with (
+            warnings.catch_warnings()
+        ):  # tornado's client keeps the sockets of lines that the server has closed
             warnings.simplefilter("ignore", ResourceWarning)
             asyncio.run(both())
             gc.collect()
@@ -90,14 +102,20 @@ def port_of(address: str) -> str:
 
 
 async def status(address: str, **options) -> int:
-    answer = await AsyncHTTPClient(force_instance=True).fetch(HTTPRequest(address, **options), raise_error=False)
+    answer = await AsyncHTTPClient(force_instance=True).fetch(
+        HTTPRequest(address, **options), raise_error=False
+    )
     return answer.code
 
 
 async def page(address: str):
     origin = "/".join(address.split("/")[:3])
     line = address.replace("http:", "ws:") + "live"
-    OPEN.append(await websocket_connect(HTTPRequest(line, headers={"Origin": origin}), max_message_size=HUGE))
+    OPEN.append(
+        await websocket_connect(
+            HTTPRequest(line, headers={"Origin": origin}), max_message_size=HUGE
+        )
+    )
     return OPEN[-1]
 
 
@@ -127,23 +145,52 @@ def test_only_a_page_with_the_token_from_this_address_is_answered(bench) -> None
         assert re.fullmatch(r"http://127\.0\.0\.1:\d+/[A-Za-z0-9_-]{32,}/", address)
         fetched = await AsyncHTTPClient(force_instance=True).fetch(address)
         assert fetched.code == 200 and b"Crank-rocker" in fetched.body
-        assert fetched.headers["Referrer-Policy"] == "no-referrer" and fetched.headers["Cache-Control"] == "no-store"
+        assert (
+            fetched.headers["Referrer-Policy"] == "no-referrer"
+            and fetched.headers["Cache-Control"] == "no-store"
+        )
         inside = address.split("/")[3] + "/scene.toml"
-        for place in ("", "x" * 43 + "/", "x/", "../scene.toml", "%2e%2e/scene.toml", inside):
+        for place in (
+            "",
+            "x" * 43 + "/",
+            "x/",
+            "../scene.toml",
+            "%2e%2e/scene.toml",
+            inside,
+        ):
             assert await status(root + place) == 404, place
         assert await status(address + "report") == 404
-        for host in (f"example.org:{port}", "example.org", "127.0.0.1", f"127.0.0.1:{int(port) ^ 1}"):
+        for host in (
+            f"example.org:{port}",
+            "example.org",
+            "127.0.0.1",
+            f"127.0.0.1:{int(port) ^ 1}",
+        ):
             assert await status(address, headers={"Host": host}) == 403, host
         assert await status(address, headers={"Host": f"localhost:{port}"}) == 200
-        for origin in ("http://example.org", "null", f"https://127.0.0.1:{port}", f"http://127.0.0.1:{int(port) ^ 1}"):
+        for origin in (
+            "http://example.org",
+            "null",
+            f"https://127.0.0.1:{port}",
+            f"http://127.0.0.1:{int(port) ^ 1}",
+        ):
             assert await status(address, headers={"Origin": origin}) == 403, origin
-            assert await status(address + "live", headers={"Origin": origin}) == 403, origin
+            assert await status(address + "live", headers={"Origin": origin}) == 403, (
+                origin
+            )
         assert await status(address + "live") == 403  # no browser leaves it out
-        assert await status(root + "x" * 43 + "/live", headers={"Origin": root[:-1]}) == 404
-        assert await status(address + "live", headers={"Origin": root[:-1]}) == 400  # as it should be, but no WebSocket
+        assert (
+            await status(root + "x" * 43 + "/live", headers={"Origin": root[:-1]})
+            == 404
+        )
+        assert (
+            await status(address + "live", headers={"Origin": root[:-1]}) == 400
+        )  # as it should be, but no WebSocket
         assert await status(address, method="POST", body="x") == 405
         assert not made.pages
-        with pytest.raises(ConnectionRefusedError):  # as is every other address of this machine
+        with pytest.raises(
+            ConnectionRefusedError
+        ):  # as is every other address of this machine
             socket.create_connection(("127.0.0.2", int(port)), timeout=1.0)
 
     bench(ask)
@@ -154,8 +201,12 @@ def test_a_request_of_a_hundred_megabytes_is_not_read(bench) -> None:
         host, port = address.split("/")[2].split(":")
         reader, writer = await asyncio.open_connection(host, int(port))
         path = "/" + address.split("/", 3)[3]
-        writer.write(f"POST {path} HTTP/1.1\r\nHost: {host}:{port}\r\nContent-Length: {HUGE}\r\n\r\n".encode())
-        assert (await asyncio.wait_for(reader.read(), 5.0)).startswith((b"HTTP/1.1 400", b"HTTP/1.1 413"))
+        writer.write(
+            f"POST {path} HTTP/1.1\r\nHost: {host}:{port}\r\nContent-Length: {HUGE}\r\n\r\n".encode()
+        )
+        assert (await asyncio.wait_for(reader.read(), 5.0)).startswith(
+            (b"HTTP/1.1 400", b"HTTP/1.1 413")
+        )
         writer.close()
         line = await page(address)
         await line.write_message("[" * (LARGEST_REQUEST + 1))
@@ -170,7 +221,9 @@ def test_a_request_of_a_hundred_megabytes_is_not_read(bench) -> None:
 
 
 @pytest.mark.slow
-def test_a_hundred_requests_at_once_are_answered_and_of_a_drag_only_the_latest(bench) -> None:
+def test_a_hundred_requests_at_once_are_answered_and_of_a_drag_only_the_latest(
+    bench,
+) -> None:
     async def ask(made: Workbench, address: str) -> None:
         assert await asyncio.gather(*(status(address) for _ in range(30))) == [200] * 30
         line = await page(address)
@@ -178,12 +231,27 @@ def test_a_hundred_requests_at_once_are_answered_and_of_a_drag_only_the_latest(b
         do = made.session.do
         made.session.do = lambda asked: solved.append(asked) or do(asked)
         for size in range(100):
-            request = {"do": "set", "path": ["lengths", "input"], "value": f"{101 + 0.1 * size:.1f} mm", "gesture": "g"}
-            line.write_message(json.dumps(request | {"id": "mine" if size == 99 else "old"}))
+            request = {
+                "do": "set",
+                "path": ["lengths", "input"],
+                "value": f"{101 + 0.1 * size:.1f} mm",
+                "gesture": "g",
+            }
+            line.write_message(
+                json.dumps(request | {"id": "mine" if size == 99 else "old"})
+            )
         about = await told(line)
         assert 'input = "110.9 mm"' in about["text"] and len(solved) < 60
         for number in range(3 * MOST_WAITING):
-            line.write_message(json.dumps({"do": "units", "units": "SI", "id": "mine" if number == 299 else "old"}))
+            line.write_message(
+                json.dumps(
+                    {
+                        "do": "units",
+                        "units": "SI",
+                        "id": "mine" if number == 299 else "old",
+                    }
+                )
+            )
         await told(line)
         assert len(made.waiting) <= MOST_WAITING
 
@@ -194,13 +262,21 @@ def test_error_bars_follow_and_every_page_sees_the_change(bench) -> None:
     async def ask(made: Workbench, address: str) -> None:
         first_page, second_page = await page(address), await page(address)
         await told(first_page, {"do": "hello"})
-        about = await told(first_page, {"do": "set", "path": ["lengths", "input"], "value": "4 in"})
+        about = await told(
+            first_page, {"do": "set", "path": ["lengths", "input"], "value": "4 in"}
+        )
         assert not about["settled"] and "torque_error" not in str(about["columns"])
         for line in (first_page, second_page):
             about = await settled(line)
-            assert '"4 in"' in about["text"] and "torque_error" in str(about["columns"]) and about["saved"] is False
+            assert (
+                '"4 in"' in about["text"]
+                and "torque_error" in str(about["columns"])
+                and about["saved"] is False
+            )
             assert "  torque   peak" in "".join(about["data"]["summary"])
-        assert "refused" in await told(second_page, {"do": "set", "path": ["lengths", "input"], "value": "9 ft"})
+        assert "refused" in await told(
+            second_page, {"do": "set", "path": ["lengths", "input"], "value": "9 ft"}
+        )
 
     session = bench(ask)
     assert session.state_file.exists()  # it is not saved
@@ -246,12 +322,15 @@ def test_it_ends_when_the_last_page_has_gone_and_not_before(bench) -> None:
     assert not bench(ask).state_file.exists()  # nothing was changed
 
 
-def test_the_check_runs_in_a_process_of_its_own_reports_and_can_be_stopped(bench, monkeypatch) -> None:
+def test_the_check_runs_in_a_process_of_its_own_reports_and_can_be_stopped(
+    bench, monkeypatch
+) -> None:
     program = "import sys, time, pathlib; print('agrees', flush=True); out = pathlib.Path(sys.argv[-1]); "
-    program += (
-        "(out / 'report.html').write_text('<p>report'); time.sleep(float(out.parent.joinpath('wait').read_text()))"
+    program += "(out / 'report.html').write_text('<p>report'); "
+    program += "time.sleep(float(out.parent.joinpath('wait').read_text()))"
+    monkeypatch.setattr(
+        exports, "find_harness", lambda: [sys.executable, "-c", program]
     )
-    monkeypatch.setattr(exports, "find_harness", lambda: [sys.executable, "-c", program])
     monkeypatch.setattr(exports, "TICK", 0.05)
 
     async def ask(made: Workbench, address: str) -> None:
@@ -264,18 +343,37 @@ def test_the_check_runs_in_a_process_of_its_own_reports_and_can_be_stopped(bench
             if stopped:
                 await heard(line, lambda about: about.get("check", {}).get("lines"))
                 await line.write_message(json.dumps({"do": "stop"}))
-            check = (await heard(line, lambda about: "check" in about and not about["check"]["running"]))["check"]
-            assert check["lines"] == ["agrees"] and check["report"] and check["stopped"] is stopped
+            check = (
+                await heard(
+                    line,
+                    lambda about: "check" in about and not about["check"]["running"],
+                )
+            )["check"]
+            assert (
+                check["lines"] == ["agrees"]
+                and check["report"]
+                and check["stopped"] is stopped
+            )
         answer = await AsyncHTTPClient(force_instance=True).fetch(address + "report")
-        assert answer.body == b"<p>report" and "sandbox" in answer.headers["Content-Security-Policy"]
+        assert (
+            answer.body == b"<p>report"
+            and "sandbox" in answer.headers["Content-Security-Policy"]
+        )
         assert (folder / "check" / "scene.toml").read_text() == CRANK_ROCKER.read_text()
 
     bench(ask)
 
 
 @pytest.mark.slow
-def test_a_change_overtakes_a_summary_that_is_being_computed(bench, monkeypatch) -> None:
-    evaluate, asked_for, released, summaries = server.evaluate_scene, threading.Event(), threading.Event(), []
+def test_a_change_overtakes_a_summary_that_is_being_computed(
+    bench, monkeypatch
+) -> None:
+    evaluate, asked_for, released, summaries = (
+        server.evaluate_scene,
+        threading.Event(),
+        threading.Event(),
+        [],
+    )
 
     def slow(scene, plain, units, **options):
         asked_for.set()
@@ -286,14 +384,23 @@ def test_a_change_overtakes_a_summary_that_is_being_computed(bench, monkeypatch)
     async def ask(made: Workbench, address: str) -> None:
         line = await page(address)
         await told(line, {"do": "hello"})
-        await asyncio.to_thread(asked_for.wait, 20)  # the summary of the first state is under way
+        await asyncio.to_thread(
+            asked_for.wait, 20
+        )  # the summary of the first state is under way
         for size in range(101, 111):
-            about = await told(line, {"do": "set", "path": ["lengths", "input"], "value": f"{size} mm"})
+            about = await told(
+                line, {"do": "set", "path": ["lengths", "input"], "value": f"{size} mm"}
+            )
             assert f'"{size} mm"' in about["text"] and not about["settled"]
-            await asyncio.sleep(server.SETTLED * 1.2)  # each asks for a summary of its own
+            await asyncio.sleep(
+                server.SETTLED * 1.2
+            )  # each asks for a summary of its own
         released.set()
         about = await settled(line)
-        assert '"110 mm"' in about["text"] and summaries == [0.1, 0.11]  # the one of each state between was given up
+        assert '"110 mm"' in about["text"] and summaries == [
+            0.1,
+            0.11,
+        ]  # the one of each state between was given up
 
     monkeypatch.setattr(server, "evaluate_scene", slow)
     bench(ask)
@@ -304,7 +411,9 @@ def test_a_page_that_closes_while_answers_wait_leaves_no_trace(bench, caplog) ->
     async def ask(made: Workbench, address: str) -> None:
         line = await page(address)
         for _ in range(3):
-            reader, writer = await asyncio.open_connection("127.0.0.1", int(port_of(address)))
+            reader, writer = await asyncio.open_connection(
+                "127.0.0.1", int(port_of(address))
+            )
             host, path = address.split("/")[2], "/" + address.split("/", 3)[3] + "live"
             head = f"GET {path} HTTP/1.1\r\nHost: {host}\r\nOrigin: http://{host}\r\nUpgrade: websocket\r\n"
             head += f"Connection: Upgrade\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: {'A' * 22}==\r\n\r\n"
@@ -312,7 +421,9 @@ def test_a_page_that_closes_while_answers_wait_leaves_no_trace(bench, caplog) ->
             await reader.readuntil(b"\r\n\r\n")
             for number in range(60):
                 text = json.dumps({"do": "units", "units": "SI", "id": number}).encode()
-                writer.write(struct.pack("!BB4x", 0x81, 0x80 | len(text)) + text)  # masked by zeros
+                writer.write(
+                    struct.pack("!BB4x", 0x81, 0x80 | len(text)) + text
+                )  # masked by zeros
             await writer.drain()
             writer.transport.pause_reading()
             while made.waiting:
@@ -331,7 +442,9 @@ def half_open(address: str, number: int) -> list[socket.socket]:
     """Connections that begin a request and say no more."""
     made = []
     for _ in range(number):
-        made.append(socket.create_connection(("127.0.0.1", int(port_of(address))), timeout=5.0))
+        made.append(
+            socket.create_connection(("127.0.0.1", int(port_of(address))), timeout=5.0)
+        )
         made[-1].sendall(b"GET / HTTP/1.1\r\n")
     return made
 
@@ -344,8 +457,12 @@ def processor_time(process: subprocess.Popen) -> float:
 
 @pytest.mark.slow
 @pytest.mark.linux
-@pytest.mark.parametrize("files", [256, 40], ids=["within its limit of files", "beyond its limit of files"])
-def test_half_open_connections_neither_stop_the_server_nor_stay(path: Path, files: int) -> None:
+@pytest.mark.parametrize(
+    "files", [256, 40], ids=["within its limit of files", "beyond its limit of files"]
+)
+def test_half_open_connections_neither_stop_the_server_nor_stay(
+    path: Path, files: int
+) -> None:
     import resource
 
     # imported before the limit holds: the server alone is tried
@@ -362,7 +479,9 @@ server.edit(Path(sys.argv[1]), Path(sys.argv[1] + "_exports"), browse=False)
     with ExitStack() as stack:
         command = [sys.executable, "-c", program, str(path)]
         process = stack.enter_context(
-            subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+            subprocess.Popen(
+                command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+            )
         )
         stack.callback(process.kill)
         address = process.stdout.readline().strip()
@@ -375,7 +494,9 @@ server.edit(Path(sys.argv[1]), Path(sys.argv[1] + "_exports"), browse=False)
 
         async def save() -> None:
             line = await page(address)
-            await told(line, {"do": "set", "path": ["lengths", "input"], "value": "105 mm"})
+            await told(
+                line, {"do": "set", "path": ["lengths", "input"], "value": "105 mm"}
+            )
             assert (await told(line, {"do": "save"})).get("saved")
             line.close()
 
@@ -397,7 +518,10 @@ def test_the_oldest_connection_gives_way_and_a_page_stays(bench) -> None:
         idle = await asyncio.to_thread(half_open, address, 2 * MOST_CONNECTIONS)
         await asyncio.sleep(0.2)
         assert await asyncio.to_thread(idle[0].recv, 100) == b""
-        assert len([stream for stream in made.entrance.streams if not stream.closed()]) <= MOST_CONNECTIONS
+        assert (
+            len([stream for stream in made.entrance.streams if not stream.closed()])
+            <= MOST_CONNECTIONS
+        )
         assert (await told(line, {"do": "hello"}))["file"] == "scene.toml"
         for connection in idle:
             connection.close()
@@ -405,13 +529,17 @@ def test_the_oldest_connection_gives_way_and_a_page_stays(bench) -> None:
     bench(ask)
 
 
-def test_a_page_in_the_background_which_is_woken_once_a_minute_finds_its_server() -> None:
+def test_a_page_in_the_background_which_is_woken_once_a_minute_finds_its_server() -> (
+    None
+):
     assert GONE >= 60.0 + 20.0
 
 
 @pytest.mark.slow
 @pytest.mark.posix
-def test_the_browser_gets_a_private_page_and_the_token_stands_in_no_list_of_processes(path: Path) -> None:
+def test_the_browser_gets_a_private_page_and_the_token_stands_in_no_list_of_processes(
+    path: Path,
+) -> None:
     seen, browser = path.with_name("seen"), path.with_name("browser")
     browser.write_text(f'#!/bin/sh\necho "$@" >> {seen}.part; mv {seen}.part {seen}\n')
     browser.chmod(0o755)
@@ -420,8 +548,13 @@ def test_the_browser_gets_a_private_page_and_the_token_stands_in_no_list_of_proc
         wait_until(seen.exists)
         (opened_url,) = seen.read_text().split()
         redirect = Path(opened_url.removeprefix("file://"))
-        assert opened_url.startswith("file://") and address.split("/")[3] not in opened_url
-        assert redirect.stat().st_mode & 0o777 == 0o600 and f'url={address}"' in redirect.read_text().replace("0; ", "")
+        assert (
+            opened_url.startswith("file://") and address.split("/")[3] not in opened_url
+        )
+        assert (
+            redirect.stat().st_mode & 0o777 == 0o600
+            and f'url={address}"' in redirect.read_text().replace("0; ", "")
+        )
         process.send_signal(2)
         process.communicate(timeout=20)
     assert not redirect.exists()
@@ -440,7 +573,9 @@ def test_a_second_workbench_on_one_file_leads_to_the_first(path: Path) -> None:
     assert (guest.returncode, guest.communicate(), host.poll()) == (0, ("", ""), None)
     host.kill()
     host.communicate()
-    with start(path, "--no-browser") as third:  # the page of a server that was killed leads nobody astray
+    with start(
+        path, "--no-browser"
+    ) as third:  # the page of a server that was killed leads nobody astray
         assert third.stdout.readline() not in addresses
         third.send_signal(2)
         assert third.communicate(timeout=20) == ("", "")
@@ -448,7 +583,9 @@ def test_a_second_workbench_on_one_file_leads_to_the_first(path: Path) -> None:
 
 
 @pytest.mark.posix
-def test_a_file_that_another_one_locks_and_gives_no_address_for_is_named(tmp_path: Path, monkeypatch) -> None:
+def test_a_file_that_another_one_locks_and_gives_no_address_for_is_named(
+    tmp_path: Path, monkeypatch
+) -> None:
     from fourbar.edit import redirect
 
     monkeypatch.setattr(redirect, "PATIENCE", 0.1)
@@ -463,7 +600,9 @@ def test_a_file_that_another_one_locks_and_gives_no_address_for_is_named(tmp_pat
 
 @pytest.mark.slow
 @pytest.mark.posix
-def test_the_command_prints_the_address_alone_and_ends_by_an_interrupt(path: Path) -> None:
+def test_the_command_prints_the_address_alone_and_ends_by_an_interrupt(
+    path: Path,
+) -> None:
     began = time.monotonic()
     with start(path, "--no-browser") as process:
         address = process.stdout.readline()

@@ -12,9 +12,15 @@ import pytest
 
 import fourbar
 
-pytest.importorskip("selenium", reason="pages are driven by selenium: pip install selenium")
-pytest.importorskip("tornado", reason="the workbench is served by tornado: pip install tornado")
-pytest.importorskip("tomlkit", reason="the workbench edits scene files by tomlkit: pip install tomlkit")
+pytest.importorskip(
+    "selenium", reason="pages are driven by selenium: pip install selenium"
+)
+pytest.importorskip(
+    "tornado", reason="the workbench is served by tornado: pip install tornado"
+)
+pytest.importorskip(
+    "tomlkit", reason="the workbench edits scene files by tomlkit: pip install tomlkit"
+)
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.keys import Keys
 
@@ -79,7 +85,9 @@ def click_pins(driver, width: str, *pixels: tuple[float, float]) -> None:
     picture = driver.find_element("id", "picture")
     middle = picture.size["width"] / 2, picture.size["height"] / 2
     for x, y in pixels:
-        ActionChains(driver).move_to_element_with_offset(picture, x - middle[0], y - middle[1]).click().perform()
+        ActionChains(driver).move_to_element_with_offset(
+            picture, x - middle[0], y - middle[1]
+        ).click().perform()
 
 
 def save(driver) -> None:
@@ -95,10 +103,12 @@ def drag_pin_B(driver) -> None:
     handles = driver.find_elements("css selector", ".handle")
     assert "pin B" in handles[1].get_attribute("aria-label")
     scale = driver.execute_script("return view.k * picture.clientWidth / view.width")
-    ActionChains(driver).move_to_element(handles[1]).click_and_hold().move_by_offset(12, -9).move_by_offset(
-        8, -11
-    ).release().perform()
-    wait_for(driver, "!inFlight && !waiting.length && plain.lengths.output !== '220 mm'")
+    ActionChains(driver).move_to_element(handles[1]).click_and_hold().move_by_offset(
+        12, -9
+    ).move_by_offset(8, -11).release().perform()
+    wait_for(
+        driver, "!inFlight && !waiting.length && plain.lengths.output !== '220 mm'"
+    )
     moved = np.subtract(driver.execute_script("return at(row).B"), before) * scale
     assert moved == pytest.approx([20.0, 20.0], abs=PIXELS)
 
@@ -131,14 +141,21 @@ def opened(chromium):
 
 
 @pytest.mark.slow
-def test_the_table_of_limits_keeps_its_columns_in_a_narrow_window(chromium, opened, tmp_path: Path) -> None:
-    (tmp_path / "a.toml").write_text(fourbar.dump(fourbar.Scene(fourbar.uniform(0.3, 0.1, 0.25, 0.22))))
+def test_the_table_of_limits_keeps_its_columns_in_a_narrow_window(
+    chromium, opened, tmp_path: Path
+) -> None:
+    (tmp_path / "a.toml").write_text(
+        fourbar.dump(fourbar.Scene(fourbar.uniform(0.3, 0.1, 0.25, 0.22)))
+    )
     resize(chromium, 400)
     chromium.get(opened(tmp_path / "a.toml"))
     lines = "[...document.querySelectorAll('#summary .columns')]"
     wait_for(chromium, f"{lines}.length")
     told, heights = zip(
-        *chromium.execute_script(f"return {lines}.map(e => [e.textContent, e.offsetHeight])"), strict=True
+        *chromium.execute_script(
+            f"return {lines}.map(e => [e.textContent, e.offsetHeight])"
+        ),
+        strict=True,
     )
     assert any("limit positions" in line for line in told) and len(told) > 2
     assert len(set(heights)) == 1  # of one line each
@@ -146,7 +163,9 @@ def test_the_table_of_limits_keeps_its_columns_in_a_narrow_window(chromium, open
 
 
 @pytest.mark.slow
-def test_a_designer_goes_from_an_empty_scene_to_a_saved_file(chromium, opened, tmp_path: Path) -> None:
+def test_a_designer_goes_from_an_empty_scene_to_a_saved_file(
+    chromium, opened, tmp_path: Path
+) -> None:
     path, driver = tmp_path / "mine.toml", chromium
     open_scene(driver, opened(path))
     type_into(driver, "field:title", "<b>Mine</b><script>alert(1)</script>")
@@ -154,20 +173,35 @@ def test_a_designer_goes_from_an_empty_scene_to_a_saved_file(chromium, opened, t
     wait_for(driver, "data.lengths[1] === 0.1016")
     type_into(driver, "field:lengths/input", "4 lb")
     # the keys before the last one are refused too, each with a line of its own
-    wait_for(driver, "document.getElementById('field:lengths/input!').textContent.includes('does not convert to m')")
-    assert driver.find_element("id", "field:lengths/input").get_attribute("aria-invalid") == "true"
+    wait_for(
+        driver,
+        "document.getElementById('field:lengths/input!').textContent.includes('does not convert to m')",
+    )
+    assert (
+        driver.find_element("id", "field:lengths/input").get_attribute("aria-invalid")
+        == "true"
+    )
     assert driver.execute_script("return data.lengths[1]") == 0.1016
     driver.find_element("id", "field:lengths/input").send_keys(Keys.ESCAPE)
     type_into(driver, "field:bars/coupler/mass", "2 kg")
     wait_for(driver, "plain.bars.coupler.mass === '2 kg'")
     driver.find_element("id", "field:bars/coupler/mass").send_keys(Keys.ARROW_DOWN)
     wait_for(driver, "plain.bars.coupler.mass === '1.99 kg'")
-    next(button for button in driver.find_elements("css selector", ".parts button") if button.text == "+ force").click()
+    next(
+        button
+        for button in driver.find_elements("css selector", ".parts button")
+        if button.text == "+ force"
+    ).click()
     wait_for(driver, "plain.loads?.length === 1 && data.handles.length === 4")
     drag_pin_B(driver)
     wait_for(driver, "'torque_error' in table()")
     assert driver.find_element("id", "compared").text.startswith("peak torque on bar 2")
-    assert driver.execute_script("return document.querySelectorAll('#chart .behind').length") == 1
+    assert (
+        driver.execute_script(
+            "return document.querySelectorAll('#chart .behind').length"
+        )
+        == 1
+    )
     steps = driver.execute_script("return plain")
     driver.find_element("id", "undo").click()
     wait_for(driver, "plain.lengths.output === '220 mm'")
@@ -176,14 +210,17 @@ def test_a_designer_goes_from_an_empty_scene_to_a_saved_file(chromium, opened, t
     assert driver.execute_script("return plain") == steps
     driver.refresh()  # a reload loses nothing
     wait_for(driver, "offers && plain.lengths && 'torque_error' in table()")
-    assert driver.execute_script("return plain") == steps and driver.find_element("tag name", "h1").text.startswith(
-        "<b>"
-    )
+    assert driver.execute_script("return plain") == steps and driver.find_element(
+        "tag name", "h1"
+    ).text.startswith("<b>")
     save(driver)
     solution = fourbar.solve(loads(path.read_text(), str(path)), "error")
     for row in (0, 90, 217):
         driver.execute_script(f"go({row})")
-        shown = [driver.find_element("id", name).text.replace("−", "-") for name in ("torque", "F12_x", "alpha_4")]
+        shown = [
+            driver.find_element("id", name).text.replace("−", "-")
+            for name in ("torque", "F12_x", "alpha_4")
+        ]
         expected = [solution.torque[row], solution.F12[row, 0], solution.alpha_4[row]]
         assert [float(text) for text in shown] == pytest.approx(expected, rel=PRINTED)
     held = json.loads(driver.execute_script("return JSON.stringify(table().torque)"))
@@ -191,17 +228,23 @@ def test_a_designer_goes_from_an_empty_scene_to_a_saved_file(chromium, opened, t
     cells = driver.find_elements("css selector", "#positions tbody tr:nth-child(4) td")
     cells[2].click()
     assert driver.execute_script("return row") == 30
-    assert driver.find_element("id", "theta-text").text == f"{math.degrees(solution.theta_2[30]):.2f}°"
+    assert (
+        driver.find_element("id", "theta-text").text
+        == f"{math.degrees(solution.theta_2[30]):.2f}°"
+    )
     assert not driver.get_log("browser")
 
 
 SHOWN_FIELDS = (
-    "[...document.querySelectorAll('.editor :is(input, select, textarea, button)')].filter(e => e.checkVisibility())"
+    "[...document.querySelectorAll('.editor :is(input, select, textarea, button)')]"
+    ".filter(e => e.checkVisibility())"
 )
 
 
 @pytest.mark.slow
-def test_a_linkage_is_drawn_by_four_clicks_and_its_numbers_are_typed_over(chromium, opened, tmp_path: Path) -> None:
+def test_a_linkage_is_drawn_by_four_clicks_and_its_numbers_are_typed_over(
+    chromium, opened, tmp_path: Path
+) -> None:
     path, driver = tmp_path / "mine.toml", chromium
     driver.get(opened(path))
     wait_for(driver, "offers && sketch")
@@ -220,9 +263,13 @@ def test_a_linkage_is_drawn_by_four_clicks_and_its_numbers_are_typed_over(chromi
     for name, bar in drawn.items():
         length = float(driver.execute_script(f"return plain.lengths.{name}").split()[0])
         assert length == pytest.approx(abs(bar), abs=PIXELS * scale)
-    shown = driver.execute_script("const p = at(row); return [p.A, p.B]")  # the position shown is the one drawn
+    shown = driver.execute_script(
+        "const p = at(row); return [p.A, p.B]"
+    )  # the position shown is the one drawn
     for place, pin in zip(shown, ("A", "B"), strict=True):
-        assert complex(*place) / 0.0254 == pytest.approx(pins[pin], abs=2 * PIXELS * scale)
+        assert complex(*place) / 0.0254 == pytest.approx(
+            pins[pin], abs=2 * PIXELS * scale
+        )
     assert "lbf" in driver.find_element("id", "forces").text  # results follow the file
     type_into(driver, "field:lengths/input", "6 in")
     wait_for(driver, "Math.abs(data.lengths[1] - 0.1524) < 1e-12")
@@ -232,16 +279,31 @@ def test_a_linkage_is_drawn_by_four_clicks_and_its_numbers_are_typed_over(chromi
     wait_for(driver, "!sketch && document.getElementById('bar-2').checkVisibility()")
     driver.find_element("id", "sketch").click()
     type_into(driver, "sketch-width", "2 m")
-    for place in ("0, 0", "nowhere", "0, 0.125", "1.5 0.5", "1.25; -0.25"):  # as they stand in somebody's drawing
+    for place in (
+        "0, 0",
+        "nowhere",
+        "0, 0.125",
+        "1.5 0.5",
+        "1.25; -0.25",
+    ):  # as they stand in somebody's drawing
         type_into(driver, "pin-xy", place + Keys.ENTER)
     wait_for(driver, "!sketch && Math.abs(data.lengths[1] - 0.125) < 1e-6")
-    expected = [math.hypot(1.25, 0.25), 0.125, math.hypot(1.5, 0.375), math.hypot(0.25, 0.75)]
-    assert driver.execute_script("return data.lengths") == pytest.approx(expected, abs=2e-6)
+    expected = [
+        math.hypot(1.25, 0.25),
+        0.125,
+        math.hypot(1.5, 0.375),
+        math.hypot(0.25, 0.75),
+    ]
+    assert driver.execute_script("return data.lengths") == pytest.approx(
+        expected, abs=2e-6
+    )
     assert not driver.get_log("browser")
 
 
 @pytest.mark.slow
-def test_a_designer_draws_a_cylinder_drive_and_analyze_gives_the_same(chromium, opened, tmp_path: Path) -> None:
+def test_a_designer_draws_a_cylinder_drive_and_analyze_gives_the_same(
+    chromium, opened, tmp_path: Path
+) -> None:
     path, driver = tmp_path / "mine.toml", chromium
     driver.get(opened(path))
     wait_for(driver, "offers && sketch")
@@ -250,33 +312,61 @@ def test_a_designer_draws_a_cylinder_drive_and_analyze_gives_the_same(chromium, 
     type_into(driver, "field:bars/output/mass", "80 kg")
     wait_for(driver, "plain.bars.output.mass === '80 kg'")
     driver.find_element("xpath", "//button[.='+ cylinder in place of the bar']").click()
-    wait_for(driver, "plain.drive.from && document.getElementById('field:drive/from/bar')")
-    driver.find_element("xpath", "//fieldset[legend='from']//button[.='By x and y']").click()
+    wait_for(
+        driver, "plain.drive.from && document.getElementById('field:drive/from/bar')"
+    )
+    driver.find_element(
+        "xpath", "//fieldset[legend='from']//button[.='By x and y']"
+    ).click()
     wait_for(driver, "plain.drive.from.at.x")
     for name, value in (("x", "300 mm"), ("y", "-250 mm")):
         type_into(driver, f"field:drive/from/at/{name}", value)
         wait_for(driver, f"plain.drive.from.at.{name} === '{value}'")
     driver.find_element("css selector", "#command option[value=stroke]").click()
-    wait_for(driver, "plain.motion.stroke && data.over.name === 'stroke' && 'drive_force_error' in table()")
+    wait_for(
+        driver,
+        "plain.motion.stroke && data.over.name === 'stroke' && 'drive_force_error' in table()",
+    )
     driver.execute_script("go(17)")
     force = float(driver.find_element("id", "drive_force").text.replace("−", "-"))
     type_into(driver, "pressure", "210 bar" + Keys.ENTER)
-    wait_for(driver, "document.getElementById('summary').textContent.includes('bore     at least')")
+    wait_for(
+        driver,
+        "document.getElementById('summary').textContent.includes('bore     at least')",
+    )
     summary = driver.find_element("id", "summary").text
     save(driver)
     scene = fourbar.load(path)
     assert scene.drive is not None and scene.effects and scene.motion.stroke is not None
     assert 'at = {x = "300 mm", y = "-250 mm"}' in path.read_text()
-    solution, stroke = fourbar.solve(scene), driver.execute_script("return data.over.values[17]")
-    assert force == pytest.approx(solution.drive_force[np.abs(solution.stroke - stroke).argmin()], rel=PRINTED)
-    command = [sys.executable, "-m", "fourbar", "analyze", str(path), "--pressure", "210 bar"]
+    solution, stroke = (
+        fourbar.solve(scene),
+        driver.execute_script("return data.over.values[17]"),
+    )
+    assert force == pytest.approx(
+        solution.drive_force[np.abs(solution.stroke - stroke).argmin()], rel=PRINTED
+    )
+    command = [
+        sys.executable,
+        "-m",
+        "fourbar",
+        "analyze",
+        str(path),
+        "--pressure",
+        "210 bar",
+    ]
     printed = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-    assert " ".join(summary.split()).startswith(" ".join(printed.split())) and "cylinder" in printed
+    assert (
+        " ".join(summary.split()).startswith(" ".join(printed.split()))
+        and "cylinder" in printed
+    )
     assert not driver.get_log("browser")
 
 
 @pytest.mark.slow
-def test_the_keyboard_alone_draws_types_drags_undoes_and_saves(chromium, opened, tmp_path: Path) -> None:
+def test_the_keyboard_alone_draws_types_drags_undoes_and_saves(
+    chromium, opened, tmp_path: Path
+) -> None:
     path, driver = tmp_path / "mine.toml", chromium
     driver.get(opened(path))
     wait_for(driver, "offers && sketch && document.activeElement === picture")
@@ -285,16 +375,27 @@ def test_the_keyboard_alone_draws_types_drags_undoes_and_saves(chromium, opened,
         ActionChains(driver).send_keys(*keys).perform()
 
     def with_control(key: str) -> None:
-        ActionChains(driver).key_down(Keys.CONTROL).send_keys(key).key_up(Keys.CONTROL).perform()
+        ActionChains(driver).key_down(Keys.CONTROL).send_keys(key).key_up(
+            Keys.CONTROL
+        ).perform()
 
     def tab_to(goal: str) -> None:
         for _ in range(200):
-            if driver.execute_script(f"return document.activeElement.matches({goal!r})"):
+            if driver.execute_script(
+                f"return document.activeElement.matches({goal!r})"
+            ):
                 return
             press(Keys.TAB)
         raise AssertionError(f"{goal} is not reached by Tab")
 
-    press(Keys.ENTER, *[Keys.ARROW_UP] * 5, Keys.ENTER, *[Keys.ARROW_RIGHT] * 14, *[Keys.ARROW_UP] * 6, Keys.ENTER)
+    press(
+        Keys.ENTER,
+        *[Keys.ARROW_UP] * 5,
+        Keys.ENTER,
+        *[Keys.ARROW_RIGHT] * 14,
+        *[Keys.ARROW_UP] * 6,
+        Keys.ENTER,
+    )
     press(*[Keys.ARROW_DOWN] * 12, Keys.ENTER)
     wait_for(driver, "!sketch && plain.lengths.ground !== '300 mm'")
     lengths = driver.execute_script("return data.lengths")
@@ -302,8 +403,14 @@ def test_the_keyboard_alone_draws_types_drags_undoes_and_saves(chromium, opened,
     reached = set()
     for _ in range(200):  # every field and button of the editor, in turn
         press(Keys.TAB)
-        reached.add(driver.execute_script("return document.activeElement.id || document.activeElement.textContent"))
-        if driver.execute_script("return document.activeElement === document.querySelector('.editor summary')"):
+        reached.add(
+            driver.execute_script(
+                "return document.activeElement.id || document.activeElement.textContent"
+            )
+        )
+        if driver.execute_script(
+            "return document.activeElement === document.querySelector('.editor summary')"
+        ):
             break
     missing = driver.execute_script(
         f"return {SHOWN_FIELDS}.filter(e => !e.disabled && e.id !== 'file-text').map(e => e.id || e.textContent)"
@@ -331,17 +438,23 @@ def test_the_keyboard_alone_draws_types_drags_undoes_and_saves(chromium, opened,
 
 
 @pytest.mark.slow
-def test_each_label_is_what_a_screen_reader_says_and_each_choice_a_list(chromium, opened, tmp_path: Path) -> None:
+def test_each_label_is_what_a_screen_reader_says_and_each_choice_a_list(
+    chromium, opened, tmp_path: Path
+) -> None:
     path, driver = tmp_path / "bucket.toml", chromium
     path.write_text((MODELS / "gallery" / "excavator_bucket.toml").read_text())
     open_scene(driver, opened(path))
     visible = (
-        "e => [...e.labels].map(l => [...l.childNodes].filter(n => n.nodeType === 3).map(n => n.data).join('')).join()"
+        "e => [...e.labels].map(l => [...l.childNodes]"
+        ".filter(n => n.nodeType === 3).map(n => n.data).join('')).join()"
     )
     for command in ("theta_2", "stroke"):
         if command == "stroke":
             driver.find_element("css selector", "#command option[value=stroke]").click()
-            wait_for(driver, "plain.motion.stroke && document.getElementById('field:motion/side')")
+            wait_for(
+                driver,
+                "plain.motion.stroke && document.getElementById('field:motion/side')",
+            )
         entries = driver.find_elements("css selector", "#fields :is(input, select)")
         words = driver.execute_script(f"return arguments[0].map({visible})", entries)
         assert len(entries) > 20 and all(words)
@@ -349,16 +462,28 @@ def test_each_label_is_what_a_screen_reader_says_and_each_choice_a_list(chromium
             assert entry.accessible_name == word
         ids = [entry.get_attribute("id") for entry in entries]
         lists = {
-            name.rpartition("/")[2] for entry, name in zip(entries, ids, strict=True) if entry.tag_name == "select"
+            name.rpartition("/")[2]
+            for entry, name in zip(entries, ids, strict=True)
+            if entry.tag_name == "select"
         }
         assert {"branch", "bar", "frame"} <= lists and not any(
             name.endswith("theta_2") for name in ids if command != "theta_2"
         )
         if command == "stroke":  # what does not apply is not there
-            assert "side" in lists and not {"field:motion/omega_2", "field:motion/through", "field:drive/bar"} & {*ids}
-            assert not driver.find_elements("xpath", "//button[.='+ sweep' or .='+ released' or .='+ law over time']")
+            assert "side" in lists and not {
+                "field:motion/omega_2",
+                "field:motion/through",
+                "field:drive/bar",
+            } & {*ids}
+            assert not driver.find_elements(
+                "xpath",
+                "//button[.='+ sweep' or .='+ released' or .='+ law over time']",
+            )
     side = driver.find_element("id", "field:motion/side")
-    assert [option.text for option in side.find_elements("tag name", "option")] == ["left", "right"]
+    assert [option.text for option in side.find_elements("tag name", "option")] == [
+        "left",
+        "right",
+    ]
     assert len(driver.find_elements("css selector", "#units option")) > 5
 
 
@@ -369,7 +494,12 @@ def test_it_opens_in_the_middle_with_a_linkage_that_fills_half_and_labels_apart(
 ) -> None:
     driver = chromium
     resize(driver, width)
-    for model in ("crank_rocker", "gallery/excavator_bucket", "gallery/tailgate", "gallery/landing_gear"):
+    for model in (
+        "crank_rocker",
+        "gallery/excavator_bucket",
+        "gallery/tailgate",
+        "gallery/landing_gear",
+    ):
         path = tmp_path / f"{model.rpartition('/')[2]}.toml"
         path.write_text((MODELS / f"{model}.toml").read_text())
         driver.get(opened(path))
@@ -389,11 +519,16 @@ def test_it_opens_in_the_middle_with_a_linkage_that_fills_half_and_labels_apart(
         for row in range(0, rows[1], rows[1] // 8):
             driver.execute_script(f"go({row})")
             assert driver.execute_script(OVERLAPS) == [], (model, row)
-        assert driver.execute_script("return document.documentElement.scrollWidth") <= width
+        assert (
+            driver.execute_script("return document.documentElement.scrollWidth")
+            <= width
+        )
 
 
 @pytest.mark.slow
-def test_undo_takes_a_refused_entry_back_and_leaves_the_last_good_state(chromium, opened, tmp_path: Path) -> None:
+def test_undo_takes_a_refused_entry_back_and_leaves_the_last_good_state(
+    chromium, opened, tmp_path: Path
+) -> None:
     driver = chromium
     open_scene(driver, opened(tmp_path / "mine.toml"))
     type_into(driver, "field:lengths/input", "110 mm")
@@ -401,23 +536,35 @@ def test_undo_takes_a_refused_entry_back_and_leaves_the_last_good_state(chromium
     type_into(driver, "field:lengths/coupler", "240 mm")
     wait_for(driver, "data.lengths[2] === 0.24")
     type_into(driver, "field:lengths/input", "4 lb")
-    driver.find_element("id", "field:lengths/input").send_keys(Keys.CONTROL, "z")  # while the refusals are on their way
+    driver.find_element("id", "field:lengths/input").send_keys(
+        Keys.CONTROL, "z"
+    )  # while the refusals are on their way
     entry = "document.getElementById('field:lengths/input')"
-    wait_for(driver, f"{entry}.value === '110 mm' && {entry}.getAttribute('aria-invalid') !== 'true'")
+    wait_for(
+        driver,
+        f"{entry}.value === '110 mm' && {entry}.getAttribute('aria-invalid') !== 'true'",
+    )
     assert driver.execute_script("return data.lengths.slice(1, 3)") == [0.11, 0.24]
     driver.find_element("id", "field:lengths/input").send_keys(Keys.CONTROL, "z")
     wait_for(driver, "data.lengths[2] === 0.25")
-    driver.execute_script("document.getElementById('file-text').closest('details').open = true")
+    driver.execute_script(
+        "document.getElementById('file-text').closest('details').open = true"
+    )
     driver.execute_script("document.getElementById('file-text').value = 'lengths = 3'")
     driver.find_element("id", "apply").click()
-    wait_for(driver, "document.getElementById('file-text').getAttribute('aria-invalid') === 'true'")
+    wait_for(
+        driver,
+        "document.getElementById('file-text').getAttribute('aria-invalid') === 'true'",
+    )
     driver.find_element("id", "undo").click()
     wait_for(driver, "document.getElementById('file-text').value.includes('110 mm')")
     assert driver.execute_script("return data.lengths.slice(1, 3)") == [0.11, 0.25]
 
 
 @pytest.mark.slow
-def test_a_page_finds_its_server_again_and_a_new_one_goes_on_from_the_state(chromium, opened, tmp_path: Path) -> None:
+def test_a_page_finds_its_server_again_and_a_new_one_goes_on_from_the_state(
+    chromium, opened, tmp_path: Path
+) -> None:
     path, driver = tmp_path / "mine.toml", chromium
     server = opened(path)
     open_scene(driver, server)
@@ -425,7 +572,10 @@ def test_a_page_finds_its_server_again_and_a_new_one_goes_on_from_the_state(chro
     type_into(driver, "field:lengths/input", "110 mm")
     wait_for(driver, "data.lengths[1] === 0.11")
     opened.end()
-    wait_for(driver, "document.getElementById('bench').textContent.includes('The server has stopped')")
+    wait_for(
+        driver,
+        "document.getElementById('bench').textContent.includes('The server has stopped')",
+    )
     again = opened(path, server.split("/")[2].partition(":")[2])
     assert again != server  # the token is another one, and the old page is told nothing
     time.sleep(2.0)

@@ -15,7 +15,9 @@ import fourbar
 from fourbar.files import loads
 from fourbar.quantities.units import find_unit
 
-pytest.importorskip("tomlkit", reason="the workbench edits scene files by tomlkit: pip install tomlkit")
+pytest.importorskip(
+    "tomlkit", reason="the workbench edits scene files by tomlkit: pip install tomlkit"
+)
 from fourbar.edit.document import SceneDocument, list_offers
 from fourbar.edit.dragging import write_rounded
 from fourbar.edit.exports import evaluate_scene, pack_frame
@@ -39,21 +41,29 @@ def session(tmp_path: Path) -> Session:
 
 def leaves(value, path=()):
     if isinstance(value, dict | list):
-        for step, inner in value.items() if isinstance(value, dict) else enumerate(value):
+        for step, inner in (
+            value.items() if isinstance(value, dict) else enumerate(value)
+        ):
             yield from leaves(inner, (*path, step))
     else:
         yield path, value
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
-def test_a_file_is_unchanged_on_a_round_trip_and_one_number_changes_one_place(path: Path) -> None:
+def test_a_file_is_unchanged_on_a_round_trip_and_one_number_changes_one_place(
+    path: Path,
+) -> None:
     text = path.read_bytes().decode()
     assert SceneDocument(text).text() == text
     document, numbers = SceneDocument(text), 0
     for place, value in leaves(tomllib.loads(text)):
-        if isinstance(value, bool) or (isinstance(value, str) and not value[:1].strip("-+.").isdigit()):
+        if isinstance(value, bool) or (
+            isinstance(value, str) and not value[:1].strip("-+.").isdigit()
+        ):
             continue
-        new, stands = ("9.25 zz", '"9.25 zz"') if isinstance(value, str) else ("77", "77")
+        new, stands = (
+            ("9.25 zz", '"9.25 zz"') if isinstance(value, str) else ("77", "77")
+        )
         document.set(place, new)
         changed = document.text()
         start = end = 0
@@ -62,7 +72,9 @@ def test_a_file_is_unchanged_on_a_round_trip_and_one_number_changes_one_place(pa
         while text[-1 - end] == changed[-1 - end] and end < len(changed) - start:
             end += 1
         assert changed[start : len(changed) - end] in stands
-        assert dict(leaves(tomllib.loads(changed)))[place] == (new if isinstance(value, str) else 77)
+        assert dict(leaves(tomllib.loads(changed)))[place] == (
+            new if isinstance(value, str) else 77
+        )
         document.set(place, str(value))
         numbers += 1
     assert numbers > 3 and tomllib.loads(document.text()) == tomllib.loads(text)
@@ -79,7 +91,12 @@ def test_each_part_that_is_offered_is_one_that_the_file_takes() -> None:
         if place[-1] == "free":
             document.set(["motion", "theta_2"], "60 deg")
         if place[0] == "effects" and len(place) == 3:
-            document.put(place[:2], next(p["value"] for p in list_offers()["parts"] if p["at"] == place[:2]))
+            document.put(
+                place[:2],
+                next(
+                    p["value"] for p in list_offers()["parts"] if p["at"] == place[:2]
+                ),
+            )
         before = document.text()
         document.put(place, part["value"])
         assert document.text() != before or place[0] == "effects"
@@ -89,15 +106,24 @@ def test_each_part_that_is_offered_is_one_that_the_file_takes() -> None:
     for place, value in fields.items():
         document.set(place, str(value))
     scene = loads(document.text())
-    assert scene.linkage.input.inertia == pytest.approx(2e-4) and scene.title == "of the drawing"
+    assert (
+        scene.linkage.input.inertia == pytest.approx(2e-4)
+        and scene.title == "of the drawing"
+    )
 
 
 def test_what_a_pair_consists_of_is_read_from_the_declarations() -> None:
     places = {key: ["distance", "angle"] for key in ("centre", "from_pin", "at")}
-    assert list_offers()["pairs"] == {**places, "force": ["size", "angle"], "gravity": ["magnitude", "angle"]}
+    assert list_offers()["pairs"] == {
+        **places,
+        "force": ["size", "angle"],
+        "gravity": ["magnitude", "angle"],
+    }
 
 
-def test_what_the_file_refuses_is_refused_in_its_words_and_the_last_good_state_stays(session: Session) -> None:
+def test_what_the_file_refuses_is_refused_in_its_words_and_the_last_good_state_stays(
+    session: Session,
+) -> None:
     before = session.now.text
     for place, value, words in (
         (["lengths", "input"], "100 kg", '"kg" does not convert to m'),
@@ -110,10 +136,17 @@ def test_what_the_file_refuses_is_refused_in_its_words_and_the_last_good_state_s
         told = session.do({"do": "set", "path": place, "value": value})
         assert words in told["refused"]
         assert session.now.text == session.document.text() == before
-    for nonsense in ({}, {"do": "set"}, {"do": "set", "path": [], "value": "1"}, {"do": "drag", "what": "A"}):
+    for nonsense in (
+        {},
+        {"do": "set"},
+        {"do": "set", "path": [], "value": "1"},
+        {"do": "drag", "what": "A"},
+    ):
         assert "refused" in session.do(nonsense)
     assert "refused" in session.do({"do": "text", "text": "lengths = 3"})
-    assert not session.do({"do": "set", "path": ["lengths", "input"], "value": "4 in"})["data"]["time"]
+    assert not session.do({"do": "set", "path": ["lengths", "input"], "value": "4 in"})[
+        "data"
+    ]["time"]
     assert session.now.scene.linkage.input.length == 0.1016
     assert session.now.text == before.replace('input = "100 mm"', 'input = "4 in"')
 
@@ -121,12 +154,29 @@ def test_what_the_file_refuses_is_refused_in_its_words_and_the_last_good_state_s
 def test_a_gesture_is_one_step_back(session: Session) -> None:
     before = session.now.text
     for size in range(101, 131):
-        session.do({"do": "set", "path": ["lengths", "input"], "value": f"{size} mm", "gesture": "wheel"})
-    session.do({"do": "set", "path": ["bars", "output", "mass"], "value": "1 kg", "gesture": "other"})
+        session.do(
+            {
+                "do": "set",
+                "path": ["lengths", "input"],
+                "value": f"{size} mm",
+                "gesture": "wheel",
+            }
+        )
+    session.do(
+        {
+            "do": "set",
+            "path": ["bars", "output", "mass"],
+            "value": "1 kg",
+            "gesture": "other",
+        }
+    )
     heavy = session.now.text
     assert len(session.texts) == 3
     session.do({"do": "undo"})
-    assert session.now.scene.linkage.input.length == pytest.approx(0.13) and 'mass = "0.4 kg"' in session.now.text
+    assert (
+        session.now.scene.linkage.input.length == pytest.approx(0.13)
+        and 'mass = "0.4 kg"' in session.now.text
+    )
     session.do({"do": "undo"})
     assert session.now.text == before
     assert "refused" in session.do({"do": "undo"})
@@ -152,7 +202,9 @@ def dragged(session: Session, what, to: complex, **more) -> dict:
 def at_50(session: Session) -> fourbar.Solution:
     scene = session.now.scene
     command = fourbar.command(scene)
-    at_50_deg = command._replace(angle=np.array([math.radians(50.0)]), branch=command.branch[:1])
+    at_50_deg = command._replace(
+        angle=np.array([math.radians(50.0)]), branch=command.branch[:1]
+    )
     return fourbar.solve(scene, at=at_50_deg)
 
 
@@ -175,9 +227,13 @@ def test_what_is_dragged_stands_where_it_was_dragged_to(session: Session) -> Non
             assert complex(*s.B[0]) == pytest.approx(to, abs=3 * PIXEL)
         else:
             linkage = session.now.scene.linkage
-            assert linkage.ground * np.exp(1j * linkage.ground_angle) == pytest.approx(to, abs=2 * PIXEL)
+            assert linkage.ground * np.exp(1j * linkage.ground_angle) == pytest.approx(
+                to, abs=2 * PIXEL
+            )
     dragged(session, ["points", "P", "from_pin"], 0.11 + 0.2j)
-    assert complex(*at_50(session).points["P"][0]) == pytest.approx(0.11 + 0.2j, abs=2 * PIXEL)
+    assert complex(*at_50(session).points["P"][0]) == pytest.approx(
+        0.11 + 0.2j, abs=2 * PIXEL
+    )
     assert session.now.plain["points"]["P"]["from_pin"][0].endswith(" in")
     dragged(session, ["bars", "output", "centre"], 0.3 + 0.1j)
     assert complex(*at_50(session).G4[0]) == pytest.approx(0.3 + 0.1j, abs=2 * PIXEL)
@@ -186,17 +242,28 @@ def test_what_is_dragged_stands_where_it_was_dragged_to(session: Session) -> Non
     dragged(session, ["effects", "springs", 0, "from", "at"], 0.1 - 0.05j)
     start = session.now.scene.effects[-1].springs[0].start
     turned = session.now.scene.linkage.ground_angle
-    assert np.exp(1j * turned) * start[1] * np.exp(1j * start[2]) == pytest.approx(0.1 - 0.05j, abs=2 * PIXEL)
+    assert np.exp(1j * turned) * start[1] * np.exp(1j * start[2]) == pytest.approx(
+        0.1 - 0.05j, abs=2 * PIXEL
+    )
     dragged(session, ["loads", 1, "at"], 0.12 + 0.12j)
     load, s = session.now.scene.loads[1], at_50(session)
-    foot = complex(*s.G3[0]) + load.at[0] * np.exp(1j * (load.at[1] + s.theta_3[0]))  # frame = "bar"
+    foot = complex(*s.G3[0]) + load.at[0] * np.exp(
+        1j * (load.at[1] + s.theta_3[0])
+    )  # frame = "bar"
     assert foot == pytest.approx(0.12 + 0.12j, abs=2 * PIXEL)
     dragged(session, ["loads", 1, "force"], foot + 0.05j, stretch=2.0)
     load, s = session.now.scene.loads[1], at_50(session)
     assert load.force[0] == pytest.approx(1.0, rel=0.02)
     assert math.sin(load.force[1] + s.theta_3[0]) == pytest.approx(1.0, abs=1e-3)
     assert "refused" in session.do(
-        {"do": "drag", "what": "O2", "to": [0, 0], "grain": 1.0, "theta_2": 0.0, "branch": 1}
+        {
+            "do": "drag",
+            "what": "O2",
+            "to": [0, 0],
+            "grain": 1.0,
+            "theta_2": 0.0,
+            "branch": 1,
+        }
     )
 
 
@@ -218,33 +285,51 @@ def test_the_arrow_of_a_load_goes_where_it_is_dragged_in_either_frame_and_a_nega
     dragged(session, [*load_path, "force"], foot + arrow, stretch=2.0)
     force = session.now.scene.loads[-1].force
     assert force[0] == pytest.approx(2.0 * float(size.split(maxsplit=1)[0]), rel=0.02)
-    pulls = force[0] * np.exp(1j * (force[1] + turned))  # the direction in which it acts
+    pulls = force[0] * np.exp(
+        1j * (force[1] + turned)
+    )  # the direction in which it acts
     assert np.angle(pulls / arrow) == pytest.approx(0.0, abs=0.02)
 
 
-def test_a_place_by_coordinates_is_dragged_and_stays_so_until_it_is_restated(session: Session) -> None:
+def test_a_place_by_coordinates_is_dragged_and_stays_so_until_it_is_restated(
+    session: Session,
+) -> None:
     load = '[[loads]]\nbar = 3\nforce = ["5 N", "10 deg"]\nat = { x = "1 in", y = "20 mm" }\n'
     line = '[drive]\nfrom = { bar = 1, at = { x = "-30 mm", y = "40 mm" } }\nto = { bar = 2, at = ["9 cm", "0 deg"] }\n'
     text = session.now.text.replace("[drive]\nbar = 2\n", "")
-    assert "refused" not in (told := session.do({"do": "text", "text": text + load + line})), told
+    assert "refused" not in (
+        told := session.do({"do": "text", "text": text + load + line})
+    ), told
     path = ["loads", len(session.now.scene.loads) - 1, "at"]
     to = 0.13 + 0.11j
     dragged(session, path, to)
     s, load = at_50(session), session.now.scene.loads[-1]
-    assert complex(*s.G3[0]) + load.at[0] * np.exp(1j * load.at[1]) == pytest.approx(to, abs=2 * PIXEL)
+    assert complex(*s.G3[0]) + load.at[0] * np.exp(1j * load.at[1]) == pytest.approx(
+        to, abs=2 * PIXEL
+    )
     stated = session.document.at(path)
-    assert set(stated) == {"x", "y"} and stated["x"].endswith(" in") and stated["y"].endswith(" mm")
+    assert (
+        set(stated) == {"x", "y"}
+        and stated["x"].endswith(" in")
+        and stated["y"].endswith(" mm")
+    )
     dragged(session, ["drive", "from", "at"], 0.02 + 0.05j)
     turned = np.exp(1j * session.now.scene.linkage.ground_angle)
     start = session.now.scene.drive.start
-    assert turned * start.distance * np.exp(1j * start.angle) == pytest.approx(0.02 + 0.05j, abs=2 * PIXEL)
+    assert turned * start.distance * np.exp(1j * start.angle) == pytest.approx(
+        0.02 + 0.05j, abs=2 * PIXEL
+    )
     for by, kind in (("polar", list), ("xy", dict)):
         assert "refused" not in session.do({"do": "restate", "path": path, "by": by})
         entry = session.now.plain["loads"][path[1]]["at"]
         assert isinstance(entry, kind)
         point = session.now.scene.loads[-1].at
         assert point == pytest.approx(load.at, rel=1e-5)
-    for nonsense in ({"path": path, "by": "z"}, {"path": ["lengths"], "by": "xy"}, {"path": ["no"], "by": "xy"}):
+    for nonsense in (
+        {"path": path, "by": "z"},
+        {"path": ["lengths"], "by": "xy"},
+        {"path": ["no"], "by": "xy"},
+    ):
         assert "refused" in session.do({"do": "restate"} | nonsense)
 
 
@@ -252,69 +337,127 @@ BUCKET = ROOT / "models" / "gallery" / "excavator_bucket.toml"
 
 
 @pytest.mark.parametrize("command", ["theta_3", "theta_4", "stroke"])
-def test_another_command_goes_over_the_same_motion(tmp_path: Path, command: str) -> None:
+def test_another_command_goes_over_the_same_motion(
+    tmp_path: Path, command: str
+) -> None:
     path = tmp_path / "bucket.toml"
     path.write_text(BUCKET.read_text())
     session = Session(path, tmp_path / "exports")
     before = fourbar.solve(session.now.scene)
-    assert "refused" not in (told := session.do({"do": "command", "command": command})), told
+    assert "refused" not in (
+        told := session.do({"do": "command", "command": command})
+    ), told
     after = fourbar.solve(session.now.scene)
     assert after.assembled.all() and np.isfinite(after.drive_force).all()
     values, places = getattr(before, command), getattr(after, command)
-    assert sorted(places[[0, -1]]) == pytest.approx(sorted(values[[0, -1]]), abs=3e-3 * np.ptp(values))
+    assert sorted(places[[0, -1]]) == pytest.approx(
+        sorted(values[[0, -1]]), abs=3e-3 * np.ptp(values)
+    )
     order = np.argsort(values)
     for name in ("theta_2", "theta_3", "theta_4"):  # the same poses
-        expected = np.interp(places, values[order], np.unwrap(getattr(before, name))[order])
-        assert np.abs(np.angle(np.exp(1j * (getattr(after, name) - expected)))).max() < 2e-3
+        expected = np.interp(
+            places, values[order], np.unwrap(getattr(before, name))[order]
+        )
+        assert (
+            np.abs(np.angle(np.exp(1j * (getattr(after, name) - expected)))).max()
+            < 2e-3
+        )
     assert session.do({"do": "undo"})["text"] == BUCKET.read_text()
 
 
 def test_what_cannot_be_commanded_is_one_line(session: Session) -> None:
-    for command, words in (("stroke", "needs a cylinder"), ("theta_1", "must be one of"), ("", "must be one of")):
+    for command, words in (
+        ("stroke", "needs a cylinder"),
+        ("theta_1", "must be one of"),
+        ("", "must be one of"),
+    ):
         assert words in session.do({"do": "command", "command": command})["refused"]
     session.change(lambda document: document.put(["motion", "theta_2"], "60 deg"))
-    assert "does not move" in session.do({"do": "command", "command": "theta_4"})["refused"]
+    assert (
+        "does not move"
+        in session.do({"do": "command", "command": "theta_4"})["refused"]
+    )
 
 
 PINS_DRAWN = [[0.0, 0.0], [3.0, 4.0], [14.0, 9.0], [12.0, -5.0]]
 
 
 @pytest.mark.parametrize("mirrored", [False, True])
-def test_four_pins_are_a_linkage_that_assembles_where_it_is_drawn(tmp_path: Path, mirrored: bool) -> None:
+def test_four_pins_are_a_linkage_that_assembles_where_it_is_drawn(
+    tmp_path: Path, mirrored: bool
+) -> None:
     session = Session(tmp_path / "new.toml", tmp_path / "exports")
     assert session.do({"do": "hello"})["fresh"]
     pins = [[x, -y if mirrored else y] for x, y in PINS_DRAWN]
     told = session.do({"do": "draw", "pins": pins, "unit": "in", "grain": 1e-6})
     assert "refused" not in told, told
     scene = session.now.scene
-    assert not session.do({"do": "hello"})["fresh"] and session.do({"do": "hello"})["units"] == "as the file"
+    assert (
+        not session.do({"do": "hello"})["fresh"]
+        and session.do({"do": "hello"})["units"] == "as the file"
+    )
     assert session.units["N"][0] == "lbf"
     A, B, O4 = (0.0254 * complex(*pin) for pin in pins[1:])
     command = fourbar.command(scene)
-    as_drawn = command._replace(angle=np.array([np.angle(A)]), branch=command.branch[:1])
+    as_drawn = command._replace(
+        angle=np.array([np.angle(A)]), branch=command.branch[:1]
+    )
     s = fourbar.solve(scene, "position", at=as_drawn)
     assert [complex(*s.A[0]), complex(*s.B[0])] == pytest.approx([A, B], abs=1e-6)
-    assert scene.linkage.ground * np.exp(1j * scene.linkage.ground_angle) == pytest.approx(O4, abs=1e-6)
+    assert scene.linkage.ground * np.exp(
+        1j * scene.linkage.ground_angle
+    ) == pytest.approx(O4, abs=1e-6)
     assert fourbar.solve(scene).assembled.any()
     session.do({"do": "set", "path": ["bars", "coupler", "mass"], "value": "3 lb"})
-    session.do({"do": "draw", "pins": [[0, 0], [3, 4], [14, 12], [12, -5]], "unit": "in", "grain": 0.01})
-    assert session.now.plain["bars"]["coupler"]["mass"] == "3 lb"  # what was typed stays
-    assert session.now.scene.linkage.coupler.length == pytest.approx(0.0254 * math.hypot(11, 8), abs=0.0254 * 0.01)
-    for nonsense in ([[0, 0]] * 4, [[0, 0], [1, 1]], [["a", 0]] * 4, [[0, 0], [1, 0], [math.nan, 1], [3, 0]]):
-        assert "refused" in session.do({"do": "draw", "pins": nonsense, "unit": "in", "grain": 0.01})
-    assert "refused" in session.do({"do": "draw", "pins": PINS_DRAWN, "unit": "lb", "grain": 0.01})
+    session.do(
+        {
+            "do": "draw",
+            "pins": [[0, 0], [3, 4], [14, 12], [12, -5]],
+            "unit": "in",
+            "grain": 0.01,
+        }
+    )
+    assert (
+        session.now.plain["bars"]["coupler"]["mass"] == "3 lb"
+    )  # what was typed stays
+    assert session.now.scene.linkage.coupler.length == pytest.approx(
+        0.0254 * math.hypot(11, 8), abs=0.0254 * 0.01
+    )
+    for nonsense in (
+        [[0, 0]] * 4,
+        [[0, 0], [1, 1]],
+        [["a", 0]] * 4,
+        [[0, 0], [1, 0], [math.nan, 1], [3, 0]],
+    ):
+        assert "refused" in session.do(
+            {"do": "draw", "pins": nonsense, "unit": "in", "grain": 0.01}
+        )
+    assert "refused" in session.do(
+        {"do": "draw", "pins": PINS_DRAWN, "unit": "lb", "grain": 0.01}
+    )
 
 
 @pytest.mark.parametrize(
-    ("length", "force"), [("12 in", "lbf"), ('12 1/2"', "lbf"), ("1' 6\"", "lbf"), ("1 ft", "lbf"), ("300 mm", "N")]
+    ("length", "force"),
+    [
+        ("12 in", "lbf"),
+        ('12 1/2"', "lbf"),
+        ("1' 6\"", "lbf"),
+        ("1 ft", "lbf"),
+        ("300 mm", "N"),
+    ],
 )
-def test_results_have_the_units_of_the_file_until_others_are_chosen(session: Session, length: str, force: str) -> None:
+def test_results_have_the_units_of_the_file_until_others_are_chosen(
+    session: Session, length: str, force: str
+) -> None:
     text = session.now.text.replace('ground = "300 mm"', f"ground = '''{length}'''")
     told = session.do({"do": "text", "text": text})
     assert "refused" not in told, told
     assert session.units.get("N", ("N", 1.0))[0] == force
     session.do({"do": "units", "units": "mm N N.mm deg"})
-    assert session.units["m"][0] == "mm" and session.answer()["units"] == "mm N N.mm deg"
+    assert (
+        session.units["m"][0] == "mm" and session.answer()["units"] == "mm N N.mm deg"
+    )
     session.do({"do": "units", "units": "as the file"})
     assert session.units.get("N", ("N", 1.0))[0] == force
 
@@ -335,7 +478,9 @@ def unpacked(data: bytes) -> dict:
     about, place = json.loads(data[4 : 4 + long]), 4 + long
     for sign, name, count, vector in about["columns"]:
         array = np.frombuffer(data, "<f8", count * vector, place)
-        about["data"]["branches"][sign][name] = array.reshape(count, 2) if vector == 2 else array
+        about["data"]["branches"][sign][name] = (
+            array.reshape(count, 2) if vector == 2 else array
+        )
         place += 8 * count * vector
     assert place == len(data)
     return about
@@ -343,7 +488,9 @@ def unpacked(data: bytes) -> dict:
 
 def settled(session: Session) -> dict:
     now = session.now
-    return session.describe(evaluate_scene(now.scene, now.plain, session.units, settled=True), settled=True)
+    return session.describe(
+        evaluate_scene(now.scene, now.plain, session.units, settled=True), settled=True
+    )
 
 
 def test_the_answer_is_what_analyze_says(session: Session) -> None:
@@ -358,33 +505,52 @@ def test_the_answer_is_what_analyze_says(session: Session) -> None:
     assert any("rank-rocker" in line for line in told["data"]["summary"])
     session.do({"do": "units", "units": "imperial"})
     assert any("lbf" in line for line in settled(session)["data"]["summary"])
-    assert "refused" in session.do({"do": "units", "units": "parsec"}) and session.unit_names == "imperial"
+    assert (
+        "refused" in session.do({"do": "units", "units": "parsec"})
+        and session.unit_names == "imperial"
+    )
 
 
 def test_every_linkage_that_people_know_has_an_answer(tmp_path: Path) -> None:
-    for path in [*(ROOT / "models").glob("*.toml"), *(ROOT / "models" / "gallery").glob("*.toml")]:
+    for path in [
+        *(ROOT / "models").glob("*.toml"),
+        *(ROOT / "models" / "gallery").glob("*.toml"),
+    ]:
         told = Session(path, tmp_path / "exports").answer()
         assert unpacked(pack_frame(told))["columns"], path
 
 
 def test_an_answer_takes_ten_bare_solves_at_most(session: Session) -> None:
     best = {"bare": math.inf, "answer": math.inf}
-    for turn in range(60):  # by turns, and the quickest of each: the machine has other work too
+    for turn in range(
+        60
+    ):  # by turns, and the quickest of each: the machine has other work too
         start = time.perf_counter()
         fourbar.solve(session.now.scene)
         middle = time.perf_counter()
         pack_frame(
-            session.do({"do": "set", "path": ["lengths", "input"], "value": f"{100 + turn % 9} mm", "gesture": "g"})
+            session.do(
+                {
+                    "do": "set",
+                    "path": ["lengths", "input"],
+                    "value": f"{100 + turn % 9} mm",
+                    "gesture": "g",
+                }
+            )
         )
         spent = {"bare": middle - start, "answer": time.perf_counter() - middle}
         best = {name: min(best[name], spent[name]) for name in best}
     assert best["answer"] < BARE_SOLVES * best["bare"], best
 
 
-def test_save_keeps_the_rest_and_asks_before_it_overwrites_what_changed(session: Session) -> None:
+def test_save_keeps_the_rest_and_asks_before_it_overwrites_what_changed(
+    session: Session,
+) -> None:
     session.do({"do": "set", "path": ["lengths", "input"], "value": "105 mm"})
     assert session.do({"do": "save"})["saved"] and session.saved
-    assert session.path.read_text() == CRANK_ROCKER.read_text().replace('"100 mm"', '"105 mm"')
+    assert session.path.read_text() == CRANK_ROCKER.read_text().replace(
+        '"100 mm"', '"105 mm"'
+    )
     session.path.write_text("title = 'somebody else'")
     session.do({"do": "set", "path": ["lengths", "input"], "value": "106 mm"})
     assert "changed on the disk" in session.do({"do": "save"})["ask"]
@@ -398,16 +564,27 @@ def test_a_session_goes_on_where_it_stopped(session: Session) -> None:
     session.do({"do": "keep"})
     session.do({"do": "set", "path": ["lengths", "input"], "value": "110 mm"})
     for wrong in ("210", "-1 bar", "3 mm"):
-        assert "pressure" in session.do({"do": "pressure", "pressure": wrong})["refused"] and session.pressure is None
+        assert (
+            "pressure" in session.do({"do": "pressure", "pressure": wrong})["refused"]
+            and session.pressure is None
+        )
     session.do({"do": "pressure", "pressure": " 210 bar "})
     session.end(gone=True)
     if os.name == "posix":
-        assert session.state_file.stat().st_mode & 0o077 == 0  # the scene may be its owner's alone
+        assert (
+            session.state_file.stat().st_mode & 0o077 == 0
+        )  # the scene may be its owner's alone
     again = Session(session.path, session.exports.folder)
     assert (again.now.text, again.kept) == (session.now.text, session.kept)
-    assert again.token != session.token and session.token not in session.state_file.read_text()
+    assert (
+        again.token != session.token
+        and session.token not in session.state_file.read_text()
+    )
     assert again.compared()["compared"] == "state 1"
-    assert again.pressure == pytest.approx(210e5) and again.answer()["pressure"] == "210 bar"
+    assert (
+        again.pressure == pytest.approx(210e5)
+        and again.answer()["pressure"] == "210 bar"
+    )
     assert '"105 mm"' in again.do({"do": "undo"})["text"]
     again.do({"do": "save"})
     again.end(gone=True)
@@ -424,10 +601,18 @@ DAMAGES = {
     "a place before": lambda state: state.replace('"place": 1', '"place": -1'),
     "no texts": lambda state: state.replace('"texts": [', '"texts": 3, "others": ['),
     "no scene": lambda state: state.replace("[lengths]", "[length]"),
-    "a pressure of nothing": lambda state: state.replace('"pressure": ""', '"pressure": "3 mm"'),
-    "units of nothing": lambda state: state.replace('"units": "as the file"', '"units": "parsec"'),
-    "a reference to nothing": lambda state: state.replace('"reference": "start"', '"reference": "state 7"'),
-    "kept is a list": lambda state: state.replace('"kept": {', '"kept": [], "others": {'),
+    "a pressure of nothing": lambda state: state.replace(
+        '"pressure": ""', '"pressure": "3 mm"'
+    ),
+    "units of nothing": lambda state: state.replace(
+        '"units": "as the file"', '"units": "parsec"'
+    ),
+    "a reference to nothing": lambda state: state.replace(
+        '"reference": "start"', '"reference": "state 7"'
+    ),
+    "kept is a list": lambda state: state.replace(
+        '"kept": {', '"kept": [], "others": {'
+    ),
 }
 
 
@@ -438,24 +623,42 @@ def test_a_damaged_state_file_is_one_line(session: Session, name: str) -> None:
     before = session.state_file.read_text()
     session.state_file.write_text(damaged := DAMAGES[name](before))
     assert damaged != before
-    with pytest.raises(fourbar.InputError, match=r"cannot be read as a state of the workbench .* remove it") as caught:
+    with pytest.raises(
+        fourbar.InputError,
+        match=r"cannot be read as a state of the workbench .* remove it",
+    ) as caught:
         Session(session.path, session.exports.folder)
-    assert "\n" not in str(caught.value) and str(session.state_file) in str(caught.value)
+    assert "\n" not in str(caught.value) and str(session.state_file) in str(
+        caught.value
+    )
 
 
 @pytest.mark.slow
-def test_the_history_of_a_large_scene_stays_within_what_the_next_start_reads(session: Session) -> None:
+def test_the_history_of_a_large_scene_stays_within_what_the_next_start_reads(
+    session: Session,
+) -> None:
     large = session.now.text + "".join(f"# {'µ' * 100} {n}\n" for n in range(1950))
     assert len(large) == pytest.approx(205_000, rel=0.05)
     session.do({"do": "text", "text": large})
     for size in range(1, 531):
-        session.do({"do": "set", "path": ["lengths", "input"], "value": f"{100 + 0.01 * size:.2f} mm", "gesture": size})
+        session.do(
+            {
+                "do": "set",
+                "path": ["lengths", "input"],
+                "value": f"{100 + 0.01 * size:.2f} mm",
+                "gesture": size,
+            }
+        )
         if size % 20 == 0:
             session.do({"do": "keep"})
     session.keep()
     assert session.state_file.stat().st_size < LARGEST_STATE / 2
     again = Session(session.path, session.exports.folder)
-    assert again.now.text == session.now.text and len(again.texts) > 40 and len(again.kept) == MOST_KEPT
+    assert (
+        again.now.text == session.now.text
+        and len(again.texts) > 40
+        and len(again.kept) == MOST_KEPT
+    )
     assert "start" in again.kept and "state 26" in again.kept
     for _ in range(len(again.texts) - 1):
         assert "refused" not in again.do({"do": "undo"})
@@ -463,7 +666,9 @@ def test_the_history_of_a_large_scene_stays_within_what_the_next_start_reads(ses
 
 
 @pytest.mark.posix
-def test_a_scene_behind_a_link_is_saved_where_it_is_and_keeps_its_mode(session: Session) -> None:
+def test_a_scene_behind_a_link_is_saved_where_it_is_and_keeps_its_mode(
+    session: Session,
+) -> None:
     session.path.chmod(0o600)
     link = session.path.with_name("link.toml")
     link.symlink_to(session.path)
@@ -490,10 +695,15 @@ def test_a_new_scene_begins_where_there_is_no_file(tmp_path: Path) -> None:
     assert fourbar.load(session.path).linkage.ground == 0.3
 
 
-def test_a_slip_of_the_finger_on_the_steps_does_not_fill_the_memory(session: Session) -> None:
+def test_a_slip_of_the_finger_on_the_steps_does_not_fill_the_memory(
+    session: Session,
+) -> None:
     from fourbar.edit.session import MOST_POSITIONS
 
     path = ["motion", "theta_2", "steps"]
     answer = session.do({"do": "set", "path": path, "value": str(MOST_POSITIONS)})
-    assert answer["refused"] == f"motion.theta_2.steps: must be below {MOST_POSITIONS} in the workbench"
+    assert (
+        answer["refused"]
+        == f"motion.theta_2.steps: must be below {MOST_POSITIONS} in the workbench"
+    )
     assert "refused" not in session.do({"do": "set", "path": path, "value": "100"})

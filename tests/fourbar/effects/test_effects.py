@@ -7,7 +7,18 @@ import numpy as np
 import pytest
 
 import fourbar
-from fourbar.effects import Flywheel, Friction, Gravity, Load, PinFriction, Spring, SpringEnd, Springs, Table, Torsion
+from fourbar.effects import (
+    Flywheel,
+    Friction,
+    Gravity,
+    Load,
+    PinFriction,
+    Spring,
+    SpringEnd,
+    Springs,
+    Table,
+    Torsion,
+)
 from fourbar.effects.pin_friction import MANY, NONE, ONE, solve_sliding
 from fourbar.errors import InputError, LimitError
 from fourbar.scene import Scene
@@ -24,16 +35,23 @@ LAST_DIGITS = 64 * 2.0**-52
 """The roundings of one evaluation."""
 
 
-def alone(*effects: object, omega_2: float = 0.0, theta_2: object = None, **changes: object) -> Scene:
+def alone(
+    *effects: object, omega_2: float = 0.0, theta_2: object = None, **changes: object
+) -> Scene:
     """Massless in effect: static, so that only the effects act."""
     angles = np.linspace(0.2, 6.0, 9) if theta_2 is None else theta_2
-    return crank_rocker(motion=Motion(angles, omega_2), loads=(), effects=effects, **changes)  # type: ignore[arg-type]
+    return crank_rocker(
+        motion=Motion(angles, omega_2), loads=(), effects=effects, **changes
+    )  # type: ignore[arg-type]
 
 
 def potential_torque(scene: Scene, energy: object) -> np.ndarray:
     """T2 = dV/dtheta_2 of a static linkage under a potential, by central differences."""
     theta_2 = np.asarray(scene.motion.theta_2)
-    ends = [solve(replace(scene, motion=Motion(theta_2 + step, 0.0)), "position") for step in (STEP, -STEP)]
+    ends = [
+        solve(replace(scene, motion=Motion(theta_2 + step, 0.0)), "position")
+        for step in (STEP, -STEP)
+    ]
     values = [energy(end) for end in ends]  # type: ignore[operator]
     return (values[0] - values[1]) / (2.0 * STEP)
 
@@ -51,7 +69,9 @@ def test_a_spring_is_the_slope_of_its_energy() -> None:
     scene = alone(Springs((spring,)))
     torque = solve(scene).torque
     assert torque is not None and np.abs(torque).max() > 1.0
-    assert torque == pytest.approx(potential_torque(scene, energy), abs=SECOND_ORDER * 10, rel=0)
+    assert torque == pytest.approx(
+        potential_torque(scene, energy), abs=SECOND_ORDER * 10, rel=0
+    )
 
 
 def test_the_work_that_compresses_a_gas_spring_is_that_of_its_two_forces() -> None:
@@ -67,8 +87,12 @@ def test_the_work_that_compresses_a_gas_spring_is_that_of_its_two_forces() -> No
     scene = alone(Springs((Spring.gas(*ends, extended, stroke, first, last),)))
     torque = solve(scene).torque
     assert torque is not None and np.abs(torque).max() > 1.0
-    assert torque == pytest.approx(potential_torque(scene, energy), abs=SECOND_ORDER * 10, rel=0)
-    assert Spring.gas(*ends, extended, stroke, first) == Spring(*ends, 0.0, extended, -first)
+    assert torque == pytest.approx(
+        potential_torque(scene, energy), abs=SECOND_ORDER * 10, rel=0
+    )
+    assert Spring.gas(*ends, extended, stroke, first) == Spring(
+        *ends, 0.0, extended, -first
+    )
 
 
 def test_a_spring_without_free_length_has_a_force_where_its_points_meet() -> None:
@@ -79,11 +103,21 @@ def test_a_spring_without_free_length_has_a_force_where_its_points_meet() -> Non
 
 
 def test_torsion_springs_are_the_slope_of_their_energy() -> None:
-    springs = {"O2": (1.5, 0.3, 0.2), "A": (1.0, 0.4, 0.0), "B": (2.0, 0.5, -0.1), "O4": (0.5, 2.0, 0.3)}
+    springs = {
+        "O2": (1.5, 0.3, 0.2),
+        "A": (1.0, 0.4, 0.0),
+        "B": (2.0, 0.5, -0.1),
+        "O4": (0.5, 2.0, 0.3),
+    }
     scene = alone(Torsion.at(**springs), theta_2=np.linspace(-1.0, 2.0, 7))
 
     def energy(s: fourbar.Solution) -> np.ndarray:
-        theta = {1: scene.linkage.ground_angle, 2: s.theta_2, 3: s.theta_3, 4: s.theta_4}
+        theta = {
+            1: scene.linkage.ground_angle,
+            2: s.theta_2,
+            3: s.theta_3,
+            4: s.theta_4,
+        }
         total = np.zeros(len(s))
         for pin, (k, rest, preload) in springs.items():
             i, j = fourbar.linkage.PINS[pin]
@@ -91,18 +125,27 @@ def test_torsion_springs_are_the_slope_of_their_energy() -> None:
             total += preload * beta + 0.5 * k * beta**2
         return total
 
-    assert solve(scene).torque == pytest.approx(potential_torque(scene, energy), abs=SECOND_ORDER * 10, rel=0)
+    assert solve(scene).torque == pytest.approx(
+        potential_torque(scene, energy), abs=SECOND_ORDER * 10, rel=0
+    )
 
 
 @pytest.mark.parametrize(("bar", "name"), [(2, "input"), (4, "output")])
 def test_a_flywheel_is_inertia_of_the_bar(bar: int, name: str) -> None:
     scene = crank_rocker(effects=(Gravity(), Flywheel(0.02, bar)), drive_bar=bar)
     plain = scene.linkage.bar(bar)
-    heavier = replace(scene.linkage, **{name: replace(plain, inertia=plain.moment_of_inertia + 0.02)})
-    with_wheel, with_bar = solve(scene), solve(replace(scene, linkage=heavier, effects=(Gravity(),)))
+    heavier = replace(
+        scene.linkage, **{name: replace(plain, inertia=plain.moment_of_inertia + 0.02)}
+    )
+    with_wheel, with_bar = (
+        solve(scene),
+        solve(replace(scene, linkage=heavier, effects=(Gravity(),))),
+    )
     for quantity in ("torque", "F12", "F32", "F43", "F14"):
         by_wheel, by_bar = getattr(with_wheel, quantity), getattr(with_bar, quantity)
-        assert np.abs(by_wheel - by_bar).max() <= LAST_DIGITS * np.abs(by_bar).max(), quantity
+        assert np.abs(by_wheel - by_bar).max() <= LAST_DIGITS * np.abs(by_bar).max(), (
+            quantity
+        )
 
 
 def test_one_cone_has_one_none_or_two_solutions() -> None:
@@ -126,21 +169,35 @@ def test_one_cone_has_one_none_or_two_solutions() -> None:
         assert sliding.number[0] == number, (F, C)
         assert sliding.x[0, 0] == pytest.approx(x, rel=1e-15, nan_ok=True), (F, C)
         if far is not None:
-            assert sliding.from_jamming[0] == pytest.approx(far, rel=LAST_DIGITS), (F, C)
+            assert sliding.from_jamming[0] == pytest.approx(far, rel=LAST_DIGITS), (
+                F,
+                C,
+            )
 
 
 def test_several_cones_one_of_which_is_known() -> None:
     """Two pins that do not feel each other are two single ones, in every outcome, each position with its own arms."""
-    for c1, c2, number in ((0.5, 0.3, ONE), (2.0, 0.3, NONE), (-2.0, 0.3, MANY), (-2.0, -3.0, MANY)):
+    for c1, c2, number in (
+        (0.5, 0.3, ONE),
+        (2.0, 0.3, NONE),
+        (-2.0, 0.3, MANY),
+        (-2.0, -3.0, MANY),
+    ):
         F = np.array([[[1.0, 0.0], [2.0, 0.0]]] * 2)
         C = np.array([[[[c1, 0.0], [0.0, 0.0]], [[0.0, 0.0], [c2, 0.0]]]] * 2)
         sliding = solve_sliding(F, C, np.array([[1.0, 1.0], [0.25, 0.125]]))
         assert list(sliding.number) == [number, ONE]
         if number != NONE:
-            assert sliding.x[0] == pytest.approx([1.0 / (1.0 - c1), 2.0 / (1.0 - c2)], rel=1e-12)
+            assert sliding.x[0] == pytest.approx(
+                [1.0 / (1.0 - c1), 2.0 / (1.0 - c2)], rel=1e-12
+            )
             # both slopes are 1 - k c where F + C x keeps the sense of F
-            assert sliding.from_jamming[0] == pytest.approx(min(1.0, 1.0 - c1, 1.0 - c2), rel=1e-12)
-        assert sliding.x[1] == pytest.approx([0.25 / (1.0 - 0.25 * c1), 0.25 / (1.0 - 0.125 * c2)], rel=1e-12)
+            assert sliding.from_jamming[0] == pytest.approx(
+                min(1.0, 1.0 - c1, 1.0 - c2), rel=1e-12
+            )
+        assert sliding.x[1] == pytest.approx(
+            [0.25 / (1.0 - 0.25 * c1), 0.25 / (1.0 - 0.125 * c2)], rel=1e-12
+        )
 
 
 def test_jamming_is_a_status_and_leaves_no_force() -> None:
@@ -152,19 +209,31 @@ def test_jamming_is_a_status_and_leaves_no_force() -> None:
     assert np.isfinite(s.theta_3).all()
 
 
-@pytest.mark.parametrize("friction", [Friction.at(O2=0.02, B=0.03), PinFriction.at(O2=(0.2, 0.01), B=(0.3, 0.02))])
+@pytest.mark.parametrize(
+    "friction",
+    [Friction.at(O2=0.02, B=0.03), PinFriction.at(O2=(0.2, 0.01), B=(0.3, 0.02))],
+)
 def test_at_rest_the_interval_is_that_of_beginning_to_move(friction: object) -> None:
     """Its ends are the limits of the torque for slow motions in either sense; at rest itself it is their inside."""
     scene = alone(Gravity(), friction)
     rest = solve(scene)
-    slow = [solve(replace(scene, motion=scene.motion.replace(speed=speed))).torque for speed in (1e-9, -1e-9)]
-    assert rest.torque_low is not None and rest.torque_high is not None and rest.torque is not None
+    slow = [
+        solve(replace(scene, motion=scene.motion.replace(speed=speed))).torque
+        for speed in (1e-9, -1e-9)
+    ]
+    assert (
+        rest.torque_low is not None
+        and rest.torque_high is not None
+        and rest.torque is not None
+    )
     # (1e-9 rad/s)^2 of inertia is nothing against these torques
     assert rest.torque_high == pytest.approx(np.maximum(*slow), rel=1e-13)
     assert rest.torque_low == pytest.approx(np.minimum(*slow), rel=1e-13)
     assert ((rest.torque_low < rest.torque) & (rest.torque < rest.torque_high)).all()
     for side, beginning in zip((1, -1), slow, strict=True):
-        assert solve(scene, "force", side=side).torque == pytest.approx(beginning, rel=1e-13)
+        assert solve(scene, "force", side=side).torque == pytest.approx(
+            beginning, rel=1e-13
+        )
 
 
 def test_without_dry_friction_there_is_no_interval() -> None:
@@ -173,7 +242,10 @@ def test_without_dry_friction_there_is_no_interval() -> None:
 
 
 def test_pin_load_friction_needs_the_pin_forces() -> None:
-    free = crank_rocker(motion=Motion(1.0, 0.0, free=fourbar.Free(1.0, 10)), effects=(PinFriction.at(A=(0.1, 0.01)),))
+    free = crank_rocker(
+        motion=Motion(1.0, 0.0, free=fourbar.Free(1.0, 10)),
+        effects=(PinFriction.at(A=(0.1, 0.01)),),
+    )
     with pytest.raises(LimitError, match="pin forces"):
         solve(free)
 
@@ -190,8 +262,13 @@ def test_a_load_over_theta_2_is_the_load_times_its_factor() -> None:
     load = Load(4, (3.0, 0.7), (0.05, 1.0), 0.2)
     table = Table((0.0, math.pi, 2 * math.pi), (1.0, 3.0, 1.0))
     angle = np.array([math.pi / 2])
-    tabled = solve(alone(theta_2=angle)), solve(replace(alone(theta_2=angle), loads=(replace(load, table=table),)))
-    twice = replace(alone(theta_2=angle), loads=(replace(load, force=(6.0, 0.7), moment=0.4),))
+    tabled = (
+        solve(alone(theta_2=angle)),
+        solve(replace(alone(theta_2=angle), loads=(replace(load, table=table),))),
+    )
+    twice = replace(
+        alone(theta_2=angle), loads=(replace(load, force=(6.0, 0.7), moment=0.4),)
+    )
     assert tabled[1].torque == pytest.approx(solve(twice).torque, rel=1e-14)
 
 
@@ -208,7 +285,9 @@ def test_a_law_through_a_cubic_is_that_cubic() -> None:
 
 def test_the_ends_of_a_law() -> None:
     points = (0.0, 0.2, 0.5, 1.0), (0.0, 1.0, 2.5, 2 * math.pi)
-    rest, periodic = (Law(*points, 10, ends).at(np.array([0.0, 1.0])) for ends in ("rest", "periodic"))
+    rest, periodic = (
+        Law(*points, 10, ends).at(np.array([0.0, 1.0])) for ends in ("rest", "periodic")
+    )
     assert rest[1] == pytest.approx([0.0, 0.0], abs=1e-13)
     assert periodic[0] == pytest.approx([0.0, 2 * math.pi], abs=1e-13)
     assert periodic[1][0] == pytest.approx(periodic[1][1], rel=1e-12)
@@ -228,10 +307,20 @@ def test_speed_and_acceleration_are_the_slopes_of_the_law(ends: str) -> None:
 def test_each_position_of_a_law_is_that_motion_alone() -> None:
     law = Law((0.0, 0.2, 0.5, 1.0), (0.0, 1.0, 2.5, 2 * math.pi), 12, "periodic")
     along_law = solve(crank_rocker(motion=Motion(law=law)))
-    assert along_law.torque is not None and along_law.omega_2 is not None and along_law.alpha_2 is not None
+    assert (
+        along_law.torque is not None
+        and along_law.omega_2 is not None
+        and along_law.alpha_2 is not None
+    )
     for i in (0, 5, 11):
-        here = Motion(float(along_law.theta_2[i]), float(along_law.omega_2[i]), float(along_law.alpha_2[i]))
-        assert solve(crank_rocker(motion=here)).torque[0] == pytest.approx(along_law.torque[i], rel=1e-13)  # type: ignore[index]
+        here = Motion(
+            float(along_law.theta_2[i]),
+            float(along_law.omega_2[i]),
+            float(along_law.alpha_2[i]),
+        )
+        assert solve(crank_rocker(motion=here)).torque[0] == pytest.approx(
+            along_law.torque[i], rel=1e-13
+        )  # type: ignore[index]
 
 
 HERE = SpringEnd(2, 0.1, 0.0), SpringEnd(4, 0.2, 0.0)
@@ -244,10 +333,19 @@ HERE = SpringEnd(2, 0.1, 0.0), SpringEnd(4, 0.2, 0.0)
         (lambda: Law((0.0, 1.0, 1.0, 2.0), (0.0, 1.0, 2.0, 3.0)), "motion.law.time"),
         (lambda: Motion(1.0, law=Law((0.0, 1.0), (0.0, 1.0), 5, "rest")), "motion.law"),
         (lambda: Flywheel(1.0, 3), "effects.flywheel.bar"),
-        (lambda: Spring(SpringEnd(2, 0.1, 0.0), SpringEnd(2, 0.2, 0.0), 1.0), "effects.springs.to.bar"),
+        (
+            lambda: Spring(SpringEnd(2, 0.1, 0.0), SpringEnd(2, 0.2, 0.0), 1.0),
+            "effects.springs.to.bar",
+        ),
         (lambda: Spring.gas(*HERE, 0.3, 0.3, 1.0), "effects.springs.gas.stroke"),
-        (lambda: Spring.gas(*HERE, 0.3, 0.1, 2.0, 1.0), "effects.springs.gas.compressed_force"),
-        (lambda: Spring.gas(*HERE, 0.3, 0.1, -2.0), "effects.springs.gas.extended_force"),
+        (
+            lambda: Spring.gas(*HERE, 0.3, 0.1, 2.0, 1.0),
+            "effects.springs.gas.compressed_force",
+        ),
+        (
+            lambda: Spring.gas(*HERE, 0.3, 0.1, -2.0),
+            "effects.springs.gas.extended_force",
+        ),
         (lambda: Torsion.at(A=(0.0, 1.0, 0.0)), "effects.torsion.A.stiffness"),
         (lambda: PinFriction.at(C=(0.1, 0.1)), "effects.pin_friction.C"),
         (lambda: PinFriction.at(A=(-0.1, 0.1)), "effects.pin_friction.A.coefficient"),
@@ -267,5 +365,7 @@ def test_a_sweep_without_theta_2_still_runs_over_the_range() -> None:
 
 def test_a_table_says_in_degrees_what_it_covers_and_what_lies_outside() -> None:
     table = fourbar.effects.Table(("0 deg", "90 deg"), (0.0, 1.0))
-    with pytest.raises(InputError, match="covers 0 to 90 deg; the position at 120 deg lies outside"):
+    with pytest.raises(
+        InputError, match="covers 0 to 90 deg; the position at 120 deg lies outside"
+    ):
         table.at(np.radians([45.0, 120.0]))

@@ -28,11 +28,17 @@ ROUND_OFF = 2e-11
 DIFFERENCES = 1e-7
 """Relative: truncation and rounding of central differences at a step of 1e-5."""
 STEP = 1e-5
-WIDE, SHORT, KITE = (0.3, 0.1, 0.25, 0.22), (0.05, 0.3, 0.28, 0.31), (0.2, 0.3, 0.24, 0.33)
+WIDE, SHORT, KITE = (
+    (0.3, 0.1, 0.25, 0.22),
+    (0.05, 0.3, 0.28, 0.31),
+    (0.2, 0.3, 0.24, 0.33),
+)
 
 
 def ends(start_bar: int, end_bar: int) -> fourbar.LinearDrive:
-    return fourbar.LinearDrive(SpringEnd(start_bar, 0.17, -1.1), SpringEnd(end_bar, 0.09, 0.7))
+    return fourbar.LinearDrive(
+        SpringEnd(start_bar, 0.17, -1.1), SpringEnd(end_bar, 0.09, 0.7)
+    )
 
 
 def driven(start_bar: int, end_bar: int, **changes: Any) -> fourbar.Scene:
@@ -46,79 +52,145 @@ def test_forces_are_those_of_thirteen_equations_in_balls_within_their_error_bars
 ) -> None:
     d, *moving = lengths
     scene = driven(start_bar, end_bar)
-    bars = [replace(bar, length=length) for bar, length in zip(scene.linkage.moving, moving, strict=True)]
+    bars = [
+        replace(bar, length=length)
+        for bar, length in zip(scene.linkage.moving, moving, strict=True)
+    ]
     scene = replace(scene, linkage=fourbar.FourBar(d, *bars, 0.2))
     for branch in (1, -1):
-        scene = replace(scene, motion=fourbar.Motion(np.linspace(0.25, 6.2, 7), 10.0, 5.0, branch))
+        scene = replace(
+            scene, motion=fourbar.Motion(np.linspace(0.25, 6.2, 7), 10.0, 5.0, branch)
+        )
         s = fourbar.solve(scene, "error")
         ok = s.status_code == 0
         assert ok.sum() >= 3 and set(s.status) <= {"ok", "not_assembled"}
         exact = compare_with_balls(scene, s, ok)
         for name in ("stroke", "stroke_speed", "power"):
             ours = getattr(s, name)[ok]
-            assert np.abs(ours - exact[name][ok]).max() <= ROUND_OFF * np.abs(ours).max(), name
-        assert np.nanmax(s.drive_force_error / np.abs(s.drive_force)) < 1e-9  # no bar is wide enough to hide anything
+            assert (
+                np.abs(ours - exact[name][ok]).max() <= ROUND_OFF * np.abs(ours).max()
+            ), name
+        assert (
+            np.nanmax(s.drive_force_error / np.abs(s.drive_force)) < 1e-9
+        )  # no bar is wide enough to hide anything
 
 
-def compare_with_balls(scene: fourbar.Scene, s: fourbar.Solution, ok: np.ndarray) -> dict[str, np.ndarray]:
+def compare_with_balls(
+    scene: fourbar.Scene, s: fourbar.Solution, ok: np.ndarray
+) -> dict[str, np.ndarray]:
     """Compare forces with those in balls by their error bars, and return all that the balls give."""
     exact = answer_in_balls(scene)
-    assert (np.abs(s.drive_force - exact["drive_force"]) <= BARS * s.drive_force_error)[ok].all()
+    assert (np.abs(s.drive_force - exact["drive_force"]) <= BARS * s.drive_force_error)[
+        ok
+    ].all()
     for name in PIN_FORCES:
-        assert (np.hypot(*(getattr(s, name) - exact[name]).T) <= BARS * s.force_error)[ok].all(), name
+        assert (np.hypot(*(getattr(s, name) - exact[name]).T) <= BARS * s.force_error)[
+            ok
+        ].all(), name
     return exact
 
 
 @pytest.mark.parametrize(("start_bar", "end_bar"), PAIRS)
-def test_beside_a_limit_of_the_input_its_digits_are_those_of_the_line(start_bar: int, end_bar: int) -> None:
+def test_beside_a_limit_of_the_input_its_digits_are_those_of_the_line(
+    start_bar: int, end_bar: int
+) -> None:
     """At rest nothing grows without end there but for a line that has no lever on bars 3 and 4 in line, bar 2's."""
     link = fourbar.uniform(0.2, 0.48, 0.55, 0.2)
     near = fourbar.Motion(fourbar.FromLimit(1, 1e-10), 0.0)
-    scene = fourbar.Scene(link, near, effects=(fourbar.Gravity(),), drive=ends(start_bar, end_bar))
+    scene = fourbar.Scene(
+        link, near, effects=(fourbar.Gravity(),), drive=ends(start_bar, end_bar)
+    )
     s = fourbar.solve(scene, "error")
     assert s.status == ["ok"] and s.condition[0] < 1e-4
     compare_with_balls(scene, s, s.status_code == 0)
     if (start_bar, end_bar) != (1, 2):
         assert s.drive_force_error[0] < 1e-13 * abs(s.drive_force[0])
         largest = max(np.hypot(*getattr(s, name)[0]) for name in PIN_FORCES)
-        assert s.force_error[0] < 1e-13 * largest  # of bars 3 and 4, so nearly in line, 1e-11 would be left
+        assert (
+            s.force_error[0] < 1e-13 * largest
+        )  # of bars 3 and 4, so nearly in line, 1e-11 would be left
 
 
 @pytest.mark.parametrize("bar", [2, 4])
 def test_from_the_ground_to_a_bar_it_is_the_torque_over_its_lever(bar: int) -> None:
     """The other pin forces are those of the torque, and only the ground's pin of the bar bears the push."""
-    torque, s = fourbar.solve(crank_rocker(drive_bar=bar)), fourbar.solve(driven(1, bar))
-    foot = {2: np.zeros((61, 2)), 4: 0.3 * np.column_stack((np.cos(np.full(61, 0.2)), np.sin(np.full(61, 0.2))))}[bar]
+    torque, s = (
+        fourbar.solve(crank_rocker(drive_bar=bar)),
+        fourbar.solve(driven(1, bar)),
+    )
+    foot = {
+        2: np.zeros((61, 2)),
+        4: 0.3 * np.column_stack((np.cos(np.full(61, 0.2)), np.sin(np.full(61, 0.2)))),
+    }[bar]
     angle = getattr(s, f"theta_{bar}") + 0.7
     arm = 0.09 * np.column_stack((np.cos(angle), np.sin(angle)))
     lever = arm[:, 0] * s.drive_line[:, 1] - arm[:, 1] * s.drive_line[:, 0]
-    np.testing.assert_allclose(s.drive_force * lever, torque.torque, rtol=0, atol=1e-12 * np.abs(torque.torque).max())
+    np.testing.assert_allclose(
+        s.drive_force * lever,
+        torque.torque,
+        rtol=0,
+        atol=1e-12 * np.abs(torque.torque).max(),
+    )
     pin = {2: "F12", 4: "F14"}[bar]
     for name in {*PIN_FORCES} - {pin}:
         assert np.array_equal(getattr(s, name), getattr(torque, name)), name
     push = s.drive_force[:, None] * s.drive_line
-    np.testing.assert_allclose(getattr(s, pin) + push, getattr(torque, pin), rtol=0, atol=1e-12 * np.abs(push).max())
-    assert np.all(np.abs(s.drive_condition - torque.drive_condition * np.abs(lever) / 0.09) < 1e-13)
+    np.testing.assert_allclose(
+        getattr(s, pin) + push,
+        getattr(torque, pin),
+        rtol=0,
+        atol=1e-12 * np.abs(push).max(),
+    )
+    assert np.all(
+        np.abs(s.drive_condition - torque.drive_condition * np.abs(lever) / 0.09)
+        < 1e-13
+    )
     # the ground's end lies where it was stated, against the ground's line
     start = 0.17 * np.array([math.cos(0.2 - 1.1), math.sin(0.2 - 1.1)])
-    np.testing.assert_allclose(start + s.stroke[:, None] * s.drive_line, foot + arm, atol=1e-15)
-
-
-@pytest.mark.parametrize(("start_bar", "end_bar"), PAIRS)
-def test_its_power_is_that_of_the_torque_and_its_line_has_no_sense(start_bar: int, end_bar: int) -> None:
-    s, torque = fourbar.solve(driven(start_bar, end_bar)), fourbar.solve(crank_rocker())
-    np.testing.assert_allclose(s.power, torque.power, rtol=0, atol=ROUND_OFF * np.abs(torque.power).max())
-    back = fourbar.solve(
-        crank_rocker(drive=fourbar.LinearDrive(ends(start_bar, end_bar).end, ends(start_bar, end_bar).start))
+    np.testing.assert_allclose(
+        start + s.stroke[:, None] * s.drive_line, foot + arm, atol=1e-15
     )
-    for name in ("drive_force", "stroke", "stroke_speed", "drive_condition", "F12", "F43"):
-        np.testing.assert_allclose(getattr(back, name), getattr(s, name), rtol=1e-12, atol=1e-12)
-    np.testing.assert_array_equal(back.drive_line, -s.drive_line)
-    assert s.torque is None and s.drive_bar is None and torque.drive_force is None and torque.stroke is None
 
 
 @pytest.mark.parametrize(("start_bar", "end_bar"), PAIRS)
-def test_the_condition_is_the_slope_of_the_stroke_over_what_its_ends_could_move(start_bar: int, end_bar: int) -> None:
+def test_its_power_is_that_of_the_torque_and_its_line_has_no_sense(
+    start_bar: int, end_bar: int
+) -> None:
+    s, torque = fourbar.solve(driven(start_bar, end_bar)), fourbar.solve(crank_rocker())
+    np.testing.assert_allclose(
+        s.power, torque.power, rtol=0, atol=ROUND_OFF * np.abs(torque.power).max()
+    )
+    back = fourbar.solve(
+        crank_rocker(
+            drive=fourbar.LinearDrive(
+                ends(start_bar, end_bar).end, ends(start_bar, end_bar).start
+            )
+        )
+    )
+    for name in (
+        "drive_force",
+        "stroke",
+        "stroke_speed",
+        "drive_condition",
+        "F12",
+        "F43",
+    ):
+        np.testing.assert_allclose(
+            getattr(back, name), getattr(s, name), rtol=1e-12, atol=1e-12
+        )
+    np.testing.assert_array_equal(back.drive_line, -s.drive_line)
+    assert (
+        s.torque is None
+        and s.drive_bar is None
+        and torque.drive_force is None
+        and torque.stroke is None
+    )
+
+
+@pytest.mark.parametrize(("start_bar", "end_bar"), PAIRS)
+def test_the_condition_is_the_slope_of_the_stroke_over_what_its_ends_could_move(
+    start_bar: int, end_bar: int
+) -> None:
     """In [0, 1] for linkages of every type; ds/dtheta_2 here from differences of the stroke."""
     rng = np.random.default_rng(start_bar + 10 * end_bar)
     seen = 0
@@ -128,11 +200,18 @@ def test_the_condition_is_the_slope_of_the_stroke_over_what_its_ends_could_move(
             continue
         polar = rng.uniform(0.05, 0.6, 2), rng.uniform(-3.0, 3.0, 2)
         drive = fourbar.LinearDrive(
-            SpringEnd(start_bar, polar[0][0], polar[1][0]), SpringEnd(end_bar, polar[0][1], polar[1][1])
+            SpringEnd(start_bar, polar[0][0], polar[1][0]),
+            SpringEnd(end_bar, polar[0][1], polar[1][1]),
         )
         theta_2 = rng.uniform(0.0, 6.0)
-        motion = fourbar.Motion(theta_2 + STEP * np.array([0.0, 1.0, -1.0]), 1.0, branch=int(rng.choice([1, -1])))
-        s = fourbar.solve(fourbar.Scene(fourbar.uniform(d, a, b, c), motion, drive=drive))
+        motion = fourbar.Motion(
+            theta_2 + STEP * np.array([0.0, 1.0, -1.0]),
+            1.0,
+            branch=int(rng.choice([1, -1])),
+        )
+        s = fourbar.solve(
+            fourbar.Scene(fourbar.uniform(d, a, b, c), motion, drive=drive)
+        )
         if s.status != ["ok"] * 3 or s.condition[0] < 0.1:
             continue
         most = sum(
@@ -141,7 +220,10 @@ def test_the_condition_is_the_slope_of_the_stroke_over_what_its_ends_could_move(
         )
         slope = (s.stroke[1] - s.stroke[2]) / (2.0 * STEP)
         assert abs(s.stroke_speed[0] - slope) < DIFFERENCES * most / s.condition[0] ** 3
-        assert abs(s.drive_condition[0] - abs(slope * s.sin_mu[0]) / most) < DIFFERENCES / s.condition[0] ** 3
+        assert (
+            abs(s.drive_condition[0] - abs(slope * s.sin_mu[0]) / most)
+            < DIFFERENCES / s.condition[0] ** 3
+        )
         assert 0.0 <= s.drive_condition[0] <= 1.0
         seen += 1
     assert seen >= 5
@@ -151,20 +233,35 @@ def test_where_it_has_no_lever_or_no_direction_there_are_no_forces() -> None:
     link = fourbar.uniform(0.3, 0.1, 0.25, 0.22)
     motion = fourbar.Motion(np.array([0.0, 0.5, math.pi]), 1.0)
     s = fourbar.solve(
-        fourbar.Scene(link, motion, drive=fourbar.LinearDrive(SpringEnd(1, 0.2, 0.0), SpringEnd(2, 0.1, 0.0))), "error"
+        fourbar.Scene(
+            link,
+            motion,
+            drive=fourbar.LinearDrive(SpringEnd(1, 0.2, 0.0), SpringEnd(2, 0.1, 0.0)),
+        ),
+        "error",
     )
     assert s.status == ["no_lever", "ok", "no_lever"]
-    assert np.isnan(s.drive_force[[0, 2]]).all() and np.isnan(s.F12[0]).all() and s.drive_condition[0] < 1e-15
+    assert (
+        np.isnan(s.drive_force[[0, 2]]).all()
+        and np.isnan(s.F12[0]).all()
+        and s.drive_condition[0] < 1e-15
+    )
     assert s.stroke[0] == pytest.approx(0.1) and abs(s.stroke_speed[0]) < 1e-15
     one = fourbar.solve(fourbar.Scene(link, fourbar.Motion(0.0, 1.0), drive=s.drive))
     assert one.status == ["no_lever"] and np.isnan(one.power).all()
     meet = fourbar.LinearDrive(SpringEnd(1, 0.1, 0.5), SpringEnd(2, 0.1, 0.0))
-    assert fourbar.solve(fourbar.Scene(link, motion, drive=meet)).status == ["ok", "no_direction", "ok"]
+    assert fourbar.solve(fourbar.Scene(link, motion, drive=meet)).status == [
+        "ok",
+        "no_direction",
+        "ok",
+    ]
     # the parallelogram's cranks keep their distance while they are parallel, and only then
     parallel = fourbar.LinearDrive(SpringEnd(2, 0.05, 0.3), SpringEnd(4, 0.05, 0.3))
     for branch, status in ((1, "no_lever"), (-1, "ok")):
         scene = fourbar.Scene(
-            fourbar.uniform(0.3, 0.1, 0.3, 0.1), fourbar.Motion(1.0, 1.0, branch=branch), drive=parallel
+            fourbar.uniform(0.3, 0.1, 0.3, 0.1),
+            fourbar.Motion(1.0, 1.0, branch=branch),
+            drive=parallel,
         )
         assert fourbar.solve(scene).status == [status]
 
@@ -182,9 +279,13 @@ def test_where_it_has_no_lever_or_no_direction_there_are_no_forces() -> None:
         ((2, 0.0, 0.0), (4, 0.0, 0.0)),
     ],
 )
-def test_ends_that_keep_their_distance_are_refused_in_one_line(start: Any, end: Any) -> None:
+def test_ends_that_keep_their_distance_are_refused_in_one_line(
+    start: Any, end: Any
+) -> None:
     drive = fourbar.LinearDrive(SpringEnd(*start), SpringEnd(*end))
-    with pytest.raises(fourbar.InputError, match=r"^drive\.to = .*keeps its distance from `from`"):
+    with pytest.raises(
+        fourbar.InputError, match=r"^drive\.to = .*keeps its distance from `from`"
+    ):
         fourbar.Scene(fourbar.uniform(0.3, 0.1, 0.25, 0.22), drive=drive)
 
 
@@ -198,24 +299,37 @@ theta_2 = "1 rad"
 omega_2 = "2 rad/s"
 [drive]
 """
-FROM, TO = 'from = { bar = 1, at = ["21 cm", "-60 deg"] }\n', 'to = { bar = 4, at = ["9 cm", "0 deg"] }\n'
+FROM, TO = (
+    'from = { bar = 1, at = ["21 cm", "-60 deg"] }\n',
+    'to = { bar = 4, at = ["9 cm", "0 deg"] }\n',
+)
 
 
 @pytest.mark.parametrize(
     ("drive", "says"),
     [
-        ("bar = 4\n" + FROM + TO, r"drive\.bar = 4: a drive acts on a bar or along a line"),
+        (
+            "bar = 4\n" + FROM + TO,
+            r"drive\.bar = 4: a drive acts on a bar or along a line",
+        ),
         (FROM, r"drive\.to"),
         (FROM + TO.replace("4", "1", 1), r"drive\.to\.bar = 1: must be another bar"),
-        (FROM.replace("21 cm", "30 cm").replace("-60", "0") + TO, r"drive\.to = .*keeps its distance"),
+        (
+            FROM.replace("21 cm", "30 cm").replace("-60", "0") + TO,
+            r"drive\.to = .*keeps its distance",
+        ),
         (FROM + TO.replace("9 cm", "9 kg"), r"drive\.to\.at"),
         (FROM + TO + "force = 1\n", r"drive\.force"),
     ],
 )
-def test_a_file_with_a_wrong_drive_is_refused_in_one_line(drive: str, says: str) -> None:
+def test_a_file_with_a_wrong_drive_is_refused_in_one_line(
+    drive: str, says: str
+) -> None:
     with pytest.raises(fourbar.InputError, match=says) as caught:
         loads(TEXT + drive, "scene.toml")
-    assert "\n" not in str(caught.value) and str(caught.value).startswith("scene.toml: ")
+    assert "\n" not in str(caught.value) and str(caught.value).startswith(
+        "scene.toml: "
+    )
 
 
 def test_it_reads_back_as_it_was_written_and_is_carried_by_studies() -> None:
@@ -224,27 +338,48 @@ def test_it_reads_back_as_it_was_written_and_is_carried_by_studies() -> None:
     assert again.drive == scene.drive
     assert again.drive.start.bar == 1 and again.drive.end == SpringEnd(4, 0.09, 0.0)
     assert again.drive.start[1:] == pytest.approx((0.21, math.radians(-60)))
-    assert again.drive_bar is None and '"drive_bar": null' in write_json(fourbar.solve(again))
-    with pytest.raises(fourbar.InputError, match="a drive acts on a bar or along a line"):
+    assert again.drive_bar is None and '"drive_bar": null' in write_json(
+        fourbar.solve(again)
+    )
+    with pytest.raises(
+        fourbar.InputError, match="a drive acts on a bar or along a line"
+    ):
         replace(scene, drive_bar=3)
     with pytest.raises(fourbar.InputError, match="out = 'torque'"):
         fourbar.solve(scene, out={"torque": np.empty(1)})
-    with pytest.raises(fourbar.InputError, match=r"drive\.from\.bar = .*same for every member"):
+    with pytest.raises(
+        fourbar.InputError, match=r"drive\.from\.bar = .*same for every member"
+    ):
         fourbar.vary(scene, {"drive.from.bar": [2]})
 
 
 @pytest.mark.parametrize(("start_bar", "end_bar"), PAIRS)
-def test_derivatives_by_its_ends_are_those_of_differences(start_bar: int, end_bar: int) -> None:
-    scene = driven(start_bar, end_bar, motion=fourbar.Motion(np.array([0.4, 2.0, 4.5]), 10.0, 5.0))
+def test_derivatives_by_its_ends_are_those_of_differences(
+    start_bar: int, end_bar: int
+) -> None:
+    scene = driven(
+        start_bar, end_bar, motion=fourbar.Motion(np.array([0.4, 2.0, 4.5]), 10.0, 5.0)
+    )
     slopes = fourbar.sensitivity(scene)
-    for key in ("drive.from.at.0", "drive.from.at.1", "drive.to.at.0", "drive.to.at.1", "lengths.coupler"):
+    for key in (
+        "drive.from.at.0",
+        "drive.from.at.1",
+        "drive.to.at.0",
+        "drive.to.at.1",
+        "lengths.coupler",
+    ):
         value = slopes.numbers[list(slopes.keys).index(key)]
-        s = fourbar.solve(fourbar.vary(scene, {key: value + STEP * np.array([-1.0, 1.0])}))
+        s = fourbar.solve(
+            fourbar.vary(scene, {key: value + STEP * np.array([-1.0, 1.0])})
+        )
         for name in ("drive_force", "stroke", "power", "F43", "drive_condition"):
             slope = (getattr(s, name)[1] - getattr(s, name)[0]) / (2.0 * STEP)
             size = np.abs(slope).max() + np.abs(getattr(s, name)).max() / 0.1
             # the truncation grows with the cube of what divides
-            assert np.abs(slopes.of(name, key) - slope).max() < DIFFERENCES / s.drive_condition.min() ** 3 * size, (
+            assert (
+                np.abs(slopes.of(name, key) - slope).max()
+                < DIFFERENCES / s.drive_condition.min() ** 3 * size
+            ), (
                 name,
                 key,
             )
@@ -259,55 +394,99 @@ def test_extremes_hold_every_sample() -> None:
         fourbar.extremes(scene, ["torque"])
     bounds = fourbar.extremes(scene, ["drive_force"])
     ((low, high),) = bounds.parts
-    s = fourbar.solve(replace(scene, motion=fourbar.Motion(np.linspace(low, high, 2001), 3.0)))
+    s = fourbar.solve(
+        replace(scene, motion=fourbar.Motion(np.linspace(low, high, 2001), 3.0))
+    )
     least, greatest = bounds.least["drive_force"], bounds.greatest["drive_force"]
     assert least.low <= s.drive_force.min() <= least.high + 1e-3 * abs(least.high)
-    assert greatest.low - 1e-3 * abs(greatest.low) <= s.drive_force.max() <= greatest.high
+    assert (
+        greatest.low - 1e-3 * abs(greatest.low) <= s.drive_force.max() <= greatest.high
+    )
 
 
 @pytest.mark.parametrize(("start_bar", "end_bar"), PAIRS)
-def test_the_frame_bears_what_changes_the_momentum_of_the_bars(start_bar: int, end_bar: int) -> None:
+def test_the_frame_bears_what_changes_the_momentum_of_the_bars(
+    start_bar: int, end_bar: int
+) -> None:
     scene = driven(start_bar, end_bar, loads=(), effects=())
     s = fourbar.solve(scene)
     force, moment = np.zeros((61, 2)), np.zeros(61)
     for number in (2, 3, 4):
-        bar, G, a = scene.linkage.bar(number), getattr(s, f"G{number}"), getattr(s, f"a_G{number}")
+        bar, G, a = (
+            scene.linkage.bar(number),
+            getattr(s, f"G{number}"),
+            getattr(s, f"a_G{number}"),
+        )
         force -= bar.mass * a
         alpha = getattr(s, f"alpha_{number}")
-        moment -= bar.mass * (G[:, 0] * a[:, 1] - G[:, 1] * a[:, 0]) + bar.moment_of_inertia * alpha
+        moment -= (
+            bar.mass * (G[:, 0] * a[:, 1] - G[:, 1] * a[:, 0])
+            + bar.moment_of_inertia * alpha
+        )
     pins = np.abs(s.F12).max() + np.abs(s.F14).max()
     assert np.abs(shaking_force(s) - force).max() < ROUND_OFF * pins
     assert np.abs(shaking_moment(s) - moment).max() < ROUND_OFF * pins
-    elsewhere = {"drive.from.at.0": [0.17, 0.12], "drive.to.at.1": [0.7, 0.6]}  # the bars move as before
+    elsewhere = {
+        "drive.from.at.0": [0.17, 0.12],
+        "drive.to.at.1": [0.7, 0.6],
+    }  # the bars move as before
     study = fourbar.solve(fourbar.vary(scene, elsewhere))
     pins = np.abs(study.F12).max() + np.abs(study.F14).max()
     assert np.abs(shaking_force(study) - force).max() < ROUND_OFF * pins
     assert np.abs(shaking_moment(study) - moment).max() < ROUND_OFF * pins
     duty, entry = motor_duty(s), write_motor(scene, s, {})
     assert duty.peak_force == np.abs(s.drive_force).max() and duty.peak_torque is None
-    assert duty.peak_speed == np.abs(s.stroke_speed).max() and entry["units"]["peak_speed"] == "m/s"
+    assert (
+        duty.peak_speed == np.abs(s.stroke_speed).max()
+        and entry["units"]["peak_speed"] == "m/s"
+    )
 
 
 @pytest.mark.parametrize(("start_bar", "end_bar"), PAIRS)
-def test_friction_that_depends_on_pin_forces_takes_its_power_from_the_drive(start_bar: int, end_bar: int) -> None:
+def test_friction_that_depends_on_pin_forces_takes_its_power_from_the_drive(
+    start_bar: int, end_bar: int
+) -> None:
     """P = power without friction + sum of mu r |F| |slip|, with the pin forces that the drive itself makes."""
-    pins = {"O2": (0.1, 0.004), "A": (0.15, 0.005), "B": (0.2, 0.003), "O4": (0.1, 0.006)}
+    pins = {
+        "O2": (0.1, 0.004),
+        "A": (0.15, 0.005),
+        "B": (0.2, 0.003),
+        "O4": (0.1, 0.006),
+    }
     motion = fourbar.Motion(np.array([0.4, 1.3, 2.0, 4.5]), 10.0, 5.0)
     scene = driven(start_bar, end_bar, motion=motion)
     bare, s = (
         fourbar.solve(scene),
         fourbar.solve(
-            replace(scene, effects=(*scene.effects, fourbar.PinFriction(tuple((p, *n) for p, n in pins.items()))))
+            replace(
+                scene,
+                effects=(
+                    *scene.effects,
+                    fourbar.PinFriction(tuple((p, *n) for p, n in pins.items())),
+                ),
+            )
         ),
     )
     ok = s.status_code == 0
     assert np.count_nonzero(ok) >= 2
-    slip = {"O2": s.omega_2, "A": s.omega_3 - s.omega_2, "B": s.omega_4 - s.omega_3, "O4": s.omega_4}
+    slip = {
+        "O2": s.omega_2,
+        "A": s.omega_3 - s.omega_2,
+        "B": s.omega_4 - s.omega_3,
+        "O4": s.omega_4,
+    }
     lost = sum(
         mu * r * np.hypot(*getattr(s, f).T) * np.abs(slip[p])
-        for (p, (mu, r)), f in zip(pins.items(), ("F12", "F32", "F43", "F14"), strict=True)
+        for (p, (mu, r)), f in zip(
+            pins.items(), ("F12", "F32", "F43", "F14"), strict=True
+        )
     )
-    np.testing.assert_allclose(s.power[ok], (bare.power + lost)[ok], rtol=0, atol=ROUND_OFF * np.abs(s.power[ok]).max())
+    np.testing.assert_allclose(
+        s.power[ok],
+        (bare.power + lost)[ok],
+        rtol=0,
+        atol=ROUND_OFF * np.abs(s.power[ok]).max(),
+    )
     rest = fourbar.solve(
         replace(
             scene,
@@ -316,19 +495,33 @@ def test_friction_that_depends_on_pin_forces_takes_its_power_from_the_drive(star
         )
     )
     wide = 0.05 / np.abs(bare.stroke_speed / 10.0)
-    np.testing.assert_allclose(rest.drive_force_high - rest.drive_force_low, 2.0 * wide, rtol=1e-9)
+    np.testing.assert_allclose(
+        rest.drive_force_high - rest.drive_force_low, 2.0 * wide, rtol=1e-9
+    )
 
 
 def test_files_of_simulators_refuse_it_by_name() -> None:
     scene = driven(1, 4, loads=())
     for write in (write_sdf, write_usd):
-        with pytest.raises(fourbar.FourBarError, match=r"linear drive \(drive\.from, drive\.to\)"):
+        with pytest.raises(
+            fourbar.FourBarError, match=r"linear drive \(drive\.from, drive\.to\)"
+        ):
             write(scene)
 
 
 def test_a_released_linkage_has_a_stroke_and_no_force() -> None:
-    scene = driven(1, 4, loads=(), motion=fourbar.Motion(1.0, 0.0, free=fourbar.Free(0.05, 50)))
+    scene = driven(
+        1, 4, loads=(), motion=fourbar.Motion(1.0, 0.0, free=fourbar.Free(0.05, 50))
+    )
     s = fourbar.solve(scene, "error")
-    assert not s.drive_force.any() and not s.power.any() and np.isfinite(s.stroke_speed).all() and s.torque is None
+    assert (
+        not s.drive_force.any()
+        and not s.power.any()
+        and np.isfinite(s.stroke_speed).all()
+        and s.torque is None
+    )
     slope = np.gradient(s.stroke, s.time)
-    assert np.abs(slope[1:-1] - s.stroke_speed[1:-1]).max() < 1e-3 * np.abs(s.stroke_speed).max()
+    assert (
+        np.abs(slope[1:-1] - s.stroke_speed[1:-1]).max()
+        < 1e-3 * np.abs(s.stroke_speed).max()
+    )

@@ -37,16 +37,33 @@ def linkage(name: str) -> fourbar.FourBar:
 @pytest.mark.slow
 @pytest.mark.parametrize("pin", ["A", "B"])
 @pytest.mark.parametrize("name", ["crank-rocker", "drag link"])
-def test_a_spring_with_both_ends_in_one_pin_has_no_direction(name: str, pin: str) -> None:
+def test_a_spring_with_both_ends_in_one_pin_has_no_direction(
+    name: str, pin: str
+) -> None:
     link = linkage(name)
     ends = {
         "A": (SpringEnd(2, link.input.length, 0.0), SpringEnd(3, 0.0, 0.0)),
-        "B": (SpringEnd(3, link.coupler.length, 0.0), SpringEnd(4, link.output.length, 0.0)),
+        "B": (
+            SpringEnd(3, link.coupler.length, 0.0),
+            SpringEnd(4, link.output.length, 0.0),
+        ),
     }[pin]
-    scene = Scene(link, Motion(Sweep(0.3, 5.9, 40), 8.0), effects=(Springs((Spring(*ends, 150.0, 0.05),)),))
+    scene = Scene(
+        link,
+        Motion(Sweep(0.3, 5.9, 40), 8.0),
+        effects=(Springs((Spring(*ends, 150.0, 0.05),)),),
+    )
     solution = solve(scene, "error")
     assert set(solution.status) == {"no_direction"}
-    for quantity in ("F12", "F32", "F43", "F14", "torque", "torque_error", "force_error"):
+    for quantity in (
+        "F12",
+        "F32",
+        "F43",
+        "F14",
+        "torque",
+        "torque_error",
+        "force_error",
+    ):
         assert np.isnan(getattr(solution, quantity)).all(), quantity
     assert solution.omega_4 is not None and np.isfinite(solution.omega_4).all()
     assert solve(scene, "velocity").status == ["ok"] * 41  # the spring plays no part
@@ -58,7 +75,10 @@ def test_a_spring_whose_ends_meet_once_loses_that_position_alone() -> None:
     theta_2 = [0.3, 0.5, 0.5 + 1e-9, 0.7]
     scenes = [
         Scene(linkage("crank-rocker"), Motion(theta_2, 8.0), effects=effects)
-        for effects in ((Springs((spring,)),), (PinFriction.at(O2=(0.2, 0.01)), Springs((spring,))))
+        for effects in (
+            (Springs((spring,)),),
+            (PinFriction.at(O2=(0.2, 0.01)), Springs((spring,))),
+        )
     ]
     for scene in scenes:
         solution = solve(scene)
@@ -82,16 +102,24 @@ def continuous(scene: Scene, pin: str) -> np.ndarray:
 @pytest.mark.parametrize("pin", PINS)
 @pytest.mark.parametrize("branch", [1, -1])
 @pytest.mark.parametrize("name", LINKAGES)
-def test_a_torsion_spring_is_wound_where_the_continuous_angle_says_so(name: str, branch: int, pin: str) -> None:
+def test_a_torsion_spring_is_wound_where_the_continuous_angle_says_so(
+    name: str, branch: int, pin: str
+) -> None:
     """Followed position by position, and evaluated at each fiftieth by itself and in another order."""
     link = replace(linkage(name), ground_angle=0.4)
     least, most = choose_range(link)
-    if name == "kite":  # from its change point to the same again: there bars 3 and 4 are free to turn
+    if (
+        name == "kite"
+    ):  # from its change point to the same again: there bars 3 and 4 are free to turn
         least, most = 0.4, 0.4 + 2.0 * math.pi
     margin = 1e-3 * (most - least)
     # a whole turn and a half where the input turns, else its one range
     turns = most - least > 2.0 * math.pi - 1e-6 and name != "kite"
-    sweep = (least + margin, least + 3.0 * math.pi) if turns else (least + margin, most - margin)
+    sweep = (
+        (least + margin, least + 3.0 * math.pi)
+        if turns
+        else (least + margin, most - margin)
+    )
     fine = Scene(link, Motion(Sweep(*sweep, FINE), 5.0, branch=branch))
     between = continuous(fine, pin)
     assert np.isfinite(between).all()
@@ -99,33 +127,60 @@ def test_a_torsion_spring_is_wound_where_the_continuous_angle_says_so(name: str,
     some = np.r_[0, np.random.default_rng(5).permutation(np.arange(50, FINE + 1, 50))]
     for rest in (between[0] - 3.0, between[0] + 1.0, between[0] + 6.0 * math.pi):
         spring = Torsion.at(**{pin: (2.0, rest, 0.1)})
-        solution = solve(Scene(link, Motion(theta_2[some], 5.0, branch=branch), effects=(spring,)), "force")
-        away = between[some] - rest - 2.0 * math.pi * round((between[0] - rest) / (2.0 * math.pi))
+        solution = solve(
+            Scene(link, Motion(theta_2[some], 5.0, branch=branch), effects=(spring,)),
+            "force",
+        )
+        away = (
+            between[some]
+            - rest
+            - 2.0 * math.pi * round((between[0] - rest) / (2.0 * math.pi))
+        )
         wound = np.abs(away) > math.pi
         sure = np.abs(np.abs(away) - math.pi) > EDGE
         assert np.array_equal(solution.status_code[sure] == 6, wound[sure])
-        assert solution.torque is not None and np.array_equal(np.isnan(solution.torque), solution.status_code == 6)
+        assert solution.torque is not None and np.array_equal(
+            np.isnan(solution.torque), solution.status_code == 6
+        )
 
 
 def test_the_pins_that_turn_do_wind_their_springs() -> None:
     """The test above has something to find: of a crank-rocker the pins of the crank turn, the others swing."""
     scene = Scene(linkage("crank-rocker"), Motion(Sweep(0.0, 2.0 * math.pi, FINE), 5.0))
     travel = {pin: np.ptp(continuous(scene, pin)) for pin in PINS}
-    assert travel["O2"] > 6.2 and travel["A"] > 6.2 and travel["B"] < math.pi and travel["O4"] < math.pi
+    assert (
+        travel["O2"] > 6.2
+        and travel["A"] > 6.2
+        and travel["B"] < math.pi
+        and travel["O4"] < math.pi
+    )
 
 
 @pytest.mark.slow
 def test_every_engine_stops_where_the_spring_is_wound() -> None:
     spring = Torsion.at(O2=(0.2, 0.5, 0.0))
-    scene = Scene(linkage("crank-rocker"), Motion(Sweep(0.1, 6.2, 12), 10.0), effects=(spring,))
+    scene = Scene(
+        linkage("crank-rocker"), Motion(Sweep(0.1, 6.2, 12), 10.0), effects=(spring,)
+    )
     record = judge("scene", scene)
     assert [row for row in record.rows if row.failed] == []
-    assert {row.engine for row in record.rows if row.verdict == "refuses"} == {"mujoco-simulated"}
+    assert {row.engine for row in record.rows if row.verdict == "refuses"} == {
+        "mujoco-simulated"
+    }
     assert any("wound by more than half a turn" in line for line in record.left_out)
-    assert record.solution is not None and record.solution.status.count("wound") == 6  # of theta_2 beyond 0.5 + pi
-    at_half = Scene(scene.linkage, Motion([0.5, 1.0, 0.5 + math.pi, 4.0], 10.0), effects=(spring,))
+    assert (
+        record.solution is not None and record.solution.status.count("wound") == 6
+    )  # of theta_2 beyond 0.5 + pi
+    at_half = Scene(
+        scene.linkage, Motion([0.5, 1.0, 0.5 + math.pi, 4.0], 10.0), effects=(spring,)
+    )
     record = judge("scene", at_half)
-    assert record.solution is not None and record.solution.status == ["ok", "ok", "wound", "wound"]
+    assert record.solution is not None and record.solution.status == [
+        "ok",
+        "ok",
+        "wound",
+        "wound",
+    ]
     assert [row for row in record.rows if row.failed] == []
     within = Scene(scene.linkage, Motion(Sweep(0.1, 3.6, 12), 10.0), effects=(spring,))
     record = judge("scene", within)
@@ -133,9 +188,15 @@ def test_every_engine_stops_where_the_spring_is_wound() -> None:
 
 
 def test_where_the_loop_closes_between_the_positions_alone_no_spring_begins() -> None:
-    scene = Scene(linkage("double rocker"), Motion([0.3, 2.6], 5.0), effects=(Torsion.at(B=(2.0, 0.3, 0.1)),))
+    scene = Scene(
+        linkage("double rocker"),
+        Motion([0.3, 2.6], 5.0),
+        effects=(Torsion.at(B=(2.0, 0.3, 0.1)),),
+    )
     record = judge("scene", scene)
-    assert record.solution is not None and set(record.solution.status) == {"not_assembled"}
+    assert record.solution is not None and set(record.solution.status) == {
+        "not_assembled"
+    }
     assert [row for row in record.rows if row.failed] == []
 
 
@@ -143,7 +204,9 @@ def test_where_the_loop_closes_between_the_positions_alone_no_spring_begins() ->
 def test_a_free_motion_that_winds_a_spring_is_an_error() -> None:
     free = Motion(0.1, 12.0, free=Free(1.0, 100))
     weak = Torsion.at(O2=(1e-4, 0.0, 0.0))
-    with pytest.raises(LimitError, match=r"effects\.torsion: at 0\.\d+ s .* half a turn"):
+    with pytest.raises(
+        LimitError, match=r"effects\.torsion: at 0\.\d+ s .* half a turn"
+    ):
         solve(Scene(linkage("crank-rocker"), free, effects=(weak,)))
     held = Torsion.at(O2=(2.0, 0.0, 0.0))
     assert len(solve(Scene(linkage("crank-rocker"), free, effects=(held, Gravity()))))

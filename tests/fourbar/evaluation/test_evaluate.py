@@ -6,7 +6,16 @@ import numpy as np
 import pytest
 
 import fourbar
-from fourbar.effects import Gravity, Load, Spring, SpringEnd, Springs, Table, Torsion, pin_friction
+from fourbar.effects import (
+    Gravity,
+    Load,
+    Spring,
+    SpringEnd,
+    Springs,
+    Table,
+    Torsion,
+    pin_friction,
+)
 from fourbar.formulas import longer
 from fourbar.linkage import Bar, FourBar
 from fourbar.quantities import PIN_FORCES
@@ -33,10 +42,18 @@ def sized(k: float = 1.0, turns: float = 0.0) -> Scene:
         Bar(0.22 * k, 0.4, 0.002 * k * k, (0.12 * k, -0.2 + turns)),
         ground_angle=0.2,
     )
-    spring = Spring(SpringEnd(1, 0.2 * k, 0.6), SpringEnd(3, 0.15 * k, -0.4), 80.0, 0.1 * k, 2.0 * k)
-    effects = (Gravity(9.81 * k, -1.3), Springs((spring,)), Torsion.at(B=(0.5 * k * k, 0.7, 0.1 * k * k)))
+    spring = Spring(
+        SpringEnd(1, 0.2 * k, 0.6), SpringEnd(3, 0.15 * k, -0.4), 80.0, 0.1 * k, 2.0 * k
+    )
+    effects = (
+        Gravity(9.81 * k, -1.3),
+        Springs((spring,)),
+        Torsion.at(B=(0.5 * k * k, 0.7, 0.1 * k * k)),
+    )
     load = Load(4, (3.0 * k, 0.7), (0.05 * k, 1.0))
-    return Scene(linkage, Motion(np.linspace(0.1, 6.0, 15), 3.0, 2.0), 2, (load,), effects)
+    return Scene(
+        linkage, Motion(np.linspace(0.1, 6.0, 15), 3.0, 2.0), 2, (load,), effects
+    )
 
 
 def near_a_limit(effect: Springs | Torsion) -> Scene:
@@ -50,36 +67,58 @@ def near_a_limit(effect: Springs | Torsion) -> Scene:
 def exactly_one() -> Scene:
     """Force and couple of 1 at the crank's own pin: nothing is rounded but the result."""
     bars = FourBar(0.3, Bar(0.1, centre=(0.0, 0.0)), Bar(0.25), Bar(0.22))
-    return Scene(bars, Motion(np.array([0.3, 1.0]), 1.0), loads=(Load(2, (1.0, 0.0), moment=1.0),))
+    return Scene(
+        bars,
+        Motion(np.array([0.3, 1.0]), 1.0),
+        loads=(Load(2, (1.0, 0.0), moment=1.0),),
+    )
 
 
 SCENES = {f"{k:g} m": sized(k) for k in (1.0, 1e60, 1e-60, 1e-75, 1e100)}
 SCENES |= {"centres of many turns": sized(turns=TURNS), "one": exactly_one()}
-SPRINGS = Springs((Spring(SpringEnd(2, 0.1, 0.6), SpringEnd(3, 0.05, -0.4), 80.0, 0.01, 2.0),))
-SCENES |= {f"{effect.key} near a limit": near_a_limit(effect) for effect in (SPRINGS, Torsion.at(B=(0.5, 0.7, 0.1)))}
+SPRINGS = Springs(
+    (Spring(SpringEnd(2, 0.1, 0.6), SpringEnd(3, 0.05, -0.4), 80.0, 0.01, 2.0),)
+)
+SCENES |= {
+    f"{effect.key} near a limit": near_a_limit(effect)
+    for effect in (SPRINGS, Torsion.at(B=(0.5, 0.7, 0.1)))
+}
 
 
 @pytest.mark.parametrize("kind", ["long doubles", "pairs of doubles"])
 @pytest.mark.parametrize("name", SCENES)
-def test_error_bars_are_of_the_size_of_the_error(name: str, kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_error_bars_are_of_the_size_of_the_error(
+    name: str, kind: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     scene = SCENES[name]
     if kind == "pairs of doubles":
         monkeypatch.setattr(longer, "HAS_LONG_DOUBLES", False)
     commanded = command(scene)
-    ours, exact = fourbar.solve(scene, "error"), BallArithmetic().answer(scene, commanded)
+    ours, exact = (
+        fourbar.solve(scene, "error"),
+        BallArithmetic().answer(scene, commanded),
+    )
     for bar, quantities in (("torque_error", ("torque",)), ("force_error", PIN_FORCES)):
         width, values = getattr(ours, bar), [getattr(ours, q) for q in quantities]
         error = np.max(
-            [magnitude(value - exact.quantities[q]) for value, q in zip(values, quantities, strict=True)], axis=0
+            [
+                magnitude(value - exact.quantities[q])
+                for value, q in zip(values, quantities, strict=True)
+            ],
+            axis=0,
         )
-        half_a_digit = 0.5 * np.spacing(np.max([magnitude(value) for value in values], axis=0))
+        half_a_digit = 0.5 * np.spacing(
+            np.max([magnitude(value) for value in values], axis=0)
+        )
         assert (error <= 10.0 * width).all(), name
         assert (width >= half_a_digit).all()
         assert np.median(width / np.maximum(error, half_a_digit)) < 5.0
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-def test_error_bars_hold_with_pairs_of_doubles(family: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_error_bars_hold_with_pairs_of_doubles(
+    family: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The numbers of a machine whose long doubles are no longer than doubles."""
     monkeypatch.setattr(longer, "HAS_LONG_DOUBLES", False)
     tally = run(family, range(3))
@@ -87,7 +126,9 @@ def test_error_bars_hold_with_pairs_of_doubles(family: str, monkeypatch: pytest.
     assert not any(tally.too_large.values()) and not tally.warned
 
 
-def test_a_run_judges_the_bars_where_each_spring_is_nearest_to_its_rest(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_run_judges_the_bars_where_each_spring_is_nearest_to_its_rest(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     ends = fourbar.Point("P", 1, (0.2, 0.6)), fourbar.Point("Q", 3, (0.15, -0.4))
     spring = Spring(SpringEnd(1, 0.2, 0.6), SpringEnd(3, 0.15, -0.4), 80.0, 0.2)
     table = Table((0.0, 1.0, 4.0, 6.2), (1.0, 1.0, -2.0, -2.0))  # 0 at 2 rad
@@ -108,7 +149,11 @@ def test_a_run_judges_the_bars_where_each_spring_is_nearest_to_its_rest(monkeypa
     true = fourbar.solve
     question = Question("", scene, command(scene))
     assert question.solution is not None
-    monkeypatch.setattr(printed, "solve", lambda *args, at: seen.append(at.theta_2) or true(*args, at=at))
+    monkeypatch.setattr(
+        printed,
+        "solve",
+        lambda *args, at: seen.append(at.theta_2) or true(*args, at=at),
+    )
     rows = list(printed.check_error_bars(question))
     assert {row.verdict for row in rows} == {"agrees"}
     assert {swept.theta_2[np.argmin(np.abs(gap))] for gap in away} <= set(seen[0])
@@ -116,7 +161,11 @@ def test_a_run_judges_the_bars_where_each_spring_is_nearest_to_its_rest(monkeypa
 
 def test_a_bar_is_of_the_motion_that_begins_to_one_side() -> None:
     """The bar of a linkage about to move was the friction itself, of which the other evaluation knew nothing."""
-    still = replace(sized(), motion=Motion(np.array([1.0, 2.0]), 0.0), effects=(fourbar.Friction.at(A=0.5, O4=2.0),))
+    still = replace(
+        sized(),
+        motion=Motion(np.array([1.0, 2.0]), 0.0),
+        effects=(fourbar.Friction.at(A=0.5, O4=2.0),),
+    )
     for side in (-1, 1):
         torque_error = fourbar.solve(still, "error", side=side).torque_error
         assert torque_error is not None and torque_error.max() < 1e-13
@@ -129,10 +178,16 @@ def test_a_bar_is_as_wide_as_what_a_position_loses() -> None:
     assert [row.verdict for row in rows] == ["agrees", "agrees"]
 
 
-def test_a_long_sweep_searches_for_friction_at_its_ends_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_long_sweep_searches_for_friction_at_its_ends_alone(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """Eight thousand positions of several loaded pins, each searched from many starts, took eight minutes."""
     searched, search = [], pin_friction._search
-    monkeypatch.setattr(pin_friction, "_search", lambda *problems: searched.extend(problems[0]) or search(*problems))
+    monkeypatch.setattr(
+        pin_friction,
+        "_search",
+        lambda *problems: searched.extend(problems[0]) or search(*problems),
+    )
     jammed = replace(
         sized(),
         motion=Motion(np.array([0.3, 0.5]), 10.0),
@@ -153,6 +208,9 @@ def test_what_gravity_drops_of_its_direction_shows_in_the_error_bar() -> None:
         Motion(1.5 * np.pi + np.linspace(-1e-3, 1e-3, 101), 1.0),
         effects=(Gravity(),),
     )
-    solution, exact = fourbar.solve(scene, "error"), BallArithmetic().answer(scene, command(scene))
+    solution, exact = (
+        fourbar.solve(scene, "error"),
+        BallArithmetic().answer(scene, command(scene)),
+    )
     error = np.abs(solution.torque - exact.quantities["torque"])
     assert (error <= printed.BARS * solution.torque_error).all()

@@ -12,7 +12,10 @@ from fourbar.evaluation.free_motion import integrate
 from fourbar.solve import solve
 
 HANGING = fourbar.FourBar(
-    0.3, fourbar.Bar(0.1, 0.2), fourbar.Bar(0.25, 0.5, 0.004, (0.13, 0.3)), fourbar.Bar(0.22, 0.4)
+    0.3,
+    fourbar.Bar(0.1, 0.2),
+    fourbar.Bar(0.25, 0.5, 0.004, (0.13, 0.3)),
+    fourbar.Bar(0.22, 0.4),
 )
 
 
@@ -21,8 +24,20 @@ def test_one_window_of_iftomm_a02() -> None:
     """Ten seconds through the change points (lim.ii.udc.es/mbsbenchmark, A02)."""
     bar = fourbar.Bar(1.0, 1.0)
     linkage = fourbar.FourBar(1.0, bar, bar, bar)
-    m = integrate(linkage, (fourbar.Gravity(),), math.pi / 2, -1.0, 1, np.array([0.0, 10.0]), follow=True)
-    x, y, w = math.cos(m.command.theta_2[-1]), math.sin(m.command.theta_2[-1]), m.command.omega_2[-1]
+    m = integrate(
+        linkage,
+        (fourbar.Gravity(),),
+        math.pi / 2,
+        -1.0,
+        1,
+        np.array([0.0, 10.0]),
+        follow=True,
+    )
+    x, y, w = (
+        math.cos(m.command.theta_2[-1]),
+        math.sin(m.command.theta_2[-1]),
+        m.command.omega_2[-1],
+    )
     printed = (0.478385058, 0.878150179, 1.727264076, -0.940952179)
     for ours, theirs in zip((x, y, -y * w, x * w), printed, strict=True):
         assert abs(ours - theirs) <= 0.5e-9
@@ -33,21 +48,38 @@ def test_needs_no_driving_torque() -> None:
     terms = (fourbar.Gravity(), fourbar.Viscous.at(O2=0.002, B=0.001))
     m = integrate(HANGING, terms, 0.3, 2.0, -1, np.linspace(0.0, 2.0, 41))
     # told to move so, not released: of a released motion the torque is zero whatever it is
-    s = solve(fourbar.Scene(HANGING, effects=terms), "force", at=m.command._replace(independent=None))
+    s = solve(
+        fourbar.Scene(HANGING, effects=terms),
+        "force",
+        at=m.command._replace(independent=None),
+    )
     assert s.torque is not None
-    assert np.abs(s.torque).max() < 1e-12 * 9.81 * 1.1  # of all the weights at one metre
+    assert (
+        np.abs(s.torque).max() < 1e-12 * 9.81 * 1.1
+    )  # of all the weights at one metre
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("coupler", [0.12, 0.15])  # the first has a change point, the second a limit position only
+@pytest.mark.parametrize(
+    "coupler", [0.12, 0.15]
+)  # the first has a change point, the second a limit position only
 def test_stops_at_a_limit_unless_set_to_follow(coupler: float) -> None:
-    linkage = fourbar.FourBar(0.3, fourbar.Bar(0.2, 0.2), fourbar.Bar(coupler, 0.5), fourbar.Bar(0.22, 0.4))
+    linkage = fourbar.FourBar(
+        0.3, fourbar.Bar(0.2, 0.2), fourbar.Bar(coupler, 0.5), fourbar.Bar(0.22, 0.4)
+    )
     times = np.linspace(0.0, 1.0, 21)  # there, back and there again
     halted = integrate(linkage, (fourbar.Gravity(),), 1.0, 0.0, 1, times)
-    assert halted.stopped_at is not None and halted.command.time[-1] <= halted.stopped_at < 0.5
+    assert (
+        halted.stopped_at is not None
+        and halted.command.time[-1] <= halted.stopped_at < 0.5
+    )
     assert set(halted.command.branch) == {1}
     passed = integrate(linkage, (fourbar.Gravity(),), 1.0, 0.0, 1, times, follow=True)
-    assert passed.stopped_at is None and set(passed.command.branch) == {1, -1} and passed.energy_drift < 1e-11
+    assert (
+        passed.stopped_at is None
+        and set(passed.command.branch) == {1, -1}
+        and passed.energy_drift < 1e-11
+    )
     n = len(halted.command.time)
     assert np.array_equal(passed.command.theta_2[:n], halted.command.theta_2)
 
@@ -55,18 +87,41 @@ def test_stops_at_a_limit_unless_set_to_follow(coupler: float) -> None:
 @pytest.mark.parametrize("bar", [2, 4])
 def test_a_flywheel_alone_turns_evenly_faster_under_a_constant_couple(bar: int) -> None:
     """Bars without mass: alpha = M/J."""
-    linkage, times = fourbar.uniform(0.1, 0.25, 0.3, 0.28, per_metre=0.0), np.linspace(0.0, 2.0, 21)  # a drag link
-    m = integrate(linkage, (fourbar.Flywheel(0.5, bar), fourbar.Load(bar, moment=0.2)), 0.3, 1.0, 1, times)
-    angle = solve(fourbar.Scene(linkage), "position", at=m.command).theta_4 if bar == 4 else m.command.theta_2
+    linkage, times = (
+        fourbar.uniform(0.1, 0.25, 0.3, 0.28, per_metre=0.0),
+        np.linspace(0.0, 2.0, 21),
+    )  # a drag link
+    m = integrate(
+        linkage,
+        (fourbar.Flywheel(0.5, bar), fourbar.Load(bar, moment=0.2)),
+        0.3,
+        1.0,
+        1,
+        times,
+    )
+    angle = (
+        solve(fourbar.Scene(linkage), "position", at=m.command).theta_4
+        if bar == 4
+        else m.command.theta_2
+    )
     start = solve(fourbar.Scene(linkage, fourbar.Motion(0.3, 1.0)), "velocity")
     speed = start.omega_4[0] if bar == 4 else 1.0
     assert angle - angle[0] == pytest.approx(speed * times + 0.2 * times**2, abs=1e-11)
 
 
 def test_dry_friction_holds() -> None:
-    m = integrate(HANGING, (fourbar.Gravity(), fourbar.Friction.at(O2=0.3)), 0.3, 1.0, 1, np.linspace(0.0, 5.0, 51))
+    m = integrate(
+        HANGING,
+        (fourbar.Gravity(), fourbar.Friction.at(O2=0.3)),
+        0.3,
+        1.0,
+        1,
+        np.linspace(0.0, 5.0, 51),
+    )
     assert (
-        m.command.omega_2[-1] == 0.0 and m.command.alpha_2[-1] == 0.0 and m.command.theta_2[-1] == m.command.theta_2[-2]
+        m.command.omega_2[-1] == 0.0
+        and m.command.alpha_2[-1] == 0.0
+        and m.command.theta_2[-1] == m.command.theta_2[-2]
     )
 
 
@@ -78,11 +133,15 @@ def test_a_scene_reports_its_times() -> None:
     assert np.abs(s.torque).max() < 1e-12 * 9.81 * 1.1
 
 
-ROCKER = fourbar.FourBar(0.3, fourbar.Bar(0.25, 0.7), fourbar.Bar(0.1, 1.3), fourbar.Bar(0.22, 0.9))
+ROCKER = fourbar.FourBar(
+    0.3, fourbar.Bar(0.25, 0.7), fourbar.Bar(0.1, 1.3), fourbar.Bar(0.22, 0.9)
+)
 """A double rocker; released at rest at 50 deg, open, it swings through limit positions of its input."""
 SWING = fourbar.Scene(
     ROCKER,
-    fourbar.Motion(math.radians(50.0), 0.0, through="follow", free=fourbar.Free(1.2, 120)),
+    fourbar.Motion(
+        math.radians(50.0), 0.0, through="follow", free=fourbar.Free(1.2, 120)
+    ),
     effects=(fourbar.Gravity(),),
 )
 PINS = ("F12", "F32", "F43", "F14")
@@ -116,7 +175,14 @@ def forces_by_energy(theta: np.ndarray, start: np.ndarray) -> np.ndarray:
     squared = moves * moves * (2.0 * 9.81 * (height(start) - height(theta)) / of_moves)
     # unknown: a_G2, alpha_2, a_G3, alpha_3, a_G4, alpha_4, then the forces; row by row Newton and Euler ...
     left, right = np.zeros((17, 17)), np.zeros(17)
-    pins = ((0, -1, 9, 1), (0, 1, 11, 1), (1, -1, 11, -1), (1, 1, 13, 1), (2, 1, 13, -1), (2, -1, 15, 1))
+    pins = (
+        (0, -1, 9, 1),
+        (0, 1, 11, 1),
+        (1, -1, 11, -1),
+        (1, 1, 13, 1),
+        (2, 1, 13, -1),
+        (2, -1, 15, 1),
+    )
     for k in range(3):
         left[3 * k, 3 * k] = left[3 * k + 1, 3 * k + 1] = m[k]
         left[3 * k + 2, 3 * k + 2] = inertia[k]
@@ -136,19 +202,26 @@ def test_a_release_is_computed_once_and_solved_as_any_command() -> None:
     released, solution = fourbar.release(SWING), solve(SWING, "force")
     again = solve(SWING, "force", at=released.command)
     for name in solution.evaluated():
-        np.testing.assert_array_equal(getattr(again, name), getattr(solution, name), err_msg=name)
+        np.testing.assert_array_equal(
+            getattr(again, name), getattr(solution, name), err_msg=name
+        )
     np.testing.assert_array_equal(released.time, solution.time)
     np.testing.assert_array_equal(released.theta_2, solution.theta_2)
     np.testing.assert_allclose(released.omega_2, solution.omega_2, rtol=0.0, atol=1e-12)
     np.testing.assert_allclose(released.alpha_2, solution.alpha_2, rtol=0.0, atol=1e-9)
-    some = np.array([3, 70, 4])  # positions of both independent angles, in an order of their own
+    some = np.array(
+        [3, 70, 4]
+    )  # positions of both independent angles, in an order of their own
     few = solve(SWING, "force", at=released.command.part(some))
     np.testing.assert_array_equal(few.F43, solution.F43[some])
 
 
 @pytest.mark.parametrize(
     ("motion", "says"),
-    [(fourbar.Motion(1.0, 2.0), "motion.free"), (SWING.motion.replace(angle=np.array([1.0, 2.0])), "at one angle")],
+    [
+        (fourbar.Motion(1.0, 2.0), "motion.free"),
+        (SWING.motion.replace(angle=np.array([1.0, 2.0])), "at one angle"),
+    ],
 )
 def test_what_is_not_released_is_refused(motion: fourbar.Motion, says: str) -> None:
     with pytest.raises(fourbar.InputError, match=says):
@@ -156,7 +229,9 @@ def test_what_is_not_released_is_refused(motion: fourbar.Motion, says: str) -> N
 
 
 @pytest.mark.slow
-def test_pin_forces_pass_a_limit_position_smoothly(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_pin_forces_pass_a_limit_position_smoothly(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """theta_2, omega_2, alpha_2 as doubles do not hold the forces there, the angle of bar 4 does."""
     motion = SWING.motion
     halted = solve(replace(SWING, motion=motion.replace(through="sign")), "position")
@@ -166,7 +241,9 @@ def test_pin_forces_pass_a_limit_position_smoothly(monkeypatch: pytest.MonkeyPat
     dense = halted.stopped_at + np.concatenate([-distances[::-1], [0.0], distances])
     times = np.unique(np.concatenate([evenly, dense]))
     true = free_motion.integrate
-    monkeypatch.setattr(free_motion, "integrate", lambda *args, **how: true(*args[:-1], times, **how))
+    monkeypatch.setattr(
+        free_motion, "integrate", lambda *args, **how: true(*args[:-1], times, **how)
+    )
     s = solve(SWING, "force")
     assert set(s.status) == {"ok"} and np.array_equal(s.time, times)
     assert set(s.branch) == {1, -1} and np.abs(s.sin_mu).min() < 1e-12
@@ -182,20 +259,40 @@ def test_pin_forces_pass_a_limit_position_smoothly(monkeypatch: pytest.MonkeyPat
 
 
 @pytest.mark.parametrize(("pin", "bar"), [("O2", 2), ("O4", 4)])
-def test_friction_that_holds_at_the_ground_loads_the_pins_as_a_drive_there(pin: str, bar: int) -> None:
+def test_friction_that_holds_at_the_ground_loads_the_pins_as_a_drive_there(
+    pin: str, bar: int
+) -> None:
     """The ground's couple on a bar is that of a drive on it, which holds a linkage still just as well."""
     held = fourbar.Motion(0.3, 0.0, free=fourbar.Free(0.2, 4))
-    s = solve(fourbar.Scene(HANGING, held, effects=(fourbar.Gravity(), fourbar.Friction.at(**{pin: 9.0}))))
-    driven = solve(fourbar.Scene(HANGING, fourbar.Motion(0.3, 0.0), bar, effects=(fourbar.Gravity(),)))
+    s = solve(
+        fourbar.Scene(
+            HANGING,
+            held,
+            effects=(fourbar.Gravity(), fourbar.Friction.at(**{pin: 9.0})),
+        )
+    )
+    driven = solve(
+        fourbar.Scene(
+            HANGING, fourbar.Motion(0.3, 0.0), bar, effects=(fourbar.Gravity(),)
+        )
+    )
     assert s.alpha_2 is not None and not s.alpha_2.any()
     for force in PINS:
-        assert np.allclose(getattr(s, force), getattr(driven, force), rtol=0.0, atol=1e-12)
+        assert np.allclose(
+            getattr(s, force), getattr(driven, force), rtol=0.0, atol=1e-12
+        )
 
 
 def test_what_begins_to_move_against_friction_does_so_at_once() -> None:
     motion = fourbar.Motion(0.3, 0.0, free=fourbar.Free(1e-4, 2))
-    s = solve(fourbar.Scene(HANGING, motion, effects=(fourbar.Gravity(), fourbar.Friction.at(O4=0.02))))
+    s = solve(
+        fourbar.Scene(
+            HANGING, motion, effects=(fourbar.Gravity(), fourbar.Friction.at(O4=0.02))
+        )
+    )
     assert s.alpha_2 is not None and s.alpha_2[0] != 0.0
     assert np.allclose(s.alpha_2, s.alpha_2[1], rtol=1e-5)
     for force in PINS:
-        assert np.allclose(getattr(s, force), getattr(s, force)[1], rtol=1e-4, atol=1e-5)
+        assert np.allclose(
+            getattr(s, force), getattr(s, force)[1], rtol=1e-4, atol=1e-5
+        )

@@ -44,11 +44,17 @@ def four_lengths(rng: np.random.Generator, grashof: bool) -> list[float]:
     while True:
         x = sorted(rng.uniform(0.1, 0.6, 4))
         gap = (x[1] + x[2] - x[0] - x[3]) / sum(x)
-        if (gap > 0.05) if grashof else (gap < -0.05 and x[3] < 0.9 * (x[0] + x[1] + x[2])):
+        if (
+            (gap > 0.05)
+            if grashof
+            else (gap < -0.05 and x[3] < 0.9 * (x[0] + x[1] + x[2]))
+        ):
             return [float(v) for v in x]
 
 
-def with_extreme(place: int, grashof: bool) -> Callable[[np.random.Generator], list[float]]:
+def with_extreme(
+    place: int, grashof: bool
+) -> Callable[[np.random.Generator], list[float]]:
     """Linkages by the place among ground, input, coupler, output of the shortest bar (Grashof) or of the longest."""
 
     def lengths(rng: np.random.Generator) -> list[float]:
@@ -63,7 +69,9 @@ def with_extreme(place: int, grashof: bool) -> Callable[[np.random.Generator], l
 def at_change_point(rng: np.random.Generator) -> list[float]:
     """s + l = p + q exactly: multiples of 2^-10."""
     while True:
-        s, p, q = (float(round(v * 2**10)) / 2**10 for v in sorted(rng.uniform(0.1, 0.5, 3)))
+        s, p, q = (
+            float(round(v * 2**10)) / 2**10 for v in sorted(rng.uniform(0.1, 0.5, 3))
+        )
         x = [s, p, q, p + q - s]
         if s < 0.9 * p:
             rng.shuffle(x)
@@ -96,23 +104,54 @@ def motion(kind: str, number: int) -> Released:
     lengths = KINDS[kind](rng)
     bars = []
     for length in lengths[1:]:
-        mass, centre = float(rng.uniform(0.2, 2.0)), (length * float(rng.uniform(0.2, 0.8)), float(rng.uniform(-1, 1)))
-        bars.append(fourbar.Bar(length, mass, mass * length**2 * float(rng.uniform(0.05, 0.3)), centre))
-    linkage = fourbar.FourBar(lengths[0], *bars, ground_angle=float(rng.uniform(-3.0, 3.0)))
+        mass, centre = (
+            float(rng.uniform(0.2, 2.0)),
+            (length * float(rng.uniform(0.2, 0.8)), float(rng.uniform(-1, 1))),
+        )
+        bars.append(
+            fourbar.Bar(
+                length, mass, mass * length**2 * float(rng.uniform(0.05, 0.3)), centre
+            )
+        )
+    linkage = fourbar.FourBar(
+        lengths[0], *bars, ground_angle=float(rng.uniform(-3.0, 3.0))
+    )
     weight = 9.81 * sum(bar.mass * bar.length for bar in bars)
     terms: list[Any] = [fourbar.Gravity()]
     if rng.random() < 0.6:
-        damping = {pin: 0.01 * weight * float(rng.uniform(0, 1)) for pin in fourbar.linkage.PINS if rng.random() < 0.5}
+        damping = {
+            pin: 0.01 * weight * float(rng.uniform(0, 1))
+            for pin in fourbar.linkage.PINS
+            if rng.random() < 0.5
+        }
         terms.append(fourbar.Viscous.at(**damping))
     if rng.random() < 0.6:
-        terms.append(fourbar.Load(int(rng.integers(2, 5)), moment=float(rng.uniform(-0.3, 0.3)) * weight))
+        terms.append(
+            fourbar.Load(
+                int(rng.integers(2, 5)), moment=float(rng.uniform(-0.3, 0.3)) * weight
+            )
+        )
     if rng.random() < 0.3:
         force = (float(rng.uniform(0, 2)), float(rng.uniform(-3, 3)))
-        terms.append(fourbar.Load(int(rng.integers(2, 5)), force, (0.1, 1.0), 0.0, str(rng.choice(["world", "bar"]))))
-    branch, omega_2, follow = int(rng.choice([-1, 1])), float(rng.uniform(-5.0, 5.0)), bool(rng.random() < 0.6)
+        terms.append(
+            fourbar.Load(
+                int(rng.integers(2, 5)),
+                force,
+                (0.1, 1.0),
+                0.0,
+                str(rng.choice(["world", "bar"])),
+            )
+        )
+    branch, omega_2, follow = (
+        int(rng.choice([-1, 1])),
+        float(rng.uniform(-5.0, 5.0)),
+        bool(rng.random() < 0.6),
+    )
     while True:
         theta_2 = float(rng.uniform(-3.0, 3.0))
-        command = fourbar.scene.Command(np.array([theta_2]), np.array([branch], dtype=np.int8), None, 0.0)
+        command = fourbar.scene.Command(
+            np.array([theta_2]), np.array([branch], dtype=np.int8), None, 0.0
+        )
         if fourbar.solve(fourbar.Scene(linkage), at=command).condition[0] > 0.3:
             return Released(linkage, tuple(terms), theta_2, omega_2, branch, follow)
 
@@ -120,7 +159,9 @@ def motion(kind: str, number: int) -> Released:
 def ours(case: Released, nudge: Sequence[float] = (0.0, 0.0)) -> OurMotion:
     """The motion of the formulas."""
     start = (case.theta_2 + nudge[0], case.omega_2 + nudge[1])
-    return integrate(case.linkage, case.terms, *start, case.branch, TIMES, follow=case.follow)
+    return integrate(
+        case.linkage, case.terms, *start, case.branch, TIMES, follow=case.follow
+    )
 
 
 def amplification(case: Released) -> float:
@@ -132,7 +173,13 @@ def amplification(case: Released) -> float:
         speed = float(np.abs(base.command.omega_2).max())
         moved = [ours(case, nudge) for nudge in ((NUDGE, 0.0), (0.0, NUDGE * speed))]
     n = min(len(m.command.time) for m in (base, *moved))
-    return max(float(np.abs(m.command.theta_2[:n] - base.command.theta_2[:n]).max()) for m in moved) / NUDGE
+    return (
+        max(
+            float(np.abs(m.command.theta_2[:n] - base.command.theta_2[:n]).max())
+            for m in moved
+        )
+        / NUDGE
+    )
 
 
 TURNS, STOPS, AT_LIMITS, AT_CHANGE_POINTS, AMPLIFIES = range(5)
@@ -150,7 +197,11 @@ SHOWN = {
     ("parallelogram", 4): AT_CHANGE_POINTS,
 }
 """The motions of `make test`, and what each is to show: a few seconds in all."""
-MANY = [(kind, number) for kind in KINDS for number in range(int(os.environ.get("FREE_MOTIONS", "0")))]
+MANY = [
+    (kind, number)
+    for kind in KINDS
+    for number in range(int(os.environ.get("FREE_MOTIONS", "0")))
+]
 
 
 @pytest.mark.slow
@@ -165,9 +216,14 @@ def test_nine_digits_over_five_seconds(kind: str, number: int) -> None:
     assert len(m.command.time) == n
     off = [float(np.abs(m.command.theta_2 - theirs.theta_2).max())]
     if m.stopped_at is not None and theirs.stopped_at is not None:
-        off.append(abs(m.stopped_at - theirs.stopped_at) * float(np.abs(m.command.omega_2).max()))
+        off.append(
+            abs(m.stopped_at - theirs.stopped_at)
+            * float(np.abs(m.command.omega_2).max())
+        )
     worst = float(np.max(off))  # NaN where one is
-    if worst > PROMISED or shown == AMPLIFIES:  # three more motions, only where they decide
+    if (
+        worst > PROMISED or shown == AMPLIFIES
+    ):  # three more motions, only where they decide
         amplified = amplification(case)
         promised *= max(1.0, amplified / AMPLIFIED)
     assert worst <= promised
@@ -176,15 +232,25 @@ def test_nine_digits_over_five_seconds(kind: str, number: int) -> None:
     assert (m.stopped_at is None) is (theirs.stopped_at is None)
     if shown is not None:
         passed = theirs.limits > 0, theirs.change_points > 0
-        kinds = [not any(passed), any(passed) and not case.follow, *(case.follow and one for one in passed)]
+        kinds = [
+            not any(passed),
+            any(passed) and not case.follow,
+            *(case.follow and one for one in passed),
+        ]
         assert [*kinds, amplified > AMPLIFIED][shown]
 
 
 def test_the_motions_shown_meet_every_force() -> None:
     terms = [term for shown in SHOWN for term in motion(*shown).terms]
-    assert {type(term) for term in terms} == {fourbar.Gravity, fourbar.Viscous, fourbar.Load}
+    assert {type(term) for term in terms} == {
+        fourbar.Gravity,
+        fourbar.Viscous,
+        fourbar.Load,
+    }
     loads = [term for term in terms if isinstance(term, fourbar.Load)]
-    assert any(load.moment != 0.0 for load in loads) and {load.frame for load in loads if load.force} == {
+    assert any(load.moment != 0.0 for load in loads) and {
+        load.frame for load in loads if load.force
+    } == {
         "world",
         "bar",
     }
@@ -204,5 +270,10 @@ def test_the_reference_against_a_printed_answer() -> None:
         follow=True,
     )
     end = theirs.theta_2[-1]
-    assert abs(np.cos(end) - 0.478385058) <= 0.5e-9 and abs(np.sin(end) - 0.878150179) <= 0.5e-9
-    assert theirs.change_points == 10  # multiples of 180 deg between 90 deg and -1739 deg
+    assert (
+        abs(np.cos(end) - 0.478385058) <= 0.5e-9
+        and abs(np.sin(end) - 0.878150179) <= 0.5e-9
+    )
+    assert (
+        theirs.change_points == 10
+    )  # multiples of 180 deg between 90 deg and -1739 deg

@@ -26,7 +26,11 @@ PRINTED = 0.5e-9
 def facts(scene: fourbar.Scene) -> tuple[object, ...]:
     """Every number of a scene, in a form that compares bit for bit (repr tells -0.0 from 0.0)."""
     motion = scene.motion
-    angles = motion.theta_2.tolist() if isinstance(motion.theta_2, np.ndarray) else motion.theta_2
+    angles = (
+        motion.theta_2.tolist()
+        if isinstance(motion.theta_2, np.ndarray)
+        else motion.theta_2
+    )
     rest = (motion.omega_2, motion.alpha_2, motion.branch, motion.through, motion.free)
     parts = (scene.linkage, angles, rest, scene.drive_bar, scene.loads, scene.effects)
     return (*(repr(part) for part in parts), scene.title, scene.source)
@@ -42,13 +46,21 @@ def test_models_read_back_and_assemble_everywhere(path: Path) -> None:
 
 def test_the_named_mechanisms_are_among_the_models() -> None:
     drives = {path.stem: load(path).drive_bar for path in MODELS}
-    assert {"thesis", "thesis_printed_inertias", "crank_rocker", "drag_link", "double_rocker", "triple_rocker"} <= set(
-        drives
-    )
+    assert {
+        "thesis",
+        "thesis_printed_inertias",
+        "crank_rocker",
+        "drag_link",
+        "double_rocker",
+        "triple_rocker",
+    } <= set(drives)
     assert set(drives.values()) == {2, 3, 4}
 
 
-@pytest.mark.parametrize(("name", "torque"), [("thesis", 3.0930935923), ("thesis_printed_inertias", 3.0933077994)])
+@pytest.mark.parametrize(
+    ("name", "torque"),
+    [("thesis", 3.0930935923), ("thesis_printed_inertias", 3.0933077994)],
+)
 def test_the_thesis_scenes_reach_the_figures(name: str, torque: float) -> None:
     scene = load(next(path for path in MODELS if path.stem == name))
     at_135 = replace(scene, motion=scene.motion.replace(angle=math.radians(135.0)))
@@ -62,7 +74,9 @@ def test_the_thesis_scenes_reach_the_figures(name: str, torque: float) -> None:
             "F14": (-15.476837016, 0.551901654),
         }
         for key, force in forces.items():
-            assert getattr(solution, key)[0] == pytest.approx(force, rel=0.0, abs=PRINTED), key
+            assert getattr(solution, key)[0] == pytest.approx(
+                force, rel=0.0, abs=PRINTED
+            ), key
 
 
 @pytest.mark.parametrize(
@@ -80,21 +94,35 @@ def test_the_thesis_scenes_reach_the_figures(name: str, torque: float) -> None:
         ("2 kNm", "N m", Fraction(2000)),
         ("3 N.mm", "N m", Fraction(3, 1000)),
         ("2 inches", "m", Fraction(508, 10000)),
-        ("16 ozf in", "N m", Fraction("0.45359237") * Fraction("9.80665") * Fraction("0.0254")),
+        (
+            "16 ozf in",
+            "N m",
+            Fraction("0.45359237") * Fraction("9.80665") * Fraction("0.0254"),
+        ),
         ("1 lbf", "N", Fraction("0.45359237") * Fraction("9.80665")),
         ("2 tonne", "kg", Fraction(2000)),
         ("5e-324 rad", "rad", Fraction(5e-324)),
-        *((text, "N m", Fraction(15)) for text in ("15 N⋅m", "15 N×m", "15 N•m", "15 kg·m²·s⁻²")),
-        *((text, "m", Fraction("0.3175")) for text in ("12 1/2 in", '12-1/2"', "12.5 in.", "25/2 inches", "12.5″")),
+        *(
+            (text, "N m", Fraction(15))
+            for text in ("15 N⋅m", "15 N×m", "15 N•m", "15 kg·m²·s⁻²")
+        ),
+        *(
+            (text, "m", Fraction("0.3175"))
+            for text in ("12 1/2 in", '12-1/2"', "12.5 in.", "25/2 inches", "12.5″")
+        ),
         ("2/3 yd", "m", Fraction("0.6096")),
         ("1 kp", "N", Fraction("9.80665")),
     ],
 )
-def test_units_are_converted_exactly_and_rounded_once(text: str, unit: str, value: Fraction) -> None:
+def test_units_are_converted_exactly_and_rounded_once(
+    text: str, unit: str, value: Fraction
+) -> None:
     assert to_si(text, unit) == float(value)
 
 
-@pytest.mark.parametrize(("degrees", "turns"), [("360", 1.0), ("45", 0.125), ("-90", -0.25), ("1080", 3.0)])
+@pytest.mark.parametrize(
+    ("degrees", "turns"), [("360", 1.0), ("45", 0.125), ("-90", -0.25), ("1080", 3.0)]
+)
 def test_degrees_are_the_nearest_doubles(degrees: str, turns: float) -> None:
     # 2 pi times a power of two, or three, of the double nearest to pi: math.tau itself is correctly rounded
     assert to_si(f"{degrees} deg", "rad") == turns * math.tau
@@ -136,13 +164,22 @@ def test_what_may_have_been_meant_is_one(text: str, unit: str, meant: str) -> No
 
 def test_defaults_are_those_of_the_contract() -> None:
     scene = loads(LENGTHS)
-    assert scene.linkage == fourbar.FourBar(0.3, fourbar.Bar(0.1), fourbar.Bar(0.25), fourbar.Bar(0.22), 0.0)
+    assert scene.linkage == fourbar.FourBar(
+        0.3, fourbar.Bar(0.1), fourbar.Bar(0.25), fourbar.Bar(0.22), 0.0
+    )
     motion = scene.motion
-    assert (motion.theta_2, motion.omega_2, motion.alpha_2, motion.branch) == (None, None, 0.0, 1)
+    assert (motion.theta_2, motion.omega_2, motion.alpha_2, motion.branch) == (
+        None,
+        None,
+        0.0,
+        1,
+    )
     assert (motion.through, motion.free, scene.drive_bar) == ("sign", None, 2)
     assert (scene.loads, scene.effects, scene.title, scene.source) == ((), (), "", "")
     bar = loads(LENGTHS + '[bars.coupler]\nmass = "6 kg"\n').linkage.coupler
-    assert bar.moment_of_inertia == pytest.approx(6.0 * 0.25**2 / 12.0, rel=1e-15) and bar.mass_centre == (0.125, 0.0)
+    assert bar.moment_of_inertia == pytest.approx(
+        6.0 * 0.25**2 / 12.0, rel=1e-15
+    ) and bar.mass_centre == (0.125, 0.0)
 
 
 def test_every_form_of_theta_2() -> None:
@@ -150,8 +187,12 @@ def test_every_form_of_theta_2() -> None:
         return loads(f'{LENGTHS}[motion]\ntheta_2 = {text}\nbranch = "crossed"').motion
 
     assert motion('"180 deg"').theta_2 == math.pi and motion('"0 rad"').branch == -1
-    assert motion('{ from = "0 deg", to = "360 deg", steps = 7 }').theta_2 == fourbar.Sweep(0.0, math.tau, 7)
-    assert motion('{ limit = 2, offset = "1e-9 rad" }').theta_2 == fourbar.FromLimit(2, 1e-9)
+    assert motion(
+        '{ from = "0 deg", to = "360 deg", steps = 7 }'
+    ).theta_2 == fourbar.Sweep(0.0, math.tau, 7)
+    assert motion('{ limit = 2, offset = "1e-9 rad" }').theta_2 == fourbar.FromLimit(
+        2, 1e-9
+    )
     assert np.array_equal(motion('["0 deg", "180 deg"]').theta_2, [0.0, math.pi])  # type: ignore[arg-type]
 
 
@@ -176,20 +217,38 @@ springs = [{ from = { bar = 1 }, to = { bar = 4, at = ["20 cm", "0 deg"] }, gas 
 """  # noqa: E501
     )
     scene = loads(text)
-    assert scene.motion.free == fourbar.Free(5.0, 500) and scene.motion.through == "follow"
-    assert scene.loads == (fourbar.Load(3, (2.0, math.pi / 2), (0.01, 0.0), frame="bar"),)
-    gas = fourbar.Spring.gas(SpringEnd(1, 0.0, 0.0), SpringEnd(4, 0.2, 0.0), 0.5, 0.2, 400.0, 520.0)
+    assert (
+        scene.motion.free == fourbar.Free(5.0, 500) and scene.motion.through == "follow"
+    )
+    assert scene.loads == (
+        fourbar.Load(3, (2.0, math.pi / 2), (0.01, 0.0), frame="bar"),
+    )
+    gas = fourbar.Spring.gas(
+        SpringEnd(1, 0.0, 0.0), SpringEnd(4, 0.2, 0.0), 0.5, 0.2, 400.0, 520.0
+    )
     springs = fourbar.Springs((gas,))
-    assert scene.effects == (fourbar.Viscous.at(O2=0.01, B=1.0), fourbar.Friction.at(A=0.05), springs)
+    assert scene.effects == (
+        fourbar.Viscous.at(O2=0.01, B=1.0),
+        fourbar.Friction.at(A=0.05),
+        springs,
+    )
     assert facts(loads(dump(scene))) == facts(scene)
 
 
-def numbers(least: float = -1e300, most: float = 1e300, **more: bool) -> st.SearchStrategy[float]:
+def numbers(
+    least: float = -1e300, most: float = 1e300, **more: bool
+) -> st.SearchStrategy[float]:
     return st.floats(least, most, allow_nan=False, allow_infinity=False, **more)
 
 
 LENGTH = numbers(1.0, 1.4)  # any four of these close
-BAR = st.builds(fourbar.Bar, LENGTH, numbers(0.0, 1e9), numbers(0.0), st.tuples(numbers(), numbers()))
+BAR = st.builds(
+    fourbar.Bar,
+    LENGTH,
+    numbers(0.0, 1e9),
+    numbers(0.0),
+    st.tuples(numbers(), numbers()),
+)
 LOAD = st.builds(
     fourbar.Load,
     st.integers(2, 4),
@@ -198,7 +257,9 @@ LOAD = st.builds(
     numbers(),
     st.sampled_from(("world", "bar")),
 )
-PER_PIN = st.dictionaries(st.sampled_from(("O2", "A", "B", "O4")), numbers(0.0), min_size=1)
+PER_PIN = st.dictionaries(
+    st.sampled_from(("O2", "A", "B", "O4")), numbers(0.0), min_size=1
+)
 THETA_2 = (
     st.none()
     | numbers()
@@ -213,7 +274,8 @@ MOTION = st.builds(
     numbers(),
     st.sampled_from((1, -1)),
     st.sampled_from(("sign", "follow")),
-    st.none() | st.builds(fourbar.Free, numbers(0.0, exclude_min=True), st.integers(1, 10**8)),
+    st.none()
+    | st.builds(fourbar.Free, numbers(0.0, exclude_min=True), st.integers(1, 10**8)),
 )
 EFFECTS = st.tuples(
     st.builds(fourbar.Gravity, numbers(), numbers()),
@@ -251,10 +313,15 @@ PLACES = {
 
 
 @pytest.mark.parametrize("key", PLACES)
-def test_a_place_by_coordinates_is_the_polar_one_and_is_written_back_as_it_was_read(key: str) -> None:
+def test_a_place_by_coordinates_is_the_polar_one_and_is_written_back_as_it_was_read(
+    key: str,
+) -> None:
     x, y = "3 in", "-5 in"
     by_coordinates = loads(LENGTHS + PLACES[key].format(f'{{ x = "{x}", y = "{y}" }}'))
-    distance, angle = math.hypot(to_si(x, "m"), to_si(y, "m")), math.atan2(to_si(y, "m"), to_si(x, "m"))
+    distance, angle = (
+        math.hypot(to_si(x, "m"), to_si(y, "m")),
+        math.atan2(to_si(y, "m"), to_si(x, "m")),
+    )
     polar = loads(LENGTHS + PLACES[key].format(f'["{distance!r} m", "{angle!r} rad"]'))
     assert by_coordinates == polar and facts(by_coordinates) == facts(polar)
     text = dump(by_coordinates)
@@ -263,7 +330,9 @@ def test_a_place_by_coordinates_is_the_polar_one_and_is_written_back_as_it_was_r
     again = loads(text)
     assert facts(again) == facts(by_coordinates) and dump(again) == text
     if key.startswith("bars"):  # another centre is written as what it is
-        bars = replace(again.linkage, coupler=replace(again.linkage.coupler, centre=(0.1, 0.2)))
+        bars = replace(
+            again.linkage, coupler=replace(again.linkage.coupler, centre=(0.1, 0.2))
+        )
         assert "{ x =" not in dump(replace(again, linkage=bars))
     for wrong, words in (
         ('{ x = "1 mm" }', "y' = None: is missing"),
@@ -273,7 +342,9 @@ def test_a_place_by_coordinates_is_the_polar_one_and_is_written_back_as_it_was_r
     ):
         with pytest.raises(InputError) as caught:
             loads(LENGTHS + PLACES[key].format(wrong))
-        assert words.replace("y' = None: ", "") in str(caught.value) and key in str(caught.value)
+        assert words.replace("y' = None: ", "") in str(caught.value) and key in str(
+            caught.value
+        )
 
 
 def test_every_letter_of_a_title_reads_back() -> None:
@@ -281,7 +352,9 @@ def test_every_letter_of_a_title_reads_back() -> None:
     assert loads(dump(replace(load(MODELS[0]), title=title))).title == title
 
 
-def test_save_is_whole_or_not_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_save_is_whole_or_not_at_all(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     scene = load(MODELS[0])
     target = tmp_path / "scene.toml"
     save(scene, target)
@@ -313,7 +386,11 @@ def test_what_a_bar_leaves_out_follows_its_length(length: float) -> None:
         '[bars.coupler]\nmass = "0.5 kg"\n'
         '[bars.output]\nmass = "2 kg"\ninertia = "3 kg m^2"\ncentre = ["7 cm", "0 deg"]\n'
     ).linkage
-    coupler, output = (replace(bar, length=length) for bar in (read.coupler, read.output))
+    coupler, output = (
+        replace(bar, length=length) for bar in (read.coupler, read.output)
+    )
     assert coupler.moment_of_inertia == pytest.approx(0.5 * length**2 / 12.0, rel=1e-15)
     assert coupler.mass_centre == (0.5 * length, 0.0)
-    assert output.moment_of_inertia == 3.0 and output.mass_centre == pytest.approx((0.07, 0.0), rel=1e-15)
+    assert output.moment_of_inertia == 3.0 and output.mass_centre == pytest.approx(
+        (0.07, 0.0), rel=1e-15
+    )

@@ -49,7 +49,9 @@ PATIENCE = 5.0
 """Seconds of processor time in which any file is answered, on a machine that does other things too."""
 
 
-def test_the_file_that_the_mistakes_are_made_in_is_good(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_file_that_the_mistakes_are_made_in_is_good(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     (tmp_path / "good.toml").write_text(GOOD)
     assert status(["analyze", str(tmp_path / "good.toml")]) == 0
     assert capsys.readouterr().err == ""
@@ -140,9 +142,17 @@ MISTAKES = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("old", "new", "words"), [case[1:] for case in MISTAKES], ids=[case[0] for case in MISTAKES])
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [case[1:] for case in MISTAKES],
+    ids=[case[0] for case in MISTAKES],
+)
 def test_a_mistake_in_a_scene_file(
-    old: str, new: str, words: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    old: str,
+    new: str,
+    words: list[str],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     assert GOOD.count(old) >= 1
     file = tmp_path / "scene.toml"
@@ -150,7 +160,12 @@ def test_a_mistake_in_a_scene_file(
     refused(["analyze", str(file)], [str(file), *words], tmp_path, capsys)
 
 
-def refused(arguments: list[str], words: list[str], folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def refused(
+    arguments: list[str],
+    words: list[str],
+    folder: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     """The command is refused with these words, and writes nothing into the folder."""
     before = sorted(folder.rglob("*"))
     started = time.process_time()
@@ -158,7 +173,11 @@ def refused(arguments: list[str], words: list[str], folder: Path, capsys: pytest
     assert time.process_time() - started < PATIENCE
     printed = capsys.readouterr()
     assert printed.out == ""
-    assert printed.err.startswith("error: ") and printed.err.endswith("\n") and printed.err.count("\n") == 1
+    assert (
+        printed.err.startswith("error: ")
+        and printed.err.endswith("\n")
+        and printed.err.count("\n") == 1
+    )
     assert "Traceback" not in printed.err and len(printed.err) <= LONGEST_LINE
     assert printed.err[:-1].isprintable()
     for word in words:
@@ -167,8 +186,15 @@ def refused(arguments: list[str], words: list[str], folder: Path, capsys: pytest
 
 
 @pytest.mark.parametrize("command", ["analyze", "mjcf", "plot", "animate"])
-def test_every_command_refuses_a_bad_file(command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    refused([command, str(tmp_path / "missing.toml")], ["missing.toml", "file not found"], tmp_path, capsys)
+def test_every_command_refuses_a_bad_file(
+    command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    refused(
+        [command, str(tmp_path / "missing.toml")],
+        ["missing.toml", "file not found"],
+        tmp_path,
+        capsys,
+    )
     bad = tmp_path / "bad.toml"
     bad.write_text(GOOD.replace('"open"', '"opne"'))
     refused([command, str(bad)], [str(bad), "motion.branch", "opne"], tmp_path, capsys)
@@ -178,22 +204,30 @@ def test_a_directory(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     refused(["analyze", str(tmp_path)], [str(tmp_path), "directory"], tmp_path, capsys)
 
 
-def test_a_huge_file_is_not_read(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_huge_file_is_not_read(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     huge = tmp_path / "huge.toml"
     with huge.open("wb") as file:
         file.truncate(100_000_000)
     os.chmod(huge, 0)  # it would not even open
-    refused(["analyze", str(huge)], ["100000000 bytes", str(LARGEST_FILE)], tmp_path, capsys)
+    refused(
+        ["analyze", str(huge)], ["100000000 bytes", str(LARGEST_FILE)], tmp_path, capsys
+    )
 
 
 @pytest.mark.posix
-def test_a_pipe_is_not_waited_for(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_pipe_is_not_waited_for(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     os.mkfifo(tmp_path / "pipe")
     refused(["analyze", str(tmp_path / "pipe")], ["ordinary file"], tmp_path, capsys)
 
 
 @pytest.mark.parametrize("name", ["a\nb\x1b[31m.toml", "n" * 300])
-def test_hostile_names(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_hostile_names(
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     refused(["analyze", str(tmp_path / name)], [], tmp_path, capsys)
 
 
@@ -202,8 +236,13 @@ def test_a_name_that_no_file_can_have() -> None:
         read_text("nul\0.toml")
 
 
-@pytest.mark.parametrize("data", [b"\xff\xfe\x00", GOOD.encode() + b"\n# \xe9\n", b"\x89PNG\r\n\x1a\n" + bytes(100)])
-def test_what_is_not_text(data: bytes, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize(
+    "data",
+    [b"\xff\xfe\x00", GOOD.encode() + b"\n# \xe9\n", b"\x89PNG\r\n\x1a\n" + bytes(100)],
+)
+def test_what_is_not_text(
+    data: bytes, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     (tmp_path / "scene.toml").write_bytes(data)
     refused(["analyze", str(tmp_path / "scene.toml")], ["UTF-8"], tmp_path, capsys)
 
@@ -214,13 +253,24 @@ def rocker(theta_2: str) -> str:
     return text.replace('"60 deg"', theta_2)
 
 
-def test_no_position_assembles(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_no_position_assembles(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     (tmp_path / "scene.toml").write_text(rocker('"180 deg"'))
-    refused(["analyze", str(tmp_path / "scene.toml")], ["scene.toml", "theta_2", "assembles at none"], tmp_path, capsys)
+    refused(
+        ["analyze", str(tmp_path / "scene.toml")],
+        ["scene.toml", "theta_2", "assembles at none"],
+        tmp_path,
+        capsys,
+    )
 
 
-def test_some_positions_do_not_assemble(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / "scene.toml").write_text(rocker('{ from = "0 deg", to = "90 deg", steps = 9 }'))
+def test_some_positions_do_not_assemble(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "scene.toml").write_text(
+        rocker('{ from = "0 deg", to = "90 deg", steps = 9 }')
+    )
     assert status(["analyze", str(tmp_path / "scene.toml")]) == 0
     shown = capsys.readouterr()
     assert "10 positions: 5 ok, 5 not assembled" in shown.out and shown.err == ""
@@ -233,20 +283,41 @@ def test_some_positions_do_not_assemble(tmp_path: Path, capsys: pytest.CaptureFi
         (["mjcf", "x.toml", "--lengths", "1", "1", "1", "1"], ["one of the two"]),
         (["mjcf", "x.toml", "--omega", "1"], ["--omega goes with --lengths"]),
         (["mjcf", "--lengths", "0.3", "0.1", "0.25"], ["Missing option"]),
-        (["mjcf", "--lengths", "0.3", "0.1", "0.25", "-1"], ["length of output", "> 0"]),
-        (["mjcf", "--lengths", "0.3", "0.1", "0.25", "nan"], ["length of output", "nan"]),
-        (["mjcf", "--lengths", "0.3", "0.1", "0.25", "2 kg"], ["length of output", "2 kg"]),
+        (
+            ["mjcf", "--lengths", "0.3", "0.1", "0.25", "-1"],
+            ["length of output", "> 0"],
+        ),
+        (
+            ["mjcf", "--lengths", "0.3", "0.1", "0.25", "nan"],
+            ["length of output", "nan"],
+        ),
+        (
+            ["mjcf", "--lengths", "0.3", "0.1", "0.25", "2 kg"],
+            ["length of output", "2 kg"],
+        ),
         (["mjcf", "--lengths", "9", "0.1", "0.25", "0.2"], ["never close"]),
-        (["mjcf", "--lengths", "0.3", "0.1", "0.25", "0.2", "--omega", "1 Hz"], ["--omega", "1 Hz"]),
-        (["mjcf", "--lengths", "0.3", "0.1", "0.25", "0.2", "--omega", "inf"], ["--omega", "inf"]),
-        *((["classify", *lengths.split()], []) for lengths in ("x", "1 1 1", "1 1 1 0", "1 1 1 1s")),
+        (
+            ["mjcf", "--lengths", "0.3", "0.1", "0.25", "0.2", "--omega", "1 Hz"],
+            ["--omega", "1 Hz"],
+        ),
+        (
+            ["mjcf", "--lengths", "0.3", "0.1", "0.25", "0.2", "--omega", "inf"],
+            ["--omega", "inf"],
+        ),
+        *(
+            (["classify", *lengths.split()], [])
+            for lengths in ("x", "1 1 1", "1 1 1 0", "1 1 1 1s")
+        ),
         (["analyse"], ["analyse"]),
         (["analyze"], ["SCENE"]),
         (["analyze", "x.toml", "--xml"], ["--xml"]),
     ],
 )
 def test_bad_arguments(
-    arguments: list[str], words: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    arguments: list[str],
+    words: list[str],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     refused(arguments, words, tmp_path, capsys)
 
@@ -265,9 +336,13 @@ def test_large_nonsense_is_answered_soon(pattern: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("pattern", ["a{n}." + "a." * 98 + "a=1\n", "[a{n}]\nb=1\n", "[[a]]\nb={n}\n"])
+@pytest.mark.parametrize(
+    "pattern", ["a{n}." + "a." * 98 + "a=1\n", "[a{n}]\nb=1\n", "[[a]]\nb={n}\n"]
+)
 def test_large_files_without_a_repeated_key_are_answered_soon(pattern: str) -> None:
-    text = "".join(pattern.format(n=n) for n in range(LARGEST_FILE // (len(pattern) + 3)))
+    text = "".join(
+        pattern.format(n=n) for n in range(LARGEST_FILE // (len(pattern) + 3))
+    )
     started = time.process_time()
     with pytest.raises(FourBarError):
         loads(text, "nonsense")
@@ -278,7 +353,23 @@ def test_large_files_without_a_repeated_key_are_answered_soon(pattern: str) -> N
 def test_mutated_files_end_in_a_scene_or_in_one_line() -> None:
     """2000 seeded mutations of a good file: any other exception than ours fails the test."""
     random.seed(20261121)
-    pieces = [*GOOD.split(), "nan", "[", "]", "{", "}", '"', "\x00", "é", "-1", "1e999", "= =", "\n", "deg", "🤖"]
+    pieces = [
+        *GOOD.split(),
+        "nan",
+        "[",
+        "]",
+        "{",
+        "}",
+        '"',
+        "\x00",
+        "é",
+        "-1",
+        "1e999",
+        "= =",
+        "\n",
+        "deg",
+        "🤖",
+    ]
     answered = 0
     for _ in range(2000):
         text = list(GOOD)
@@ -292,7 +383,9 @@ def test_mutated_files_end_in_a_scene_or_in_one_line() -> None:
             elif action == 2:
                 text[offset] = chr(random.randrange(32, 0x250))
             else:
-                digits = [index for index, letter in enumerate(text) if letter.isdecimal()]
+                digits = [
+                    index for index, letter in enumerate(text) if letter.isdecimal()
+                ]
                 text[random.choice(digits)] = random.choice("0123456789.e-")
         try:
             loads("".join(text), "mutated")

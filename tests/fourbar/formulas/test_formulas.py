@@ -28,9 +28,21 @@ from fourbar.formulas.many_digits import decide_half_angles, limit_remainder
 from fourbar.formulas.many_digits import half_angle as exact_half_angle
 from fourbar.formulas.mobility import limit_positions
 from fourbar.formulas.motion import Coefficients, Rates, State, rates
-from fourbar.formulas.path import compute_state, drive_sine, drive_sine_of_triangle, prepare_path
+from fourbar.formulas.path import (
+    compute_state,
+    drive_sine,
+    drive_sine_of_triangle,
+    prepare_path,
+)
 from fourbar.formulas.pin_forces import Body, inertia_wrenches, pin_forces
-from fourbar.formulas.position import HalfAngle, close_loop, direction, find_parallel_pairs, half_angle, loop
+from fourbar.formulas.position import (
+    HalfAngle,
+    close_loop,
+    direction,
+    find_parallel_pairs,
+    half_angle,
+    loop,
+)
 from fourbar.formulas.torque import driving_torque, half_slope, inertia
 from fourbar.linkage import MOVING_BARS, Bar, FourBar, uniform
 from tests.fourbar.formulas.test_points import Drawn, random_positions
@@ -70,15 +82,23 @@ def test_plain_numbers_stay_plain_and_arrays_broadcast() -> None:
     assert vector(1.0, 2.0) == 1.0 + 2.0j and type(vector(1.0, 2.0)) is complex
     for x, y in ((Carrying(1.0), 2.0), (1.0, Carrying(2.0))):
         assert vector(x, y) == 1.0 + 2.0j and type(vector(x, y)) is complex
-    assert type(vector(np.float64(1.0), 2.0)) is np.complex128 and vector(1.0, np.float64(2.0)) == 1.0 + 2.0j
+    assert (
+        type(vector(np.float64(1.0), 2.0)) is np.complex128
+        and vector(1.0, np.float64(2.0)) == 1.0 + 2.0j
+    )
     column, row = np.array([[1.0], [2.0]]), np.array([3.0, 4.0, 5.0])
     for x, y in ((column, row), (column, 3.0), (3.0, row)):
         assert np.array_equal(vector(x, y), x + 1j * np.asarray(y))
     assert type(angle(1j)) is float and angle(1j) == 0.5 * math.pi
-    assert [type(square_root(x)) for x in (0.0, 0.25)] == [float, float] and square_root(0.25) == 0.5
+    assert [type(square_root(x)) for x in (0.0, 0.25)] == [
+        float,
+        float,
+    ] and square_root(0.25) == 0.5
     assert type(polar(2.0, 0.0)) is complex and polar(2.0, 0.0) == 2.0
     assert type(tangent(0.25)) is float and type(power_of_two(0.7)) is float
-    assert power_of_two(0.7) == 1.0 and np.array_equal(power_of_two(np.array([0.7, 1.0, 3.0])), [1.0, 2.0, 4.0])
+    assert power_of_two(0.7) == 1.0 and np.array_equal(
+        power_of_two(np.array([0.7, 1.0, 3.0])), [1.0, 2.0, 4.0]
+    )
 
 
 def hard_doubles(seed: int, count: int) -> list[tuple[float, float, float, float]]:
@@ -87,8 +107,14 @@ def hard_doubles(seed: int, count: int) -> list[tuple[float, float, float, float
 
     def one() -> float:
         tight = (1.0, 1.5, 2.0 - 2.0**-52, 1.0 + 2.0**-52)
-        significand = float(rng.choice(tight)) if rng.random() < 0.4 else rng.uniform(1.0, 2.0)
-        return float(significand * 2.0 ** int(rng.integers(-60, 5) if rng.random() < 0.5 else rng.integers(-3, 3)))
+        significand = (
+            float(rng.choice(tight)) if rng.random() < 0.4 else rng.uniform(1.0, 2.0)
+        )
+        return float(
+            significand
+            * 2.0
+            ** int(rng.integers(-60, 5) if rng.random() < 0.5 else rng.integers(-3, 3))
+        )
 
     quadruples = []
     while len(quadruples) < count:
@@ -106,7 +132,12 @@ def hard_doubles(seed: int, count: int) -> list[tuple[float, float, float, float
 def test_a_difference_of_two_sums_is_zero_where_it_is_zero_and_nowhere_else() -> None:
     zeros = 0
     # two lengths a billiardth of the others: what both sums lose is no double
-    small = (0.9999999999999999, 5.551115123125782e-17, 0.9999999999999999, 5.551115123125783e-17)
+    small = (
+        0.9999999999999999,
+        5.551115123125782e-17,
+        0.9999999999999999,
+        5.551115123125783e-17,
+    )
     plain = [tuple(row) for row in np.random.default_rng(2).random((5000, 4))]
     for p, q, r, s in [small, *plain, *hard_doubles(1, 20_000)]:
         exact = Fraction(p) + Fraction(q) - Fraction(r) - Fraction(s)
@@ -114,7 +145,9 @@ def test_a_difference_of_two_sums_is_zero_where_it_is_zero_and_nowhere_else() ->
         zeros += exact == 0
         assert abs(difference - exact) <= THREE_SUMS * abs(exact), (p, q, r, s)
         total, rest = split_sum(p, q)
-        assert total == p + q and Fraction(total) + Fraction(rest) == Fraction(p) + Fraction(q)
+        assert total == p + q and Fraction(total) + Fraction(rest) == Fraction(
+            p
+        ) + Fraction(q)
     assert zeros > 1000
 
 
@@ -127,7 +160,10 @@ def test_the_constants_of_the_loop_vanish_at_change_points_alone() -> None:
             d, a, b, c = map(Fraction, lengths)
             constants = loop(*lengths)
             for k, (value, exact) in enumerate(
-                ((constants.E1, (b + c) ** 2 - (a + d) ** 2), (constants.E2, (d - a) ** 2 - (b - c) ** 2))
+                (
+                    (constants.E1, (b + c) ** 2 - (a + d) ** 2),
+                    (constants.E2, (d - a) ** 2 - (b - c) ** 2),
+                )
             ):
                 zeros[k] += exact == 0
                 assert (value == 0.0) == (exact == 0)
@@ -149,16 +185,24 @@ def test_pairs_stay_parallel_on_one_side_of_the_change_points_alone() -> None:
         bars = loop(*lengths)
         for branch, first, second in ((1, ahead, back), (-1, back, ahead)):
             pairs = find_parallel_pairs(bars, half_angle(bars, psi), branch)
-            assert [pair.tolist() for pair in pairs] == [first if together else neither, second if folded else neither]
+            assert [pair.tolist() for pair in pairs] == [
+                first if together else neither,
+                second if folded else neither,
+            ]
 
 
 def read_from_the_output(drawn: Drawn) -> tuple[State, Any, Any]:
     """The state read in theta_2, and position and coefficients read in theta_4."""
-    moving, from_output = drawn.moving(), prepare_path(loop(*drawn.bars.lengths), drawn.bars.ground_angle, 4)
+    moving, from_output = (
+        drawn.moving(),
+        prepare_path(loop(*drawn.bars.lengths), drawn.bars.ground_angle, 4),
+    )
     theta_4 = np.angle(moving.position.u4)
     # of the triangle B, A, O2: bars 3 and 2 there are as bars 4 and 3 in the order of theta_2
     sign = -np.sign((moving.position.u2 * moving.position.u3.conjugate()).imag)
-    return moving, *from_output.motion(from_output.position(theta_4, from_output.half_angle(theta_4), sign), sign)
+    return moving, *from_output.motion(
+        from_output.position(theta_4, from_output.half_angle(theta_4), sign), sign
+    )
 
 
 def test_read_in_theta_4_the_linkage_lies_and_moves_the_same() -> None:
@@ -166,16 +210,24 @@ def test_read_in_theta_4_the_linkage_lies_and_moves_the_same() -> None:
     compared = 0
     for drawn in random_positions(31, 300, 0.2):
         moving, position, k = read_from_the_output(drawn)
-        other_sine = abs(float((moving.position.u2 * moving.position.u3.conjugate()).imag[0]))
+        other_sine = abs(
+            float((moving.position.u2 * moving.position.u3.conjugate()).imag[0])
+        )
         if other_sine < 0.2:
             continue
         compared += 1
         size = (max(drawn.bars.lengths) / min(drawn.bars.lengths)) ** 2
         allowed = FROM_EITHER_END * size / (drawn.sine * other_sine)
         for name in ("u1", "u2", "u3", "u4", "sin_mu", "diagonal"):
-            assert abs(getattr(position, name) - getattr(moving.position, name)) <= allowed, name
+            assert (
+                abs(getattr(position, name) - getattr(moving.position, name)) <= allowed
+            ), name
         mine = moving.k
-        grown = size * (1.0 + abs(mine.h3) + 1.0 / abs(mine.h4)) ** 3 / (drawn.sine * other_sine) ** 2
+        grown = (
+            size
+            * (1.0 + abs(mine.h3) + 1.0 / abs(mine.h4)) ** 3
+            / (drawn.sine * other_sine) ** 2
+        )
         for coefficient, expected in (
             (k.h2, 1.0 / mine.h4),
             (k.h3, mine.h3 / mine.h4),
@@ -197,33 +249,53 @@ def test_read_in_theta_4_the_input_stands_at_its_limit() -> None:
         from_output = prepare_path(loop(*bars.lengths), bars.ground_angle, 4)
         sign = math.copysign(1.0, math.sin(limit.theta_3 - limit.theta_2))
         position, k = from_output.motion(
-            from_output.position(limit.theta_4, from_output.half_angle(limit.theta_4), sign), sign
+            from_output.position(
+                limit.theta_4, from_output.half_angle(limit.theta_4), sign
+            ),
+            sign,
         )
-        assert math.remainder(float(np.angle(position.u2)) - limit.theta_2, math.tau) == pytest.approx(0.0, abs=8.0 * U)
+        assert math.remainder(
+            float(np.angle(position.u2)) - limit.theta_2, math.tau
+        ) == pytest.approx(0.0, abs=8.0 * U)
         assert abs(position.sin_mu) <= 16.0 * U and abs(k.h2) <= 32.0 * U
-        assert np.isfinite(k).all() and k.h4 == 1.0 and abs(k.h43) > 0.1 and abs(k.dh2) > 0.1
+        assert (
+            np.isfinite(k).all()
+            and k.h4 == 1.0
+            and abs(k.h43) > 0.1
+            and abs(k.dh2) > 0.1
+        )
 
 
 def test_read_in_theta_4_a_parallelogram_stays_parallel_exactly() -> None:
     from_output = prepare_path(loop(0.3, 0.1, 0.3, 0.1), 0.0, 4)
     theta_4 = np.array([1e-9, 0.5, 3.0])
     sign = -1.0  # of sin(theta_3 - theta_2): the coupler lies as the ground
-    position, k = from_output.motion(from_output.position(theta_4, from_output.half_angle(theta_4), sign), sign)
+    position, k = from_output.motion(
+        from_output.position(theta_4, from_output.half_angle(theta_4), sign), sign
+    )
     assert position.u2 == pytest.approx(np.exp(1j * theta_4), abs=4.0 * U)
     assert position.u3 == pytest.approx(np.ones(3), abs=4.0 * U)
     for coefficient, expected in ((k.h2, 1.0), (k.h3, 0.0), (k.dh2, 0.0), (k.dh3, 0.0)):
         assert np.array_equal(coefficient, np.full(3, expected))
 
 
-@pytest.mark.parametrize("lengths", [(0.3, 0.1, 0.25, 0.22), (0.3, 0.1, 0.3, 0.1), (0.2, 0.3, 0.3, 0.2)])
-def test_the_sine_of_the_drive_is_that_of_the_two_bars_not_driven(lengths: tuple[float, float, float, float]) -> None:
+@pytest.mark.parametrize(
+    "lengths", [(0.3, 0.1, 0.25, 0.22), (0.3, 0.1, 0.3, 0.1), (0.2, 0.3, 0.3, 0.2)]
+)
+def test_the_sine_of_the_drive_is_that_of_the_two_bars_not_driven(
+    lengths: tuple[float, float, float, float],
+) -> None:
     """Of bars that stay parallel it is exactly zero."""
     d, a, _, _ = lengths
     angles, u1 = np.linspace(-2.9, 3.0, 30), np.exp(0.4j)
     for bar, branch in itertools.product((2, 4), (1.0, -1.0)):
         reading = prepare_path(loop(*lengths), 0.4, bar)
-        with np.errstate(invalid="ignore"):  # read from the output the loop does not close at every angle
-            position, _ = reading.motion(reading.position(angles, reading.half_angle(angles), branch), branch)
+        with np.errstate(
+            invalid="ignore"
+        ):  # read from the output the loop does not close at every angle
+            position, _ = reading.motion(
+                reading.position(angles, reading.half_angle(angles), branch), branch
+            )
         closed = np.isfinite(position.sin_mu)
         assert closed.any()
         for drive_bar, (u, v) in {
@@ -238,7 +310,9 @@ def test_the_sine_of_the_drive_is_that_of_the_two_bars_not_driven(lengths: tuple
                 parallel = (u == v) | (u == -v)
                 assert parallel.any() == (drive_bar == STAY_PARALLEL[lengths])
                 assert (sine[parallel] == 0.0).all()
-    plain = close_loop(loop(*lengths), u1, np.exp(1j), half_angle(loop(*lengths), 0.6), 1.0)
+    plain = close_loop(
+        loop(*lengths), u1, np.exp(1j), half_angle(loop(*lengths), 0.6), 1.0
+    )
     assert plain.diagonal == pytest.approx(d * u1 - a * np.exp(1j), abs=8.0 * U)
 
 
@@ -252,7 +326,12 @@ LINKAGES = np.array(
         (0.3, 0.1, 0.25, 0.22),
         (0.25, 0.22, 0.3, 0.1),
         (0.3, 0.1, 0.3, 0.1),  # a parallelogram
-        (0.1, 0.3, 0.3, 0.1),  # kites; with the second A lies on O4 at theta_2 = theta_1
+        (
+            0.1,
+            0.3,
+            0.3,
+            0.1,
+        ),  # kites; with the second A lies on O4 at theta_2 = theta_1
         (0.3, 0.3, 0.2, 0.2),
         (0.2, 0.2, 0.2, 0.2),
         (0.08, 0.24, 0.2, 0.26),  # input longer than the ground
@@ -268,7 +347,9 @@ FUSED = 64.0 * U
 """Relative to the largest: by what the roundings of some ten complex products differ, where all sines are above 0.1."""
 
 
-def everything(d: Any, a: Any, b: Any, c: Any, theta_1: Any, q: Any, branch: Any, bar: int = 2) -> dict[str, Any]:
+def everything(
+    d: Any, a: Any, b: Any, c: Any, theta_1: Any, q: Any, branch: Any, bar: int = 2
+) -> dict[str, Any]:
     """All that the formulas give, on the path in the angle of a bar."""
     lengths = loop(d, a, b, c)
     from_output = prepare_path(lengths, theta_1, bar)
@@ -276,9 +357,16 @@ def everything(d: Any, a: Any, b: Any, c: Any, theta_1: Any, q: Any, branch: Any
     position, k = from_output.motion(from_output.position(q, half, branch), branch)
     moving = rates(k, 2.0, -3.0)
     here = State(lengths, theta_1, q, position, k, 2.0, moving)
-    bodies = Body(0.2, 0.01, 0.3 * a + 0.01j), Body(0.5, 0.02, 0.6 * b - 0.02j), Body(0.4, 0.03, 0.5 * c + 0j)
+    bodies = (
+        Body(0.2, 0.01, 0.3 * a + 0.01j),
+        Body(0.5, 0.02, 0.6 * b - 0.02j),
+        Body(0.4, 0.03, 0.5 * c + 0j),
+    )
     w, mass_at_A = inertia_wrenches(a, bodies, position, moving)
-    inertial = sum(inertia(a, bodies, position, k)) * -3.0 + half_slope(a, bodies, position, k) * 4.0
+    inertial = (
+        sum(inertia(a, bodies, position, k)) * -3.0
+        + half_slope(a, bodies, position, k) * 4.0
+    )
     values = {
         **half._asdict(),
         **k._asdict(),
@@ -287,13 +375,20 @@ def everything(d: Any, a: Any, b: Any, c: Any, theta_1: Any, q: Any, branch: Any
         "u4": position.u4,
         "sin_mu": position.sin_mu,
     }
-    values |= {"sine_A": cross(position.u2, position.u3), "sine_24": cross(position.u2, position.u4)}
+    values |= {
+        "sine_A": cross(position.u2, position.u3),
+        "sine_24": cross(position.u2, position.u4),
+    }
     for k_th in MOVING_BARS:
         values[f"G{k_th}"] = here.point(k_th, bodies[k_th - 2].z)
         values[f"a_G{k_th}"] = here.acceleration(k_th, bodies[k_th - 2].z)
         values[f"T{k_th}"] = driving_torque(k[k_th - 2], inertial, 0.5)
-        pins = pin_forces(lengths, position, k_th, drive_sine(position, k_th), w, mass_at_A, 0.25)
-        values |= {f"{name} of drive {k_th}": value for name, value in pins._asdict().items()}
+        pins = pin_forces(
+            lengths, position, k_th, drive_sine(position, k_th), w, mass_at_A, 0.25
+        )
+        values |= {
+            f"{name} of drive {k_th}": value for name, value in pins._asdict().items()
+        }
     return values
 
 
@@ -309,13 +404,17 @@ def plainly(number: type, *arguments: Any) -> dict[str, Any]:
 @pytest.mark.parametrize("bar", MOVING_BARS)
 @pytest.mark.parametrize("branch", [1, -1])
 @pytest.mark.parametrize("theta_1", [0.0, 0.4])
-def test_numbers_arrays_and_many_linkages_at_once_are_the_same_formulas(theta_1: float, branch: int, bar: int) -> None:
+def test_numbers_arrays_and_many_linkages_at_once_are_the_same_formulas(
+    theta_1: float, branch: int, bar: int
+) -> None:
     q = theta_1 + ANGLES
     shape = (len(LINKAGES), len(ANGLES))
     with np.errstate(all="ignore"):
         columns = [LINKAGES[:, k : k + 1] for k in range(4)]
         at_once = everything(*columns, theta_1, q, branch, bar)
-        at_once = {name: np.broadcast_to(value, shape) for name, value in at_once.items()}
+        at_once = {
+            name: np.broadcast_to(value, shape) for name, value in at_once.items()
+        }
         others = [
             everything(
                 *columns,
@@ -325,16 +424,49 @@ def test_numbers_arrays_and_many_linkages_at_once_are_the_same_formulas(theta_1:
                 bar,
             )
         ]
-        rows = [everything(*lengths.tolist(), theta_1, q, branch, bar) for lengths in LINKAGES]
-        others.append({name: [np.broadcast_to(row[name], q.shape) for row in rows] for name in at_once})
+        rows = [
+            everything(*lengths.tolist(), theta_1, q, branch, bar)
+            for lengths in LINKAGES
+        ]
+        others.append(
+            {
+                name: [np.broadcast_to(row[name], q.shape) for row in rows]
+                for name in at_once
+            }
+        )
         for number in (float, np.float64):
             alone = [
-                [plainly(number, *map(number, lengths), number(theta_1), number(angle), branch, bar) for angle in q]
+                [
+                    plainly(
+                        number,
+                        *map(number, lengths),
+                        number(theta_1),
+                        number(angle),
+                        branch,
+                        bar,
+                    )
+                    for angle in q
+                ]
                 for lengths in LINKAGES
             ]
-            assert {np.ndim(value) for row in alone for answer in row for value in answer.values()} == {0}
-            others.append({name: [[answer[name] for answer in row] for row in alone] for name in at_once})
-    regular = np.min([np.abs(at_once[name]) for name in ("sin_mu", "sine_A", "sine_24")], axis=0) > 0.1
+            assert {
+                np.ndim(value)
+                for row in alone
+                for answer in row
+                for value in answer.values()
+            } == {0}
+            others.append(
+                {
+                    name: [[answer[name] for answer in row] for row in alone]
+                    for name in at_once
+                }
+            )
+    regular = (
+        np.min(
+            [np.abs(at_once[name]) for name in ("sin_mu", "sine_A", "sine_24")], axis=0
+        )
+        > 0.1
+    )
     assert 15 < regular.sum() < regular.size
     for answers in others:
         for name, value in at_once.items():
@@ -343,14 +475,22 @@ def test_numbers_arrays_and_many_linkages_at_once_are_the_same_formulas(theta_1:
                 assert np.array_equal(broadcast, value, equal_nan=True), name
             else:
                 allowed = FUSED * np.abs(value[regular]).max()
-                assert (np.abs(broadcast[regular] - value[regular]) <= allowed).all(), name
+                assert (np.abs(broadcast[regular] - value[regular]) <= allowed).all(), (
+                    name
+                )
 
 
 def five(bars: FourBar, psi: mp.mpf) -> list[mp.mpf]:
     """sin^2 h, cos^2 h, sin h cos h and the factors, from A and O4 as points of the complex plane."""
     d, a, b, c = map(mp.mpf, bars.lengths)
     e = abs(d - a * mp.expj(psi))
-    return [(1 - mp.cos(psi)) / 2, (1 + mp.cos(psi)) / 2, mp.sin(psi) / 2, (b + c) ** 2 - e**2, e**2 - (b - c) ** 2]
+    return [
+        (1 - mp.cos(psi)) / 2,
+        (1 + mp.cos(psi)) / 2,
+        mp.sin(psi) / 2,
+        (b + c) ** 2 - e**2,
+        e**2 - (b - c) ** 2,
+    ]
 
 
 def test_the_half_angle_in_many_digits_is_rounded_once() -> None:
@@ -358,19 +498,36 @@ def test_the_half_angle_in_many_digits_is_rounded_once() -> None:
         for drawn in random_positions(41, 60):
             bars, theta_2 = drawn.bars, float(drawn.theta_2[0])
             expected = five(bars, mp.mpf(theta_2) - mp.mpf(bars.ground_angle))
-            for ours, exact in zip(exact_half_angle(bars, theta_2), expected, strict=True):
+            for ours, exact in zip(
+                exact_half_angle(bars, theta_2), expected, strict=True
+            ):
                 assert abs(ours - exact) <= U * abs(exact)
             offset = mp.mpf("1e-25") * theta_2
             expected = five(bars, mp.mpf(theta_2) + offset - mp.mpf(bars.ground_angle))
-            for ours, exact in zip(exact_half_angle(bars, theta_2, offset), expected, strict=True):
+            for ours, exact in zip(
+                exact_half_angle(bars, theta_2, offset), expected, strict=True
+            ):
                 assert abs(ours - exact) <= U * abs(exact)
 
 
 def test_the_half_angle_in_doubles_keeps_the_digits_of_the_angle() -> None:
     """From the ground's direction to the opposite, as near to both as doubles come, and after many turns."""
     near = 10.0 ** -np.arange(1.0, 17.0)
-    turns = 2.0 * math.pi * np.array([3.0, 800.0, -800.0])[:, None] + [1e-9, 0.7, math.pi + 1e-9]
-    psi = np.concatenate([near, -near, math.pi - near, near - math.pi, np.linspace(-7.0, 7.0, 40), [math.pi]])
+    turns = 2.0 * math.pi * np.array([3.0, 800.0, -800.0])[:, None] + [
+        1e-9,
+        0.7,
+        math.pi + 1e-9,
+    ]
+    psi = np.concatenate(
+        [
+            near,
+            -near,
+            math.pi - near,
+            near - math.pi,
+            np.linspace(-7.0, 7.0, 40),
+            [math.pi],
+        ]
+    )
     psi = np.append(psi, turns)
     with mp.workdps(200):
         for lengths in [*LINKAGES.tolist(), (0.4, 0.397, 0.003, 0.002)]:
@@ -387,7 +544,9 @@ def test_the_half_angle_in_doubles_keeps_the_digits_of_the_angle() -> None:
                     (half.outer, outer, of_outer, of_inner),
                     (half.inner, inner, of_inner, of_outer),
                 ):
-                    assert abs(ours[i] - exact) <= TANGENT * min(terms, 4 * b * c + of_other)
+                    assert abs(ours[i] - exact) <= TANGENT * min(
+                        terms, 4 * b * c + of_other
+                    )
 
 
 def exact_limit(bars: FourBar, stretched: bool) -> mp.mpf:
@@ -406,12 +565,25 @@ def exact_limit(bars: FourBar, stretched: bool) -> mp.mpf:
         (FourBar(0.9, Bar(0.7), Bar(0.65), Bar(0.1), -2.5), True),
         (FourBar(0.9, Bar(0.7), Bar(0.65), Bar(0.1), -2.5), False),
         (FourBar(0.5, Bar(0.5), Bar(0.7), Bar(0.3 - 1e-9), 0.0), True),
-        (FourBar(0.5, Bar(0.1), Bar(0.7), Bar(0.3 - 1e-9), 0.0), False),  # a billionth short of a change point
+        (
+            FourBar(0.5, Bar(0.1), Bar(0.7), Bar(0.3 - 1e-9), 0.0),
+            False,
+        ),  # a billionth short of a change point
     ],
-    ids=["rocker", "double rocker, outer", "double rocker, inner", "equal ground and input", "near a change point"],
+    ids=[
+        "rocker",
+        "double rocker, outer",
+        "double rocker, inner",
+        "equal ground and input",
+        "near a change point",
+    ],
 )
-def test_an_offset_from_a_limit_in_many_digits(bars: FourBar, stretched: bool, size: float) -> None:
-    first = next(limit.theta_2 for limit in limit_positions(bars) if limit.stretched == stretched)
+def test_an_offset_from_a_limit_in_many_digits(
+    bars: FourBar, stretched: bool, size: float
+) -> None:
+    first = next(
+        limit.theta_2 for limit in limit_positions(bars) if limit.stretched == stretched
+    )
     for offset in (size, -size):
         theta_2 = first + offset
         remainder = limit_remainder(bars, first, theta_2, offset)
@@ -425,13 +597,19 @@ def test_an_offset_from_a_limit_in_many_digits(bars: FourBar, stretched: bool, s
             for ours, exact in zip(half, expected, strict=True):
                 assert abs(ours - exact) <= (1.0 + DIGITS_LEFT) * U * abs(exact)
             # beyond the limit nothing closes, however near: stretched bars stop it going on, folded ones going back
-            assert (half.outer if stretched else half.inner) * (-offset if stretched else offset) > 0.0
+            assert (half.outer if stretched else half.inner) * (
+                -offset if stretched else offset
+            ) > 0.0
 
 
 def test_a_limit_position_itself_closes_in_many_digits() -> None:
     bars = FourBar(0.5, Bar(0.4), Bar(0.3), Bar(0.25), 0.2)
     for limit in limit_positions(bars):
-        half = exact_half_angle(bars, limit.theta_2, limit_remainder(bars, limit.theta_2, limit.theta_2, 0.0))
+        half = exact_half_angle(
+            bars,
+            limit.theta_2,
+            limit_remainder(bars, limit.theta_2, limit.theta_2, 0.0),
+        )
         assert half.outer == 0.0 < half.inner
 
 
@@ -441,9 +619,13 @@ def test_bars_that_miss_by_the_rounding_of_their_lengths_touch() -> None:
         bars, constants = uniform(*lengths), loop(*lengths)
         assert -16.0 * U < constants.E2 < 0.0
         assert exact_half_angle(bars, 0.0).inner == 0.0
-        assert fourbar.solve(fourbar.Scene(bars, fourbar.Motion(0.0, 1.0))).status == ["singular"]
+        assert fourbar.solve(fourbar.Scene(bars, fourbar.Motion(0.0, 1.0))).status == [
+            "singular"
+        ]
         # what was given in more digits is what it is
-        assert exact_half_angle(bars, 0.0, mp.mpf(0)).inner == pytest.approx(constants.E2, rel=PRODUCTS)
+        assert exact_half_angle(bars, 0.0, mp.mpf(0)).inner == pytest.approx(
+            constants.E2, rel=PRODUCTS
+        )
 
 
 def test_positions_decided_in_many_digits_replace_their_own_alone() -> None:
@@ -452,7 +634,10 @@ def test_positions_decided_in_many_digits_replace_their_own_alone() -> None:
     for offset in (None, mp.mpf("1e-3")):
         decided = decide_half_angles(bars, 1.0, half, np.array([1, 4]), theta_2, offset)
         for name, before, after in zip(half._fields, half, decided, strict=True):
-            exact = [float(getattr(exact_half_angle(bars, float(angle), offset), name)) for angle in theta_2]
+            exact = [
+                float(getattr(exact_half_angle(bars, float(angle), offset), name))
+                for angle in theta_2
+            ]
             assert after[[1, 4]].tolist() == [exact[1], exact[4]]
             assert np.array_equal(np.delete(after, [1, 4]), np.delete(before, [1, 4]))
             assert offset is None or not np.array_equal(after, before)
@@ -460,13 +645,17 @@ def test_positions_decided_in_many_digits_replace_their_own_alone() -> None:
 
 @pytest.mark.parametrize("bar", [3, 4])
 @pytest.mark.parametrize("branch", [1, -1])
-def test_the_sine_of_the_drive_by_the_triangle_is_that_of_the_directions(bar: int, branch: int) -> None:
+def test_the_sine_of_the_drive_by_the_triangle_is_that_of_the_directions(
+    bar: int, branch: int
+) -> None:
     """On linkages whose directions differ by much, and on a short ground against 60 digits of the closed loop."""
     from mpmath import mp, mpf
 
     theta_2 = np.linspace(0.1, 6.0, 13)
     lengths = loop(0.3, 0.1, 0.25, 0.22)
-    position = close_loop(lengths, 1.0, direction(theta_2), half_angle(lengths, theta_2), branch)
+    position = close_loop(
+        lengths, 1.0, direction(theta_2), half_angle(lengths, theta_2), branch
+    )
     sine = drive_sine_of_triangle(lengths, position, bar)
     assert np.allclose(sine, drive_sine(position, bar), rtol=0.0, atol=16.0 * U)
     with mp.workdps(60):
@@ -479,27 +668,46 @@ def test_the_sine_of_the_drive_by_the_triangle_is_that_of_the_directions(bar: in
         exact = float((mp.conj(mp.expj(mpf(0.7))) * u).imag)
     short = loop(2.0**-14, 1.5, 0.75, 1.25)
     position = close_loop(short, 1.0, direction(0.7), half_angle(short, 0.7), branch)
-    assert drive_sine_of_triangle(short, position, bar) == pytest.approx(exact, rel=16.0 * U)
+    assert drive_sine_of_triangle(short, position, bar) == pytest.approx(
+        exact, rel=16.0 * U
+    )
 
 
 def test_a_state_holds_what_it_was_made_from() -> None:
-    bars, theta_2 = FourBar(0.3, Bar(0.1), Bar(0.25), Bar(0.22), 0.4), np.array([0.5, 1.0])
-    unit, moving = compute_state(bars, theta_2, 1), compute_state(bars, theta_2, 1, 3.0, -2.0)
+    bars, theta_2 = (
+        FourBar(0.3, Bar(0.1), Bar(0.25), Bar(0.22), 0.4),
+        np.array([0.5, 1.0]),
+    )
+    unit, moving = (
+        compute_state(bars, theta_2, 1),
+        compute_state(bars, theta_2, 1, 3.0, -2.0),
+    )
     assert unit.theta_1 == 0.4 and np.array_equal(unit.theta_2, theta_2)
     assert (unit.speed, unit.moving.omega_2, unit.moving.alpha_2) == (1.0, 1.0, 0.0)
-    assert (moving.speed, moving.moving.omega_2, moving.moving.alpha_2) == (3.0, 3.0, -2.0)
-    assert np.array_equal(unit.moving.omega_4, unit.k.h4) and np.array_equal(unit.moving.alpha_4, unit.k.dh4)
+    assert (moving.speed, moving.moving.omega_2, moving.moving.alpha_2) == (
+        3.0,
+        3.0,
+        -2.0,
+    )
+    assert np.array_equal(unit.moving.omega_4, unit.k.h4) and np.array_equal(
+        unit.moving.alpha_4, unit.k.dh4
+    )
     assert [prepare_path(unit.lengths, 0.4, bar).bar for bar in (2, 4)] == [2, 4]
 
 
 def test_the_factor_that_changes_less_gives_the_other_its_digits() -> None:
     """outer + inner = 4 b c: with a short coupler or output both are small against 4 a d."""
-    for psi, lengths in ((3.141, (0.75, 0.75, 1.5, 1e-6)), (1e-3, (0.75, 0.75 + 1.4e-3, 2e-6, 1.4e-3))):
+    for psi, lengths in (
+        (3.141, (0.75, 0.75, 1.5, 1e-6)),
+        (1e-3, (0.75, 0.75 + 1.4e-3, 2e-6, 1.4e-3)),
+    ):
         d, a, b, c = map(mp.mpf, lengths)
         half = half_angle(loop(*lengths), psi)
         with mp.workdps(50):
             e2 = (d - a) ** 2 + 4 * a * d * mp.sin(mp.mpf(psi) / 2) ** 2
             exact = ((b + c) ** 2 - e2, e2 - (b - c) ** 2)
-        changes = float(4 * a * d * abs(mp.sin(psi)) * psi)  # with the last digit of psi
+        changes = float(
+            4 * a * d * abs(mp.sin(psi)) * psi
+        )  # with the last digit of psi
         for ours, factor in zip((half.outer, half.inner), exact, strict=True):
             assert abs(factor - float(ours)) <= PRODUCTS * (float(4 * b * c) + changes)

@@ -20,7 +20,10 @@ def draw(seed: int, size: float = 3.0) -> Pair:
 
 
 def exact(pair: Pair) -> list[Any]:
-    return [mp.mpmathify(complex(h)) + mp.mpmathify(complex(low)) for h, low in zip(pair.high, pair.low, strict=True)]
+    return [
+        mp.mpmathify(complex(h)) + mp.mpmathify(complex(low))
+        for h, low in zip(pair.high, pair.low, strict=True)
+    ]
 
 
 @pytest.mark.parametrize(
@@ -30,26 +33,47 @@ def exact(pair: Pair) -> list[Any]:
         (lambda x, y: x - 1j * y, lambda x, y: x - 1j * y),
         (lambda x, y: 2.5 - x * y, lambda x, y: 2.5 - x * y),
         (lambda x, y: x / y, lambda x, y: x / y),
-        (lambda x, y: (x + 1j * y) / (y - 2j * x), lambda x, y: (x + 1j * y) / (y - 2j * x)),
+        (
+            lambda x, y: (x + 1j * y) / (y - 2j * x),
+            lambda x, y: (x + 1j * y) / (y - 2j * x),
+        ),
         (lambda x, y: np.abs(x + 1j * y), lambda x, y: abs(x + 1j * y)),
         (lambda x, y: np.sqrt(np.abs(x)), lambda x, y: mp.sqrt(abs(x))),
-        (lambda x, y: np.sin(x) + 1j * np.cos(y), lambda x, y: mp.sin(x) + 1j * mp.cos(y)),
+        (
+            lambda x, y: np.sin(x) + 1j * np.cos(y),
+            lambda x, y: mp.sin(x) + 1j * mp.cos(y),
+        ),
         (lambda x, y: np.tan(x), lambda x, y: mp.tan(x)),
         (np.arctan2, lambda x, y: mp.atan2(x.real, y.real)),
-        (lambda x, y: np.where(x > y, x, -y), lambda x, y: x if x.real > y.real else -y),
-        (lambda x, y: x - 2.0 * np.rint(x / 2.0), lambda x, y: x - 2 * mp.nint(x.real / 2)),
+        (
+            lambda x, y: np.where(x > y, x, -y),
+            lambda x, y: x if x.real > y.real else -y,
+        ),
+        (
+            lambda x, y: x - 2.0 * np.rint(x / 2.0),
+            lambda x, y: x - 2 * mp.nint(x.real / 2),
+        ),
     ],
 )
-def test_a_function_keeps_the_digits_of_a_pair(function: Callable[..., Pair], reference: Callable[..., Any]) -> None:
+def test_a_function_keeps_the_digits_of_a_pair(
+    function: Callable[..., Pair], reference: Callable[..., Any]
+) -> None:
     with mp.workdps(60):
         x, y = draw(1), draw(2)
-        expected = [reference(mp.mpc(a), mp.mpc(b)) for a, b in zip(exact(x), exact(y), strict=True)]
+        expected = [
+            reference(mp.mpc(a), mp.mpc(b))
+            for a, b in zip(exact(x), exact(y), strict=True)
+        ]
         for ours, wanted in zip(exact(function(x, y)), expected, strict=True):
             assert abs(ours - wanted) <= DIGITS * max(abs(wanted), 0.1)
 
 
 def test_what_is_no_number_stays_none_and_a_comparison_sees_the_last_digit() -> None:
     one, more = Pair(np.ones(1), np.zeros(1)), Pair(np.ones(1), np.full(1, 1e-25))
-    assert (more > one).all() and (more != one).all() and not (one != Pair(np.ones(1), 0.0)).any()
+    assert (
+        (more > one).all()
+        and (more != one).all()
+        and not (one != Pair(np.ones(1), 0.0)).any()
+    )
     with np.errstate(all="ignore"):
         assert not np.isfinite((one / 0.0).high) and np.isnan(np.sqrt(-one).high)

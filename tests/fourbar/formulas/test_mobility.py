@@ -49,9 +49,17 @@ def random_linkages(seed: int, count: int) -> list[FourBar]:
     rng = np.random.default_rng(seed)
     linkages: list[FourBar] = []
     while len(linkages) < count:
-        lengths = rng.integers(1, 7, 4).astype(float) if len(linkages) % 3 == 0 else rng.uniform(0.1, 1.0, 4)
+        lengths = (
+            rng.integers(1, 7, 4).astype(float)
+            if len(linkages) % 3 == 0
+            else rng.uniform(0.1, 1.0, 4)
+        )
         if 2.0 * lengths.max() < lengths.sum():
-            linkages.append(linkage(*lengths.tolist(), theta_1=float(rng.uniform(-math.pi, math.pi))))
+            linkages.append(
+                linkage(
+                    *lengths.tolist(), theta_1=float(rng.uniform(-math.pi, math.pi))
+                )
+            )
     return linkages
 
 
@@ -62,12 +70,17 @@ def closes(bars: FourBar, theta_2: np.ndarray) -> np.ndarray:
     return np.minimum(b + c - distance, distance - abs(b - c))
 
 
-def angle(bars: FourBar, theta_2: np.ndarray, branch: int | np.ndarray, bar: int) -> np.ndarray:
+def angle(
+    bars: FourBar, theta_2: np.ndarray, branch: int | np.ndarray, bar: int
+) -> np.ndarray:
     return np.angle(compute_state(bars, theta_2, branch).direction(bar))
 
 
 def inside(angle: np.ndarray, ranges: tuple[tuple[float, float], ...]) -> np.ndarray:
-    return np.any([(angle - start) % (2 * math.pi) <= stop - start for start, stop in ranges], axis=0)
+    return np.any(
+        [(angle - start) % (2 * math.pi) <= stop - start for start, stop in ranges],
+        axis=0,
+    )
 
 
 # the thesis's model mechanism: 20, 48, 55, 20 cm, theta_1 = 45 deg; Linares Mendoza, table 3.2 (rows 2 and 4),
@@ -81,10 +94,18 @@ def test_thesis_limits_of_the_input() -> None:
         [84.61804062253105, 365.38195937746895], abs=PRINTED_8
     )
     # theta_4 of chapter 2 (from B to O4) is ours + 180 deg
-    assert (math.degrees(limits[0].theta_4) + 180.0) % 360.0 == pytest.approx(105.98752759110246, abs=PRINTED_8)
-    assert (math.degrees(limits[1].theta_4) + 180.0) % 360.0 == pytest.approx(344.01247240889757, abs=PRINTED_8)
-    assert np.degrees(choose_range(THESIS)) == pytest.approx([85.61804062253105, 364.38195937746895], abs=PRINTED_8)
-    assert math.degrees(swing(THESIS, 2)) == pytest.approx(280.7639187549379, abs=PRINTED_8)
+    assert (math.degrees(limits[0].theta_4) + 180.0) % 360.0 == pytest.approx(
+        105.98752759110246, abs=PRINTED_8
+    )
+    assert (math.degrees(limits[1].theta_4) + 180.0) % 360.0 == pytest.approx(
+        344.01247240889757, abs=PRINTED_8
+    )
+    assert np.degrees(choose_range(THESIS)) == pytest.approx(
+        [85.61804062253105, 364.38195937746895], abs=PRINTED_8
+    )
+    assert math.degrees(swing(THESIS, 2)) == pytest.approx(
+        280.7639187549379, abs=PRINTED_8
+    )
 
 
 def test_thesis_limits_of_the_output() -> None:
@@ -92,11 +113,15 @@ def test_thesis_limits_of_the_output() -> None:
     assert np.degrees([limit.theta_2 for limit in limits]) == pytest.approx(
         [145.07865810778765, 304.92134189221235], abs=PRINTED_8
     )
-    assert sorted((math.degrees(limit.theta_4) + 180.0) % 360.0 for limit in limits) == pytest.approx(
-        [24.842683784424707, 65.15731621557532], abs=PRINTED_8
-    )
+    assert sorted(
+        (math.degrees(limit.theta_4) + 180.0) % 360.0 for limit in limits
+    ) == pytest.approx([24.842683784424707, 65.15731621557532], abs=PRINTED_8)
     classification = classify(THESIS)
-    assert (classification.code, classification.barker, classification.longest) == ("RRR3", 7, 3)
+    assert (classification.code, classification.barker, classification.longest) == (
+        "RRR3",
+        7,
+        3,
+    )
     assert classification.surplus == pytest.approx(-0.07)
 
 
@@ -153,7 +178,11 @@ def test_a_structure_stands_in_one_position() -> None:
         assert closes(bars, np.array([start]))[0] == pytest.approx(0.0, abs=12.0 * EPS)
 
 
-@pytest.mark.parametrize("bars", random_linkages(1, 60), ids=lambda bars: "-".join(f"{x:.3g}" for x in bars.lengths))
+@pytest.mark.parametrize(
+    "bars",
+    random_linkages(1, 60),
+    ids=lambda bars: "-".join(f"{x:.3g}" for x in bars.lengths),
+)
 def test_ranges_and_circuits_agree_with_a_scan(bars: FourBar) -> None:
     theta_2 = bars.ground_angle + (np.arange(GRID) + 0.5) * (2 * math.pi / GRID)
     margin = closes(bars, theta_2)
@@ -170,19 +199,35 @@ def test_ranges_and_circuits_agree_with_a_scan(bars: FourBar) -> None:
         meets |= closed & touches & np.isin(place, (0, GRID // 2))
     starts = np.concatenate([place[joined], GRID + place[joined], place[meets]])
     ends = np.concatenate([ahead[joined], GRID + ahead[joined], GRID + place[meets]])
-    graph = coo_array((np.ones(starts.size), (starts, ends)), shape=(2 * GRID, 2 * GRID))
+    graph = coo_array(
+        (np.ones(starts.size), (starts, ends)), shape=(2 * GRID, 2 * GRID)
+    )
     component = connected_components(graph, directed=False)[1][np.tile(closed, 2)]
-    number = find_circuit(bars, np.tile(theta_2, 2), np.repeat(np.array([1, -1], np.int8), GRID))[np.tile(closed, 2)]
+    number = find_circuit(
+        bars, np.tile(theta_2, 2), np.repeat(np.array([1, -1], np.int8), GRID)
+    )[np.tile(closed, 2)]
     for partition in (component, number, zip(component, number, strict=True)):
         assert len(set(partition)) == len(circuits(bars))
 
 
-def test_positions_that_a_motion_connects_have_one_circuit_and_those_that_do_not_assemble_none() -> None:
+def test_positions_that_a_motion_connects_have_one_circuit_and_those_that_do_not_assemble_none() -> (
+    None
+):
     crank_rocker, rocker = uniform(3, 1, 2.5, 2.2), uniform(3, 2.5, 1, 2.2)
-    assert find_circuit(crank_rocker, np.array([0.1, 3.0, 3.0]), np.array([1, 1, -1])).tolist() == [0, 0, 1]
+    assert find_circuit(
+        crank_rocker, np.array([0.1, 3.0, 3.0]), np.array([1, 1, -1])
+    ).tolist() == [0, 0, 1]
     start, stop = choose_range(rocker)
-    beside = np.array([start, stop, -start, 3.0, 0.0])  # 3.0 beyond stretched bars 3 and 4, 0.0 beyond folded ones
-    assert find_circuit(rocker, beside, np.array([1, -1, 1, 1, 1])).tolist() == [0, 0, 1, -1, -1]
+    beside = np.array(
+        [start, stop, -start, 3.0, 0.0]
+    )  # 3.0 beyond stretched bars 3 and 4, 0.0 beyond folded ones
+    assert find_circuit(rocker, beside, np.array([1, -1, 1, 1, 1])).tolist() == [
+        0,
+        0,
+        1,
+        -1,
+        -1,
+    ]
 
 
 def exact_psi(bars: FourBar, bar: int, stretched: bool) -> mp.mpf:
@@ -214,12 +259,27 @@ def test_limits_keep_their_digits_near_special_linkages() -> None:
             theta_1 = bars.ground_angle
             for bar in (2, 3, 4):
                 for limit in limit_positions(bars, bar):
-                    value = {2: limit.theta_2, 3: limit.theta_3, 4: limit.theta_4 + math.pi}[bar]
+                    value = {
+                        2: limit.theta_2,
+                        3: limit.theta_3,
+                        4: limit.theta_4 + math.pi,
+                    }[bar]
                     psi = exact_psi(bars, bar, limit.stretched)
-                    error = min(abs(_mod(mp.mpf(value) - theta_1 - s * psi)) for s in (1, -1))
+                    error = min(
+                        abs(_mod(mp.mpf(value) - theta_1 - s * psi)) for s in (1, -1)
+                    )
                     # theta_1 = 0, first of the pair: nothing is added, so the angle is good relative to itself
-                    size = psi if bar == 2 and theta_1 == 0.0 and 0.0 < value < math.pi else 4 * mp.pi
-                    assert error <= ANGLE * size, (bars.lengths, bar, limit, float(error))
+                    size = (
+                        psi
+                        if bar == 2 and theta_1 == 0.0 and 0.0 < value < math.pi
+                        else 4 * mp.pi
+                    )
+                    assert error <= ANGLE * size, (
+                        bars.lengths,
+                        bar,
+                        limit,
+                        float(error),
+                    )
                     checked += 1
     assert checked > 1000
 
@@ -234,17 +294,26 @@ def test_limits_close_the_loop_with_two_bars_collinear() -> None:
         for bar, pair in ((2, (3, 4)), (3, (2, 4)), (4, (2, 3))):
             limits = limit_positions(bars, bar)
             ahead = [limit.theta_2 - bars.ground_angle for limit in limits]
-            assert ahead == sorted(ahead) and all(-EPS * 8 <= angle < 2 * math.pi for angle in ahead)
+            assert ahead == sorted(ahead) and all(
+                -EPS * 8 <= angle < 2 * math.pi for angle in ahead
+            )
             for limit in limits:
                 angles = {2: limit.theta_2, 3: limit.theta_3, 4: limit.theta_4}
                 gap = a * np.exp(1j * angles[2]) + b * np.exp(1j * angles[3])
                 gap -= d * np.exp(1j * bars.ground_angle) + c * np.exp(1j * angles[4])
                 assert abs(gap) <= ANGLE * 2 * math.pi * sum(bars.lengths)
-                assert abs(math.sin(angles[pair[0]] - angles[pair[1]])) <= ANGLE * 2 * math.pi
+                assert (
+                    abs(math.sin(angles[pair[0]] - angles[pair[1]]))
+                    <= ANGLE * 2 * math.pi
+                )
                 # bars 2, 3 lie along each other where stretched; the output runs from its far end
                 along = math.cos(angles[pair[0]] - angles[pair[1]]) > 0.0
                 assert along == (limit.stretched == (bar == 4))
-                assert limit.branch == (0 if bar == 2 else math.copysign(1.0, math.sin(angles[4] - angles[3])))
+                assert limit.branch == (
+                    0
+                    if bar == 2
+                    else math.copysign(1.0, math.sin(angles[4] - angles[3]))
+                )
 
 
 def test_swing_is_what_a_scan_of_the_output_finds() -> None:
@@ -255,11 +324,15 @@ def test_swing_is_what_a_scan_of_the_output_finds() -> None:
         seen.add(classify(bars).code[:4])
         start, stop = find_intervals(bars)[0]
         phase = np.arange(0.5, SCAN) * (math.pi / SCAN)
-        theta_2 = 0.5 * (start + stop) - 0.5 * (stop - start) * np.cos(phase)  # dense where theta_4 goes as a root
+        theta_2 = 0.5 * (start + stop) - 0.5 * (stop - start) * np.cos(
+            phase
+        )  # dense where theta_4 goes as a root
         branches = (1,) if turns_fully(bars) else (1, -1)
         theta_4 = [np.unwrap(angle(bars, theta_2, branch, 4)) for branch in branches]
         if len(theta_4) == 2:  # both branches start from the same limit position
-            theta_4[1] += 2 * math.pi * round((theta_4[0][0] - theta_4[1][0]) / (2 * math.pi))
+            theta_4[1] += (
+                2 * math.pi * round((theta_4[0][0] - theta_4[1][0]) / (2 * math.pi))
+            )
         scanned = max(x.max() for x in theta_4) - min(x.min() for x in theta_4)
         assert scanned == pytest.approx(swing(bars), abs=SCAN_STEP), bars.lengths
     assert seen >= {"GCCC", "GCRR", "GRCR", "GRRC", "RRR1", "RRR2", "RRR3", "RRR4"}
@@ -270,9 +343,15 @@ def test_ranges_of_coupler_and_output_hold_every_position_and_no_more() -> None:
         theta_2 = bars.ground_angle + (np.arange(GRID) + 0.5) * (2 * math.pi / GRID)
         theta_2 = theta_2[closes(bars, theta_2) > 0.0]
         for bar in (3, 4):
-            reached = np.concatenate([angle(bars, theta_2, branch, bar) for branch in (1, -1)])
+            reached = np.concatenate(
+                [angle(bars, theta_2, branch, bar) for branch in (1, -1)]
+            )
             clear = np.min(
-                [np.abs(np.sin(0.5 * (reached - end))) for end in np.ravel(find_intervals(bars, bar))], axis=0
+                [
+                    np.abs(np.sin(0.5 * (reached - end)))
+                    for end in np.ravel(find_intervals(bars, bar))
+                ],
+                axis=0,
             )
             assert inside(reached[clear > 1e-6], find_intervals(bars, bar)).all()
             # the first range holds the ground's direction (bar 4: its opposite) or begins less than pi after it
@@ -281,7 +360,10 @@ def test_ranges_of_coupler_and_output_hold_every_position_and_no_more() -> None:
             for start, stop in find_intervals(bars, bar):
                 for end in (start, stop) if not turns_fully(bars, bar) else ():
                     # theta_k goes as a square root near its limit's theta_2, or is tangent to it
-                    assert np.abs(np.sin(0.5 * (reached - end))).min() < 20.0 * math.pi / GRID
+                    assert (
+                        np.abs(np.sin(0.5 * (reached - end))).min()
+                        < 20.0 * math.pi / GRID
+                    )
 
 
 def test_time_ratio_is_the_time_of_both_strokes() -> None:
@@ -289,25 +371,45 @@ def test_time_ratio_is_the_time_of_both_strokes() -> None:
     n = 200_000
     theta_2 = (np.arange(n) + 0.5) * (2 * math.pi / n)
     position = compute_state(bars, theta_2, 1).position
-    ahead = np.count_nonzero(np.sin(theta_2 - np.angle(position.u3)) * position.sin_mu > 0.0)  # omega_4 > 0
+    ahead = np.count_nonzero(
+        np.sin(theta_2 - np.angle(position.u3)) * position.sin_mu > 0.0
+    )  # omega_4 > 0
     ratio = max(ahead, n - ahead) / min(ahead, n - ahead)
-    assert time_ratio(bars) == pytest.approx(ratio, rel=8.0 / n)  # both ends counted to one step
+    assert time_ratio(bars) == pytest.approx(
+        ratio, rel=8.0 / n
+    )  # both ends counted to one step
     assert time_ratio(uniform(1, 3, 2.5, 3.2)) is None
     assert time_ratio(THESIS) is None
     # limits of the output alone are not enough: there are change points, or the input does not turn
-    assert time_ratio(uniform(3, 1, 2, 2)) is None and len(limit_positions(linkage(3, 1, 2, 2), 4)) == 2
+    assert (
+        time_ratio(uniform(3, 1, 2, 2)) is None
+        and len(limit_positions(linkage(3, 1, 2, 2), 4)) == 2
+    )
     for bars in random_linkages(11, 100):
         assert turns_fully(bars) or time_ratio(bars) is None
     # a central (in-line) crank-rocker, d^2 + a^2 = b^2 + c^2, has equal strokes
-    assert time_ratio(uniform(math.sqrt(2.5**2 + 2.2**2 - 1), 1, 2.5, 2.2)) == pytest.approx(1.0, abs=1e-14)
+    assert time_ratio(
+        uniform(math.sqrt(2.5**2 + 2.2**2 - 1), 1, 2.5, 2.2)
+    ) == pytest.approx(1.0, abs=1e-14)
 
 
 @pytest.mark.parametrize(
     "lengths",
-    [(2, 1, 2, 1), (1, 1, 2, 2), (2, 1, 1, 2), (2, 1, 4, 3), (1, 2, 4, 3), (2, 4, 3, 1), (1, 1, 1, 1), (3, 1, 2, 2)],
+    [
+        (2, 1, 2, 1),
+        (1, 1, 2, 2),
+        (2, 1, 1, 2),
+        (2, 1, 4, 3),
+        (1, 2, 4, 3),
+        (2, 4, 3, 1),
+        (1, 1, 1, 1),
+        (3, 1, 2, 2),
+    ],
 )
 @pytest.mark.parametrize("backwards", [False, True])
-def test_the_smooth_path_has_no_corner(lengths: tuple[float, ...], backwards: bool) -> None:
+def test_the_smooth_path_has_no_corner(
+    lengths: tuple[float, ...], backwards: bool
+) -> None:
     bars = linkage(*lengths, theta_1=0.4)
     assert change_points(bars)
     if turns_fully(bars):
@@ -323,7 +425,9 @@ def test_the_smooth_path_has_no_corner(lengths: tuple[float, ...], backwards: bo
     largest = {True: 0.0, False: 0.0}
     for smooth in (True, False):
         for bar in (3, 4):
-            bend = np.diff(np.unwrap(angle(bars, theta_2, branch if smooth else 1, bar)), 2)
+            bend = np.diff(
+                np.unwrap(angle(bars, theta_2, branch if smooth else 1, bar)), 2
+            )
             near = np.abs(np.sin(theta_2[1:-1] - 0.4)) < 0.02
             largest[smooth] = max(largest[smooth], float(np.abs(bend[near]).max()))
     # a corner bends by the step itself, a smooth path by its square
@@ -335,11 +439,33 @@ def test_a_sweep_on_a_change_point_is_before_it() -> None:
     quarter = np.arange(5) * (math.pi / 2)
     assert follow_smooth_path(bars, quarter, 1).tolist() == [1, -1, -1, 1, 1]
     assert follow_smooth_path(bars, quarter[::-1], 1).tolist() == [1, -1, -1, 1, 1]
-    assert follow_smooth_path(bars, np.array([-1.0, 0.0, -1.0]), 1).tolist() == [1, 1, 1]  # touched, then back
-    assert follow_smooth_path(bars, np.array([-1.0, 0.0, 1.0]), -1).tolist() == [-1, -1, 1]
-    assert follow_smooth_path(bars, np.array([1.0, 1.0, 1.0]), -1).tolist() == [-1, -1, -1]
-    assert follow_smooth_path(bars, np.array([-1.0, 0.5, 0.0, 0.5]), 1).tolist() == [1, -1, -1, -1]
-    assert follow_smooth_path(bars, np.array([0.5, -1.0, 0.0, -1.0]), 1).tolist() == [1, -1, -1, -1]
+    assert follow_smooth_path(bars, np.array([-1.0, 0.0, -1.0]), 1).tolist() == [
+        1,
+        1,
+        1,
+    ]  # touched, then back
+    assert follow_smooth_path(bars, np.array([-1.0, 0.0, 1.0]), -1).tolist() == [
+        -1,
+        -1,
+        1,
+    ]
+    assert follow_smooth_path(bars, np.array([1.0, 1.0, 1.0]), -1).tolist() == [
+        -1,
+        -1,
+        -1,
+    ]
+    assert follow_smooth_path(bars, np.array([-1.0, 0.5, 0.0, 0.5]), 1).tolist() == [
+        1,
+        -1,
+        -1,
+        -1,
+    ]
+    assert follow_smooth_path(bars, np.array([0.5, -1.0, 0.0, -1.0]), 1).tolist() == [
+        1,
+        -1,
+        -1,
+        -1,
+    ]
     assert follow_smooth_path(bars, np.array([1.0]), 1).dtype == np.int8
     assert (follow_smooth_path(uniform(3, 1, 2.5, 2.2), quarter, -1) == -1).all()
 
@@ -367,20 +493,31 @@ def test_what_touches_is_up_to_the_rounding_of_the_lengths_and_no_further() -> N
 
 @pytest.mark.parametrize(
     ("lengths", "turning"),
-    [((3, 1, 2.5, 2.2), {2}), ((1, 3, 2.5, 3.2), {2, 3, 4}), ((3, 2.5, 1, 2.2), {3}), ((3, 2.2, 2.5, 1), {4})],
+    [
+        ((3, 1, 2.5, 2.2), {2}),
+        ((1, 3, 2.5, 3.2), {2, 3, 4}),
+        ((3, 2.5, 1, 2.2), {3}),
+        ((3, 2.2, 2.5, 1), {4}),
+    ],
 )
-def test_the_shortest_bar_of_a_grashof_linkage_turns(lengths: tuple[float, ...], turning: set[int]) -> None:
+def test_the_shortest_bar_of_a_grashof_linkage_turns(
+    lengths: tuple[float, ...], turning: set[int]
+) -> None:
     """Grashof: the shortest bar turns against all others; where it is the ground, all turn against it."""
     assert {bar for bar in (2, 3, 4) if turns_fully(linkage(*lengths), bar)} == turning
 
 
 def test_angles_of_limits_exclude_minus_pi() -> None:
-    straight = linkage(6.0, 1.0, 2.0, 3.0, -math.pi)  # a structure: all bars along the ground
+    straight = linkage(
+        6.0, 1.0, 2.0, 3.0, -math.pi
+    )  # a structure: all bars along the ground
     assert len(limit_positions(straight)) == 1
     for limit in limit_positions(straight):
         assert limit.theta_3 == math.pi
     for limit in limit_positions(linkage(6.0, 1.0, 2.0, 3.0001, -math.pi)):
-        assert -math.pi < limit.theta_3 <= math.pi and -math.pi < limit.theta_4 <= math.pi
+        assert (
+            -math.pi < limit.theta_3 <= math.pi and -math.pi < limit.theta_4 <= math.pi
+        )
 
 
 def test_a_change_point_is_met_in_spite_of_rounding() -> None:
@@ -396,7 +533,9 @@ def test_a_range_narrower_than_two_margins_is_halved() -> None:
     bars = linkage(6.0, 1.0, 2.0, 3.0001, 0.3)  # 1e-4 beyond a structure
     (start, stop), (low, high) = find_intervals(bars)[0], choose_range(bars)
     assert 0.0 < stop - start < math.radians(4.0)
-    assert (low - start, stop - high) == pytest.approx(2 * [(stop - start) / 4.0], rel=1e-12)
+    assert (low - start, stop - high) == pytest.approx(
+        2 * [(stop - start) / 4.0], rel=1e-12
+    )
 
 
 def test_the_default_range_is_as_wide_as_the_contract_says() -> None:
@@ -405,9 +544,16 @@ def test_the_default_range_is_as_wide_as_the_contract_says() -> None:
         start, stop = choose_range(bars)
         if turns_fully(bars):
             continue
-        touching = -16.0 * EPS * sum(bars.lengths)  # at a change point the bars just meet
-        assert start < stop and (closes(bars, np.linspace(start, stop, 50)) > touching).all()
-        ends = closes(bars, np.array([start - math.radians(1.001), stop + math.radians(1.001)]))
+        touching = (
+            -16.0 * EPS * sum(bars.lengths)
+        )  # at a change point the bars just meet
+        assert (
+            start < stop
+            and (closes(bars, np.linspace(start, stop, 50)) > touching).all()
+        )
+        ends = closes(
+            bars, np.array([start - math.radians(1.001), stop + math.radians(1.001)])
+        )
         assert (ends < 0.0).all()
         holds_theta_1 = closes(bars, np.array([bars.ground_angle]))[0] > touching
         assert (start < bars.ground_angle < stop) == holds_theta_1

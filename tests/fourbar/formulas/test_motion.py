@@ -18,7 +18,9 @@ CLOSURE = 8 * EPS
 """Of the sum of the lengths: eight roundings of unit vectors and their sum."""
 
 
-def linkage(theta_1: float = 0.4, lengths: tuple[float, ...] = LENGTHS) -> fourbar.FourBar:
+def linkage(
+    theta_1: float = 0.4, lengths: tuple[float, ...] = LENGTHS
+) -> fourbar.FourBar:
     ground, *moving = lengths
     return fourbar.FourBar(ground, *map(fourbar.Bar, moving), ground_angle=theta_1)
 
@@ -35,21 +37,38 @@ def test_positions_that_cannot_close_are_nan_and_say_so() -> None:
     link = fourbar.uniform(1.0, 1.0, 0.4, 0.4)
     moving = compute_state(link, np.array([0.5, 2.0]), 1)
     assert assembled(moving).tolist() == [True, False]
-    for value in (angle(moving, 3), moving.omega(3), moving.alpha(4), moving.point(3, 0.1)):
+    for value in (
+        angle(moving, 3),
+        moving.omega(3),
+        moving.alpha(4),
+        moving.point(3, 0.1),
+    ):
         assert np.isnan(value).tolist() == [False, True]
 
 
 @pytest.mark.parametrize(
     "lengths",  # no bars alike, or one pair: one alone never stays parallel
-    [(0.5, 0.4, 0.3, 0.25), (0.5, 0.3, 0.4, 0.3), (0.5, 0.6, 0.5, 0.45), (0.5, 0.3, 0.3, 0.25), (0.5, 0.6, 0.45, 0.5)],
+    [
+        (0.5, 0.4, 0.3, 0.25),
+        (0.5, 0.3, 0.4, 0.3),
+        (0.5, 0.6, 0.5, 0.45),
+        (0.5, 0.3, 0.3, 0.25),
+        (0.5, 0.6, 0.45, 0.5),
+    ],
 )
 @pytest.mark.parametrize("offset", [1e-6, 1e-12, 1e-20, 1e-40])
-def test_beyond_a_limit_nothing_assembles_however_near(lengths: tuple[float, ...], offset: float) -> None:
+def test_beyond_a_limit_nothing_assembles_however_near(
+    lengths: tuple[float, ...], offset: float
+) -> None:
     link = linkage(0.2, lengths)
     # the first limit ends the range in which the linkage closes, the second begins it
     for limit, inside in ((1, -1.0), (2, 1.0)):
         status = [
-            fourbar.solve(fourbar.Scene(link, fourbar.Motion(fourbar.FromLimit(limit, side * offset), 1.0))).status
+            fourbar.solve(
+                fourbar.Scene(
+                    link, fourbar.Motion(fourbar.FromLimit(limit, side * offset), 1.0)
+                )
+            ).status
             for side in (inside, 0.0, -inside)
         ]
         assert status == [["ok"], ["singular"], ["not_assembled"]]
@@ -63,7 +82,9 @@ BY_DIFFERENCES = 1e-5
 @pytest.mark.parametrize("alpha", [0.0, 1.0, -7.0])
 @pytest.mark.parametrize("theta_1", [0.0, 0.4])
 @pytest.mark.parametrize("point", [(0.05, -0.02), (0.07, 0.0), (0.0, 1.0)])
-def test_points_move_as_their_positions_do(point: tuple[float, float], theta_1: float, alpha: float) -> None:
+def test_points_move_as_their_positions_do(
+    point: tuple[float, float], theta_1: float, alpha: float
+) -> None:
     """Points of all bars as complex numbers; speeds and accelerations as differences of their positions."""
     link, omega = linkage(theta_1), 3.0
     angles = np.linspace(0.3, 6.0, 9)
@@ -78,17 +99,30 @@ def test_points_move_as_their_positions_do(point: tuple[float, float], theta_1: 
     e2, e3, e4 = (np.exp(1j * angle(moving, bar)) for bar in (2, 3, 4))
     O4 = d * cmath.exp(1j * theta_1)
     first = {2: np.zeros(9), 3: a * e2, 4: np.full(9, O4)}
-    pins = {(2, a): a * e2, (3, 0.0): a * e2, (3, b): a * e2 + b * e3, (4, c): a * e2 + b * e3, (4, 0.0): first[4]}
+    pins = {
+        (2, a): a * e2,
+        (3, 0.0): a * e2,
+        (3, b): a * e2 + b * e3,
+        (4, c): a * e2 + b * e3,
+        (4, 0.0): first[4],
+    }
     for (bar, along), place in pins.items():
         assert np.max(np.abs(moving.point(bar, along) - place)) <= CLOSURE
     for bar, unit in ((2, e2), (3, e3), (4, e4)):
         assert np.max(np.abs(moving.direction(bar) - unit)) <= CLOSURE
         assert np.max(np.abs(moving.foot(bar) - first[bar])) <= CLOSURE
         place = moving.point(bar, z)
-        assert place.shape == (9,) and np.max(np.abs(place - (first[bar] + z * unit))) <= CLOSURE
+        assert (
+            place.shape == (9,)
+            and np.max(np.abs(place - (first[bar] + z * unit))) <= CLOSURE
+        )
         ahead, back = (at(t).point(bar, z) for t in (STEP, -STEP))
-        assert moving.velocity(bar, z) == pytest.approx((ahead - back) / (2 * STEP), abs=BY_DIFFERENCES)
-        assert moving.point_coefficient(bar, z) * omega == pytest.approx(moving.velocity(bar, z), abs=CLOSURE * omega)
+        assert moving.velocity(bar, z) == pytest.approx(
+            (ahead - back) / (2 * STEP), abs=BY_DIFFERENCES
+        )
+        assert moving.point_coefficient(bar, z) * omega == pytest.approx(
+            moving.velocity(bar, z), abs=CLOSURE * omega
+        )
         bend = (ahead - 2.0 * place + back) / STEP**2
         assert moving.acceleration(bar, z) == pytest.approx(bend, abs=BY_DIFFERENCES)
 
@@ -97,28 +131,49 @@ def test_singular_positions_have_no_speed_and_their_neighbours_keep_theirs() -> 
     link = fourbar.uniform(0.3, 0.1, 0.3, 0.1)
     theta_2 = np.array([0.0, 1.0, math.pi])
     moving = compute_state(link, theta_2, 1, 2.0, 5.0)
-    assert find_singular(moving.position).tolist() == [True, False, True] and assembled(moving).all()
+    assert (
+        find_singular(moving.position).tolist() == [True, False, True]
+        and assembled(moving).all()
+    )
     assert np.isnan(moving.position.root).tolist() == [True, False, True]
-    assert np.isfinite(moving.position.sin_mu).all() and np.isfinite(moving.position.u3).all()
+    assert (
+        np.isfinite(moving.position.sin_mu).all()
+        and np.isfinite(moving.position.u3).all()
+    )
     for bar in (3, 4):
         assert np.isnan(moving.omega(bar)).tolist() == [True, False, True]
-    assert (moving.omega(4)[1], moving.alpha(4)[1], moving.alpha(3)[1]) == (2.0, 5.0, 0.0)
+    assert (moving.omega(4)[1], moving.alpha(4)[1], moving.alpha(3)[1]) == (
+        2.0,
+        5.0,
+        0.0,
+    )
     still = compute_state(link, theta_2, 1, 2.0)
-    assert np.isnan(still.alpha(3)).tolist() == np.isnan(still.alpha(4)).tolist() == [True, False, True]
+    assert (
+        np.isnan(still.alpha(3)).tolist()
+        == np.isnan(still.alpha(4)).tolist()
+        == [True, False, True]
+    )
     assert not find_singular(compute_state(linkage(), ANGLES, 1).position).any()
 
 
 @pytest.mark.parametrize("lengths", [(3, 1, 2, 2), (0.99, 0.97, 0.98, 0.98)])
-def test_within_the_rounding_of_a_change_point_no_direction_is_left(lengths: tuple[float, ...]) -> None:
+def test_within_the_rounding_of_a_change_point_no_direction_is_left(
+    lengths: tuple[float, ...],
+) -> None:
     theta_2 = math.pi + 2.0 * EPS * np.arange(5)  # the next doubles after pi
     moving = compute_state(fourbar.uniform(*lengths), theta_2, 1)
-    assert (moving.position.sin_mu > 0.0).all() and (moving.position.sin_mu < 8.0 * EPS).all()
+    assert (moving.position.sin_mu > 0.0).all() and (
+        moving.position.sin_mu < 8.0 * EPS
+    ).all()
     assert find_singular(moving.position).all() and np.isnan(moving.omega(3)).all()
-    assert not find_singular(compute_state(fourbar.uniform(*lengths), theta_2 + 1e-13, 1).position).any()
+    assert not find_singular(
+        compute_state(fourbar.uniform(*lengths), theta_2 + 1e-13, 1).position
+    ).any()
 
 
 @pytest.mark.parametrize(
-    ("lengths", "branch"), [((0.3, 0.1, 0.3, 0.1), 1), ((0.1, 0.3, 0.3, 0.1), -1), ((0.2, 0.2, 0.2, 0.2), 1)]
+    ("lengths", "branch"),
+    [((0.3, 0.1, 0.3, 0.1), 1), ((0.1, 0.3, 0.3, 0.1), -1), ((0.2, 0.2, 0.2, 0.2), 1)],
 )
 @pytest.mark.parametrize("half_turn", [0, 1])
 @pytest.mark.parametrize("theta_1", [0.0, 0.4])
@@ -133,35 +188,57 @@ def test_pairs_that_stay_parallel_keep_the_directions_of_ground_and_input(
     u1, u2 = cmath.exp(1j * theta_1), moving.position.u2
     together = lengths[1] == lengths[3]  # a parallelogram
     directions, speeds, growths = (
-        ((u1, u2), (0.0, 2.0), (0.0, 3.0)) if together else ((-u2, -u1), (2.0, 0.0), (3.0, 0.0))
+        ((u1, u2), (0.0, 2.0), (0.0, 3.0))
+        if together
+        else ((-u2, -u1), (2.0, 0.0), (3.0, 0.0))
     )
     for k, bar in enumerate((3, 4)):
-        assert moving.direction(bar) == pytest.approx(np.broadcast_to(directions[k], 3), abs=EPS)
+        assert moving.direction(bar) == pytest.approx(
+            np.broadcast_to(directions[k], 3), abs=EPS
+        )
         assert np.array_equal(moving.omega(bar), np.full(3, speeds[k]))
         assert np.array_equal(moving.alpha(bar), np.full(3, growths[k]))
     # between the bars: the angle of input and ground
-    assert np.abs(moving.position.sin_mu) == pytest.approx(np.abs(np.sin(theta_2 - theta_1)), rel=8 * EPS, abs=2 * EPS)
+    assert np.abs(moving.position.sin_mu) == pytest.approx(
+        np.abs(np.sin(theta_2 - theta_1)), rel=8 * EPS, abs=2 * EPS
+    )
 
 
 @pytest.mark.parametrize("theta_1", [0.0, 0.4, -2.5])
 @pytest.mark.parametrize("branch", [1, -1])
-def test_a_kite_whose_A_lies_on_O4_lies_where_its_neighbours_do(branch: int, theta_1: float) -> None:
+def test_a_kite_whose_A_lies_on_O4_lies_where_its_neighbours_do(
+    branch: int, theta_1: float
+) -> None:
     """As theta_2 falls to theta_1 bars 3 and 4 come to lie on the ground's line, both in the same direction."""
-    link = fourbar.FourBar(0.3, fourbar.Bar(0.3), fourbar.Bar(0.2), fourbar.Bar(0.2), theta_1)
+    link = fourbar.FourBar(
+        0.3, fourbar.Bar(0.3), fourbar.Bar(0.2), fourbar.Bar(0.2), theta_1
+    )
     step = 2.0**-30
     # on it, and so near that e^2 leaves the range of doubles
-    for psi, towards in ((0.0, 1.0), *((side * psi, side) for psi in (1e-170, 1e-157) for side in (1.0, -1.0))):
+    for psi, towards in (
+        (0.0, 1.0),
+        *((side * psi, side) for psi in (1e-170, 1e-157) for side in (1.0, -1.0)),
+    ):
         if psi != 0.0 and theta_1 != 0.0:
             continue
         on, near = (
-            compute_state(link, theta_1 + np.array([psi, 0.5]), branch, 2.0, 3.0) for psi in (psi, towards * step)
+            compute_state(link, theta_1 + np.array([psi, 0.5]), branch, 2.0, 3.0)
+            for psi in (psi, towards * step)
         )
         for bar in (3, 4):
-            assert on.direction(bar) == pytest.approx(near.direction(bar), abs=2.0 * step)
+            assert on.direction(bar) == pytest.approx(
+                near.direction(bar), abs=2.0 * step
+            )
         assert find_singular(on.position).tolist() == [True, False]
-        assert np.isnan(on.omega(3)).tolist() == np.isnan(on.alpha(4)).tolist() == [True, False]
+        assert (
+            np.isnan(on.omega(3)).tolist()
+            == np.isnan(on.alpha(4)).tolist()
+            == [True, False]
+        )
     # with b and c unlike each other nothing closes there
-    assert not assembled(compute_state(fourbar.uniform(0.3, 0.3, 0.2, 0.25), np.zeros(1), branch)).any()
+    assert not assembled(
+        compute_state(fourbar.uniform(0.3, 0.3, 0.2, 0.25), np.zeros(1), branch)
+    ).any()
 
 
 def test_near_parallel_bars_mu_is_the_angle_of_the_input_to_the_last_bit() -> None:
@@ -172,7 +249,9 @@ def test_near_parallel_bars_mu_is_the_angle_of_the_input_to_the_last_bit() -> No
         dot(position.u3, position.u4), position.u2.real
     )
     # 8 EPS has no digit left, the next double has
-    assert find_singular(compute_state(link, np.array([8.0 * EPS, 8.0 * EPS * (1.0 + EPS)]), 1).position).tolist() == [
+    assert find_singular(
+        compute_state(link, np.array([8.0 * EPS, 8.0 * EPS * (1.0 + EPS)]), 1).position
+    ).tolist() == [
         True,
         False,
     ]
@@ -186,28 +265,41 @@ def test_short_ground_and_input_leave_no_digit_of_mu() -> None:
         link = fourbar.uniform(d, a, b, b)
         moving = compute_state(link, psi, 1, 2.0)
         e = np.abs(d - a * np.exp(1j * psi))
-        assert assembled(moving).all() and np.array_equal(find_singular(moving.position), e / b <= 8.0 * EPS)
+        assert assembled(moving).all() and np.array_equal(
+            find_singular(moving.position), e / b <= 8.0 * EPS
+        )
         assert np.array_equal(np.isnan(moving.omega(3)), find_singular(moving.position))
         status = fourbar.solve(fourbar.Scene(link, fourbar.Motion(psi, 2.0))).status
-        assert [word == "singular" for word in status] == find_singular(moving.position).tolist()
+        assert [word == "singular" for word in status] == find_singular(
+            moving.position
+        ).tolist()
 
 
 @pytest.mark.parametrize("theta_1", [0.0, 1.2, -2.9])
 @pytest.mark.parametrize("branch", [1, -1])
-@pytest.mark.parametrize("lengths", [(0.3, 0.1, 0.25, 0.22), (0.3, 0.25, 0.1, 0.22), (0.3, 0.3, 0.2, 0.2)])
+@pytest.mark.parametrize(
+    "lengths", [(0.3, 0.1, 0.25, 0.22), (0.3, 0.25, 0.1, 0.22), (0.3, 0.3, 0.2, 0.2)]
+)
 def test_angles_alone_are_those_of_the_whole_position(
     lengths: tuple[float, float, float, float], branch: int, theta_1: float
 ) -> None:
     """The same angles, statuses and gaps, a limit and A on O4 among them; to the roundings of an angle."""
     link = linkage(theta_1, lengths)
     theta_2 = theta_1 + np.concatenate([np.linspace(-7.0, 7.0, 57), [0.0, np.pi, 1e-9]])
-    command = fourbar.scene.Command(theta_2, np.full(theta_2.shape, branch, np.int8), None, 0.0)
+    command = fourbar.scene.Command(
+        theta_2, np.full(theta_2.shape, branch, np.int8), None, 0.0
+    )
     positions = fourbar.solve(fourbar.Scene(link), "position", at=command)
     alone = fourbar.solve(
-        fourbar.Scene(link), at=command, out={"theta_3": np.empty(theta_2.shape), "theta_4": np.empty(theta_2.shape)}
+        fourbar.Scene(link),
+        at=command,
+        out={"theta_3": np.empty(theta_2.shape), "theta_4": np.empty(theta_2.shape)},
     )
     assert alone.status == positions.status
     for name in ("theta_3", "theta_4"):
         ours, theirs = getattr(alone, name), getattr(positions, name)
         assert np.array_equal(np.isnan(ours), np.isnan(theirs))
-        assert np.nanmax(np.abs(np.remainder(ours - theirs + np.pi, 2.0 * np.pi) - np.pi)) <= 1e-15 * 32
+        assert (
+            np.nanmax(np.abs(np.remainder(ours - theirs + np.pi, 2.0 * np.pi) - np.pi))
+            <= 1e-15 * 32
+        )

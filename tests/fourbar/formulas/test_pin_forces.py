@@ -26,9 +26,20 @@ def make_bodies(case: fourbar.Scene, command: fourbar.scene.Command) -> FreeBodi
     """The right-hand sides of the thirteen equations from the kinematics, under gravity alone."""
     s = fourbar.solve(case, "acceleration", at=command)
     gravity = np.array(
-        next((effect.vector for effect in case.effects if isinstance(effect, fourbar.Gravity)), (0.0, 0.0))
+        next(
+            (
+                effect.vector
+                for effect in case.effects
+                if isinstance(effect, fourbar.Gravity)
+            ),
+            (0.0, 0.0),
+        )
     )
-    first = {2: np.zeros_like(s.A), 3: s.A, 4: np.full_like(s.A, (case.linkage.ground, 0.0))}
+    first = {
+        2: np.zeros_like(s.A),
+        3: s.A,
+        4: np.full_like(s.A, (case.linkage.ground, 0.0)),
+    }
     second = {2: s.A, 3: s.B, 4: s.B}
     bars = {k: case.linkage.bar(k) for k in MOVING_BARS}
     centre = {k: getattr(s, f"G{k}") for k in MOVING_BARS}
@@ -48,9 +59,22 @@ def scene(drive_bar: int) -> fourbar.Scene:
         fourbar.Bar(0.22, 0.4),
         0.3,
     )
-    loads = (fourbar.Load(3, (5.0, 1.0), (0.05, 0.3), 0.2, "bar"), fourbar.Load(4, (-3.0, 0.5)))
-    effects = (fourbar.Gravity(), fourbar.Viscous.at(O2=0.1, A=0.05, B=0.02), fourbar.Friction.at(O4=0.03))
-    return fourbar.Scene(link, fourbar.Motion(np.linspace(0.1, 6.0, 31), -8.0, 20.0), drive_bar, loads, effects)
+    loads = (
+        fourbar.Load(3, (5.0, 1.0), (0.05, 0.3), 0.2, "bar"),
+        fourbar.Load(4, (-3.0, 0.5)),
+    )
+    effects = (
+        fourbar.Gravity(),
+        fourbar.Viscous.at(O2=0.1, A=0.05, B=0.02),
+        fourbar.Friction.at(O4=0.03),
+    )
+    return fourbar.Scene(
+        link,
+        fourbar.Motion(np.linspace(0.1, 6.0, 31), -8.0, 20.0),
+        drive_bar,
+        loads,
+        effects,
+    )
 
 
 CORRECT = {
@@ -84,28 +108,46 @@ def test_the_model_mechanism_of_the_thesis(inertias: tuple[float, float]) -> Non
     )
     loads = [fourbar.Load(2, (10, 0), (0.05, math.radians(265)))]
     loads += [fourbar.Load(k, moment=-0.15) for k in (2, 3, 4)]
-    s = fourbar.solve(fourbar.Scene(link, fourbar.Motion(math.radians(135), 0.2244), 4, tuple(loads)))
+    s = fourbar.solve(
+        fourbar.Scene(link, fourbar.Motion(math.radians(135), 0.2244), 4, tuple(loads))
+    )
     torque, *forces = CORRECT[inertias]
     assert s.torque is not None
     assert s.torque[0] == pytest.approx(torque, rel=PRINTED)
     for name, force in zip(("F12", "F32", "F43", "F14"), forces, strict=True):
-        assert getattr(s, name)[0] == pytest.approx(force, rel=0, abs=PRINTED * math.hypot(*force))
+        assert getattr(s, name)[0] == pytest.approx(
+            force, rel=0, abs=PRINTED * math.hypot(*force)
+        )
 
 
 @pytest.mark.parametrize("drive_bar", [2, 3, 4])
 @pytest.mark.parametrize("alpha", [0.0, 70.0])
 @pytest.mark.parametrize(
     "bodies",
-    [((0, 1), (1, 0), (0.4, 1)), ((1, 1), (0, 0), (1, 0)), ((0, 0), (0, 0.5), (0.7, 0)), ((0, 0), (1, 1), (0, 0))],
+    [
+        ((0, 1), (1, 0), (0.4, 1)),
+        ((1, 1), (0, 0), (1, 0)),
+        ((0, 0), (0, 0.5), (0.7, 0)),
+        ((0, 0), (1, 1), (0, 0)),
+    ],
 )
-def test_bars_without_mass_or_inertia(bodies: tuple[tuple[float, float], ...], alpha: float, drive_bar: int) -> None:
+def test_bars_without_mass_or_inertia(
+    bodies: tuple[tuple[float, float], ...], alpha: float, drive_bar: int
+) -> None:
     """Mass and inertia of 0 and of 1, where a term may be left out: the thirteen equations leave none out."""
-    bars = (fourbar.Bar(x, *body, (0.4 * x, 0.3)) for x, body in zip((0.1, 0.25, 0.22), bodies, strict=True))
+    bars = (
+        fourbar.Bar(x, *body, (0.4 * x, 0.3))
+        for x, body in zip((0.1, 0.25, 0.22), bodies, strict=True)
+    )
     link, motion = fourbar.FourBar(0.3, *bars), fourbar.Motion(0.0, 10.0)
-    command = fourbar.scene.Command(np.linspace(0.1, 6.0, 13), np.ones(13, np.int8), 10.0, alpha)
+    command = fourbar.scene.Command(
+        np.linspace(0.1, 6.0, 13), np.ones(13, np.int8), 10.0, alpha
+    )
     for effects in ((), (fourbar.Gravity(),)):
         case = fourbar.Scene(link, motion, drive_bar, effects=effects)
-        compare_with_thirteen(make_bodies(case, command), fourbar.solve(case, at=command))
+        compare_with_thirteen(
+            make_bodies(case, command), fourbar.solve(case, at=command)
+        )
 
 
 def compare_with_thirteen(bodies: FreeBodies, s: fourbar.Solution) -> None:
@@ -113,29 +155,51 @@ def compare_with_thirteen(bodies: FreeBodies, s: fourbar.Solution) -> None:
     unknowns = solve_thirteen(bodies, s.drive_bar)
     size = SOLVED * np.max(np.abs(unknowns[:, :12])) / np.min(np.abs(s.drive_condition))
     for name, column in (("F12", 0), ("F32", 2), ("F43", 6), ("F14", 8)):
-        assert np.max(np.abs(unknowns[:, column : column + 2] - getattr(s, name))) <= size
+        assert (
+            np.max(np.abs(unknowns[:, column : column + 2] - getattr(s, name))) <= size
+        )
     assert np.max(np.abs(unknowns[:, 12] - s.torque)) <= size
 
 
-@pytest.mark.parametrize("pins", [("O2",), ("A",), ("B",), ("O4",), ("O2", "A", "B", "O4")], ids="-".join)
+@pytest.mark.parametrize(
+    "pins", [("O2",), ("A",), ("B",), ("O4",), ("O2", "A", "B", "O4")], ids="-".join
+)
 @pytest.mark.parametrize("drive_bar", [2, 3, 4])
 def test_the_couple_of_a_loaded_pin_is_its_force_times_the_radius_of_friction(
     pins: tuple[str, ...], drive_bar: int
 ) -> None:
     """With the couples mu r |F| of the forces found, the thirteen equations give these forces again."""
-    case = fourbar.Scene(make_example().linkage, fourbar.Motion(0.0, 10.0), drive_bar, effects=(fourbar.Gravity(),))
-    command = fourbar.scene.Command(np.linspace(0.1, 6.0, 13), np.ones(13, np.int8), 10.0, 0.0)
+    case = fourbar.Scene(
+        make_example().linkage,
+        fourbar.Motion(0.0, 10.0),
+        drive_bar,
+        effects=(fourbar.Gravity(),),
+    )
+    command = fourbar.scene.Command(
+        np.linspace(0.1, 6.0, 13), np.ones(13, np.int8), 10.0, 0.0
+    )
     friction = fourbar.PinFriction.at(**{pin: (0.1, 0.02) for pin in pins})
-    s, bodies = fourbar.solve(replace(case, effects=(*case.effects, friction)), at=command), make_bodies(case, command)
+    s, bodies = (
+        fourbar.solve(replace(case, effects=(*case.effects, friction)), at=command),
+        make_bodies(case, command),
+    )
     rate = {1: 0.0, 2: s.omega_2, 3: s.omega_3, 4: s.omega_4}
     for pin in pins:
         i, j = PINS[pin]
-        couple = 0.1 * 0.02 * np.hypot(*getattr(s, PIN_FORCE[pin]).T) * np.sign(rate[j] - rate[i])
+        couple = (
+            0.1
+            * 0.02
+            * np.hypot(*getattr(s, PIN_FORCE[pin]).T)
+            * np.sign(rate[j] - rate[i])
+        )
         for bar, sign in ((i, 1.0), (j, -1.0)):
             if bar != 1:
                 bodies.inertia_moment[bar][:] -= sign * couple
     largest = max(np.max(np.hypot(*getattr(s, name).T)) for name in PIN_FORCE.values())
-    assert s.friction_residual is not None and np.max(s.friction_residual) <= 8.0 * EPS * 0.1 * 0.02 * largest
+    assert (
+        s.friction_residual is not None
+        and np.max(s.friction_residual) <= 8.0 * EPS * 0.1 * 0.02 * largest
+    )
     compare_with_thirteen(bodies, s)
 
 
@@ -145,35 +209,55 @@ def test_a_force_between_two_bars_in_line_does_not_exist() -> None:
         force = solve_between(2.0, 3.0, u, v, cross(u, v))
     assert not np.isfinite(force[0])
     u, v, force = u[1:], v[1:], force[1:]
-    assert cross(u, force) == pytest.approx([2.0, 2.0]) and cross(v, force) == pytest.approx([3.0, 3.0])
+    assert cross(u, force) == pytest.approx([2.0, 2.0]) and cross(
+        v, force
+    ) == pytest.approx([3.0, 3.0])
 
 
 @pytest.mark.parametrize("drive_bar", [2, 3, 4])
 def test_dry_friction_at_rest_holds_as_much_as_its_work(drive_bar: int) -> None:
     """Virtual work: the torque may move by the friction couples times the turns of their pins, in either sense."""
     couples = {"O2": 0.04, "A": 0.02, "B": 0.03, "O4": 0.01}
-    case = replace(scene(drive_bar), motion=fourbar.Motion(np.linspace(0.1, 6.0, 7), 0.0))
+    case = replace(
+        scene(drive_bar), motion=fourbar.Motion(np.linspace(0.1, 6.0, 7), 0.0)
+    )
     loads_and_gravity = replace(case, effects=case.effects[:1])
-    s = fourbar.solve(replace(case, effects=(case.effects[0], fourbar.Friction.at(**couples))))
+    s = fourbar.solve(
+        replace(case, effects=(case.effects[0], fourbar.Friction.at(**couples)))
+    )
     free = fourbar.solve(loads_and_gravity)
-    turning = fourbar.solve(replace(loads_and_gravity, motion=case.motion.replace(speed=1.0)))
+    turning = fourbar.solve(
+        replace(loads_and_gravity, motion=case.motion.replace(speed=1.0))
+    )
     rate = {1: 0.0, 2: 1.0, 3: turning.omega_3, 4: turning.omega_4}
     pins = {"O2": (1, 2), "A": (2, 3), "B": (3, 4), "O4": (1, 4)}
-    work = sum(f * np.abs(rate[j] - rate[i]) for (i, j), f in ((pins[pin], f) for pin, f in couples.items()))
+    work = sum(
+        f * np.abs(rate[j] - rate[i])
+        for (i, j), f in ((pins[pin], f) for pin, f in couples.items())
+    )
     half = work / np.abs(rate[drive_bar])
     size = np.abs(free.torque) + half
     for end, side in ((s.torque_high, 1.0), (s.torque_low, -1.0)):
         assert np.all(np.abs(end - (free.torque + side * half)) <= SOLVED * size)
     moving = fourbar.solve(replace(case, motion=case.motion.replace(speed=2.0)))
-    assert np.array_equal(moving.torque_low, moving.torque) and np.array_equal(moving.torque_high, moving.torque)
+    assert np.array_equal(moving.torque_low, moving.torque) and np.array_equal(
+        moving.torque_high, moving.torque
+    )
 
 
 def test_bars_without_mass_hold_a_load_where_the_input_turns_back() -> None:
     """Near a limit position what they hold tends to a limit; in it the speeds are 0/0, and with them no force is."""
-    link = fourbar.FourBar(0.5, fourbar.Bar(0.4), fourbar.Bar(0.3), fourbar.Bar(0.25), 0.2)
+    link = fourbar.FourBar(
+        0.5, fourbar.Bar(0.4), fourbar.Bar(0.3), fourbar.Bar(0.25), 0.2
+    )
     loads = (fourbar.Load(3, (2.0, 0.3), (0.1, 0.02)),)
     on, close, near = (
-        fourbar.solve(fourbar.Scene(link, fourbar.Motion(fourbar.FromLimit(1, offset), 1.0), 4, loads), "error")
+        fourbar.solve(
+            fourbar.Scene(
+                link, fourbar.Motion(fourbar.FromLimit(1, offset), 1.0), 4, loads
+            ),
+            "error",
+        )
         for offset in (0.0, -1e-20, -1e-22)
     )
     assert on.status == ["singular"] and close.status == near.status == ["ok"]
@@ -191,7 +275,9 @@ def test_written_into_given_arrays() -> None:
     solution = fourbar.solve(case)
     out = {"torque": np.empty(31), "F43": np.empty((31, 2))}
     part = fourbar.solve(case, out=out)
-    assert part.torque is out["torque"] and np.array_equal(out["torque"], solution.torque)  # type: ignore[arg-type]
+    assert part.torque is out["torque"] and np.array_equal(
+        out["torque"], solution.torque
+    )  # type: ignore[arg-type]
     assert np.array_equal(out["F43"], solution.F43)  # type: ignore[arg-type]
     assert part.F12 is None and part.theta_3 is None
     with pytest.raises(fourbar.InputError, match=r"out\.torque"):
@@ -206,9 +292,13 @@ def test_the_forces_of_a_member_are_the_same_alone_and_beside_others() -> None:
     ground, names = np.array([0.06, 0.3, 0.08]), ("F12", "F32", "F43", "F14", "torque")
     together = fourbar.solve(fourbar.vary(case, {"lengths.ground": ground}))
     for member, length in enumerate(ground):
-        alone = fourbar.solve(fourbar.vary(case, {"lengths.ground": np.array([length])}))
+        alone = fourbar.solve(
+            fourbar.vary(case, {"lengths.ground": np.array([length])})
+        )
         for name in names:
-            assert np.array_equal(getattr(together, name)[member], getattr(alone, name)[0]), (length, name)
+            assert np.array_equal(
+                getattr(together, name)[member], getattr(alone, name)[0]
+            ), (length, name)
             assert np.isfinite(getattr(alone, name)).all()
 
 
@@ -216,9 +306,13 @@ def test_the_forces_of_a_member_are_the_same_alone_and_beside_others() -> None:
 def test_a_force_beside_B_has_its_moment_there(beside: float) -> None:
     """With the output driven and bars 2 and 4 free of moments, b u3 x F32 is the moment about B: force times arm."""
     b, direction = 0.25, 0.3
-    link = fourbar.FourBar(0.3, fourbar.Bar(0.1), fourbar.Bar(b, centre=(0.0, 0.0)), fourbar.Bar(0.22))
+    link = fourbar.FourBar(
+        0.3, fourbar.Bar(0.1), fourbar.Bar(b, centre=(0.0, 0.0)), fourbar.Bar(0.22)
+    )
     load = fourbar.Load(3, (1.0, direction), (b + beside, 0.0), frame="bar")
-    s = fourbar.solve(fourbar.Scene(link, fourbar.Motion(np.linspace(0.1, 6.0, 7), 0.0), 4, (load,)))
+    s = fourbar.solve(
+        fourbar.Scene(link, fourbar.Motion(np.linspace(0.1, 6.0, 7), 0.0), 4, (load,))
+    )
     arm = (b + beside) - b  # exact: as the doubles have it
     exact = arm * math.sin(direction) / (b * np.abs(np.sin(s.theta_3 - s.theta_2)))
     assert np.hypot(*s.F32.T) == pytest.approx(exact, rel=GROWN)

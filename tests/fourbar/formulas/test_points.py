@@ -11,7 +11,12 @@ from fourbar.errors import InputError
 from fourbar.formulas.mobility import circuits, find_intervals, turns_fully
 from fourbar.formulas.motion import State
 from fourbar.formulas.path import compute_state
-from fourbar.formulas.points import Centre, coupler_curve, instant_centres, point_coefficients
+from fourbar.formulas.points import (
+    Centre,
+    coupler_curve,
+    instant_centres,
+    point_coefficients,
+)
 from fourbar.linkage import Bar, FourBar
 
 EPS = 2.0**-52
@@ -58,7 +63,9 @@ class Exact:
     """Position in 50 digits by the intersection of two circles in the complex plane."""
 
     def __init__(self, drawn: Drawn) -> None:
-        self.d, self.a, self.b, self.c = (mp.mpf(length) for length in drawn.bars.lengths)
+        self.d, self.a, self.b, self.c = (
+            mp.mpf(length) for length in drawn.bars.lengths
+        )
         self.theta_1, self.sign = mp.mpf(drawn.bars.ground_angle), drawn.branch
 
     def pin_b(self, theta_2: mp.mpf) -> tuple[mp.mpc, mp.mpc, mp.mpc]:
@@ -92,7 +99,11 @@ SPECIAL = {
 def special_positions() -> list[Drawn]:
     """Return positions of linkages some of whose terms vanish, on both branches."""
     every = [
-        Drawn(FourBar(d, Bar(a), Bar(b), Bar(c), theta_1), np.array([theta_1 + psi]), branch)
+        Drawn(
+            FourBar(d, Bar(a), Bar(b), Bar(c), theta_1),
+            np.array([theta_1 + psi]),
+            branch,
+        )
         for d, a, b, c, theta_1 in SPECIAL.values()
         for psi in (0.7, 2.5, 4.6)
         for branch in (1, -1)
@@ -100,8 +111,14 @@ def special_positions() -> list[Drawn]:
     return [drawn for drawn in every if drawn.sine > 0.05]
 
 
-@pytest.mark.parametrize("positions", [random_positions(11, 60), special_positions()], ids=["random", "special"])
-def test_directions_and_bar_coefficients_are_those_of_the_loop(positions: list[Drawn]) -> None:
+@pytest.mark.parametrize(
+    "positions",
+    [random_positions(11, 60), special_positions()],
+    ids=["random", "special"],
+)
+def test_directions_and_bar_coefficients_are_those_of_the_loop(
+    positions: list[Drawn],
+) -> None:
     with mp.workdps(50):
         for drawn in positions:
             exact, theta_2 = Exact(drawn), mp.mpf(float(drawn.theta_2[0]))
@@ -111,15 +128,27 @@ def test_directions_and_bar_coefficients_are_those_of_the_loop(positions: list[D
             for bar, first, second in ((3, k.h3, k.dh3), (4, k.h4, k.dh4)):
                 # about the direction itself, so that the angle never jumps
                 theta = exact.angle(bar, theta_2)
-                assert abs(complex(moving.direction(bar)[0]) - mp.expj(theta)) <= FIRST * EPS * size / sine
+                assert (
+                    abs(complex(moving.direction(bar)[0]) - mp.expj(theta))
+                    <= FIRST * EPS * size / sine
+                )
                 slopes[bar], bend = (
-                    mp.diff(lambda x, e=exact, b=bar, about=theta: _near(e.angle(b, x), about), theta_2, n)
+                    mp.diff(
+                        lambda x, e=exact, b=bar, about=theta: _near(
+                            e.angle(b, x), about
+                        ),
+                        theta_2,
+                        n,
+                    )
                     for n in (1, 2)
                 )
                 assert abs(first[0] - slopes[bar]) <= FIRST * EPS * size**2 / sine**2
                 assert abs(second[0] - bend) <= SECOND * EPS * size**3 / sine**4
             assert abs(k.h23[0] - (1 - slopes[3])) <= FIRST * EPS * size**2 / sine**2
-            assert abs(k.h43[0] - (slopes[4] - slopes[3])) <= FIRST * EPS * size**2 / sine**2
+            assert (
+                abs(k.h43[0] - (slopes[4] - slopes[3]))
+                <= FIRST * EPS * size**2 / sine**2
+            )
             assert (k.h2, k.dh2) == (1.0, 0.0)
 
 
@@ -130,11 +159,20 @@ def _near(angle: mp.mpf, about: mp.mpf) -> mp.mpf:
 def test_point_coefficients_are_derivatives() -> None:
     with mp.workdps(50):
         for drawn in random_positions(12, 40):
-            exact, theta_2, sine = Exact(drawn), mp.mpf(float(drawn.theta_2[0])), drawn.sine
+            exact, theta_2, sine = (
+                Exact(drawn),
+                mp.mpf(float(drawn.theta_2[0])),
+                drawn.sine,
+            )
             coefficients = point_coefficients(*drawn, 3, 0.3 - 0.2j)
             size = 1.0 + drawn.bars.input.length / min(drawn.bars.lengths)
-            for n, value, roundings in ((1, coefficients.first, FIRST), (2, coefficients.second, SECOND)):
-                derivative = mp.diff(lambda angle, e=exact: e.point(angle, 0.3, -0.2), theta_2, n)
+            for n, value, roundings in (
+                (1, coefficients.first, FIRST),
+                (2, coefficients.second, SECOND),
+            ):
+                derivative = mp.diff(
+                    lambda angle, e=exact: e.point(angle, 0.3, -0.2), theta_2, n
+                )
                 error = abs(mp.mpc(value[0]) - derivative)
                 assert error <= roundings * EPS * size ** (n + 1) / sine ** (2 * n)
 
@@ -174,9 +212,13 @@ def test_the_coupler_turns_about_I13_and_bars_2_and_4_share_I24() -> None:
 
 def test_centres_at_infinity_have_a_direction() -> None:
     # a parallelogram: bars 2, 4 are parallel, so is the coupler to the ground
-    centres = instant_centres(FourBar(2.0, Bar(1.0), Bar(2.0), Bar(1.0)), np.array([1.0]), 1)
+    centres = instant_centres(
+        FourBar(2.0, Bar(1.0), Bar(2.0), Bar(1.0)), np.array([1.0]), 1
+    )
     assert centres[1, 3].w[0] == 0.0 and centres[2, 4].w[0] == 0.0
-    assert math.atan2(centres[1, 3].y[0], centres[1, 3].x[0]) % math.pi == pytest.approx(1.0, abs=4 * EPS)
+    assert math.atan2(
+        centres[1, 3].y[0], centres[1, 3].x[0]
+    ) % math.pi == pytest.approx(1.0, abs=4 * EPS)
     assert centres[2, 4].y[0] == 0.0 and centres[2, 4].x[0] != 0.0
     assert not np.isfinite(centres[1, 3].point[0][0])
 
@@ -194,7 +236,9 @@ CURVES = {
 
 
 @pytest.mark.parametrize("lengths", CURVES.values(), ids=CURVES)
-def test_coupler_curves_are_closed_and_lie_on_the_sextic(lengths: tuple[float, float, float, float]) -> None:
+def test_coupler_curves_are_closed_and_lie_on_the_sextic(
+    lengths: tuple[float, float, float, float],
+) -> None:
     d, a, b, c = lengths
     bars = FourBar(d, Bar(a), Bar(b), Bar(c), 0.3)
     along, across = 0.4 * b, 0.3 * b
@@ -231,16 +275,23 @@ def _off_sextic(bars: FourBar, point: np.ndarray, along: float, across: float) -
 
 def test_symmetric_circuits_draw_mirror_images() -> None:
     bars = FourBar(3.0, Bar(2.5), Bar(1.0), Bar(2.2))
-    circuit_0, circuit_1 = (coupler_curve(bars, 0.5, 0.0, circuit) for circuit in (0, 1))
+    circuit_0, circuit_1 = (
+        coupler_curve(bars, 0.5, 0.0, circuit) for circuit in (0, 1)
+    )
     assert (circuit_0.y > 0.0).mean() > 0.5 > (circuit_1.y > 0.0).mean()
-    for x, y in ((circuit_0.x[10], -circuit_0.y[10]), (circuit_0.x[200], -circuit_0.y[200])):
+    for x, y in (
+        (circuit_0.x[10], -circuit_0.y[10]),
+        (circuit_0.x[200], -circuit_0.y[200]),
+    ):
         assert np.hypot(circuit_1.x - x, circuit_1.y - y).min() < 1e-12
 
 
 def test_a_curve_with_one_change_point_takes_two_turns() -> None:
     curve = coupler_curve(FourBar(2.0, Bar(1.0), Bar(4.0), Bar(3.0)), 1.0, 1.0)
     assert turns_fully(FourBar(2.0, Bar(1.0), Bar(4.0), Bar(3.0)))
-    assert curve.theta_2[-1] - curve.theta_2[0] == pytest.approx(4 * math.pi, rel=4 * EPS)
+    assert curve.theta_2[-1] - curve.theta_2[0] == pytest.approx(
+        4 * math.pi, rel=4 * EPS
+    )
     assert set(curve.branch.tolist()) == {1, -1}
 
 

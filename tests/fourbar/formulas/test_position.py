@@ -6,10 +6,23 @@ import pytest
 from mpmath import mpf
 
 from fourbar.formulas.arithmetic import cross, dot
-from fourbar.formulas.motion import State, coefficients, put_parallel_pairs, rates, take_sines_of_rates
+from fourbar.formulas.motion import (
+    State,
+    coefficients,
+    put_parallel_pairs,
+    rates,
+    take_sines_of_rates,
+)
 from fourbar.formulas.path import compute_state, drive_sine, prepare_path
 from fourbar.formulas.pin_forces import Body, Wrenches, coupler_about_B, pin_forces
-from fourbar.formulas.position import Loop, close_loop, direction, find_parallel_pairs, half_angle, loop
+from fourbar.formulas.position import (
+    Loop,
+    close_loop,
+    direction,
+    find_parallel_pairs,
+    half_angle,
+    loop,
+)
 from fourbar.linkage import uniform
 
 FEW_ROUNDINGS = 8.0 * 2.0**-52
@@ -37,14 +50,19 @@ def differences(lengths: tuple[float, ...], psi: float, branch: int) -> list[mpf
     def angles(theta: mpf) -> tuple[mpf, mpf]:
         A = a * mp.expj(theta)
         e = abs(d - A)
-        B = A + b * ((d - A) / e) * mp.expj(branch * mp.acos((b * b + e * e - c * c) / (2 * b * e)))
+        B = A + b * ((d - A) / e) * mp.expj(
+            branch * mp.acos((b * b + e * e - c * c) / (2 * b * e))
+        )
         return mp.arg(B - A), mp.arg(B - d)
 
     with mp.workdps(90):
         step = mpf(10) ** -STEP
         before, middle, after = (angles(mpf(psi) + k * step) for k in (-1, 0, 1))
         first = [(y - x) / (2 * step) for x, y in zip(before, after, strict=True)]
-        return first + [(x - 2 * y + z) / step**2 for x, y, z in zip(before, middle, after, strict=True)]
+        return first + [
+            (x - 2 * y + z) / step**2
+            for x, y, z in zip(before, middle, after, strict=True)
+        ]
 
 
 @pytest.mark.parametrize(("lengths", "psi", "branch"), SHORT)
@@ -54,7 +72,12 @@ def test_coefficients_keep_their_digits_where_the_diagonal_is_short(
     k = compute_state(uniform(*lengths), psi, branch).k
     h3, h4, dh3, dh4 = differences(lengths, psi, branch)
     size = FEW_ROUNDINGS * (1 + abs(h3) + abs(h4))
-    for coefficient, exact in ((k.h3, h3), (k.h4, h4), (k.h23, 1 - h3), (k.h43, h4 - h3)):
+    for coefficient, exact in (
+        (k.h3, h3),
+        (k.h4, h4),
+        (k.h23, 1 - h3),
+        (k.h43, h4 - h3),
+    ):
         assert abs(exact - float(coefficient)) < size
     for coefficient, exact in ((k.dh3, dh3), (k.dh4, dh4)):
         assert abs(exact - float(coefficient)) < size / abs(psi)
@@ -73,11 +96,17 @@ def test_small_sines_of_coupler_and_output_keep_their_digits(
         d, a, b, c = map(mpf, lengths)
         A = a * mp.expj(mpf(psi))
         e = abs(d - A)
-        B = A + b * ((d - A) / e) * mp.expj(branch * mp.acos((b * b + e * e - c * c) / (2 * b * e)))
+        B = A + b * ((d - A) / e) * mp.expj(
+            branch * mp.acos((b * b + e * e - c * c) / (2 * b * e))
+        )
         exact = (B - A) / b, (B - d) / c
-    for ours, theirs, before in zip((corrected.u3, corrected.u4), exact, (plain.u3, plain.u4), strict=True):
+    for ours, theirs, before in zip(
+        (corrected.u3, corrected.u4), exact, (plain.u3, plain.u4), strict=True
+    ):
         apart = abs(mp.mpc(ours) - theirs * mp.mpc(u1))
-        assert apart < FEW_ROUNDINGS / abs(psi) and abs(ours - before) < FEW_ROUNDINGS / abs(psi)
+        assert apart < FEW_ROUNDINGS / abs(psi) and abs(
+            ours - before
+        ) < FEW_ROUNDINGS / abs(psi)
         if theta_1 == 0.0:
             assert abs(ours.imag - theirs.imag) < 4.0 * FEW_ROUNDINGS * abs(theirs.imag)
 
@@ -88,17 +117,27 @@ def test_small_sines_are_those_of_the_triangle_elsewhere() -> None:
     assert take_sines_of_rates(bars, position, coefficients(bars, position)) is position
 
 
-def test_moment_of_the_coupler_about_B_is_that_of_its_inertia_at_the_mass_centre() -> None:
-    s = compute_state(uniform(0.3, 0.1, 0.25, 0.22), np.array([0.4, 1.0, 4.0]), 1, 3.0, -5.0)
+def test_moment_of_the_coupler_about_B_is_that_of_its_inertia_at_the_mass_centre() -> (
+    None
+):
+    s = compute_state(
+        uniform(0.3, 0.1, 0.25, 0.22), np.array([0.4, 1.0, 4.0]), 1, 3.0, -5.0
+    )
     three = Body(0.7, 0.02, 0.11 + 0.07j)
     arm = s.point(3, three.z) - s.point(4, s.lengths.c)
     expected = -three.I * s.alpha(3) - three.m * cross(arm, s.acceleration(3, three.z))
-    moment = coupler_about_B(s.lengths, three, s.position, s.moving, drive_sine(s.position, 4))
+    moment = coupler_about_B(
+        s.lengths, three, s.position, s.moving, drive_sine(s.position, 4)
+    )
     assert np.allclose(moment, expected, rtol=0.0, atol=64 * FEW_ROUNDINGS)
 
 
-@pytest.mark.parametrize(("lengths", "branch"), [((3.0, 1.0, 3.0, 1.0), 1), ((3.0, 1.0, 1.0, 3.0), -1)])
-def test_bars_that_stay_parallel_turn_as_one(lengths: tuple[float, ...], branch: int) -> None:
+@pytest.mark.parametrize(
+    ("lengths", "branch"), [((3.0, 1.0, 3.0, 1.0), 1), ((3.0, 1.0, 1.0, 3.0), -1)]
+)
+def test_bars_that_stay_parallel_turn_as_one(
+    lengths: tuple[float, ...], branch: int
+) -> None:
     bars, theta_2 = loop(*lengths), np.array([1e-12, 0.7, -0.7, 2.0])
     half = half_angle(bars, theta_2)
     position = close_loop(bars, 1.0 + 0.0j, direction(theta_2), half, branch)
@@ -106,10 +145,22 @@ def test_bars_that_stay_parallel_turn_as_one(lengths: tuple[float, ...], branch:
     assert np.any(first | second) and not np.all(first | second)
     k = coefficients(bars, position)
     exact = put_parallel_pairs(k, first, second)
-    assert set(exact.h23[first]) <= {1.0} and set(exact.h23[second]) <= {0.0}  # however near the change point
+    assert set(exact.h23[first]) <= {1.0} and set(exact.h23[second]) <= {
+        0.0
+    }  # however near the change point
     assert set(exact.h43[first]) <= {1.0} and set(exact.h43[second]) <= {-1.0}
-    for name in ("h3", "h4", "h23", "h43"):  # the formulas themselves, away from the change point, up to rounding
-        assert np.allclose(getattr(k, name)[1:], getattr(exact, name)[1:], rtol=0.0, atol=64 * FEW_ROUNDINGS)
+    for name in (
+        "h3",
+        "h4",
+        "h23",
+        "h43",
+    ):  # the formulas themselves, away from the change point, up to rounding
+        assert np.allclose(
+            getattr(k, name)[1:],
+            getattr(exact, name)[1:],
+            rtol=0.0,
+            atol=64 * FEW_ROUNDINGS,
+        )
 
 
 def two_readings() -> tuple[State, State]:
@@ -119,7 +170,9 @@ def two_readings() -> tuple[State, State]:
     lengths, theta_4 = by_2.lengths, np.angle(by_2.position.u4)
     reading = prepare_path(lengths, 0.0, 4)
     sign = np.sign(drive_sine(by_2.position, 4))
-    position, k = reading.motion(reading.position(theta_4, reading.half_angle(theta_4), sign), sign)
+    position, k = reading.motion(
+        reading.position(theta_4, reading.half_angle(theta_4), sign), sign
+    )
     return by_2, State(lengths, 0.0, by_2.theta_2, position, k, 1.0, rates(k, 1.0, 0.0))
 
 
@@ -132,7 +185,9 @@ def test_grounds_at_several_angles_are_those_of_each() -> None:
         one = prepare_path(lengths, float(angle))
         alone = one.position(theta_2, one.half_angle(theta_2), 1)
         assert np.allclose(positions.u2[row], alone.u2, rtol=0.0, atol=FEW_ROUNDINGS)
-        assert np.allclose(positions.u2[row], np.exp(1j * theta_2), rtol=0.0, atol=FEW_ROUNDINGS)
+        assert np.allclose(
+            positions.u2[row], np.exp(1j * theta_2), rtol=0.0, atol=FEW_ROUNDINGS
+        )
 
 
 @pytest.mark.parametrize("pin", ["O2", "A", "B", "O4"])
@@ -140,7 +195,12 @@ def test_slip_is_that_of_the_two_bars(pin: str) -> None:
     i, j = {"O2": (1, 2), "A": (2, 3), "B": (3, 4), "O4": (1, 4)}[pin]
     for s in two_readings():
         h = (0.0, s.k.h2, s.k.h3, s.k.h4)
-        assert np.allclose(s.slip(pin), np.subtract(h[j - 1], h[i - 1]), rtol=0.0, atol=64 * FEW_ROUNDINGS)
+        assert np.allclose(
+            s.slip(pin),
+            np.subtract(h[j - 1], h[i - 1]),
+            rtol=0.0,
+            atol=64 * FEW_ROUNDINGS,
+        )
 
 
 def test_a_point_moves_by_either_angle_alike() -> None:
@@ -148,19 +208,34 @@ def test_a_point_moves_by_either_angle_alike() -> None:
     for bar in (2, 3, 4):
         z = 0.07 + 0.03j
         chain = by_4.point_coefficient(bar, z) * by_2.k.h4
-        assert np.allclose(by_2.point_coefficient(bar, z), chain, rtol=0.0, atol=64 * FEW_ROUNDINGS)
+        assert np.allclose(
+            by_2.point_coefficient(bar, z), chain, rtol=0.0, atol=64 * FEW_ROUNDINGS
+        )
 
 
 @pytest.mark.parametrize(("ground", "taken"), [(0.01, True), (1.1, False)])
-def test_a_short_ground_takes_the_moment_of_the_force_at_A_from_virtual_work(ground: float, taken: bool) -> None:
+def test_a_short_ground_takes_the_moment_of_the_force_at_A_from_virtual_work(
+    ground: float, taken: bool
+) -> None:
     s = compute_state(uniform(ground, 1.0, 1.2, 1.1), np.array([0.4, 1.0, 4.0]), 1)
     wrenches = Wrenches(1.0 + 2.0j, -0.5j, 0.3 + 0.1j, 0.7, -0.4, 0.2)
     forces = [
-        pin_forces(s.lengths, s.position, 2, s.position.sin_mu, wrenches, 0.2j, moment).F32 for moment in (0.3, -0.5)
+        pin_forces(
+            s.lengths, s.position, 2, s.position.sin_mu, wrenches, 0.2j, moment
+        ).F32
+        for moment in (0.3, -0.5)
     ]
     along = [dot(s.position.u2, F32) for F32 in forces]
-    assert np.allclose(*along, rtol=0.0, atol=64 * FEW_ROUNDINGS * np.max(np.abs(forces)))
+    assert np.allclose(
+        *along, rtol=0.0, atol=64 * FEW_ROUNDINGS * np.max(np.abs(forces))
+    )
     for F32, moment in zip(forces, (0.3, -0.5), strict=True):
         assert (
-            np.allclose(cross(s.position.u2, F32), moment, rtol=0.0, atol=FEW_ROUNDINGS * np.max(np.abs(F32))) is taken
+            np.allclose(
+                cross(s.position.u2, F32),
+                moment,
+                rtol=0.0,
+                atol=FEW_ROUNDINGS * np.max(np.abs(F32)),
+            )
+            is taken
         )

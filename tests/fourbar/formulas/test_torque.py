@@ -34,7 +34,12 @@ def random_case(rng: np.random.Generator) -> tuple[fourbar.FourBar, tuple, Comma
         if 2.0 * lengths.max() < 0.999 * lengths.sum():
             break
     bars = [
-        fourbar.Bar(x, rng.uniform(0, 2), rng.uniform(0, 0.1), (rng.uniform(-0.5, 0.5), rng.uniform(-3, 3)))
+        fourbar.Bar(
+            x,
+            rng.uniform(0, 2),
+            rng.uniform(0, 0.1),
+            (rng.uniform(-0.5, 0.5), rng.uniform(-3, 3)),
+        )
         for x in lengths[1:]
     ]
     linkage = fourbar.FourBar(lengths[0], *bars, ground_angle=rng.uniform(-3, 3))
@@ -56,8 +61,16 @@ def random_case(rng: np.random.Generator) -> tuple[fourbar.FourBar, tuple, Comma
 
 def some_of(command: Command, mask: np.ndarray) -> Command:
     """The positions of a command at which `mask` is true."""
-    omega, alpha = (np.broadcast_to(x, command.theta_2.shape)[mask] for x in (command.omega_2, command.alpha_2))
-    return command._replace(angle=command.theta_2[mask], branch=command.branch[mask], speed=omega, acceleration=alpha)
+    omega, alpha = (
+        np.broadcast_to(x, command.theta_2.shape)[mask]
+        for x in (command.omega_2, command.alpha_2)
+    )
+    return command._replace(
+        angle=command.theta_2[mask],
+        branch=command.branch[mask],
+        speed=omega,
+        acceleration=alpha,
+    )
 
 
 @pytest.mark.slow
@@ -67,10 +80,15 @@ def test_torque_and_pin_forces_agree_with_the_thirteen_equations(drive: int) -> 
     compared = 0
     for _ in range(80):
         linkage, terms, command = random_case(rng)
-        scene = fourbar.Scene(linkage, fourbar.Motion(0.0, 1.0), drive, terms[:3], terms[3:])
+        scene = fourbar.Scene(
+            linkage, fourbar.Motion(0.0, 1.0), drive, terms[:3], terms[3:]
+        )
         ok = solve(scene, "force", at=command).status_code == 0
         command = some_of(command, ok)
-        s, theirs = solve(scene, "force", at=command), solve_thirteen_equations(scene, command)
+        s, theirs = (
+            solve(scene, "force", at=command),
+            solve_thirteen_equations(scene, command),
+        )
         assert s.torque is not None and s.drive_condition is not None
         force = sum(np.hypot(*theirs[name].T) for name in PINS)
         worth = K * EPS / (s.condition**2 * s.drive_condition)
@@ -78,13 +96,17 @@ def test_torque_and_pin_forces_agree_with_the_thirteen_equations(drive: int) -> 
         size = force * max(linkage.lengths) + np.abs(s.torque)
         assert np.all(np.abs(theirs["torque"] - s.torque) <= worth * size)
         for name in PINS:
-            assert np.all(np.hypot(*(theirs[name] - getattr(s, name)).T) <= worth * force)
+            assert np.all(
+                np.hypot(*(theirs[name] - getattr(s, name)).T) <= worth * force
+            )
         compared += len(s)
     assert compared > 1000
 
 
 @pytest.mark.parametrize("offset", [1e-2, 1e-8, 1e-14, 1e-30])
-def test_they_keep_their_digits_at_a_stated_distance_from_a_limit(offset: float) -> None:
+def test_they_keep_their_digits_at_a_stated_distance_from_a_limit(
+    offset: float,
+) -> None:
     """theta_2 = limit + offset: it assembles on one side of the limit, with the torque of the free bodies in balls."""
     for seed in range(6):
         rng = np.random.default_rng(seed)
@@ -93,14 +115,22 @@ def test_they_keep_their_digits_at_a_stated_distance_from_a_limit(offset: float)
             drive, branch = int(rng.integers(2, 5)), int(rng.choice([-1, 1]))
             assembled = []
             for side in (offset, -offset):
-                motion = fourbar.Motion(fourbar.FromLimit(number, side), 1.3, 0.7, branch=branch)
+                motion = fourbar.Motion(
+                    fourbar.FromLimit(number, side), 1.3, 0.7, branch=branch
+                )
                 scene = fourbar.Scene(linkage, motion, drive, terms[:3], terms[3:5])
-                s, exact = solve(scene, "force"), answer_in_balls(scene).get("torque", [np.nan])[0]
+                s, exact = (
+                    solve(scene, "force"),
+                    answer_in_balls(scene).get("torque", [np.nan])[0],
+                )
                 assert s.torque is not None and s.drive_condition is not None
                 assembled.append(bool(s.assembled[0]))
                 assert assembled[-1] == np.isfinite(exact)
                 if assembled[-1]:
-                    assert abs(exact - s.torque[0]) <= K * EPS * abs(s.torque[0]) / s.drive_condition[0]
+                    assert (
+                        abs(exact - s.torque[0])
+                        <= K * EPS * abs(s.torque[0]) / s.drive_condition[0]
+                    )
             assert any(assembled) and (offset > 1e-3 or not all(assembled))
 
 
@@ -115,8 +145,12 @@ def test_where_the_loop_closes_is_known_at_the_last_digits_of_a_limit() -> None:
             ours = solve(fourbar.Scene(linkage), at=command).assembled
             with mp.workdps(50):
                 d, a, b, c = (mp.mpf(length) for length in linkage.lengths)
-                for angle, assembled in zip(angles.tolist(), ours.tolist(), strict=True):
-                    e = abs(d - a * mp.expj(mp.mpf(angle) - mp.mpf(linkage.ground_angle)))
+                for angle, assembled in zip(
+                    angles.tolist(), ours.tolist(), strict=True
+                ):
+                    e = abs(
+                        d - a * mp.expj(mp.mpf(angle) - mp.mpf(linkage.ground_angle))
+                    )
                     missed = max(e - (b + c), abs(b - c) - e)
                     assert assembled == (missed <= U * (a + b + c + d))
                     compared[assembled] += 1
@@ -131,7 +165,11 @@ def free_acceleration(
     terms: tuple = (),  # type: ignore[type-arg]
 ) -> float:
     """alpha_2 of the linkage just released, rad/s^2."""
-    return float(integrate(linkage, terms, theta_2, omega_2, branch, np.zeros(1)).command.alpha_2[0])
+    return float(
+        integrate(
+            linkage, terms, theta_2, omega_2, branch, np.zeros(1)
+        ).command.alpha_2[0]
+    )
 
 
 def test_four_bar_of_gtdynamics() -> None:
@@ -148,10 +186,15 @@ def test_free_acceleration_of_sympy() -> None:
     relative = np.array([2.1, 0.6655470375077588, 2.527408138024188])
     rate = 0.2
     for theta_1 in (0.0, np.pi):
-        linkage = fourbar.FourBar(0.13, linkage.input, linkage.coupler, linkage.output, theta_1)
+        linkage = fourbar.FourBar(
+            0.13, linkage.input, linkage.coupler, linkage.output, theta_1
+        )
         for branch in (1, -1):
             state = state_of(linkage, relative[0], branch)
-            if abs(np.angle(state.position.u3 / state.position.u2) - relative[1]) < 1e-8:
+            if (
+                abs(np.angle(state.position.u3 / state.position.u2) - relative[1])
+                < 1e-8
+            ):
                 alpha = free_acceleration(linkage, relative[0], rate, branch)
                 alpha_3 = state.k.h3 * alpha + state.k.dh3 * rate**2
                 assert abs(state.k.h3 * rate - rate - -0.17963733938852067) < 1e-9
@@ -172,14 +215,21 @@ def test_statics_of_motiongenesis() -> None:
         theta_3, theta_4 = float(np.angle(position.u3)), float(np.angle(position.u4))
         loads = (fourbar.Load(3, (200.0, np.pi / 2), (1.0, theta_3)),)
         motion = fourbar.Motion(angle, 0.0, branch=branch)
-        s = solve(fourbar.Scene(linkage, motion, 2, loads, (fourbar.Gravity(9.81, 0.0),)), "force")
+        s = solve(
+            fourbar.Scene(linkage, motion, 2, loads, (fourbar.Gravity(9.81, 0.0),)),
+            "force",
+        )
         return float(s.torque[0]), theta_3, theta_4
 
     near = np.radians(19.98690555)
     branch = min((1, -1), key=lambda sign: abs(held(near, sign)[0]))
     angle = brentq(lambda q: held(q, branch)[0], near - 1e-3, near + 1e-3, xtol=1e-15)
     _, theta_3, theta_4 = held(angle, branch)
-    for ours, theirs in ((angle, 19.98690555), (theta_3, 71.66202052), (theta_4, 38.32488502)):
+    for ours, theirs in (
+        (angle, 19.98690555),
+        (theta_3, 71.66202052),
+        (theta_4, 38.32488502),
+    ):
         assert abs(np.degrees(ours) - theirs) <= 0.5e-8
 
 
@@ -200,22 +250,36 @@ SHAPES = {
 def of(lengths: tuple[float, ...]) -> fourbar.FourBar:
     """A linkage with masses off their bars."""
     d, *moving, theta_1 = lengths
-    bars = (fourbar.Bar(x, 2.0 + x, 0.01, (0.4 * x, phase)) for x, phase in zip(moving, (0.5, -0.7, 2.0), strict=True))
+    bars = (
+        fourbar.Bar(x, 2.0 + x, 0.01, (0.4 * x, phase))
+        for x, phase in zip(moving, (0.5, -0.7, 2.0), strict=True)
+    )
     return fourbar.FourBar(d, *bars, ground_angle=theta_1)
 
 
 def J_of(linkage: fourbar.FourBar, state: State) -> np.ndarray:
     """The equivalent inertia of all bars, kg m^2."""
-    return np.asarray(sum(inertia(linkage.input.length, list_bodies(linkage), state.position, state.k)))
+    return np.asarray(
+        sum(
+            inertia(linkage.input.length, list_bodies(linkage), state.position, state.k)
+        )
+    )
 
 
 def slope_of(linkage: fourbar.FourBar, state: State) -> np.ndarray:
     """Its derivative by the independent angle."""
-    return np.asarray(2.0 * half_slope(linkage.input.length, list_bodies(linkage), state.position, state.k))
+    return np.asarray(
+        2.0
+        * half_slope(
+            linkage.input.length, list_bodies(linkage), state.position, state.k
+        )
+    )
 
 
 @pytest.mark.parametrize("lengths", SHAPES.values(), ids=SHAPES.keys())
-def test_equivalent_inertia_is_that_of_the_kinetic_energy(lengths: tuple[float, ...]) -> None:
+def test_equivalent_inertia_is_that_of_the_kinetic_energy(
+    lengths: tuple[float, ...],
+) -> None:
     """J against the speeds of the mass centres, J' against its difference, both also in another coordinate."""
     linkage = of(lengths)
     theta_2 = linkage.ground_angle + np.array([0.7, 2.5, 4.6])
@@ -224,37 +288,64 @@ def test_equivalent_inertia_is_that_of_the_kinetic_energy(lengths: tuple[float, 
     for number in (2, 3, 4):
         bar = linkage.bar(number)
         v = np.abs(state.velocity(number, bar.to_centre))
-        energy += 0.5 * bar.mass * v**2 + 0.5 * bar.moment_of_inertia * np.asarray(state.omega(number)) ** 2
+        energy += (
+            0.5 * bar.mass * v**2
+            + 0.5 * bar.moment_of_inertia * np.asarray(state.omega(number)) ** 2
+        )
     ok = np.isfinite(state.position.u3)
     assert ok.any()
     J, slope = J_of(linkage, state), slope_of(linkage, state)
     assert 0.5 * J[ok] * 3.0**2 == pytest.approx(energy[ok], rel=1e-13)
     step = 1e-5
-    ahead, back = (J_of(linkage, state_of(linkage, theta_2 + s, 1)) for s in (step, -step))
-    assert slope[ok] == pytest.approx(((ahead - back) / (2 * step))[ok], abs=1e-6 * float(np.max(J[ok])))
+    ahead, back = (
+        J_of(linkage, state_of(linkage, theta_2 + s, 1)) for s in (step, -step)
+    )
+    assert slope[ok] == pytest.approx(
+        ((ahead - back) / (2 * step))[ok], abs=1e-6 * float(np.max(J[ok]))
+    )
     # q = theta_4: the chain rule, on the path that reads the loop from bar 4
     rate, bend = state.k.h4, state.k.dh4
     backwards = prepare_path(state.lengths, linkage.ground_angle, 4)
     q = np.angle(state.position.u4)
     half = backwards.half_angle(q)
     for sign in (1.0, -1.0):
-        with np.errstate(invalid="ignore"):  # of bars that stay parallel, whose coefficients are put in
+        with np.errstate(
+            invalid="ignore"
+        ):  # of bars that stay parallel, whose coefficients are put in
             position, k = backwards.motion(backwards.position(q, half, sign), sign)
         same = ok & (np.abs(position.u2 - state.position.u2) < 1e-9)
-        by_theta_4 = State(state.lengths, linkage.ground_angle, theta_2, position, k, 1.0, rates(k, 1.0, 0.0))
+        by_theta_4 = State(
+            state.lengths,
+            linkage.ground_angle,
+            theta_2,
+            position,
+            k,
+            1.0,
+            rates(k, 1.0, 0.0),
+        )
         expected = ((slope - 2.0 * J * bend / rate) / rate**3)[same]
         size = float(np.max(np.abs(expected), initial=0.0))
-        assert np.all(np.abs(J_of(linkage, by_theta_4) * rate**2 / J - 1.0)[same] <= READ_BACKWARDS / rate[same] ** 2)
-        assert slope_of(linkage, by_theta_4)[same] == pytest.approx(expected, rel=1e-10, abs=1e-10 * size)
+        assert np.all(
+            np.abs(J_of(linkage, by_theta_4) * rate**2 / J - 1.0)[same]
+            <= READ_BACKWARDS / rate[same] ** 2
+        )
+        assert slope_of(linkage, by_theta_4)[same] == pytest.approx(
+            expected, rel=1e-10, abs=1e-10 * size
+        )
         ok = ok & ~same
     assert not ok.any()
 
 
 @pytest.mark.parametrize("drive", [2, 3, 4])
-def test_springs_tables_and_rest_have_the_torque_of_the_thirteen_equations(drive: int) -> None:
+def test_springs_tables_and_rest_have_the_torque_of_the_thirteen_equations(
+    drive: int,
+) -> None:
     """What depends on O4, on theta_2 and on rest next to motion, in one sweep."""
     linkage = of(SHAPES["crank-rocker"])
-    ends = fourbar.effects.SpringEnd(1, 0.2, 0.3), fourbar.effects.SpringEnd(4, 0.15, 0.2)
+    ends = (
+        fourbar.effects.SpringEnd(1, 0.2, 0.3),
+        fourbar.effects.SpringEnd(4, 0.15, 0.2),
+    )
     table = fourbar.effects.Table((0.0, 2.0, 6.0), (1.0, 3.0, -1.0))
     loads = (fourbar.Load(3, (2.0, 0.3), (0.1, 2.0), 0.4, table=table),)
     effects = (
@@ -262,11 +353,15 @@ def test_springs_tables_and_rest_have_the_torque_of_the_thirteen_equations(drive
         fourbar.Friction.at(O2=0.1, B=0.3),
     )
     omega = np.array([0.0, 3.0, -3.0, 0.0, 1.0])
-    command = Command(np.linspace(0.2, 5.5, 5), np.ones(5, np.int8), omega, np.full(5, 4.0))
+    command = Command(
+        np.linspace(0.2, 5.5, 5), np.ones(5, np.int8), omega, np.full(5, 4.0)
+    )
     for terms in ((loads, effects), (loads, effects[:1]), ((), ())):
         scene = fourbar.Scene(linkage, fourbar.Motion(0.0, 1.0), drive, *terms)
         s = solve(scene, "force", at=command)
-        assert solve_thirteen_equations(scene, command)["torque"] == pytest.approx(s.torque, rel=1e-11)
+        assert solve_thirteen_equations(scene, command)["torque"] == pytest.approx(
+            s.torque, rel=1e-11
+        )
         for i in range(5):  # one by one
             alone = solve(scene, "force", at=some_of(command, np.arange(5) == i)).torque
             assert alone[0] == pytest.approx(s.torque[i], rel=1e-13)
@@ -278,12 +373,18 @@ def test_positions_that_do_not_close_and_limits_are_quiet() -> None:
     linkage = of((0.3, 0.25, 0.1, 0.22, 0.4))
     limit = limit_positions(linkage)[0].theta_2
     state = state_of(linkage, np.array([limit, 0.4 + np.pi, 0.4]), 1, 3.0, 4.0)
-    assert np.isnan(state.position.u3[1:]).all() and not np.isfinite(state.k.h3[1:]).any()
+    assert (
+        np.isnan(state.position.u3[1:]).all() and not np.isfinite(state.k.h3[1:]).any()
+    )
     for number in (1, 2):
         motion = fourbar.Motion(fourbar.FromLimit(number), 3.0, 4.0)
         effects = (fourbar.Gravity(), fourbar.Viscous.at(B=0.1))
         s = solve(fourbar.Scene(linkage, motion, effects=effects))
-        assert s.status == ["singular"] and s.sin_mu[0] == 0.0 and np.isfinite(s.theta_3).all()
+        assert (
+            s.status == ["singular"]
+            and s.sin_mu[0] == 0.0
+            and np.isfinite(s.theta_3).all()
+        )
         assert np.isnan(s.omega_3).all() and np.isnan(s.torque).all()
 
 
@@ -300,8 +401,15 @@ def test_what_touches_is_up_to_the_rounding_of_the_lengths() -> None:
     assert wide[4:] == pytest.approx(products)
 
 
-def test_directions_are_unit_vectors_and_the_last_rate_is_that_of_bar_4_against_bar_3() -> None:
-    lengths = (0.3, 0.3 + 1e-9, 0.25, 0.25 - 1e-9)  # A passes O4 at a billionth of the bars
+def test_directions_are_unit_vectors_and_the_last_rate_is_that_of_bar_4_against_bar_3() -> (
+    None
+):
+    lengths = (
+        0.3,
+        0.3 + 1e-9,
+        0.25,
+        0.25 - 1e-9,
+    )  # A passes O4 at a billionth of the bars
     q = np.concatenate([np.linspace(0.3, 1.5, 20), np.linspace(-1e-8, 1e-8, 40)])
     for sign in (1, -1):
         state = state_of(of((*lengths, 0.0)), q, sign)
@@ -309,13 +417,18 @@ def test_directions_are_unit_vectors_and_the_last_rate_is_that_of_bar_4_against_
         assert closed.sum() > 30 and closed[:20].all()
         for u in (state.position.u2, state.position.u3, state.position.u4):
             assert np.all(np.abs(np.abs(u[closed]) - 1.0) <= 2 * EPS)
-        assert np.all(np.abs(k.h43 - (k.h4 - k.h3))[:20] <= 64 * EPS * (np.abs(k.h3) + np.abs(k.h4))[:20])
+        assert np.all(
+            np.abs(k.h43 - (k.h4 - k.h3))[:20]
+            <= 64 * EPS * (np.abs(k.h3) + np.abs(k.h4))[:20]
+        )
 
 
 def test_a_single_pendulum() -> None:
     """Of a crank alone: T = (I + m r^2) alpha + m g r cos(theta_2 + phi); of bars without mass none."""
     m, r, phi = 0.7, 0.04, 0.5
-    linkage = fourbar.FourBar(0.3, fourbar.Bar(0.1, m, 1e-3, (r, phi)), fourbar.Bar(0.25), fourbar.Bar(0.22))
+    linkage = fourbar.FourBar(
+        0.3, fourbar.Bar(0.1, m, 1e-3, (r, phi)), fourbar.Bar(0.25), fourbar.Bar(0.22)
+    )
     for alpha in (0.0, 5.0):
         motion = fourbar.Motion(np.linspace(0.0, 6.0, 13), 3.0, alpha)
         s = solve(fourbar.Scene(linkage, motion, effects=(fourbar.Gravity(),)), "force")
@@ -326,9 +439,20 @@ def test_a_single_pendulum() -> None:
 def test_a_parallelogram_moves_its_coupler_without_turning_it() -> None:
     """T = (I2 + I4 about the pins + m3 a^2) alpha + the weights at their arms, m3 at A and its own arm at none."""
     a, m2, m3, m4 = 0.1, 0.2, 0.5, 0.4
-    bars = fourbar.Bar(a, m2), fourbar.Bar(0.3, m3, None, (0.2, 1.0)), fourbar.Bar(a, m4)
+    bars = (
+        fourbar.Bar(a, m2),
+        fourbar.Bar(0.3, m3, None, (0.2, 1.0)),
+        fourbar.Bar(a, m4),
+    )
     motion = fourbar.Motion(np.linspace(0.2, 2.9, 13), 3.0, 5.0)
-    s = solve(fourbar.Scene(fourbar.FourBar(0.3, *bars), motion, effects=(fourbar.Gravity(),)), "force")
+    s = solve(
+        fourbar.Scene(
+            fourbar.FourBar(0.3, *bars), motion, effects=(fourbar.Gravity(),)
+        ),
+        "force",
+    )
     J = (m2 + m4) * a**2 / 3.0 + m3 * a**2
     weight = 9.81 * (0.5 * m2 + m3 + 0.5 * m4) * a
-    assert s.torque == pytest.approx(J * 5.0 + weight * np.cos(s.theta_2), rel=0.0, abs=16 * EPS * (weight + J * 5.0))
+    assert s.torque == pytest.approx(
+        J * 5.0 + weight * np.cos(s.theta_2), rel=0.0, abs=16 * EPS * (weight + J * 5.0)
+    )

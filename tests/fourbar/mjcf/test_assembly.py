@@ -32,13 +32,20 @@ NUMBER = r"-?[\d.]+(?:e-?\d+)?"
 def ours(scene: Scene, q: Array, v: Array, a: Array) -> Any:
     """The formulas at the simulator's own angle, speed and acceleration; the file drives bar 2 whatever the scene."""
     scene = replace(scene, drive_bar=2)
-    command = Command(np.array([q[0]]), np.array([1]), np.array([v[0]]), np.array([a[0]]))
+    command = Command(
+        np.array([q[0]]), np.array([1]), np.array([v[0]]), np.array([a[0]])
+    )
     return fourbar.solve(scene, "force", at=command)
 
 
-def errors(scene: Scene, q: Array, v: Array, a: Array, torque: float, force: Array) -> tuple[float, float]:
+def errors(
+    scene: Scene, q: Array, v: Array, a: Array, torque: float, force: Array
+) -> tuple[float, float]:
     """Of T2 and of the pin force at B, by their greatest value in a turn."""
-    expected, turn = ours(scene, q, v, a), fourbar.solve(replace(scene, drive_bar=2), "force")
+    expected, turn = (
+        ours(scene, q, v, a),
+        fourbar.solve(replace(scene, drive_bar=2), "force"),
+    )
     assert turn.torque is not None and turn.F43 is not None
     return (
         abs(torque - expected.torque[0]) / np.abs(turn.torque).max(),
@@ -55,7 +62,10 @@ def read_mujoco(text: str, forward: int) -> tuple[Array, Array, Array, float, Ar
     mujoco.mj_step(model, data, STEPS)
     for _ in range(forward):
         mujoco.mj_forward(model, data)
-    torque = data.actuator_force[model.actuator("drive").id] - model.dof_armature[0] * data.qacc[0]
+    torque = (
+        data.actuator_force[model.actuator("drive").id]
+        - model.dof_armature[0] * data.qacc[0]
+    )
     return data.qpos, data.qvel, data.qacc, float(torque), data.efc_force[:2]
 
 
@@ -72,7 +82,10 @@ def read_warp(text: str, forward: int) -> tuple[Array, Array, Array, float, Arra
         mjw.step(theirs, state)
     for _ in range(forward):
         mjw.forward(theirs, state)
-    q, v, a, drive = (x.numpy()[0].astype(float) for x in (state.qpos, state.qvel, state.qacc, state.actuator_force))
+    q, v, a, drive = (
+        x.numpy()[0].astype(float)
+        for x in (state.qpos, state.qvel, state.qacc, state.actuator_force)
+    )
     torque = drive[model.actuator("drive").id] - model.dof_armature[0] * a[0]
     return q, v, a, float(torque), state.efc.force.numpy()[0, :2].astype(float)
 
@@ -85,11 +98,18 @@ def read_mjx(text: str, steps: int) -> tuple[Array, Array, Array, float, Array]:
     model = mujoco.MjModel.from_xml_string(text)
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, 0)
-    theirs, state, step = mjx.put_model(model), mjx.put_data(model, data), jax.jit(mjx.step)
+    theirs, state, step = (
+        mjx.put_model(model),
+        mjx.put_data(model, data),
+        jax.jit(mjx.step),
+    )
     for _ in range(steps):
         state = step(theirs, state)
     state = jax.jit(mjx.forward)(theirs, state)
-    q, v, a, drive = (np.array(x, dtype=float) for x in (state.qpos, state.qvel, state.qacc, state.actuator_force))
+    q, v, a, drive = (
+        np.array(x, dtype=float)
+        for x in (state.qpos, state.qvel, state.qacc, state.actuator_force)
+    )
     torque = drive[model.actuator("drive").id] - model.dof_armature[0] * a[0]
     closing = getattr(state, "_impl", state).efc_force
     return q, v, a, float(torque), np.array(closing, dtype=float)[:2]
@@ -100,7 +120,9 @@ def keyframe(text: str) -> tuple[Array, float]:
     root = ET.fromstring(text)
     key, option = root.find("keyframe/key"), root.find("option")
     assert key is not None and option is not None
-    return np.array([float(x) for x in str(key.get("qvel")).split()]), float(str(option.get("timestep")))
+    return np.array([float(x) for x in str(key.get("qvel")).split()]), float(
+        str(option.get("timestep"))
+    )
 
 
 def read_genesis(file: Path, steps: int) -> tuple[Array, Array, Array, float, Array]:
@@ -123,7 +145,13 @@ def read_genesis(file: Path, steps: int) -> tuple[Array, Array, Array, float, Ar
     world.step()
     a = world.sim.rigid_solver.get_dofs_acc().cpu().numpy().ravel()
     torque = -float(bars.get_dofs_armature()[0]) * float(a[0])
-    return q, v, a, torque, world.sim.rigid_solver.constraint_solver.efc_force.to_numpy()[:2].ravel()
+    return (
+        q,
+        v,
+        a,
+        torque,
+        world.sim.rigid_solver.constraint_solver.efc_force.to_numpy()[:2].ravel(),
+    )
 
 
 def read_newton(file: Path, steps: int) -> tuple[Array, Array, Array, float, Array]:
@@ -144,7 +172,10 @@ def read_newton(file: Path, steps: int) -> tuple[Array, Array, Array, float, Arr
     data, mjw = solver.mjw_data, importlib.import_module("mujoco_warp")
     for _ in range(2):
         mjw.forward(solver.mjw_model, data)
-    q, v, a, drive = (x.numpy()[0].astype(float) for x in (data.qpos, data.qvel, data.qacc, data.actuator_force))
+    q, v, a, drive = (
+        x.numpy()[0].astype(float)
+        for x in (data.qpos, data.qvel, data.qacc, data.actuator_force)
+    )
     torque = float(drive[0] - solver.mj_model.dof_armature[0] * a[0])
     return q, v, a, torque, data.efc.force.numpy()[0, :2].astype(float)
 
@@ -154,22 +185,36 @@ MIDWAY = 200
 
 
 JOINTS = (fourbar.Gravity(), fourbar.Viscous.at(A=0.05), fourbar.Friction.at(O4=0.1))
-KEPT = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.4, 0.4 + 2.0 * np.pi, 60), 10.0), loads=(), effects=JOINTS)
+KEPT = crank_rocker(
+    motion=fourbar.Motion(fourbar.Sweep(0.4, 0.4 + 2.0 * np.pi, 60), 10.0),
+    loads=(),
+    effects=JOINTS,
+)
 """All of it is in a file for Genesis."""
 ENDS = fourbar.effects.SpringEnd(1, 0.1, -1.5), fourbar.effects.SpringEnd(3, 0.08, 0.3)
-WHOLE = crank_rocker(motion=KEPT.motion, effects=(*JOINTS, fourbar.Springs((fourbar.Spring(*ENDS, 200.0, 0.02),))))
+WHOLE = crank_rocker(
+    motion=KEPT.motion,
+    effects=(*JOINTS, fourbar.Springs((fourbar.Spring(*ENDS, 200.0, 0.02),))),
+)
 STIFF = replace(KEPT, effects=(*JOINTS, Torsion.at(O4=(0.5, 0.2, 0.1))))
 
 
 def test_a_file_for_genesis_names_what_it_leaves_out() -> None:
-    at_B = (fourbar.Viscous.at(A=0.05, B=0.1), fourbar.Friction.at(B=0.2), Torsion.at(B=(1, 0, 0)))
+    at_B = (
+        fourbar.Viscous.at(A=0.05, B=0.1),
+        fourbar.Friction.at(B=0.2),
+        Torsion.at(B=(1, 0, 0)),
+    )
     for scene, names in (
         (KEPT, []),
         (WHOLE, ["loads, springs"]),
         (STIFF, ["rest angles of torsion (it rests as assembled)"]),
         (replace(KEPT, effects=at_B), ["viscous at B, friction at B, torsion at B"]),
     ):
-        assert re.findall(r"it leaves out ([^.]*)\. ", write_mjcf_for(scene, "genesis")) == names
+        assert (
+            re.findall(r"it leaves out ([^.]*)\. ", write_mjcf_for(scene, "genesis"))
+            == names
+        )
 
 
 @pytest.fixture
@@ -184,14 +229,23 @@ def _genesis() -> Iterator[None]:
 @pytest.mark.nightly
 @pytest.mark.usefixtures("_genesis")
 def test_genesis_reads_as_the_comment_says(tmp_path: Path) -> None:
-    assembled = float(fourbar.solve(KEPT, "position").theta_4[0]) - KEPT.linkage.ground_angle
+    assembled = (
+        float(fourbar.solve(KEPT, "position").theta_4[0]) - KEPT.linkage.ground_angle
+    )
     resting = replace(KEPT, effects=(*JOINTS, Torsion.at(O4=(0.5, assembled, 0.0))))
     faster = replace(WHOLE, motion=KEPT.motion.replace(acceleration=30.0))
-    for scene, moves_as in ((KEPT, KEPT), (WHOLE, KEPT), (faster, KEPT), (STIFF, resting)):
+    for scene, moves_as in (
+        (KEPT, KEPT),
+        (WHOLE, KEPT),
+        (faster, KEPT),
+        (STIFF, resting),
+    ):
         (file := tmp_path / "four_bar.xml").write_text(write_mjcf_for(scene, "genesis"))
         read = read_genesis(file, MIDWAY)
         assert max(errors(moves_as, *read)) < YIELDING
-        assert read[1][0] == pytest.approx(10.0, rel=1e-6), "the keyframe's speed, of an accelerated scene too"
+        assert read[1][0] == pytest.approx(10.0, rel=1e-6), (
+            "the keyframe's speed, of an accelerated scene too"
+        )
 
 
 @pytest.mark.nightly
@@ -222,14 +276,19 @@ def test_warp_reads_as_the_comment_says() -> None:
 def test_mjx_reads_as_the_comment_says() -> None:
     scene = crank_rocker(drive_bar=4)
     assert max(errors(scene, *read_mjx(write_mjcf_for(scene, "mjx"), STEPS))) < YIELDING
-    assert max(errors(scene, *read_mjx(write_mjcf_for(scene, "mjx"), 0))) > 0.1, "a state that was only set"
+    assert max(errors(scene, *read_mjx(write_mjcf_for(scene, "mjx"), 0))) > 0.1, (
+        "a state that was only set"
+    )
 
 
 @pytest.mark.parametrize("simulator", SIMULATORS)
 def test_each_file_loads_in_mujoco_and_runs(simulator: str) -> None:
     """Single precision, pads or none: MuJoCo itself carries all of them."""
     scene = crank_rocker()
-    assert max(errors(scene, *read_mujoco(write_mjcf_for(scene, simulator), forward=1))) < CARRIED
+    assert (
+        max(errors(scene, *read_mujoco(write_mjcf_for(scene, simulator), forward=1)))
+        < CARRIED
+    )
 
 
 CARRIED = 2e-3
@@ -240,7 +299,9 @@ def released(**changes: Any) -> Scene:
     """A linkage let go under its weight, with a damper."""
     motion = fourbar.Motion(1.0, 3.0, free=fourbar.Free(0.2, 2))
     effects = (fourbar.Gravity(), fourbar.Viscous.at(O2=0.05))
-    return crank_rocker(**({"motion": motion, "effects": effects, "loads": ()} | changes))
+    return crank_rocker(
+        **({"motion": motion, "effects": effects, "loads": ()} | changes)
+    )
 
 
 FIRST_ORDER = 0.5
@@ -254,15 +315,22 @@ FORCE = 0.01
 @pytest.mark.nightly
 def test_drake_loads_the_sdf_and_moves_as_released() -> None:
     pytest.importorskip("pydrake")
-    plants, parsing = (importlib.import_module(f"pydrake.multibody.{name}") for name in ("plant", "parsing"))
+    plants, parsing = (
+        importlib.import_module(f"pydrake.multibody.{name}")
+        for name in ("plant", "parsing")
+    )
     simulator = importlib.import_module("pydrake.systems.analysis").Simulator
     scene = released()
     text = write_sdf(scene, "drake")
-    theta_2, theta_3, _, *speeds = (float(x) for x in re.findall(r"(-?[\d.]+(?:e-?\d+)?) rad", text))
+    theta_2, theta_3, _, *speeds = (
+        float(x) for x in re.findall(r"(-?[\d.]+(?:e-?\d+)?) rad", text)
+    )
     ours, missed, pulls = fourbar.solve(scene), [], []
     for step in (1e-3, 5e-4):
         plant = plants.MultibodyPlant(step)
-        plant.set_discrete_contact_approximation(plants.DiscreteContactApproximation.kSap)
+        plant.set_discrete_contact_approximation(
+            plants.DiscreteContactApproximation.kSap
+        )
         parsing.Parser(plant).AddModelsFromString(text, "sdf")
         plant.mutable_gravity_field().set_gravity_vector([0.0, -9.81, 0.0])
         plant.Finalize()
@@ -270,23 +338,48 @@ def test_drake_loads_the_sdf_and_moves_as_released() -> None:
         for name, speed in zip(("O2", "A", "O4"), speeds, strict=True):
             plant.GetJointByName(name).set_angular_rate(context, speed)
         simulator(plant, context).AdvanceTo(0.2)
-        missed.append(theta_2 + plant.GetJointByName("O2").get_angle(context) - ours.theta_2[-1])
+        missed.append(
+            theta_2 + plant.GetJointByName("O2").get_angle(context) - ours.theta_2[-1]
+        )
         joint = plant.GetJointByName("A")
-        on_3 = plant.get_reaction_forces_output_port().Eval(context)[int(joint.index())].translational()[:2]
-        turned = theta_3 + plant.GetJointByName("O2").get_angle(context) + joint.get_angle(context)
-        pulls.append(abs(complex(*on_3) * cmath.exp(1j * turned) + complex(*ours.F32[-1])))
-    assert pulls[0] < FORCE * abs(complex(*ours.F32[-1])), "the force at A as the comment says"
-    assert abs(missed[1]) < 1e-2 and missed[1] / missed[0] == pytest.approx(0.5, rel=FIRST_ORDER)
+        on_3 = (
+            plant.get_reaction_forces_output_port()
+            .Eval(context)[int(joint.index())]
+            .translational()[:2]
+        )
+        turned = (
+            theta_3
+            + plant.GetJointByName("O2").get_angle(context)
+            + joint.get_angle(context)
+        )
+        pulls.append(
+            abs(complex(*on_3) * cmath.exp(1j * turned) + complex(*ours.F32[-1]))
+        )
+    assert pulls[0] < FORCE * abs(complex(*ours.F32[-1])), (
+        "the force at A as the comment says"
+    )
+    assert abs(missed[1]) < 1e-2 and missed[1] / missed[0] == pytest.approx(
+        0.5, rel=FIRST_ORDER
+    )
 
 
 @pytest.mark.parametrize(
     ("engine", "effects"),
     [
-        ("sdf", (fourbar.Gravity(), fourbar.Viscous.at(O2=0.05, B=0.02), fourbar.Friction.at(A=0.1))),
+        (
+            "sdf",
+            (
+                fourbar.Gravity(),
+                fourbar.Viscous.at(O2=0.05, B=0.02),
+                fourbar.Friction.at(A=0.1),
+            ),
+        ),
         ("usd", (fourbar.Gravity(), fourbar.Flywheel(0.02, 2))),
     ],
 )
-def test_a_file_holds_the_linkage_its_pins_and_what_acts(engine: str, effects: tuple[Any, ...]) -> None:
+def test_a_file_holds_the_linkage_its_pins_and_what_acts(
+    engine: str, effects: tuple[Any, ...]
+) -> None:
     """As a run judges it, which reads the text and asks free bodies."""
     rows = rows_of(crank_rocker(effects=effects), engine)
     assert len(rows) > 5 and all(row.compared and not row.failed for row in rows)
@@ -294,30 +387,56 @@ def test_a_file_holds_the_linkage_its_pins_and_what_acts(engine: str, effects: t
 
 def test_the_pin_at_B_alone_closes_the_loop_from_outside() -> None:
     sdf, usd = write_sdf(released()), write_usd(released(effects=()))
-    assert re.findall(r'joint name="(\w+)"', sdf) == ["ground_on_world", "O2", "A", "O4", "B"]
+    assert re.findall(r'joint name="(\w+)"', sdf) == [
+        "ground_on_world",
+        "O2",
+        "A",
+        "O4",
+        "B",
+    ]
     assert re.findall(r'Joint "(\w+)"', usd) == ["O2", "A", "O4", "B"]
-    assert re.findall(r"Articulation = (\w+)", usd) == ["false", "false", "false", "true"]
+    assert re.findall(r"Articulation = (\w+)", usd) == [
+        "false",
+        "false",
+        "false",
+        "true",
+    ]
 
 
-LOADED, AT_B = crank_rocker(loads=(fourbar.Load(4, moment=1.0),)), (fourbar.Viscous.at(B=1.0),)
+LOADED, AT_B = (
+    crank_rocker(loads=(fourbar.Load(4, moment=1.0),)),
+    (fourbar.Viscous.at(B=1.0),),
+)
 
 
 @pytest.mark.parametrize(
     ("write", "scene", "words"),
     [
-        (write_sdf, LOADED, r"^loads \(here on bar 4\) have no counterpart in SDF for gazebo"),
-        (partial(write_sdf, reader="drake"), released(effects=(Torsion.at(O2=(1.0, 0.0, 0.0)),)), "torsion"),
+        (
+            write_sdf,
+            LOADED,
+            r"^loads \(here on bar 4\) have no counterpart in SDF for gazebo",
+        ),
+        (
+            partial(write_sdf, reader="drake"),
+            released(effects=(Torsion.at(O2=(1.0, 0.0, 0.0)),)),
+            "torsion",
+        ),
         (partial(write_sdf, reader="drake"), released(effects=AT_B), "pin B"),
         (write_usd, LOADED, "no counterpart in USD"),
         (write_usd, released(effects=AT_B), "no counterpart in USD"),
     ],
 )
-def test_what_a_file_cannot_hold_is_refused(write: Any, scene: Scene, words: str) -> None:
+def test_what_a_file_cannot_hold_is_refused(
+    write: Any, scene: Scene, words: str
+) -> None:
     with pytest.raises(LimitError, match=words):
         write(scene)
 
 
-@pytest.mark.parametrize("write", [write_sdf, partial(write_sdf, reader="drake"), write_usd])
+@pytest.mark.parametrize(
+    "write", [write_sdf, partial(write_sdf, reader="drake"), write_usd]
+)
 def test_without_loads_every_model_is_written_and_says_how_to_start(write: Any) -> None:
     for file in list_model_files():
         scene = fourbar.load(file)
@@ -325,12 +444,23 @@ def test_without_loads_every_model_is_written_and_says_how_to_start(write: Any) 
         assert "loads are left out" in text and f"puts on bar {scene.drive_bar}" in text
         stated = [float(x) for x in re.findall(rf"({NUMBER}) rad", text)][:6]
         theta_2, omega_2 = stated[0], stated[3]
-        command = Command(np.array([theta_2]), np.array([scene.motion.branch]), omega_2, 0.0)
+        command = Command(
+            np.array([theta_2]), np.array([scene.motion.branch]), omega_2, 0.0
+        )
         s = fourbar.solve(scene, "velocity", at=command)
-        assert s.omega_3 is not None and s.omega_4 is not None and omega_2 == scene.motion.omega_2
+        assert (
+            s.omega_3 is not None
+            and s.omega_4 is not None
+            and omega_2 == scene.motion.omega_2
+        )
         expected = [s.theta_3[0], s.theta_4[0], s.omega_3[0] - omega_2, s.omega_4[0]]
         written = [*stated[1:3], *stated[4:]]
-        assert np.abs(np.exp(1j * np.array(written[:2])) - np.exp(1j * np.array(expected[:2]))).max() < 1e-12
+        assert (
+            np.abs(
+                np.exp(1j * np.array(written[:2])) - np.exp(1j * np.array(expected[:2]))
+            ).max()
+            < 1e-12
+        )
         assert written[2:] == pytest.approx(expected[2:], rel=1e-9)
 
 
@@ -343,7 +473,9 @@ def test_newton_loads_the_usd_and_reads_as_the_comment_says() -> None:
     newton = pytest.importorskip("newton")
     pytest.importorskip("newton_usd_schemas")
     wheel = fourbar.Flywheel(100.0, 2)
-    scene = crank_rocker(effects=(fourbar.Gravity(), wheel), loads=(), motion=fourbar.Motion(1.0, 3.0))
+    scene = crank_rocker(
+        effects=(fourbar.Gravity(), wheel), loads=(), motion=fourbar.Motion(1.0, 3.0)
+    )
     text = write_usd(scene)
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "four_bar.usda"
@@ -362,7 +494,9 @@ def test_newton_loads_the_usd_and_reads_as_the_comment_says() -> None:
         turned = now.body_q.numpy().astype(float)
         solver.step(now, then, model.control(), None, 1e-3)
         now, then = then, now
-    row = solver._solver_kamino.data.joints.lambda_kin_j.numpy().astype(float)[15 + 1 : 15 + 3]
+    row = solver._solver_kamino.data.joints.lambda_kin_j.numpy().astype(float)[
+        15 + 1 : 15 + 3
+    ]
     theta = 2.0 * np.arctan2(turned[:, 5], turned[:, 6])
     force = complex(*row) * cmath.exp(1j * (theta[2] + angles[1] - angles[2]))
     command = Command(theta[:1], np.array([1]), np.array([omega_2]), np.zeros(1))

@@ -13,7 +13,14 @@ from fourbar.effects import Torsion
 from fourbar.formulas.mobility import choose_range, turns_fully
 from fourbar.mjcf import Settings, list_defaults, make_scene, write_mjcf
 from fourbar.mjcf.document import SETTLING
-from fourbar_validation.scenes.random import MACHINES, DrawnType, draw_decades, draw_lengths, draw_scene, draw_uniform
+from fourbar_validation.scenes.random import (
+    MACHINES,
+    DrawnType,
+    draw_decades,
+    draw_lengths,
+    draw_scene,
+    draw_uniform,
+)
 from fourbar_validation.scenes.suites import list_model_files
 from tests.support.scenes import crank_rocker, thesis
 
@@ -24,7 +31,10 @@ GAP = 1e-4
 SHORT_OF_LIMIT = math.radians(2.0)
 SEED = 20261121
 ANY_SIZE = replace(
-    MACHINES, centre=draw_uniform(0.0, 1.2), centre_angle=draw_uniform(-3.0, 3.0), speed=draw_decades(-1.0, 2.5)
+    MACHINES,
+    centre=draw_uniform(0.0, 1.2),
+    centre_angle=draw_uniform(-3.0, 3.0),
+    speed=draw_decades(-1.0, 2.5),
 )
 
 
@@ -33,12 +43,20 @@ def random_scene(rng: np.random.Generator, kind: DrawnType) -> fourbar.Scene:
     size = 10.0 ** rng.uniform(math.log10(0.05), 2.0)
     scene = draw_scene(rng, [size * x for x in draw_lengths(rng, kind)], ANY_SIZE)
     start, stop = choose_range(scene.linkage)
-    short = 0.0 if turns_fully(scene.linkage) else min(SHORT_OF_LIMIT, 0.25 * (stop - start))
-    motion = scene.motion.replace(angle=fourbar.Sweep(start + short, stop - short, 90), acceleration=0.0)
+    short = (
+        0.0
+        if turns_fully(scene.linkage)
+        else min(SHORT_OF_LIMIT, 0.25 * (stop - start))
+    )
+    motion = scene.motion.replace(
+        angle=fourbar.Sweep(start + short, stop - short, 90), acceleration=0.0
+    )
     return replace(scene, motion=motion, drive_bar=2, loads=())
 
 
-def at_keyframe(scene: fourbar.Scene, text: str = "") -> tuple[mujoco.MjModel, mujoco.MjData]:
+def at_keyframe(
+    scene: fourbar.Scene, text: str = ""
+) -> tuple[mujoco.MjModel, mujoco.MjData]:
     model = mujoco.MjModel.from_xml_string(text or write_mjcf(scene))
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, 0)
@@ -52,15 +70,26 @@ def gap(data: mujoco.MjData) -> float:
 
 def run_alone(scene: fourbar.Scene) -> tuple[float, float, float]:
     """Plain MuJoCo from keyframe 0 through the sweep: worst gap, worst speed, angle still missing at the end."""
-    assert isinstance(scene.motion.theta_2, fourbar.Sweep) and scene.motion.omega_2 is not None
+    assert (
+        isinstance(scene.motion.theta_2, fourbar.Sweep)
+        and scene.motion.omega_2 is not None
+    )
     model, data = at_keyframe(scene)
-    start, stop, omega = scene.motion.theta_2.start, scene.motion.theta_2.stop, scene.motion.omega_2
+    start, stop, omega = (
+        scene.motion.theta_2.start,
+        scene.motion.theta_2.stop,
+        scene.motion.omega_2,
+    )
     open_by = speed = 0.0
     for _ in range(round((stop - start) / abs(omega) / model.opt.timestep)):
         mujoco.mj_step(model, data)
         open_by = max(open_by, gap(data) / max(scene.linkage.lengths))
         speed = max(speed, abs(data.qvel[0] / omega - 1.0))
-    return open_by, speed, abs(data.qpos[0] - (stop if omega > 0 else start)) / (stop - start)
+    return (
+        open_by,
+        speed,
+        abs(data.qpos[0] - (stop if omega > 0 else start)) / (stop - start),
+    )
 
 
 @pytest.mark.slow
@@ -70,7 +99,12 @@ def test_runs_alone(kind: DrawnType) -> None:
     for _ in range(8):
         scene = random_scene(rng, kind)
         open_by, speed, missing = run_alone(scene)
-        assert open_by <= GAP and speed <= SPEED and missing <= SPEED, (scene, open_by, speed, missing)
+        assert open_by <= GAP and speed <= SPEED and missing <= SPEED, (
+            scene,
+            open_by,
+            speed,
+            missing,
+        )
 
 
 OPEN = 1e-9
@@ -101,7 +135,10 @@ def test_the_joints_count_the_turns_of_every_spring() -> None:
     _, data = opened(crank_rocker(motion=fourbar.Motion(1.0, 10.0), effects=(springs,)))
     at_O2, at_A, at_O4 = data.qpos
     assert gap(data) < OPEN
-    assert abs(at_O4 - rests["O4"]) < math.pi and abs(at_O4 - at_O2 - at_A - rests["B"]) < math.pi
+    assert (
+        abs(at_O4 - rests["O4"]) < math.pi
+        and abs(at_O4 - at_O2 - at_A - rests["B"]) < math.pi
+    )
 
 
 @pytest.mark.slow
@@ -115,8 +152,14 @@ def test_opens_assembled_and_moves_without_keyframe_or_control() -> None:
         assert omega and not data.qvel.any() and not data.ctrl.any()
         # a second, or what is left of the range where it ends before; longer than the drive settles
         travel, settling = scene.motion.theta_2, 20.0 * SETTLING * model.opt.timestep
-        travelled = 0.9 * (travel.stop - travel.start) if isinstance(travel, fourbar.Sweep) else 0.5
-        steps = int(min(max(1.0, settling), travelled / abs(omega)) / model.opt.timestep)
+        travelled = (
+            0.9 * (travel.stop - travel.start)
+            if isinstance(travel, fourbar.Sweep)
+            else 0.5
+        )
+        steps = int(
+            min(max(1.0, settling), travelled / abs(omega)) / model.opt.timestep
+        )
         worst = 0.0
         for _ in range(steps):
             mujoco.mj_step(model, data)
@@ -124,7 +167,8 @@ def test_opens_assembled_and_moves_without_keyframe_or_control() -> None:
         assert worst < GAP * max(scene.linkage.lengths), scene
         turned = data.qpos[0] - model.qpos0[0]
         assert turned == pytest.approx(
-            omega * (data.time - SETTLING * model.opt.timestep), abs=LAG * abs(omega) * model.opt.timestep
+            omega * (data.time - SETTLING * model.opt.timestep),
+            abs=LAG * abs(omega) * model.opt.timestep,
         )
 
 
@@ -134,7 +178,10 @@ RELEASE = 1e-4
 
 @pytest.mark.parametrize("scale", (1.0, 0.01))
 def test_a_released_linkage_falls_by_itself(scale: float) -> None:
-    bars = [fourbar.Bar(scale * length, mass) for length, mass in ((0.1, 0.2), (0.25, 0.5), (0.22, 0.4))]
+    bars = [
+        fourbar.Bar(scale * length, mass)
+        for length, mass in ((0.1, 0.2), (0.25, 0.5), (0.22, 0.4))
+    ]
     linkage = fourbar.FourBar(scale * 0.3, *bars, ground_angle=0.2)
     motion = fourbar.Motion(0.5, 0.0, free=fourbar.Free(0.5 * math.sqrt(scale), 10))
     scene = fourbar.Scene(linkage, motion, effects=(fourbar.Gravity(),))
@@ -144,12 +191,16 @@ def test_a_released_linkage_falls_by_itself(scale: float) -> None:
     assert expected.time is not None and np.ptp(expected.theta_2) > 0.5
     for time, theta_2 in zip(expected.time[1:], expected.theta_2[1:], strict=True):
         mujoco.mj_step(model, data, round((time - data.time) / model.opt.timestep))
-        assert data.qpos[0] + data.qvel[0] * (time - data.time) == pytest.approx(theta_2, abs=RELEASE)
+        assert data.qpos[0] + data.qvel[0] * (time - data.time) == pytest.approx(
+            theta_2, abs=RELEASE
+        )
 
 
 def test_keyframe_is_on_the_requested_branch_and_closed() -> None:
     for branch in (1, -1):
-        scene = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.1, 6.0, 60), 10.0, 0.0, branch))
+        scene = crank_rocker(
+            motion=fourbar.Motion(fourbar.Sweep(0.1, 6.0, 60), 10.0, 0.0, branch)
+        )
         _, data = at_keyframe(scene)
         A, B, O4 = (data.site(name).xpos[:2] for name in ("A", "B3", "O4"))
         diagonal, to_B = O4 - A, B - A
@@ -162,7 +213,10 @@ def test_keyframe_is_on_the_requested_branch_and_closed() -> None:
 def test_numbers_survive_bit_for_bit() -> None:
     scene = thesis()
     model = mujoco.MjModel.from_xml_string(write_mjcf(scene))
-    for name, bar in (("input", scene.linkage.input), ("coupler", scene.linkage.coupler)):
+    for name, bar in (
+        ("input", scene.linkage.input),
+        ("coupler", scene.linkage.coupler),
+    ):
         assert model.body(name).mass[0] == bar.mass
         assert model.body(name).inertia[2] == bar.moment_of_inertia
     assert model.site("A").pos[0] == scene.linkage.input.length
@@ -184,8 +238,15 @@ def test_shapes_add_no_mass_and_change_no_bit() -> None:
 
 
 @pytest.mark.parametrize(("mass", "inertia"), [(0.0, None), (1e-16, 1.0), (1.0, 1e-16)])
-def test_massless_bar_is_refused_in_one_line(mass: float, inertia: float | None) -> None:
-    linkage = fourbar.FourBar(0.3, fourbar.Bar(0.1, 1.0), fourbar.Bar(0.25, mass, inertia), fourbar.Bar(0.22, 1.0))
+def test_massless_bar_is_refused_in_one_line(
+    mass: float, inertia: float | None
+) -> None:
+    linkage = fourbar.FourBar(
+        0.3,
+        fourbar.Bar(0.1, 1.0),
+        fourbar.Bar(0.25, mass, inertia),
+        fourbar.Bar(0.22, 1.0),
+    )
     with pytest.raises(fourbar.InputError, match=r"^bars\.coupler\..*massless[^\n]*$"):
         write_mjcf(crank_rocker(linkage=linkage))
 
@@ -195,7 +256,9 @@ def test_at_rest_a_file_is_written_that_stays_at_rest(omega: float | None) -> No
     scene = crank_rocker(motion=fourbar.Motion(1.0, omega), loads=(), effects=())
     model, data = at_keyframe(scene)
     mujoco.mj_step(model, data, 100)
-    assert np.abs(data.qvel).max() < 1e-9  # rounding of the keyframe's gap, nothing else moves it
+    assert (
+        np.abs(data.qvel).max() < 1e-9
+    )  # rounding of the keyframe's gap, nothing else moves it
 
 
 def test_from_lengths_alone() -> None:

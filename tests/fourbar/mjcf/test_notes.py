@@ -28,13 +28,19 @@ QUICK = 5e-3
 """The same of a released linkage, whose closure is made to take no energy out; measured 1.9e-3."""
 FOUND = 2e-3
 """What a test must find where a sentence says that numbers differ."""
-NEXT_BAR = {"input": ("input", "coupler"), "coupler": ("coupler",), "output": ("output",)}
+NEXT_BAR = {
+    "input": ("input", "coupler"),
+    "coupler": ("coupler",),
+    "output": ("output",),
+}
 MATRIX = Path(__file__).parents[3] / "docs" / "examples" / "benchmark.csv"
 
 
 def acted_on(**changes: Any) -> Scene:
     """Everything that has a counterpart in MJCF acts; a load of each kind on each bar, and the drive is on bar 4."""
-    spring = fourbar.Spring(SpringEnd(1, 0.1, -1.5), SpringEnd(3, 0.08, 0.3), 200.0, 0.02)
+    spring = fourbar.Spring(
+        SpringEnd(1, 0.1, -1.5), SpringEnd(3, 0.08, 0.3), 200.0, 0.02
+    )
     effects = (
         fourbar.Gravity(),
         fourbar.Viscous.at(O2=0.02, B=0.03),
@@ -50,21 +56,37 @@ def acted_on(**changes: Any) -> Scene:
         fourbar.Load(4, (3.0, 0.7), (0.05, 1.0)),
     )
     motion = fourbar.Motion(fourbar.Sweep(0.4, 0.4 + math.tau, 60), 10.0)
-    return crank_rocker(**{"motion": motion, "effects": effects, "loads": loads, "drive_bar": 4, **changes})
+    return crank_rocker(
+        **{
+            "motion": motion,
+            "effects": effects,
+            "loads": loads,
+            "drive_bar": 4,
+            **changes,
+        }
+    )
 
 
 class Opened:
     """A file in MuJoCo at its keyframe."""
 
     def __init__(self, scene: Scene, drive: Drive) -> None:
-        self.scene, self.drive, self.text = scene, drive, write_mjcf_for(scene, drive=drive)
+        self.scene, self.drive, self.text = (
+            scene,
+            drive,
+            write_mjcf_for(scene, drive=drive),
+        )
         self.model = mujoco.MjModel.from_xml_string(self.text)
         self.data = mujoco.MjData(self.model)
         mujoco.mj_resetDataKeyframe(self.model, self.data, 0)
 
     def comments(self) -> list[str]:
         parser = ET.XMLParser(target=ET.TreeBuilder(insert_comments=True))
-        return [str(node.text).strip() for node in ET.fromstring(self.text, parser) if node.tag is ET.Comment]
+        return [
+            str(node.text).strip()
+            for node in ET.fromstring(self.text, parser)
+            if node.tag is ET.Comment
+        ]
 
     def step(self, steps: int = 20) -> None:
         mujoco.mj_step(self.model, self.data, steps)
@@ -79,23 +101,41 @@ class Opened:
     @property
     def driven(self) -> Scene:
         """The scene with the drive where the file has its own."""
-        return replace(self.scene, drive=None, drive_bar=2) if self.drive == "flywheel" else self.scene
+        return (
+            replace(self.scene, drive=None, drive_bar=2)
+            if self.drive == "flywheel"
+            else self.scene
+        )
 
-    def errors(self, answers: dict[str, Any], scene: Scene | None = None) -> dict[str, float]:
+    def errors(
+        self, answers: dict[str, Any], scene: Scene | None = None
+    ) -> dict[str, float]:
         """Against the formulas at the state that was last forwarded, by the greatest value in a turn."""
         d, scene = self.data, scene or self.driven
-        round_ = replace(scene, drive=None, drive_bar=2, motion=scene.motion.replace(free=None))  # without poles
-        command = Command(*(np.array([x]) for x in (d.qpos[0], 1, d.qvel[0], d.qacc[0])))
-        expected, turn = fourbar.solve(scene, "force", at=command), fourbar.solve(round_, "force")
+        round_ = replace(
+            scene, drive=None, drive_bar=2, motion=scene.motion.replace(free=None)
+        )  # without poles
+        command = Command(
+            *(np.array([x]) for x in (d.qpos[0], 1, d.qvel[0], d.qacc[0]))
+        )
+        expected, turn = (
+            fourbar.solve(scene, "force", at=command),
+            fourbar.solve(round_, "force"),
+        )
         errors = {}
         for name, answer in answers.items():
             size = np.abs(getattr(turn, name)).max()
-            errors[name] = float(np.abs(np.asarray(answer) - getattr(expected, name)[0]).max() / size)
+            errors[name] = float(
+                np.abs(np.asarray(answer) - getattr(expected, name)[0]).max() / size
+            )
         return errors
 
     def torque(self) -> float:
         armature = self.model.dof_armature[self.model.joint("O2").dofadr[0]]
-        return float(self.data.actuator_force[self.model.actuator("drive").id] - armature * self.data.qacc[0])
+        return float(
+            self.data.actuator_force[self.model.actuator("drive").id]
+            - armature * self.data.qacc[0]
+        )
 
     def at_pins(self, *, loads: bool) -> dict[str, Array]:
         """cfrc_int, with the loads that MuJoCo counts in, or without."""
@@ -110,7 +150,11 @@ class Opened:
                         x = d.site(f"load_{index}").xmat
                         angle += math.atan2(x[3], x[0])
                     forces[name] -= size * np.array([math.cos(angle), math.sin(angle)])
-        return {"F12": forces["input"], "F32": -forces["coupler"], "F14": forces["output"]}
+        return {
+            "F12": forces["input"],
+            "F32": -forces["coupler"],
+            "F14": forces["output"],
+        }
 
 
 def opens_assembled(file: Opened) -> None:
@@ -118,9 +162,14 @@ def opens_assembled(file: Opened) -> None:
     mujoco.mj_resetData(m, d)
     file.forward()
     gap = math.dist(d.site("B3").xpos, d.site("B4").xpos)
-    s = fourbar.solve(file.scene, "position", at=Command(d.qpos[:1].copy(), np.array([1]), None, 0.0))
+    s = fourbar.solve(
+        file.scene, "position", at=Command(d.qpos[:1].copy(), np.array([1]), None, 0.0)
+    )
     assert gap < 1e-9 and m.joint("O2").qpos0[0] == d.qpos[0] == pytest.approx(0.4)
-    for angle, theta in ((d.qpos[0] + d.qpos[1], s.theta_3[0]), (d.qpos[2], s.theta_4[0])):
+    for angle, theta in (
+        (d.qpos[0] + d.qpos[1], s.theta_3[0]),
+        (d.qpos[2], s.theta_4[0]),
+    ):
         assert math.remainder(angle - theta, math.tau) == pytest.approx(0.0, abs=1e-12)
 
 
@@ -138,7 +187,9 @@ def is_accelerated(file: Opened) -> None:
     d = file.data
     assert d.qvel[0] == 10.0
     file.step(100)
-    assert d.qvel[0] ** 2 == pytest.approx(100.0 + 2.0 * file.scene.motion.alpha_2 * (d.qpos[0] - 0.4), rel=1e-6)
+    assert d.qvel[0] ** 2 == pytest.approx(
+        100.0 + 2.0 * file.scene.motion.alpha_2 * (d.qpos[0] - 0.4), rel=1e-6
+    )
 
 
 def starts_anew(file: Opened) -> None:
@@ -158,7 +209,12 @@ def is_driven_elsewhere(file: Opened) -> None:
     file.step()
     file.forward()
     answers = {"F43": file.data.efc_force[:2], **file.at_pins(loads=False)}
-    assert max(file.errors(answers).values()) < EXACT < FOUND < min(file.errors(answers, file.scene).values())
+    assert (
+        max(file.errors(answers).values())
+        < EXACT
+        < FOUND
+        < min(file.errors(answers, file.scene).values())
+    )
 
 
 def takes_control(file: Opened) -> None:
@@ -171,7 +227,9 @@ def takes_control(file: Opened) -> None:
 
 def takes_what_is_applied(file: Opened) -> None:
     m, d = file.model, file.data
-    assert d.qvel[0] == 10.0 and all(m.actuator(index).name.startswith("load_") for index in range(m.nu))
+    assert d.qvel[0] == 10.0 and all(
+        m.actuator(index).name.startswith("load_") for index in range(m.nu)
+    )
     d.qfrc_applied[{2: 0, 4: 2}[file.scene.drive_bar]] = 0.7
     file.step()
     file.forward()
@@ -183,7 +241,9 @@ def cylinder_force(file: Opened) -> float:
     d = file.data
     command = Command(*(np.array([x]) for x in (d.qpos[0], 1, d.qvel[0], d.qacc[0])))
     solution = fourbar.solve(file.scene, "force", at=command)
-    assert d.ten_length[file.model.tendon("cylinder").id] == pytest.approx(solution.stroke[0], rel=1e-9)
+    assert d.ten_length[file.model.tendon("cylinder").id] == pytest.approx(
+        solution.stroke[0], rel=1e-9
+    )
     return float(solution.drive_force[0])
 
 
@@ -209,7 +269,9 @@ def pushes_as_controlled(file: Opened) -> None:
 
 def pushes_as_applied(file: Opened) -> None:
     m, d = file.model, file.data
-    assert d.qvel[0] == 10.0 and all(m.actuator(index).name.startswith("load_") for index in range(m.nu))
+    assert d.qvel[0] == 10.0 and all(
+        m.actuator(index).name.startswith("load_") for index in range(m.nu)
+    )
     file.step()
     file.forward()
     assert abs(cylinder_force(file)) < FOUND * 7.0
@@ -224,12 +286,18 @@ def is_released(file: Opened) -> None:
 
 def is_of_the_instant_after_forward(file: Opened) -> None:
     file.step()
-    before = np.array([*file.data.qacc, *file.data.actuator_force, *file.data.efc_force[:2]])
+    before = np.array(
+        [*file.data.qacc, *file.data.actuator_force, *file.data.efc_force[:2]]
+    )
     file.forward()
-    after = np.array([*file.data.qacc, *file.data.actuator_force, *file.data.efc_force[:2]])
+    after = np.array(
+        [*file.data.qacc, *file.data.actuator_force, *file.data.efc_force[:2]]
+    )
     assert np.abs(after - before)[[0, 1, 2, -2, -1]].min() > 0.0
     assert file.errors({"F43": file.data.efc_force[:2]})["F43"] < file.exact
-    if file.drive == "flywheel" and file.scene.motion.free is None:  # the other files step more finely
+    if (
+        file.drive == "flywheel" and file.scene.motion.free is None
+    ):  # the other files step more finely
         assert file.errors({"F43": before[-2:]})["F43"] > 10.0 * file.exact
 
 
@@ -266,12 +334,22 @@ def was_wrong_before_3_7(file: Opened) -> None:
     errors: dict[str, dict[str, float]] = {"3.3.7": {}, "4.0.0": {}}
     with MATRIX.open(encoding="utf-8", newline="") as table:
         for row in csv.DictReader(table):
-            in_a_turn = row["problem"] in ("crank_rocker", "newton_128", "drake_23842") and row["quantity"] == "F43"
-            if in_a_turn and row["engine"] in ("MuJoCo 3.3.7: simulated", "MuJoCo: simulated"):
+            in_a_turn = (
+                row["problem"] in ("crank_rocker", "newton_128", "drake_23842")
+                and row["quantity"] == "F43"
+            )
+            if in_a_turn and row["engine"] in (
+                "MuJoCo 3.3.7: simulated",
+                "MuJoCo: simulated",
+            ):
                 worst = errors[row["version"]]
-                worst[row["problem"]] = max(worst.get(row["problem"], 0.0), float(row["error"]))
+                worst[row["problem"]] = max(
+                    worst.get(row["problem"], 0.0), float(row["error"])
+                )
     assert len(errors["3.3.7"]) == len(errors["4.0.0"]) == 3
-    assert min(errors["3.3.7"].values()) > 0.1 and max(errors["4.0.0"].values()) < 1e-6, errors
+    assert (
+        min(errors["3.3.7"].values()) > 0.1 and max(errors["4.0.0"].values()) < 1e-6
+    ), errors
 
 
 SAID: dict[str, Callable[[Opened], None]] = {
@@ -297,7 +375,10 @@ SAID: dict[str, Callable[[Opened], None]] = {
 CYLINDER = fourbar.LinearDrive(SpringEnd(1, 0.17, -1.1), SpringEnd(3, 0.09, 0.7))
 FILES: dict[str, tuple[Scene, Drive]] = {
     "at omega_2": (acted_on(), "flywheel"),
-    "at alpha_2": (acted_on(motion=fourbar.Motion(fourbar.Sweep(0.4, 5.0, 60), 10.0, 30.0)), "flywheel"),
+    "at alpha_2": (
+        acted_on(motion=fourbar.Motion(fourbar.Sweep(0.4, 5.0, 60), 10.0, 30.0)),
+        "flywheel",
+    ),
     "motor on bar 4": (acted_on(), "motor"),
     "motor on bar 3": (acted_on(drive_bar=3), "motor"),
     "motor on bar 2": (acted_on(drive_bar=2), "motor"),
@@ -305,7 +386,10 @@ FILES: dict[str, tuple[Scene, Drive]] = {
     "cylinder": (acted_on(drive_bar=None, drive=CYLINDER), "flywheel"),
     "motor along a cylinder": (acted_on(drive_bar=None, drive=CYLINDER), "motor"),
     "no drive along a cylinder": (acted_on(drive_bar=None, drive=CYLINDER), "none"),
-    "released": (acted_on(motion=fourbar.Motion(0.4, 10.0, free=fourbar.Free(0.1, 2))), "flywheel"),
+    "released": (
+        acted_on(motion=fourbar.Motion(0.4, 10.0, free=fourbar.Free(0.1, 2))),
+        "flywheel",
+    ),
 }
 
 
@@ -319,8 +403,12 @@ def test_every_sentence_holds(name: str) -> None:
         holds[0](Opened(*FILES[name]))
 
 
-def test_a_linkage_with_limits_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)  # MuJoCo writes a log of its resets into the working folder
+def test_a_linkage_with_limits_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(
+        tmp_path
+    )  # MuJoCo writes a log of its resets into the working folder
     file = Opened(thesis(), "flywheel")
     assert any(line.startswith("Past a limit position") for line in file.comments())
     starts_anew(file)
@@ -329,7 +417,9 @@ def test_a_linkage_with_limits_says_so(tmp_path: Path, monkeypatch: pytest.Monke
 def test_every_sentence_of_the_table_is_said_somewhere() -> None:
     said = [line for name in FILES for line in Opened(*FILES[name]).comments()]
     said += Opened(thesis(), "flywheel").comments()
-    assert not [start for start in SAID if not any(line.startswith(start) for line in said)]
+    assert not [
+        start for start in SAID if not any(line.startswith(start) for line in said)
+    ]
 
 
 FOLLOWED = 1e-6
@@ -338,21 +428,32 @@ FOLLOWED = 1e-6
 
 def test_a_controller_of_ones_own_finds_the_torque() -> None:
     """PD control about omega_2 t; its torque is the formulas' at what then happens."""
-    file = Opened(crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.4, 6.0, 60), 10.0)), "motor")
+    file = Opened(
+        crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.4, 6.0, 60), 10.0)), "motor"
+    )
     m, d = file.model, file.data
     assert m.dof_armature[0] == 0.0
     worst = 0.0
     for step in range(1000):
         wanted = 0.4 + 10.0 * d.time
         d.ctrl[0] = 400.0 * (wanted - d.qpos[0]) + 4.0 * (10.0 - d.qvel[0])
-        if step >= 200 and step % 100 == 0:  # ten time constants of the closure after the start
+        if (
+            step >= 200 and step % 100 == 0
+        ):  # ten time constants of the closure after the start
             file.forward()
-            worst = max(worst, file.errors({"torque": d.ctrl[0], "F43": d.efc_force[:2]})["torque"])
+            worst = max(
+                worst,
+                file.errors({"torque": d.ctrl[0], "F43": d.efc_force[:2]})["torque"],
+            )
         file.step(1)
     assert worst < FOLLOWED and abs(d.qpos[0] - 0.4 - 10.0 * d.time) < 0.05
 
 
 def test_a_motor_for_one_that_takes_none_is_refused() -> None:
-    for wrong in ({"simulator": "newton", "drive": "motor"}, {"drive": "servo"}, {"simulator": "ode"}):
+    for wrong in (
+        {"simulator": "newton", "drive": "motor"},
+        {"drive": "servo"},
+        {"simulator": "ode"},
+    ):
         with pytest.raises(fourbar.InputError, match=r"^[^\n]+$"):
             write_mjcf_for(crank_rocker(), **wrong)  # type: ignore[arg-type]

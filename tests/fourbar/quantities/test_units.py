@@ -15,32 +15,60 @@ from fourbar.quantities.units import DEFINITIONS, UnitError, to_si
 
 ENDS = SpringEnd(1, 0.1, 0.0), SpringEnd(4, 0.2, np.pi)
 SAME: list[tuple[Callable[..., Any], tuple[Any, ...], tuple[Any, ...]]] = [
-    (fourbar.Bar, ("10 cm", "200 g", "2 kg cm^2", ("5 cm", "180 deg")), (0.1, 0.2, 2e-4, (0.05, np.pi))),
+    (
+        fourbar.Bar,
+        ("10 cm", "200 g", "2 kg cm^2", ("5 cm", "180 deg")),
+        (0.1, 0.2, 2e-4, (0.05, np.pi)),
+    ),
     (fourbar.uniform, ("6 in", 0.05, "127 mm", "4 in"), (0.1524, 0.05, 0.127, 0.1016)),
     (fourbar.Sweep, ("180 deg", "2 rad", 4), (np.pi, 2.0, 4)),
     (fourbar.FromLimit, (1, "180 deg"), (1, np.pi)),
     (fourbar.Free, ("0.5 min", 4), (30.0, 4)),
-    (fourbar.Law, (("0 s", "0.5 min"), ("0 deg", 2.0), 4, "rest"), ((0.0, 30.0), (0.0, 2.0), 4, "rest")),
+    (
+        fourbar.Law,
+        (("0 s", "0.5 min"), ("0 deg", 2.0), 4, "rest"),
+        ((0.0, 30.0), (0.0, 2.0), 4, "rest"),
+    ),
     (fourbar.Point, ("P", 3, ("5 cm", "180 deg")), ("P", 3, (0.05, np.pi))),
-    (fourbar.Load, (4, ("2 kN", "180 deg"), ("5 cm", 0), "3 N cm"), (4, (2000.0, np.pi), (0.05, 0.0), 0.03)),
+    (
+        fourbar.Load,
+        (4, ("2 kN", "180 deg"), ("5 cm", 0), "3 N cm"),
+        (4, (2000.0, np.pi), (0.05, 0.0), 0.03),
+    ),
     (Table, (("0 deg", "180 deg"), (1.0, 2.0)), ((0.0, np.pi), (1.0, 2.0))),
     (fourbar.Gravity, ("1 g_0", "180 deg"), (9.80665, np.pi)),
     (fourbar.Flywheel, ("200 kg cm^2",), (0.02,)),
     (fourbar.Viscous, ((("A", "2 N mm s/rad"),),), ((("A", 0.002),),)),
     (fourbar.Friction, ((("A", "5 N cm"),),), ((("A", 0.05),),)),
     (fourbar.PinFriction, ((("A", 0.1, "8 mm"),),), ((("A", 0.1, 0.008),),)),
-    (fourbar.Torsion, ((("A", "2 N m/rad", "180 deg", "1 N cm"),),), ((("A", 2.0, np.pi, 0.01),),)),
+    (
+        fourbar.Torsion,
+        ((("A", "2 N m/rad", "180 deg", "1 N cm"),),),
+        ((("A", 2.0, np.pi, 0.01),),),
+    ),
     (
         fourbar.Spring,
-        (SpringEnd(1, "10 cm", 0), SpringEnd(4, "20 cm", "180 deg"), "2 N/mm", "5 cm", "3 N"),  # type: ignore[arg-type]
+        (
+            SpringEnd(1, "10 cm", 0),
+            SpringEnd(4, "20 cm", "180 deg"),
+            "2 N/mm",
+            "5 cm",
+            "3 N",
+        ),  # type: ignore[arg-type]
         (*ENDS, 2000.0, 0.05, 3.0),
     ),
-    (fourbar.Spring.gas, (*ENDS, "50 cm", "20 cm", "400 N", "0.5 kN"), (*ENDS, 0.5, 0.2, 400.0, 500.0)),
+    (
+        fourbar.Spring.gas,
+        (*ENDS, "50 cm", "20 cm", "400 N", "0.5 kN"),
+        (*ENDS, 0.5, 0.2, 400.0, 500.0),
+    ),
 ]
 
 
 @pytest.mark.parametrize(("make", "texts", "numbers"), SAME)
-def test_a_text_with_a_unit_is_its_number(make: Callable[..., Any], texts: Any, numbers: Any) -> None:
+def test_a_text_with_a_unit_is_its_number(
+    make: Callable[..., Any], texts: Any, numbers: Any
+) -> None:
     assert make(*texts) == make(*numbers)
 
 
@@ -51,18 +79,40 @@ def test_a_motion_is_written_as_in_the_file() -> None:
         'theta_2 = ["10 deg", "1 rad"]\nomega_2 = "60 rpm"\nalpha_2 = "30 deg/s^2"\nbranch = "crossed"\n'
     ).motion
     assert np.array_equal(stated.theta_2, read.theta_2)  # type: ignore[arg-type]
-    assert (stated.omega_2, stated.alpha_2, stated.branch) == (read.omega_2, read.alpha_2, read.branch)
+    assert (stated.omega_2, stated.alpha_2, stated.branch) == (
+        read.omega_2,
+        read.alpha_2,
+        read.branch,
+    )
 
 
 @pytest.mark.parametrize(
     ("make", "words"),
     [
-        (lambda: fourbar.uniform("6", 1, 1, 1), r"lengths.ground = '6': the unit is missing.*like \"1 m\""),
-        (lambda: fourbar.uniform(1, "6 kg", 1, 1), "lengths.input = '6 kg'.*does not convert to m"),
-        (lambda: fourbar.uniform(1, "-6 in", 1, 1), "lengths.input = '-6 in': must be a finite number > 0"),
-        (lambda: fourbar.Motion("60", 1.0), r"motion.theta_2 = '60': the unit is missing"),
-        (lambda: fourbar.Motion(1.0, branch="opne"), r"motion.branch = 'opne': must be \+1 \(open\)"),
-        (lambda: fourbar.PinFriction.at(A=("0.1", 1)), "coefficient = '0.1': must be a finite number"),
+        (
+            lambda: fourbar.uniform("6", 1, 1, 1),
+            r"lengths.ground = '6': the unit is missing.*like \"1 m\"",
+        ),
+        (
+            lambda: fourbar.uniform(1, "6 kg", 1, 1),
+            "lengths.input = '6 kg'.*does not convert to m",
+        ),
+        (
+            lambda: fourbar.uniform(1, "-6 in", 1, 1),
+            "lengths.input = '-6 in': must be a finite number > 0",
+        ),
+        (
+            lambda: fourbar.Motion("60", 1.0),
+            r"motion.theta_2 = '60': the unit is missing",
+        ),
+        (
+            lambda: fourbar.Motion(1.0, branch="opne"),
+            r"motion.branch = 'opne': must be \+1 \(open\)",
+        ),
+        (
+            lambda: fourbar.PinFriction.at(A=("0.1", 1)),
+            "coefficient = '0.1': must be a finite number",
+        ),
     ],
 )
 def test_a_mistake_is_one_line(make: Callable[[], object], words: str) -> None:
@@ -72,7 +122,11 @@ def test_a_mistake_is_one_line(make: Callable[[], object], words: str) -> None:
 
 PI = Fraction(314159265358979323846264338327950288419716939937510582097494459, 10**62)
 """To 63 digits (A000796 of the On-Line Encyclopedia of Integer Sequences)."""
-FOOT, POUND, GRAVITY = Fraction(3048, 10_000), Fraction(45_359_237, 100_000_000), Fraction(980_665, 100_000)
+FOOT, POUND, GRAVITY = (
+    Fraction(3048, 10_000),
+    Fraction(45_359_237, 100_000_000),
+    Fraction(980_665, 100_000),
+)
 """m; kg; m/s^2: exact by definition."""
 UNITS: dict[str, tuple[str, Fraction | int]] = {
     **dict.fromkeys(("meter", "m", "metre"), ("m", 1)),
@@ -134,13 +188,20 @@ def test_every_unit_is_its_fraction(name: str) -> None:
 
 @pytest.mark.parametrize(
     ("text", "inches"),
-    [("1'6\"", 18), ("1' 6 1/2\"", Fraction(37, 2)), ("1'-6.5\"", Fraction(37, 2)), ("0\u203212\u2033", 12)],
+    [
+        ("1'6\"", 18),
+        ("1' 6 1/2\"", Fraction(37, 2)),
+        ("1'-6.5\"", Fraction(37, 2)),
+        ("0\u203212\u2033", 12),
+    ],
 )
 def test_feet_and_inches_are_one_length(text: str, inches: Fraction | int) -> None:
     assert to_si(text, "m") == float(inches * FOOT / 12)
 
 
-@pytest.mark.parametrize("text", ["1'6", "1'6'", "6\"1'", "1'6 lb", "1'-\"", '1\'6""', "-1'6\""])
+@pytest.mark.parametrize(
+    "text", ["1'6", "1'6'", "6\"1'", "1'6 lb", "1'-\"", '1\'6""', "-1'6\""]
+)
 def test_what_is_no_length_in_feet_and_inches_is_refused(text: str) -> None:
     with pytest.raises(UnitError):
         to_si(text, "m")
@@ -152,7 +213,11 @@ def test_every_prefix_is_its_power_of_ten(prefix: str) -> None:
 
 
 def test_the_tables_name_every_unit_and_prefix() -> None:
-    lines = [line.split(" = ") for line in DEFINITIONS.strip().splitlines() if not line.startswith(("#", "pi = "))]
+    lines = [
+        line.split(" = ")
+        for line in DEFINITIONS.strip().splitlines()
+        if not line.startswith(("#", "pi = "))
+    ]
     names = {name for name, _, *others in lines for name in (name, *others)}
     prefixes = {name for name in names if name.endswith("-")}
     assert names - prefixes == set(UNITS)

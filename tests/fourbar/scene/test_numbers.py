@@ -13,7 +13,11 @@ from fourbar.show.tables import list_columns
 from fourbar.solution import write_csv, write_json
 from tests.support.scenes import crank_rocker
 
-POINTS = (Point("P", 3, (0.04, 0.4)), Point("on_ground", 1, (0.1, 0.5)), Point("tip", 4, (0.3, -0.2)))
+POINTS = (
+    Point("P", 3, (0.04, 0.4)),
+    Point("on_ground", 1, (0.1, 0.5)),
+    Point("tip", 4, (0.3, -0.2)),
+)
 
 STEP = 1e-5
 """rad, of a central difference."""
@@ -36,28 +40,56 @@ def test_pins_and_mass_centres_are_points() -> None:
         )
     )
     for point, name in (("pin_A", "A"), ("pin_B", "B"), ("centre_3", "G3")):
-        for vectors, start in ((s.points, ""), (s.velocity, "v_"), (s.acceleration, "a_")):
-            np.testing.assert_allclose(vectors[point], getattr(s, start + name), rtol=1e-13, atol=1e-13)
+        for vectors, start in (
+            (s.points, ""),
+            (s.velocity, "v_"),
+            (s.acceleration, "a_"),
+        ):
+            np.testing.assert_allclose(
+                vectors[point], getattr(s, start + name), rtol=1e-13, atol=1e-13
+            )
 
 
 def test_velocity_and_acceleration_are_derivatives() -> None:
     theta_2, h, omega_2 = np.linspace(0.3, 6.0, 7), STEP, 10.0
-    before, here, after = (solve(scene(*POINTS, motion=Motion(theta_2 + step, omega_2))) for step in (-h, 0.0, h))
+    before, here, after = (
+        solve(scene(*POINTS, motion=Motion(theta_2 + step, omega_2)))
+        for step in (-h, 0.0, h)
+    )
     for point in POINTS:
         low, high = before.points[point.name], after.points[point.name]
-        np.testing.assert_allclose(here.velocity[point.name], (high - low) / (2 * h) * omega_2, atol=OF_A_DIFFERENCE)
-        slope = (after.velocity[point.name] - before.velocity[point.name]) / (2 * h) * omega_2
-        np.testing.assert_allclose(here.acceleration[point.name], slope, atol=100.0 * OF_A_DIFFERENCE)
+        np.testing.assert_allclose(
+            here.velocity[point.name],
+            (high - low) / (2 * h) * omega_2,
+            atol=OF_A_DIFFERENCE,
+        )
+        slope = (
+            (after.velocity[point.name] - before.velocity[point.name])
+            / (2 * h)
+            * omega_2
+        )
+        np.testing.assert_allclose(
+            here.acceleration[point.name], slope, atol=100.0 * OF_A_DIFFERENCE
+        )
     for name in ("A", "B", "G2", "G3", "G4"):
         slope = (getattr(after, name) - getattr(before, name)) / (2 * h) * omega_2
-        np.testing.assert_allclose(getattr(here, f"v_{name}"), slope, atol=OF_A_DIFFERENCE)
-    np.testing.assert_allclose(here.points["on_ground"], [[0.1 * np.cos(0.7), 0.1 * np.sin(0.7)]] * 7, atol=1e-15)
+        np.testing.assert_allclose(
+            getattr(here, f"v_{name}"), slope, atol=OF_A_DIFFERENCE
+        )
+    np.testing.assert_allclose(
+        here.points["on_ground"],
+        [[0.1 * np.cos(0.7), 0.1 * np.sin(0.7)]] * 7,
+        atol=1e-15,
+    )
 
 
 def test_positions_alone_have_no_velocities_of_points() -> None:
     posed = scene(*POINTS, motion=Motion(1.0))
     s = solve(posed)
-    assert list(s.points) == [point.name for point in POINTS] and s.velocity == {} == s.acceleration
+    assert (
+        list(s.points) == [point.name for point in POINTS]
+        and s.velocity == {} == s.acceleration
+    )
     assert json.loads(write_json(s))["v_P"] is None
     out = {"a_P": np.zeros((1, 2))}
     s = solve(scene(*POINTS, motion=Motion(1.0, 2.0)), out=out)
@@ -67,7 +99,10 @@ def test_positions_alone_have_no_velocities_of_points() -> None:
 @pytest.mark.slow
 def test_every_table_has_their_columns() -> None:
     s = solve(scene(*POINTS))
-    document, head = json.loads(write_json(s)), write_csv(s).split("\n", 1)[0].split(",")
+    document, head = (
+        json.loads(write_json(s)),
+        write_csv(s).split("\n", 1)[0].split(","),
+    )
     frame, shown = s.to_pandas(), list_columns(s)
     for start, arrays in (("", s.points), ("v_", s.velocity), ("a_", s.acceleration)):
         for point in POINTS:
@@ -76,20 +111,32 @@ def test_every_table_has_their_columns() -> None:
             for axis, letter in enumerate("xy"):
                 assert f"{name}_{letter}" in head
                 assert np.array_equal(frame[f"{name}_{letter}"], array[:, axis])
-                assert any(heading.startswith(f"{name}_{letter}\n") for heading in shown)
+                assert any(
+                    heading.startswith(f"{name}_{letter}\n") for heading in shown
+                )
 
 
 def test_a_study_varies_them_and_lists_its_members() -> None:
-    study = vary(scene(*POINTS), {"points.P.from_pin.0": [0.0, 0.04], "lengths.coupler": [0.25, 0.26]})
+    study = vary(
+        scene(*POINTS),
+        {"points.P.from_pin.0": [0.0, 0.04], "lengths.coupler": [0.25, 0.26]},
+    )
     s = solve(study)
     np.testing.assert_allclose(s.points["P"][0], s.A[0], atol=1e-15)
     longer = replace(crank_rocker().linkage.coupler, length=0.26)
-    alone = solve(scene(*POINTS, linkage=replace(crank_rocker().linkage, coupler=longer)))
+    alone = solve(
+        scene(*POINTS, linkage=replace(crank_rocker().linkage, coupler=longer))
+    )
     np.testing.assert_array_equal(s.acceleration["P"][1], alone.acceleration["P"])
     frame = s.to_pandas()
-    assert len(frame) == s.theta_2.size and frame["member"].tolist() == [0] * 61 + [1] * 61
+    assert (
+        len(frame) == s.theta_2.size and frame["member"].tolist() == [0] * 61 + [1] * 61
+    )
     assert np.array_equal(frame["a_P_x"].to_numpy()[61:], alone.acceleration["P"][:, 0])
-    assert np.shape(json.loads(write_json(s))["torque"]) == (2, 61) and "2 linkages" in s._repr_html_()  # type: ignore[attr-defined]
+    assert (
+        np.shape(json.loads(write_json(s))["torque"]) == (2, 61)
+        and "2 linkages" in s._repr_html_()
+    )  # type: ignore[attr-defined]
 
 
 def test_a_file_holds_them(tmp_path: Any) -> None:
@@ -99,15 +146,33 @@ def test_a_file_holds_them(tmp_path: Any) -> None:
 
 
 WRONG = {
-    "a quantity's name": ('torque = { bar = 3, from_pin = ["1 m", "0 deg"] }', "is the name of a quantity"),
+    "a quantity's name": (
+        'torque = { bar = 3, from_pin = ["1 m", "0 deg"] }',
+        "is the name of a quantity",
+    ),
     "a quantity's column": ('G = { bar = 3, from_pin = ["1 m"] }', "must be a pair"),
-    "a velocity's name": ('v_P = { bar = 3, from_pin = ["1 m", "0 deg"] }', "not beginning with"),
-    "a name of two words": ('"two words" = { bar = 3, from_pin = ["1 m", "0 deg"] }', "must be a word"),
-    "no bar": ('P = { from_pin = ["1 m", "0 deg"] }', "is missing; must be a whole number from 1 to 4"),
+    "a velocity's name": (
+        'v_P = { bar = 3, from_pin = ["1 m", "0 deg"] }',
+        "not beginning with",
+    ),
+    "a name of two words": (
+        '"two words" = { bar = 3, from_pin = ["1 m", "0 deg"] }',
+        "must be a word",
+    ),
+    "no bar": (
+        'P = { from_pin = ["1 m", "0 deg"] }',
+        "is missing; must be a whole number from 1 to 4",
+    ),
     "a fifth bar": ('P = { bar = 5, from_pin = ["1 m", "0 deg"] }', "from 1 to 4"),
-    "another key": ('P = { bar = 3, from_pni = ["1 m", "0 deg"] }', 'did you mean "from_pin"?'),
+    "another key": (
+        'P = { bar = 3, from_pni = ["1 m", "0 deg"] }',
+        'did you mean "from_pin"?',
+    ),
     "no place": ("P = { bar = 3 }", "must be a pair"),
-    "a wrong unit": ('P = { bar = 3, from_pin = ["1 kg", "0 deg"] }', "does not convert to m"),
+    "a wrong unit": (
+        'P = { bar = 3, from_pin = ["1 kg", "0 deg"] }',
+        "does not convert to m",
+    ),
 }
 
 
@@ -116,7 +181,11 @@ def test_a_wrong_point_is_refused_in_one_line(name: str) -> None:
     line, words = WRONG[name]
     with pytest.raises(InputError) as caught:
         loads(dump(scene()) + f"\n[points]\n{line}\n")
-    assert words in str(caught.value) and "points" in str(caught.value) and "\n" not in str(caught.value)
+    assert (
+        words in str(caught.value)
+        and "points" in str(caught.value)
+        and "\n" not in str(caught.value)
+    )
 
 
 def test_two_points_of_one_name_are_refused() -> None:

@@ -38,20 +38,28 @@ def test_the_picture_of_a_scene_file_is_shown_and_saved(
     again = load(tmp_path / "again.toml")
     assert again.pictures == scene.pictures
     assert dump(loads(dump(scene), str(tmp_path / "x.toml"))) == dump(scene)
-    assert again.linkage == scene.linkage  # a massless bar with a picture stays massless
+    assert (
+        again.linkage == scene.linkage
+    )  # a massless bar with a picture stays massless
 
 
-def test_a_scene_saved_elsewhere_names_the_same_file_or_says_why_not(tmp_path: Path) -> None:
+def test_a_scene_saved_elsewhere_names_the_same_file_or_says_why_not(
+    tmp_path: Path,
+) -> None:
     inner = tmp_path / "inner"
     inner.mkdir()
     (inner / "bar.png").write_bytes(PNG)
     scene = load(scene_file(inner, "bar.png", "output"))
     save(scene, tmp_path / "outer.toml")
     assert 'picture = "inner/bar.png"' in (tmp_path / "outer.toml").read_text()
-    assert embedded(animate.write_page(load(tmp_path / "outer.toml")))["pictures"] == {"4": EMBEDDED}
+    assert embedded(animate.write_page(load(tmp_path / "outer.toml")))["pictures"] == {
+        "4": EMBEDDED
+    }
     elsewhere = tmp_path / "other"
     elsewhere.mkdir()
-    with pytest.raises(InputError, match=r"^bars\.output\.picture.*copy it there first[^\n]*$"):
+    with pytest.raises(
+        InputError, match=r"^bars\.output\.picture.*copy it there first[^\n]*$"
+    ):
         save(scene, elsewhere / "scene.toml")
     assert not list(elsewhere.iterdir())
 
@@ -60,15 +68,35 @@ def test_one_given_with_the_command_takes_its_place(tmp_path: Path) -> None:
     (tmp_path / "bar.png").write_bytes(PNG)
     (tmp_path / "other.png").write_bytes(PNG + b"x")
     scene = load(scene_file(tmp_path, "bar.png"))
-    shown = embedded(animate.write_page(scene, {"coupler": tmp_path / "other.png"}))["pictures"]["3"]
+    shown = embedded(animate.write_page(scene, {"coupler": tmp_path / "other.png"}))[
+        "pictures"
+    ]["3"]
     assert base64.b64decode(shown.partition(",")[2]) == PNG + b"x"
 
 
 @pytest.mark.parametrize(
     "name",
     (
-        *("", ".", "..", "../secret.png", "a/../../secret.png", "/etc/passwd", "//host/x.png", "a//b.png"),
-        *(r"..\\secret.png", "C:/x.png", "C:x.png", "a\\u0000b.png", "a\\nb.png", "x" * 300, "file:x.png", "./x.png"),
+        *(
+            "",
+            ".",
+            "..",
+            "../secret.png",
+            "a/../../secret.png",
+            "/etc/passwd",
+            "//host/x.png",
+            "a//b.png",
+        ),
+        *(
+            r"..\\secret.png",
+            "C:/x.png",
+            "C:x.png",
+            "a\\u0000b.png",
+            "a\\nb.png",
+            "x" * 300,
+            "file:x.png",
+            "./x.png",
+        ),
     ),
 )
 def test_a_name_that_leads_elsewhere_is_refused_when_the_file_is_read(
@@ -80,7 +108,9 @@ def test_a_name_that_leads_elsewhere_is_refused_when_the_file_is_read(
     file = scene_file(inner, name)
     assert status(["analyze", str(file)]) == 2
     (line,) = capsys.readouterr().err.strip().split("\n")
-    assert str(file) in line and "bars.coupler.picture" in line and "PNG or JPEG" in line
+    assert (
+        str(file) in line and "bars.coupler.picture" in line and "PNG or JPEG" in line
+    )
 
 
 def test_a_picture_that_is_no_text_is_refused() -> None:
@@ -107,7 +137,9 @@ def test_what_the_name_leads_to_is_looked_at_before_it_is_shown(tmp_path: Path) 
     ):
         scene = load(scene_file(inner, name))
         fourbar.solve(scene)  # nobody has to see it to compute
-        with pytest.raises(InputError, match=rf"^bars\.coupler\.picture[^\n]*{word}[^\n]*$"):
+        with pytest.raises(
+            InputError, match=rf"^bars\.coupler\.picture[^\n]*{word}[^\n]*$"
+        ):
             animate.write(scene, tmp_path / "page.html")
         assert not (tmp_path / "page.html").exists()
 

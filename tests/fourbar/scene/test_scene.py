@@ -9,7 +9,20 @@ import numpy as np
 import pytest
 
 import fourbar
-from fourbar import Bar, FourBar, Free, FromLimit, Law, Load, Motion, Scene, Sweep, solve, uniform, vary
+from fourbar import (
+    Bar,
+    FourBar,
+    Free,
+    FromLimit,
+    Law,
+    Load,
+    Motion,
+    Scene,
+    Sweep,
+    solve,
+    uniform,
+    vary,
+)
 from fourbar.effects import Gravity, Torsion, Viscous
 from fourbar.errors import InputError, LimitError
 from fourbar.formulas.mobility import find_limit_angles, limit_positions
@@ -30,7 +43,11 @@ RETURNED = 64.0
 DIFFERENCE = 1e-6
 """Relative, of a central difference over 1e-5."""
 BARS = [Bar(0.1, 0.2), Bar(0.25, 0.5, 0.01, (0.12, 0.2)), Bar(0.22, 0.4)]
-LOADED = Scene(FourBar(0.3, *BARS, 0.4), loads=(Load(3, (10.0, 0.3), (0.05, 0.1)),), effects=(Gravity(9.81, -1.5),))
+LOADED = Scene(
+    FourBar(0.3, *BARS, 0.4),
+    loads=(Load(3, (10.0, 0.3), (0.05, 0.1)),),
+    effects=(Gravity(9.81, -1.5),),
+)
 OTHERS = {2: (3, 4), 3: (2, 4), 4: (2, 3)}
 
 
@@ -42,14 +59,25 @@ def sine(solution: Solution, bar: int) -> np.ndarray:
 
 def of_bar(solution: Solution, bar: int) -> Command:
     """What a bar was found to do, as a command."""
-    numbers = (np.asarray(getattr(solution, f"{name}_{bar}")) for name in ("theta", "omega", "alpha"))
+    numbers = (
+        np.asarray(getattr(solution, f"{name}_{bar}"))
+        for name in ("theta", "omega", "alpha")
+    )
     theta, omega, alpha = numbers
-    return Command(theta, np.where(sine(solution, bar) < 0.0, -1, 1).astype(np.int8), omega, alpha, bar=bar)
+    return Command(
+        theta,
+        np.where(sine(solution, bar) < 0.0, -1, 1).astype(np.int8),
+        omega,
+        alpha,
+        bar=bar,
+    )
 
 
 @pytest.mark.parametrize("bar", [3, 4])
 @pytest.mark.parametrize("path", MODELS, ids=lambda path: path.stem)
-def test_what_comes_out_fed_back_as_a_command_returns_itself(path: Path, bar: int) -> None:
+def test_what_comes_out_fed_back_as_a_command_returns_itself(
+    path: Path, bar: int
+) -> None:
     scene = fourbar.load(path)
     compared = 0
     for branch in (1, -1):
@@ -58,18 +86,40 @@ def test_what_comes_out_fed_back_as_a_command_returns_itself(path: Path, bar: in
         back = solve(scene, "force", at=of_bar(forth, bar))
         lost = np.minimum(np.abs(sine(forth, bar)), np.abs(forth.sin_mu))
         ok = (forth.status_code == 0) & (lost > 1e-3)
-        assert (back.status_code[ok] == 0).all() and np.array_equal(back.branch[ok], branch + 0 * ok[ok])
+        assert (back.status_code[ok] == 0).all() and np.array_equal(
+            back.branch[ok], branch + 0 * ok[ok]
+        )
         compared += int(ok.sum())
         turned = np.angle(np.exp(1j * (back.theta_2 - forth.theta_2)))
         size = max(scene.linkage.lengths) / min(scene.linkage.lengths)
         assert (np.abs(turned) * lost**2)[ok].max() <= RETURNED * size * U
         drive = np.fmin(forth.drive_condition, 1.0)
-        for name in ("omega_2", "omega_3", "omega_4", "alpha_2", "a_B", "F12", "F32", "F43", "F14", "torque"):
-            sent, returned = (getattr(s, name).reshape(len(ok), -1)[ok] for s in (forth, back))
+        for name in (
+            "omega_2",
+            "omega_3",
+            "omega_4",
+            "alpha_2",
+            "a_B",
+            "F12",
+            "F32",
+            "F43",
+            "F14",
+            "torque",
+        ):
+            sent, returned = (
+                getattr(s, name).reshape(len(ok), -1)[ok] for s in (forth, back)
+            )
             apart = np.abs(sent - returned).max(axis=1) * (lost**3 * drive**2)[ok]
             allowed = RETURNED**2 * size**2 * U * np.abs(sent).max()
-            if name == "alpha_2":  # told to be 0, it comes back as a difference of what speeds and bars make
-                allowed += RETURNED**2 * size**2 * U * max(np.abs(forth.alpha_4[ok]).max(), 1.0)
+            if (
+                name == "alpha_2"
+            ):  # told to be 0, it comes back as a difference of what speeds and bars make
+                allowed += (
+                    RETURNED**2
+                    * size**2
+                    * U
+                    * max(np.abs(forth.alpha_4[ok]).max(), 1.0)
+                )
             assert (apart <= allowed).all(), name
     assert compared > 100
 
@@ -78,10 +128,23 @@ def test_what_comes_out_fed_back_as_a_command_returns_itself(path: Path, bar: in
 def test_limits_of_a_bar_are_where_its_own_sine_is_zero(bar: int) -> None:
     rocker = FourBar(0.5, Bar(0.4), Bar(0.3), Bar(0.25), 0.2)
     for number, angle in enumerate(find_limit_angles(rocker, bar), 1):
-        assert any(abs(math.sin(0.5 * (limit[bar - 2] - angle))) < 8 * U for limit in limit_positions(rocker, bar))
+        assert any(
+            abs(math.sin(0.5 * (limit[bar - 2] - angle))) < 8 * U
+            for limit in limit_positions(rocker, bar)
+        )
         names = [f"theta_{bar}", f"omega_{bar}"]
         beside = [
-            solve(Scene(rocker, Motion(**dict(zip(names, (FromLimit(number, offset), 1.0), strict=True)))), "velocity")
+            solve(
+                Scene(
+                    rocker,
+                    Motion(
+                        **dict(
+                            zip(names, (FromLimit(number, offset), 1.0), strict=True)
+                        )
+                    ),
+                ),
+                "velocity",
+            )
             for offset in (1e-12, -1e-12)
         ]
         assert sorted(s.status[0] for s in beside) == ["not_assembled", "ok"]
@@ -90,14 +153,23 @@ def test_limits_of_a_bar_are_where_its_own_sine_is_zero(bar: int) -> None:
         assert abs(sine(inside, bar)[0]) == pytest.approx(inside.condition[0], rel=1e-6)
     with pytest.raises(InputError, match=rf"motion.theta_{bar}.limit = 9"):
         solve(Scene(rocker, Motion(**{f"theta_{bar}": FromLimit(9)})))
-    with pytest.raises(InputError, match="the output of this linkage has no limit positions"):
+    with pytest.raises(
+        InputError, match="the output of this linkage has no limit positions"
+    ):
         solve(Scene(uniform(0.1, 0.3, 0.25, 0.28), Motion(theta_4=FromLimit(1))))
 
 
 def test_at_a_limit_of_theta_2_a_command_of_theta_4_has_motion_and_forces() -> None:
     """The drive on bar 2 alone has no lever there; pin forces with the others are those just before and after."""
     rocker = replace(
-        LOADED, linkage=FourBar(0.5, *(replace(bar, length=x) for bar, x in zip(BARS, (0.4, 0.3, 0.25), strict=True)))
+        LOADED,
+        linkage=FourBar(
+            0.5,
+            *(
+                replace(bar, length=x)
+                for bar, x in zip(BARS, (0.4, 0.3, 0.25), strict=True)
+            ),
+        ),
     )
     for limit in limit_positions(rocker.linkage):
         sign = 1 if math.sin(limit.theta_3 - limit.theta_2) > 0.0 else -1
@@ -105,20 +177,31 @@ def test_at_a_limit_of_theta_2_a_command_of_theta_4_has_motion_and_forces() -> N
         motion = Motion(theta_4=angles, omega_4=2.0, alpha_4=3.0, branch=sign)
         for drive in (3, 4):
             s = solve(replace(rocker, motion=motion, drive_bar=drive), "error")
-            assert s.status == ["ok"] * 3 and abs(s.sin_mu[1]) < 1e-14 and abs(s.omega_2[1]) < 1e-13
+            assert (
+                s.status == ["ok"] * 3
+                and abs(s.sin_mu[1]) < 1e-14
+                and abs(s.omega_2[1]) < 1e-13
+            )
             assert s.branch.tolist()[0] == -s.branch.tolist()[2]
             assert s.condition[1] > 0.1 and s.drive_condition[1] > 0.1
             for name in ("theta_2", "alpha_2", "F12", "F32", "F43", "F14", "torque"):
                 before, at_limit, after = getattr(s, name)
-                assert at_limit == pytest.approx(0.5 * (before + after), rel=1e-9, abs=1e-9)
+                assert at_limit == pytest.approx(
+                    0.5 * (before + after), rel=1e-9, abs=1e-9
+                )
             assert (s.torque_error < 1e-11 * np.abs(s.torque)).all()
             answer = FreeBody().answer(
-                replace(rocker, drive_bar=drive), fourbar.command(replace(rocker, motion=motion))
+                replace(rocker, drive_bar=drive),
+                fourbar.command(replace(rocker, motion=motion)),
             )
             assert answer.quantities["F43"] == pytest.approx(s.F43, rel=1e-11)
         s = solve(replace(rocker, motion=motion), "error")
-        assert s.torque_error[1] > 0.01 * abs(s.torque[1]) and s.drive_condition[1] < 1e-14
-        exact = compute_reference(replace(rocker, motion=motion, drive_bar=3), sign, limit.theta_4)
+        assert (
+            s.torque_error[1] > 0.01 * abs(s.torque[1]) and s.drive_condition[1] < 1e-14
+        )
+        exact = compute_reference(
+            replace(rocker, motion=motion, drive_bar=3), sign, limit.theta_4
+        )
         assert exact is not None and np.isfinite(float(exact[0]["torque"].mid()))
 
 
@@ -130,34 +213,58 @@ def test_a_periodic_law_passes_its_points_whenever_it_begins() -> None:
     assert theta == pytest.approx(angles, rel=4 * U)
     assert (omega[0], alpha[0]) == pytest.approx((omega[-1], alpha[-1]), rel=1e-13)
     early = Law(tuple(t - 10.0 for t in times), angles, 8, "periodic")
-    assert np.array(law.at(law.times())) == pytest.approx(np.array(early.at(early.times())), rel=1e-13)
+    assert np.array(law.at(law.times())) == pytest.approx(
+        np.array(early.at(early.times())), rel=1e-13
+    )
 
 
 @pytest.mark.parametrize("bar", [3, 4])
 def test_a_sweep_a_law_and_what_is_left_out_follow_the_commanded_bar(bar: int) -> None:
     swept = solve(replace(LOADED, motion=Motion(**{f"omega_{bar}": 2.0})))
     angle = getattr(swept, f"theta_{bar}")
-    assert len(swept) == 361 and np.isfinite(swept.torque).all() and (getattr(swept, f"omega_{bar}") == 2.0).all()
+    assert (
+        len(swept) == 361
+        and np.isfinite(swept.torque).all()
+        and (getattr(swept, f"omega_{bar}") == 2.0).all()
+    )
     assert (np.diff(angle) > 0.0).all() and swept.commanded == f"theta_{bar}"
     assert np.abs(np.diff(swept.theta_2)).max() < 1.0  # continuous
     table = tuple(np.linspace(angle[30], angle[200], 5).tolist())
-    law = Law((0.0, 1.0, 2.0, 3.0, 4.0), steps=8, ends="rest", **{f"theta_{bar}": table})
+    law = Law(
+        (0.0, 1.0, 2.0, 3.0, 4.0), steps=8, ends="rest", **{f"theta_{bar}": table}
+    )
     assert law.bar == bar and law.angle == table
     moved = solve(replace(LOADED, motion=Motion(law=law)))
-    again = solve(replace(LOADED, motion=Motion()), at=fourbar.command(replace(LOADED, motion=Motion(law=law))))
+    again = solve(
+        replace(LOADED, motion=Motion()),
+        at=fourbar.command(replace(LOADED, motion=Motion(law=law))),
+    )
     assert np.array_equal(moved.torque, again.torque) and moved.time is not None
-    assert getattr(moved, f"theta_{bar}")[-1] == pytest.approx(table[-1], rel=4 * U) and abs(moved.omega_2[0]) < 1e-12
-    with pytest.raises(InputError, match=f"gives theta_{bar}, omega_{bar} and alpha_{bar}"):
+    assert (
+        getattr(moved, f"theta_{bar}")[-1] == pytest.approx(table[-1], rel=4 * U)
+        and abs(moved.omega_2[0]) < 1e-12
+    )
+    with pytest.raises(
+        InputError, match=f"gives theta_{bar}, omega_{bar} and alpha_{bar}"
+    ):
         Motion(law=law, theta_2=1.0)
     with pytest.raises(InputError, match="is the command of one bar"):
         Law((0.0, 1.0), (0.0, 1.0), ends="rest", theta_4=(0.0, 1.0))
 
 
-def test_a_study_sensitivities_and_tolerances_take_the_keys_of_the_commanded_bar() -> None:
-    inside = fourbar.command(replace(LOADED, motion=Motion(omega_4=1.0))).angle[[90, 200]]
+def test_a_study_sensitivities_and_tolerances_take_the_keys_of_the_commanded_bar() -> (
+    None
+):
+    inside = fourbar.command(replace(LOADED, motion=Motion(omega_4=1.0))).angle[
+        [90, 200]
+    ]
     motion = Motion(theta_4=inside, omega_4=2.0, alpha_4=-3.0)
     scene = replace(LOADED, motion=motion)
-    step = {"lengths.input": (0.1, 1e-6), "motion.theta_4": (motion.theta_4, 1e-6), "motion.omega_4": (2.0, 1e-5)}
+    step = {
+        "lengths.input": (0.1, 1e-6),
+        "motion.theta_4": (motion.theta_4, 1e-6),
+        "motion.omega_4": (2.0, 1e-5),
+    }
     slopes = fourbar.sensitivity(scene)
     for key, (value, h) in step.items():
         ends = [np.atleast_2d((value + side * h) * np.ones((1, 1))) for side in (-1, 1)]
@@ -170,29 +277,46 @@ def test_a_study_sensitivities_and_tolerances_take_the_keys_of_the_commanded_bar
         for name in ("theta_2", "omega_2", "torque", "F43"):
             low, high = getattr(solved, name)
             slope = (high - low) / (2 * h)
-            assert slopes.of(name, key) == pytest.approx(slope, rel=DIFFERENCE, abs=DIFFERENCE * np.abs(slope).max())
+            assert slopes.of(name, key) == pytest.approx(
+                slope, rel=DIFFERENCE, abs=DIFFERENCE * np.abs(slope).max()
+            )
     assert np.array_equal(slopes.of("theta_4", "motion.theta_4"), [1.0, 1.0])
     assert not slopes.of("theta_4", "lengths.input").any()
     with pytest.raises(InputError, match=r"motion\.theta_4"):
         vary(scene, {"motion.theta_2": [1.0]})
     toleranced = replace(scene, tolerances=(fourbar.Tolerance("motion.omega_4", 0.01),))
     spread = fourbar.tolerances(toleranced, 64).spreads["omega_2"]
-    assert spread.worst == pytest.approx(np.abs(slopes.value("omega_2")) * 0.005, rel=1e-9)
+    assert spread.worst == pytest.approx(
+        np.abs(slopes.value("omega_2")) * 0.005, rel=1e-9
+    )
 
 
 @pytest.mark.parametrize("bar", [3, 4])
-def test_released_at_an_angle_of_another_bar_it_moves_as_at_its_own_theta_2(bar: int) -> None:
+def test_released_at_an_angle_of_another_bar_it_moves_as_at_its_own_theta_2(
+    bar: int,
+) -> None:
     free = Free(0.4, 8)
     scene = replace(LOADED, effects=(*LOADED.effects, Viscous.at(O2=0.01)), loads=())
     start = solve(replace(scene, motion=Motion(1.2, 3.0)), "velocity")
     command = of_bar(replace_alpha(start), bar)
-    commanded = {f"theta_{bar}": float(command.angle[0]), f"omega_{bar}": float(np.ravel(command.speed)[0])}
+    commanded = {
+        f"theta_{bar}": float(command.angle[0]),
+        f"omega_{bar}": float(np.ravel(command.speed)[0]),
+    }
     moved = solve(
-        replace(scene, motion=Motion(branch=int(command.branch[0]), through="follow", free=free, **commanded))
+        replace(
+            scene,
+            motion=Motion(
+                branch=int(command.branch[0]), through="follow", free=free, **commanded
+            ),
+        )
     )
     same = solve(replace(scene, motion=Motion(1.2, 3.0, through="follow", free=free)))
     assert len(moved) == len(same) == 9
-    assert moved.theta_2 == pytest.approx(same.theta_2, abs=1e-9) and pytest.approx(same.F12, abs=1e-6) == moved.F12
+    assert (
+        moved.theta_2 == pytest.approx(same.theta_2, abs=1e-9)
+        and pytest.approx(same.F12, abs=1e-6) == moved.F12
+    )
 
 
 def replace_alpha(solution: Solution) -> Solution:
@@ -201,15 +325,34 @@ def replace_alpha(solution: Solution) -> Solution:
     return solution
 
 
-def test_released_at_theta_4_it_passes_a_limit_of_theta_2_and_stops_at_its_own() -> None:
+def test_released_at_theta_4_it_passes_a_limit_of_theta_2_and_stops_at_its_own() -> (
+    None
+):
     rocker = FourBar(0.5, Bar(0.4, 1.0), Bar(0.3, 1.0), Bar(0.25, 1.0))
     limit = limit_positions(rocker)[0]
     sign = 1 if math.sin(limit.theta_3 - limit.theta_2) > 0.0 else -1
-    ahead = 1.0 if math.sin(find_limit_angles(rocker, 4)[0] - limit.theta_4) > 0.0 else -1.0
-    motion = Motion(theta_4=limit.theta_4 - 0.1 * ahead, omega_4=ahead, branch=sign, free=Free(20.0, 200))
+    ahead = (
+        1.0 if math.sin(find_limit_angles(rocker, 4)[0] - limit.theta_4) > 0.0 else -1.0
+    )
+    motion = Motion(
+        theta_4=limit.theta_4 - 0.1 * ahead,
+        omega_4=ahead,
+        branch=sign,
+        free=Free(20.0, 200),
+    )
     solution = solve(Scene(rocker, motion))
-    assert solution.stopped_at is not None and len(solution) < 201 and set(solution.branch.tolist()) == {1, -1}
-    assert min(abs(math.sin(0.5 * (solution.theta_4[-1] - x))) for x in find_limit_angles(rocker, 4)) < 0.1
+    assert (
+        solution.stopped_at is not None
+        and len(solution) < 201
+        and set(solution.branch.tolist()) == {1, -1}
+    )
+    assert (
+        min(
+            abs(math.sin(0.5 * (solution.theta_4[-1] - x)))
+            for x in find_limit_angles(rocker, 4)
+        )
+        < 0.1
+    )
 
 
 TWO = """
@@ -222,31 +365,69 @@ output = "22 cm"
 """
 
 
-STROKE = Motion(stroke=0.3, stroke_speed=0.1, stroke_acceleration=0.2, side="left", branch=-1)
+STROKE = Motion(
+    stroke=0.3, stroke_speed=0.1, stroke_acceleration=0.2, side="left", branch=-1
+)
 
 
 @pytest.mark.parametrize(
     ("motion", "changes", "same"),
     [
-        (Motion(1.0, 2.0, 3.0, -1, "follow"), {"angle": 1.5, "branch": 1}, Motion(1.5, 2.0, 3.0, 1, "follow")),
-        (Motion(theta_4=1.0, omega_4=2.0), {"speed": 3.0}, Motion(theta_4=1.0, omega_4=3.0)),
-        (STROKE, {"acceleration": 0.0}, Motion(stroke=0.3, stroke_speed=0.1, side="left", branch=-1)),
-        (Motion(law=Law((0.0, 1.0, 2.0, 3.0), theta_3=(0.0, 1.0, 1.5, 1.0))), {"law": None}, Motion(theta_3=None)),
+        (
+            Motion(1.0, 2.0, 3.0, -1, "follow"),
+            {"angle": 1.5, "branch": 1},
+            Motion(1.5, 2.0, 3.0, 1, "follow"),
+        ),
+        (
+            Motion(theta_4=1.0, omega_4=2.0),
+            {"speed": 3.0},
+            Motion(theta_4=1.0, omega_4=3.0),
+        ),
+        (
+            STROKE,
+            {"acceleration": 0.0},
+            Motion(stroke=0.3, stroke_speed=0.1, side="left", branch=-1),
+        ),
+        (
+            Motion(law=Law((0.0, 1.0, 2.0, 3.0), theta_3=(0.0, 1.0, 1.5, 1.0))),
+            {"law": None},
+            Motion(theta_3=None),
+        ),
         (Motion(1.0, free=Free(1.0, 2)), {"free": None}, Motion(1.0)),
     ],
     ids=str,
 )
-def test_a_motion_is_replaced_by_what_it_commands(motion: Motion, changes: dict[str, Any], same: Motion) -> None:
+def test_a_motion_is_replaced_by_what_it_commands(
+    motion: Motion, changes: dict[str, Any], same: Motion
+) -> None:
     assert motion.replace() == motion != same == motion.replace(**changes)
-    with pytest.raises(TypeError, match="no field 'theta_2' to replace; it has angle, speed, acceleration"):
+    with pytest.raises(
+        TypeError,
+        match="no field 'theta_2' to replace; it has angle, speed, acceleration",
+    ):
         motion.replace(theta_2=1.0)
 
 
 def test_a_motion_reads_by_the_name_of_what_it_commands() -> None:
-    assert (STROKE.stroke, STROKE.stroke_speed, STROKE.stroke_acceleration, STROKE.theta_2) == (0.3, 0.1, 0.2, None)
+    assert (
+        STROKE.stroke,
+        STROKE.stroke_speed,
+        STROKE.stroke_acceleration,
+        STROKE.theta_2,
+    ) == (0.3, 0.1, 0.2, None)
     output = Motion(theta_4=1.0, omega_4=2.0, alpha_4=3.0)
-    assert (output.theta_4, output.omega_4, output.alpha_4, output.bar) == (1.0, 2.0, 3.0, 4)
-    assert (output.theta_2, output.omega_2, output.alpha_2, output.stroke) == (None, None, 0.0, None)
+    assert (output.theta_4, output.omega_4, output.alpha_4, output.bar) == (
+        1.0,
+        2.0,
+        3.0,
+        4,
+    )
+    assert (output.theta_2, output.omega_2, output.alpha_2, output.stroke) == (
+        None,
+        None,
+        0.0,
+        None,
+    )
 
 
 @pytest.mark.parametrize(
@@ -258,8 +439,14 @@ def test_a_motion_reads_by_the_name_of_what_it_commands() -> None:
         ),
         ('theta_4 = "1 rad"\nomega_2 = "1 rad/s"', "motion.theta_4"),
         ('theta_3 = "1 m"', "motion.theta_3"),
-        ('theta_4 = "1 rad"\nlaw = { time = ["0 s"], theta_4 = ["0 rad"] }', "motion.law"),
-        ('law = { time = ["0 s", "1 s"], theta_2 = ["0 rad", "1 rad"], theta_3 = ["0 rad", "1 rad"] }', "motion.law"),
+        (
+            'theta_4 = "1 rad"\nlaw = { time = ["0 s"], theta_4 = ["0 rad"] }',
+            "motion.law",
+        ),
+        (
+            'law = { time = ["0 s", "1 s"], theta_2 = ["0 rad", "1 rad"], theta_3 = ["0 rad", "1 rad"] }',
+            "motion.law",
+        ),
     ],
 )
 def test_two_commands_of_motion_are_one_line(lines: str, said: str) -> None:
@@ -268,34 +455,71 @@ def test_two_commands_of_motion_are_one_line(lines: str, said: str) -> None:
     assert said in str(refused.value) and "\n" not in str(refused.value)
 
 
-@pytest.mark.parametrize("angle", [1.5, Sweep(3.8, 4.2, 7), np.array([4.0, 4.1]), FromLimit(1, 1e-9), None])
+@pytest.mark.parametrize(
+    "angle", [1.5, Sweep(3.8, 4.2, 7), np.array([4.0, 4.1]), FromLimit(1, 1e-9), None]
+)
 def test_a_file_of_it_reads_back_bit_for_bit(angle: object) -> None:
-    scene = replace(LOADED, motion=Motion(theta_4=angle, omega_4=2.0, alpha_4=-0.1, branch=-1))  # type: ignore[arg-type]
+    scene = replace(
+        LOADED, motion=Motion(theta_4=angle, omega_4=2.0, alpha_4=-0.1, branch=-1)
+    )  # type: ignore[arg-type]
     text = fourbar.dump(scene)
     again = fourbar.files.loads(text)
-    assert fourbar.dump(again) == text and again.motion.bar == 4 and again.motion.speed == 2.0
+    assert (
+        fourbar.dump(again) == text
+        and again.motion.bar == 4
+        and again.motion.speed == 2.0
+    )
     before, after = (solve(version, "velocity") for version in (scene, again))
     assert np.array_equal(before.theta_2, after.theta_2, equal_nan=True)
 
 
 def test_what_takes_theta_2_alone_refuses_in_one_line() -> None:
-    scene = replace(LOADED, motion=Motion(theta_4=Sweep(3.8, 4.2, 7), omega_4=1.0), loads=())
+    scene = replace(
+        LOADED, motion=Motion(theta_4=Sweep(3.8, 4.2, 7), omega_4=1.0), loads=()
+    )
     for refuse in (write_mjcf, fourbar.extremes):
-        with pytest.raises(LimitError, match=r"^motion.theta_4: .* takes a command of theta_2 alone$"):
+        with pytest.raises(
+            LimitError, match=r"^motion.theta_4: .* takes a command of theta_2 alone$"
+        ):
             refuse(scene)
-    with pytest.raises(InputError, match=r"theta_4'?: is commanded, and theta_2 is not"):
+    with pytest.raises(
+        InputError, match=r"theta_4'?: is commanded, and theta_2 is not"
+    ):
         _ = fourbar.command(scene).theta_2
 
 
 @pytest.mark.slow
-def test_the_harness_asks_who_takes_the_command_and_writes_the_refusal_of_the_others() -> None:
-    scene = replace(LOADED, motion=Motion(theta_4=Sweep(3.9, 4.4, 4), omega_4=2.0, alpha_4=1.0), drive_bar=3)
+def test_the_harness_asks_who_takes_the_command_and_writes_the_refusal_of_the_others() -> (
+    None
+):
+    scene = replace(
+        LOADED,
+        motion=Motion(theta_4=Sweep(3.9, 4.4, 4), omega_4=2.0, alpha_4=1.0),
+        drive_bar=3,
+    )
     rows = judge("", scene).rows
     assert not [row for row in rows if row.failed]
-    agreed = {row.quantity for row in rows if row.engine == "free-body" and row.verdict == AGREES}
-    assert {"theta_3", "omega_2", "alpha_2", "A", "F12", "F43", "torque", "closure"} <= agreed
+    agreed = {
+        row.quantity
+        for row in rows
+        if row.engine == "free-body" and row.verdict == AGREES
+    }
+    assert {
+        "theta_3",
+        "omega_2",
+        "alpha_2",
+        "A",
+        "F12",
+        "F43",
+        "torque",
+        "closure",
+    } <= agreed
     undeclared = replace(ENGINES[0], name="undeclared", start=Undeclared)
-    (row,) = (row for row in judge("", scene, (undeclared,)).rows if row.engine == "undeclared")
+    (row,) = (
+        row
+        for row in judge("", scene, (undeclared,)).rows
+        if row.engine == "undeclared"
+    )
     assert row.verdict == REFUSES
     assert row.reason == "it takes a command of theta_2, and here theta_4 is commanded"
 
@@ -310,7 +534,11 @@ class Undeclared:
 def test_springs_count_turns_along_the_commanded_angle(bar: int) -> None:
     """A drag link, whose bars all turn: where a spring is wound is the same whichever of them is told to."""
     springs = Torsion.at(**{pin: (0.1, 0.3, 0.0) for pin in ("O2", "A", "B", "O4")})
-    scene = Scene(uniform(0.1, 0.3, 0.25, 0.28), Motion(np.linspace(0.2, 5.2, 26), 1.0), effects=(springs,))
+    scene = Scene(
+        uniform(0.1, 0.3, 0.25, 0.28),
+        Motion(np.linspace(0.2, 5.2, 26), 1.0),
+        effects=(springs,),
+    )
     forth = solve(scene, "acceleration")
     for pin, *_ in springs.springs:
         one_spring = replace(scene, effects=(Torsion.at(**{pin: (0.1, 0.3, 0.0)}),))

@@ -32,26 +32,48 @@ DIFFERENCES = 1e-5
 """Relative, of differences over two millionths of a length of a tenth: (1e-5)^2 times third derivatives of 1e4."""
 
 
-def scene(bar: int, stroke: Any, side: str = "left", *, turned: bool = False, **motion: Any) -> fourbar.Scene:
+def scene(
+    bar: int, stroke: Any, side: str = "left", *, turned: bool = False, **motion: Any
+) -> fourbar.Scene:
     ends = (ENDS[bar], GROUND) if turned else (GROUND, ENDS[bar])
     commanded = fourbar.Motion(stroke=stroke, side=side, **motion)
-    return crank_rocker(motion=commanded, drive=LinearDrive(*ends), effects=(fourbar.Gravity(),))
+    return crank_rocker(
+        motion=commanded, drive=LinearDrive(*ends), effects=(fourbar.Gravity(),)
+    )
 
 
 @pytest.mark.parametrize("turned", [False, True])
 @pytest.mark.parametrize("side", ["left", "right"])
-@pytest.mark.parametrize(("bar", "strokes"), [(2, Sweep(0.25, 0.35, 6)), (4, Sweep(0.45, 0.52, 6))])
-def test_its_bar_moves_as_the_triangle_in_balls_does(bar: int, strokes: Sweep, side: str, turned: bool) -> None:
-    by_stroke = scene(bar, strokes, side, turned=turned, stroke_speed=0.2, stroke_acceleration=0.1)
+@pytest.mark.parametrize(
+    ("bar", "strokes"), [(2, Sweep(0.25, 0.35, 6)), (4, Sweep(0.45, 0.52, 6))]
+)
+def test_its_bar_moves_as_the_triangle_in_balls_does(
+    bar: int, strokes: Sweep, side: str, turned: bool
+) -> None:
+    by_stroke = scene(
+        bar, strokes, side, turned=turned, stroke_speed=0.2, stroke_acceleration=0.1
+    )
     s, exact = fourbar.solve(by_stroke), answer_in_balls(by_stroke)
     ok = s.status_code == 0
     assert ok.sum() > 4
     for name in ("theta_2", "theta_3", "theta_4"):
         away = np.remainder(getattr(s, name) - exact[name] + np.pi, math.tau) - np.pi
         assert np.abs(away[ok]).max() < ROUND_OFF, name
-    for name in ("omega_2", "omega_3", "omega_4", "alpha_2", "alpha_3", "alpha_4", "condition", "drive_force", "F43"):
+    for name in (
+        "omega_2",
+        "omega_3",
+        "omega_4",
+        "alpha_2",
+        "alpha_3",
+        "alpha_4",
+        "condition",
+        "drive_force",
+        "F43",
+    ):
         largest = np.abs(exact[name][ok]).max()
-        np.testing.assert_allclose(getattr(s, name)[ok], exact[name][ok], rtol=0.0, atol=ROUND_OFF * largest)
+        np.testing.assert_allclose(
+            getattr(s, name)[ok], exact[name][ok], rtol=0.0, atol=ROUND_OFF * largest
+        )
 
 
 def test_the_sides_are_left_and_right_of_the_line_from_pin_to_ground_end() -> None:
@@ -62,21 +84,42 @@ def test_the_sides_are_left_and_right_of_the_line_from_pin_to_ground_end() -> No
         assert sign * (np.conj(ground) * end).imag > 0.0
 
 
-@pytest.mark.parametrize(("bar", "strokes"), [(2, [0.181, 0.4, 0.4199999]), (4, [0.4, 0.45, 0.5])])
-def test_error_bars_hold_what_the_angle_of_a_stroke_loses(bar: int, strokes: list[float]) -> None:
+@pytest.mark.parametrize(
+    ("bar", "strokes"), [(2, [0.181, 0.4, 0.4199999]), (4, [0.4, 0.45, 0.5])]
+)
+def test_error_bars_hold_what_the_angle_of_a_stroke_loses(
+    bar: int, strokes: list[float]
+) -> None:
     """The ground turned with all that is on it: the same force, every number of which rounds otherwise.
 
     Against balls, and not the median of the doubles, which all lose the same in what does not turn.
     """
-    by_stroke = replace(scene(bar, np.array(strokes), stroke_speed=0.2, stroke_acceleration=0.1), effects=(), loads=())
+    by_stroke = replace(
+        scene(bar, np.array(strokes), stroke_speed=0.2, stroke_acceleration=0.1),
+        effects=(),
+        loads=(),
+    )
     angles = by_stroke.linkage.ground_angle + np.linspace(0.0, 3.0, 100)
-    s = fourbar.solve(fourbar.vary(by_stroke, {"lengths.ground_angle": angles}), "error")
-    assert (s.status_code == 0).all() and s.drive_force is not None and s.drive_force_error is not None
+    s = fourbar.solve(
+        fourbar.vary(by_stroke, {"lengths.ground_angle": angles}), "error"
+    )
+    assert (
+        (s.status_code == 0).all()
+        and s.drive_force is not None
+        and s.drive_force_error is not None
+    )
     for place, stroke in enumerate(strokes):
-        reference = compute_reference(replace(by_stroke, motion=by_stroke.motion.replace(angle=stroke)), 1, stroke)
+        reference = compute_reference(
+            replace(by_stroke, motion=by_stroke.motion.replace(angle=stroke)), 1, stroke
+        )
         assert reference is not None
         exact = reference[0]["drive_force"]
-        error = np.array([abs(float((force - exact).mid())) for force in s.drive_force[:, place].tolist()])
+        error = np.array(
+            [
+                abs(float((force - exact).mid()))
+                for force in s.drive_force[:, place].tolist()
+            ]
+        )
         off = error / s.drive_force_error[:, place]
         assert np.quantile(off, 0.5) < OF_LONGER_NUMBERS and off.max() < BARS
         assert np.quantile(off, 0.9) > 0.1  # no bar is wide enough to hide anything
@@ -89,7 +132,9 @@ def test_where_the_line_passes_the_pin_the_stroke_is_at_its_end_and_singular() -
 
 
 def test_it_reads_back_as_it_was_written() -> None:
-    by_stroke = scene(4, Sweep(0.4, 0.5, 5), "right", stroke_speed=0.2, stroke_acceleration=-0.1)
+    by_stroke = scene(
+        4, Sweep(0.4, 0.5, 5), "right", stroke_speed=0.2, stroke_acceleration=-0.1
+    )
     again = loads(dump(by_stroke))
     assert again == by_stroke and again.motion.bar == 4
 
@@ -103,9 +148,13 @@ def test_it_reads_back_as_it_was_written() -> None:
         ({"stroke": -0.3, "side": "left"}, "above 0"),
     ],
 )
-def test_what_cannot_be_is_refused_in_one_line(motion: dict[str, Any], says: str) -> None:
+def test_what_cannot_be_is_refused_in_one_line(
+    motion: dict[str, Any], says: str
+) -> None:
     with pytest.raises(InputError, match=says) as caught:
-        refused = crank_rocker(motion=fourbar.Motion(**motion), drive=LinearDrive(GROUND, ENDS[2]))
+        refused = crank_rocker(
+            motion=fourbar.Motion(**motion), drive=LinearDrive(GROUND, ENDS[2])
+        )
         fourbar.solve(refused)
     assert "\n" not in str(caught.value)
 
@@ -120,43 +169,94 @@ def test_who_does_not_take_it_says_so() -> None:
 
 
 @pytest.mark.parametrize(("bar", "strokes"), [(2, (0.25, 0.35)), (4, (0.45, 0.52))])
-def test_a_study_of_strokes_is_as_its_members_one_by_one(bar: int, strokes: tuple[float, float]) -> None:
-    by_stroke = scene(bar, Sweep(*strokes, 6), stroke_speed=0.2, stroke_acceleration=0.1)
-    values = {"lengths.input": [0.1, 0.11], "drive.to.at.0": [0.12, 0.14], "drive.from.at.1": [2.2, 2.3]}
+def test_a_study_of_strokes_is_as_its_members_one_by_one(
+    bar: int, strokes: tuple[float, float]
+) -> None:
+    by_stroke = scene(
+        bar, Sweep(*strokes, 6), stroke_speed=0.2, stroke_acceleration=0.1
+    )
+    values = {
+        "lengths.input": [0.1, 0.11],
+        "drive.to.at.0": [0.12, 0.14],
+        "drive.from.at.1": [2.2, 2.3],
+    }
     values |= {"lengths.ground_angle": [0.0, 0.2], "motion.stroke_speed": [0.2, -0.3]}
     study = fourbar.solve(fourbar.vary(by_stroke, values))
     for k in range(2):
-        one = fourbar.solve(replace_numbers(by_stroke, {key: pair[k] for key, pair in values.items()}))
+        one = fourbar.solve(
+            replace_numbers(by_stroke, {key: pair[k] for key, pair in values.items()})
+        )
         assert one.status == study.status[k] and one.status.count("ok") > 5
-        for name in ("theta_2", "theta_4", "alpha_3", "drive_force", "F14", "condition", "stroke"):
+        for name in (
+            "theta_2",
+            "theta_4",
+            "alpha_3",
+            "drive_force",
+            "F14",
+            "condition",
+            "stroke",
+        ):
             theirs = getattr(one, name)
-            np.testing.assert_allclose(getattr(study, name)[k], theirs, rtol=ROUND_OFF, atol=1e-12)
+            np.testing.assert_allclose(
+                getattr(study, name)[k], theirs, rtol=ROUND_OFF, atol=1e-12
+            )
 
 
 def test_a_member_whose_cylinder_cannot_have_the_stroke_does_not_assemble() -> None:
-    solution = fourbar.solve(fourbar.vary(scene(2, 0.3, stroke_speed=0.2), {"motion.stroke": [0.1, 0.3, 0.5]}))
-    assert solution.status == [["not_assembled", "ok", "not_assembled"]] and np.isnan(solution.theta_2[0, ::2]).all()
+    solution = fourbar.solve(
+        fourbar.vary(
+            scene(2, 0.3, stroke_speed=0.2), {"motion.stroke": [0.1, 0.3, 0.5]}
+        )
+    )
+    assert (
+        solution.status == [["not_assembled", "ok", "not_assembled"]]
+        and np.isnan(solution.theta_2[0, ::2]).all()
+    )
 
 
 @pytest.mark.parametrize(("bar", "stroke"), [(2, 0.3), (4, 0.48)])
 def test_sensitivities_at_a_stroke_are_its_differences(bar: int, stroke: float) -> None:
     by_stroke, h = scene(bar, stroke, stroke_speed=0.2, stroke_acceleration=0.1), 1e-6
     slopes = fourbar.sensitivity(by_stroke)
-    assert {"motion.stroke", "motion.stroke_speed", "motion.stroke_acceleration", "drive.to.at.1"} <= set(slopes.keys)
+    assert {
+        "motion.stroke",
+        "motion.stroke_speed",
+        "motion.stroke_acceleration",
+        "drive.to.at.1",
+    } <= set(slopes.keys)
     for key in slopes.keys:
-        value = stroke if key == "motion.stroke" else read_place(by_stroke, slopes.keys[key].place)
+        value = (
+            stroke
+            if key == "motion.stroke"
+            else read_place(by_stroke, slopes.keys[key].place)
+        )
         ends = np.array([value + h, value - h])
-        s = fourbar.solve(fourbar.vary(by_stroke, {key: ends[:, None] if key == "motion.stroke" else ends}))
-        for name in ("theta_2", "theta_3", "alpha_4", "drive_force", "F12", "condition"):
+        s = fourbar.solve(
+            fourbar.vary(
+                by_stroke, {key: ends[:, None] if key == "motion.stroke" else ends}
+            )
+        )
+        for name in (
+            "theta_2",
+            "theta_3",
+            "alpha_4",
+            "drive_force",
+            "F12",
+            "condition",
+        ):
             ahead, back = getattr(s, name)
             slope = (ahead - back)[0] / (2.0 * h)
             size = np.abs(getattr(slopes.solution, name)).max() / h
-            np.testing.assert_allclose(slopes.of(name, key)[0], slope, rtol=DIFFERENCES, atol=1e-11 * size)
+            np.testing.assert_allclose(
+                slopes.of(name, key)[0], slope, rtol=DIFFERENCES, atol=1e-11 * size
+            )
 
 
 def test_tolerances_at_a_stroke_spread_as_first_order_says() -> None:
     drawn = fourbar.Tolerance("drive.to.at.0", 1e-5, sigma=True)
-    by_stroke = replace(scene(2, Sweep(0.25, 0.35, 5), stroke_speed=0.2), tolerances=(drawn,))
+    by_stroke = replace(
+        scene(2, Sweep(0.25, 0.35, 5), stroke_speed=0.2), tolerances=(drawn,)
+    )
     spread, slopes = fourbar.tolerances(by_stroke, 256), fourbar.sensitivity(by_stroke)
     for name in ("theta_2", "theta_4", "drive_force"):
         wanted = 1e-5 * np.abs(slopes.of(name, drawn.key))

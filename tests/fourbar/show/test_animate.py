@@ -57,10 +57,24 @@ def test_embedded_numbers_are_those_of_solve_on_both_branches() -> None:
     scene = crank_rocker()
     data = embedded(animate.write_page(scene))
     for sign in (1, -1):
-        solution = fourbar.solve(replace(scene, motion=scene.motion.replace(branch=sign)))
+        solution = fourbar.solve(
+            replace(scene, motion=scene.motion.replace(branch=sign))
+        )
         columns = data["branches"][str(sign)]
-        for name in ("theta_3", "theta_4", "omega_3", "alpha_4", "torque", "F12", "F32", "F43", "F14"):
-            np.testing.assert_array_equal(np.array(columns[name]), getattr(solution, name))  # to the last bit
+        for name in (
+            "theta_3",
+            "theta_4",
+            "omega_3",
+            "alpha_4",
+            "torque",
+            "F12",
+            "F32",
+            "F43",
+            "F14",
+        ):
+            np.testing.assert_array_equal(
+                np.array(columns[name]), getattr(solution, name)
+            )  # to the last bit
         assert columns["sign"] == [sign] * 61
     np.testing.assert_array_equal(data["theta_2"], fourbar.solve(scene).theta_2)
 
@@ -69,11 +83,16 @@ def test_a_single_position_is_one_of_the_rows_and_the_first_shown() -> None:
     theta_2 = math.radians(123.456)
     data = embedded(animate.write_page(thesis(theta_2)))
     assert data["theta_2"][data["start"]] == theta_2
-    assert data["branches"]["1"]["torque"][data["start"]] == fourbar.solve(thesis(theta_2)).torque[0]
+    assert (
+        data["branches"]["1"]["torque"][data["start"]]
+        == fourbar.solve(thesis(theta_2)).torque[0]
+    )
     assert len(data["theta_2"]) > 300
 
 
-RELEASED = crank_rocker(motion=fourbar.Motion(0.5, 0.0, free=fourbar.Free(1.8, 90)), drive_bar=2)
+RELEASED = crank_rocker(
+    motion=fourbar.Motion(0.5, 0.0, free=fourbar.Free(1.8, 90)), drive_bar=2
+)
 
 
 @pytest.mark.slow
@@ -82,14 +101,21 @@ def test_a_free_motion_is_embedded_instant_by_instant() -> None:
     (columns,) = data["branches"].values()
     np.testing.assert_array_equal(data["time"], solution.time)
     for name in ("theta_2", "theta_4", "omega_2", "alpha_3", "F12"):
-        np.testing.assert_array_equal(np.array(columns[name]), getattr(solution, name))  # to the last bit
+        np.testing.assert_array_equal(
+            np.array(columns[name]), getattr(solution, name)
+        )  # to the last bit
     assert columns["energy"][0] == 0.0 and max(columns["energy"]) > 0.1
     assert "torque" not in columns  # nothing drives it
     assert data["rate"] == 1.0 and "real time" in data["pace"]
 
 
-@pytest.mark.parametrize(("duration", "rate"), [(0.2, 0.1), (1.4e-3, 1e-4), (30.0, 1.0), (6e3, 100.0), (6.1e3, 1e3)])
-def test_what_is_too_quick_to_see_is_slowed_down_by_a_power_of_ten(duration: float, rate: float) -> None:
+@pytest.mark.parametrize(
+    ("duration", "rate"),
+    [(0.2, 0.1), (1.4e-3, 1e-4), (30.0, 1.0), (6e3, 100.0), (6.1e3, 1e3)],
+)
+def test_what_is_too_quick_to_see_is_slowed_down_by_a_power_of_ten(
+    duration: float, rate: float
+) -> None:
     law = Law((0.0, 0.5 * duration, duration), (0.0, 1.0, 2.0), ends="rest")
     data = embedded(animate.write_page(crank_rocker(motion=fourbar.Motion(law=law))))
     assert data["rate"] == pytest.approx(rate)
@@ -99,16 +125,24 @@ def test_what_is_too_quick_to_see_is_slowed_down_by_a_power_of_ten(duration: flo
 
 def test_positions_that_do_not_assemble_are_null() -> None:
     data = embedded(animate.write_page(thesis(fourbar.Sweep(0.0, 2 * math.pi, 360))))
-    solution = fourbar.solve(replace(thesis(), motion=fourbar.Motion(np.array(data["theta_2"]), 0.2244)))
-    assert [v is None for v in data["branches"]["1"]["torque"]] == np.isnan(solution.torque).tolist()
+    solution = fourbar.solve(
+        replace(thesis(), motion=fourbar.Motion(np.array(data["theta_2"]), 0.2244))
+    )
+    assert [v is None for v in data["branches"]["1"]["torque"]] == np.isnan(
+        solution.torque
+    ).tolist()
     assert data["branches"]["1"]["F12"][30] == [None, None]
 
 
 def test_a_fine_sweep_is_thinned_evenly_and_says_so() -> None:
-    scene = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.0, 2 * math.pi, 36_000), 1.0))
+    scene = crank_rocker(
+        motion=fourbar.Motion(fourbar.Sweep(0.0, 2 * math.pi, 36_000), 1.0)
+    )
     data = embedded(animate.write_page(scene))
     assert len(data["theta_2"]) == animate.MAX_ROWS
-    assert np.diff(data["theta_2"]) == pytest.approx(2 * math.pi / (animate.MAX_ROWS - 1))
+    assert np.diff(data["theta_2"]) == pytest.approx(
+        2 * math.pi / (animate.MAX_ROWS - 1)
+    )
     assert data["positions"] == 36_001
 
 
@@ -150,7 +184,9 @@ def test_the_policy_of_the_page_allows_its_own_script_and_nothing_else() -> None
         ("wheel", PNG, "must name one of input, coupler, output"),
     ],
 )
-def test_what_is_no_picture_is_refused(tmp_path: Path, bar: str, content: bytes | None, message: str) -> None:
+def test_what_is_no_picture_is_refused(
+    tmp_path: Path, bar: str, content: bytes | None, message: str
+) -> None:
     path = tmp_path / "picture.png"
     if content is not None:
         path.write_bytes(content)
@@ -163,11 +199,16 @@ def test_what_cannot_be_shown_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"\.html, \.gif, \.mp4"):
         animate.write(crank_rocker(), tmp_path / "a.avi")
     with pytest.raises(NotAssembledError):
-        animate.write(thesis(fourbar.Sweep(math.radians(40), math.radians(50), 5)), tmp_path / "a.html")
+        animate.write(
+            thesis(fourbar.Sweep(math.radians(40), math.radians(50), 5)),
+            tmp_path / "a.html",
+        )
     with pytest.raises(InputError, match="seconds"):
         animate.write(crank_rocker(), tmp_path / "a.gif", seconds=math.nan)
     with pytest.raises(InputError, match="html page only"):
-        animate.write(crank_rocker(), tmp_path / "a.gif", pictures={"input": tmp_path / "x.png"})
+        animate.write(
+            crank_rocker(), tmp_path / "a.gif", pictures={"input": tmp_path / "x.png"}
+        )
     assert not list(tmp_path.iterdir())
 
 
@@ -187,24 +228,31 @@ def test_a_gif_moves_the_linkage(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.skipif(
-    shutil.which("ffmpeg") is None and find_spec("imageio_ffmpeg") is None, reason="neither ffmpeg nor imageio-ffmpeg"
+    shutil.which("ffmpeg") is None and find_spec("imageio_ffmpeg") is None,
+    reason="neither ffmpeg nor imageio-ffmpeg",
 )
 def test_an_mp4_is_written(tmp_path: Path) -> None:
     animate.write(thesis(), tmp_path / "a.mp4", seconds=0.2)
     assert (tmp_path / "a.mp4").read_bytes()[4:8] == b"ftyp"
 
 
-def test_without_ffmpeg_an_mp4_is_refused_in_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_ffmpeg_an_mp4_is_refused_in_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
-    with pytest.raises(DependencyError, match=r"^an \.mp4 film needs the program ffmpeg[^\n]*$"):
+    with pytest.raises(
+        DependencyError, match=r"^an \.mp4 film needs the program ffmpeg[^\n]*$"
+    ):
         animate.write(crank_rocker(), tmp_path / "a.mp4")
     assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.slow
 @pytest.mark.posix
-def test_an_ffmpeg_without_the_encoder_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_ffmpeg_without_the_encoder_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     program = tmp_path / "bin" / "ffmpeg"
     program.parent.mkdir()
     program.write_text("#!/bin/sh\nexit 1\n")
@@ -222,7 +270,10 @@ def test_a_film_of_a_free_motion_runs_forward_and_as_long_as_it_does(
     from PIL import Image
 
     shown = make_view(RELEASED)
-    assert np.all(np.diff(choose_frames(shown, 46)) == 2) and shown.sweep.time[choose_frames(shown, 46)[-1]] == 1.8
+    assert (
+        np.all(np.diff(choose_frames(shown, 46)) == 2)
+        and shown.sweep.time[choose_frames(shown, 46)[-1]] == 1.8
+    )
     monkeypatch.setattr(films, "FRAMES_PER_SECOND", 5)
     animate.write(RELEASED, tmp_path / "a.gif")
     with Image.open(tmp_path / "a.gif") as film:

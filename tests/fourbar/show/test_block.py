@@ -23,7 +23,9 @@ LOCATED = 1e-6
 BENDING = 1e-6
 """Relative, of a largest moment against that of steps of 0.01 degrees: (0.01 deg)^2 times its curvature."""
 PSI = 0.45359237 * 9.80665 / 0.0254**2
-CYLINDER = fourbar.LinearDrive(SpringEnd(1, 0.25, math.radians(-160.0)), SpringEnd(2, 0.09, 0.17))
+CYLINDER = fourbar.LinearDrive(
+    SpringEnd(1, 0.25, math.radians(-160.0)), SpringEnd(2, 0.09, 0.17)
+)
 D, A, B, C = 0.3, 0.1, 0.25, 0.22
 TURN = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.0, math.tau, 360), 10.0))
 
@@ -52,7 +54,9 @@ def test_ranges_are_those_of_the_triangles_whatever_the_steps(steps: int) -> Non
     low, high = facts.angles[4]
     assert low.value == pytest.approx(math.pi - opposite(A + B, D, C), abs=LOCATED)
     assert high.value == pytest.approx(math.pi - opposite(B - A, D, C), abs=LOCATED)
-    assert low.place == pytest.approx(opposite(C, D, A + B), abs=1e-4)  # where it is flat, a place is less sharp
+    assert low.place == pytest.approx(
+        opposite(C, D, A + B), abs=1e-4
+    )  # where it is flat, a place is less sharp
     assert high.place == pytest.approx(math.pi + opposite(C, D, B - A), abs=1e-4)
     assert facts.transmission.value == pytest.approx(opposite(D - A, B, C), abs=LOCATED)
 
@@ -61,117 +65,221 @@ def test_where_the_assembly_ends_is_the_limit_of_the_commanded_bar() -> None:
     text, scene = plain(block(thesis(fourbar.Sweep(0.0, math.tau, 360)))), thesis()
     limits = fourbar.limit_positions(scene.linkage, 2)
     ends = sorted({f"{math.degrees(limit.theta_2) % 360.0:.4g}" for limit in limits})
-    facts = summarize(swept := thesis(fourbar.Sweep(0.0, math.tau, 100)), fourbar.solve(swept))
+    facts = summarize(
+        swept := thesis(fourbar.Sweep(0.0, math.tau, 100)), fourbar.solve(swept)
+    )
     bounds = [end for stretch in facts.stretches for end in stretch if end is not None]
-    assert sorted(bounds) == pytest.approx(sorted(limit.theta_2 % math.tau for limit in limits), abs=1e-12)
-    assert f"assembles up to theta_2 = {ends[0]} deg, and from theta_2 = {ends[1]} deg" in text
-    assert "the torque grows without bound there" in text and "transmission angle: at least 0 deg" in text
+    assert sorted(bounds) == pytest.approx(
+        sorted(limit.theta_2 % math.tau for limit in limits), abs=1e-12
+    )
+    assert (
+        f"assembles up to theta_2 = {ends[0]} deg, and from theta_2 = {ends[1]} deg"
+        in text
+    )
+    assert (
+        "the torque grows without bound there" in text
+        and "transmission angle: at least 0 deg" in text
+    )
     assert re.search(r"361 positions: \d+ ok, \d+ not assembled", text)
 
 
 def test_peaks_and_means_are_those_of_much_finer_steps() -> None:
-    fine = fourbar.solve(replace(TURN, motion=TURN.motion.replace(angle=fourbar.Sweep(0.0, math.tau, 36000))))
+    fine = fourbar.solve(
+        replace(
+            TURN, motion=TURN.motion.replace(angle=fourbar.Sweep(0.0, math.tau, 36000))
+        )
+    )
     text = block(TURN)
     worst = int(np.argmax(np.abs(fine.torque)))
     place, torque = math.degrees(fine.theta_2[worst]), 1e3 * fine.torque[worst]
-    row = re.search(r"torque   peak (\S+) mN m at theta_2 = (\S+) deg, RMS (\S+) mN m", text)
+    row = re.search(
+        r"torque   peak (\S+) mN m at theta_2 = (\S+) deg, RMS (\S+) mN m", text
+    )
     assert row is not None and [float(x) for x in row.groups()] == pytest.approx(
         [torque, place, 1e3 * np.sqrt(np.mean(fine.torque[:-1] ** 2))], rel=6e-4
     )
     pins = text[text.index("pins") : text.index("bending")]
-    cells = {line.split("  ")[1]: line[11:] for line in pins.splitlines() if line.startswith("  ")}
+    cells = {
+        line.split("  ")[1]: line[11:]
+        for line in pins.splitlines()
+        if line.startswith("  ")
+    }
     for k, name in enumerate(("F12", "F32", "F43", "F14")):
         size = np.hypot(*getattr(fine, name).T)
-        peak, angle, rms = (float(cells[label][12 * k : 12 * k + 12].split()[0]) for label in ("peak", "at", "RMS"))
+        peak, angle, rms = (
+            float(cells[label][12 * k : 12 * k + 12].split()[0])
+            for label in ("peak", "at", "RMS")
+        )
         mean = np.sqrt(np.mean(size[:-1] ** 2))
         assert [peak, angle, rms] == pytest.approx(
             [size.max(), math.degrees(fine.theta_2[size.argmax()]), mean], rel=1e-3
         )
-    supplied, back = (float(x) for x in re.findall(r"(\S+) J (?:per turn given|taken back)", text))
+    supplied, back = (
+        float(x) for x in re.findall(r"(\S+) J (?:per turn given|taken back)", text)
+    )
     energy = np.trapezoid(np.maximum(fine.power, 0.0), fine.theta_2) / 10.0
-    assert supplied == pytest.approx(energy, rel=6e-4) and back - supplied == pytest.approx(
+    assert supplied == pytest.approx(
+        energy, rel=6e-4
+    ) and back - supplied == pytest.approx(
         -np.trapezoid(fine.power, fine.theta_2) / 10.0, abs=2e-3
     )
-    assert "of these positions" not in text and "rounding changes none of these digits" in text
-    assert re.search(r"^motor: at least \S+ mN m at 95\.49 rpm \(RMS \S+ mN m\), \S+ W$", text, re.MULTILINE)
+    assert (
+        "of these positions" not in text
+        and "rounding changes none of these digits" in text
+    )
+    assert re.search(
+        r"^motor: at least \S+ mN m at 95\.49 rpm \(RMS \S+ mN m\), \S+ W$",
+        text,
+        re.MULTILINE,
+    )
 
 
 def test_each_kind_of_motion_shows_what_it_has_and_nothing_else() -> None:
     block_of = lambda **motion: block(crank_rocker(motion=fourbar.Motion(**motion)))  # noqa: E731
     positions = block_of(theta_2=fourbar.Sweep(0.0, math.tau, 36))
-    assert not re.search("drive|pins|rounding", positions) and 'omega_2 = "0 rad/s" gives the static' in positions
+    assert (
+        not re.search("drive|pins|rounding", positions)
+        and 'omega_2 = "0 rad/s" gives the static' in positions
+    )
     one = block_of(theta_2=1.0, omega_2=10.0)
-    assert "theta_2 = 57.3 deg, theta_3 = 47.33 deg" in one and "  force    7.964 N" in one
+    assert (
+        "theta_2 = 57.3 deg, theta_3 = 47.33 deg" in one and "  force    7.964 N" in one
+    )
     assert not re.search("peak|RMS|motor", one)
     listed = block_of(theta_2=np.radians([10.0, 50.0, 200.0]), omega_2=10.0)
-    assert "3 positions from theta_2 = 10 deg to 200 deg" in listed and "given" not in listed
-    assert "(of these positions)" in listed and "peak and RMS are those of these positions" in listed
+    assert (
+        "3 positions from theta_2 = 10 deg to 200 deg" in listed
+        and "given" not in listed
+    )
+    assert (
+        "(of these positions)" in listed
+        and "peak and RMS are those of these positions" in listed
+    )
     part = block_of(theta_2=fourbar.Sweep(0.5, 2.0, 50), omega_2=10.0)
-    assert "over the sweep given" in part and "input from 28.65 deg to 114.6 deg" in part
+    assert (
+        "over the sweep given" in part and "input from 28.65 deg to 114.6 deg" in part
+    )
     twice = block_of(theta_2=fourbar.Sweep(0.0, 2.0 * math.tau, 720), omega_2=10.0)
     assert "in 2 turns given" in twice
-    law = block(crank_rocker(motion=fourbar.Motion(law=Law((0.0, 1.0, 2.0), (0.3, 2.0, 1.0), steps=20, ends="rest"))))
-    assert "by a law over 2 s" in law and "over the motion given" in law and " at t = " in law
+    law = block(
+        crank_rocker(
+            motion=fourbar.Motion(
+                law=Law((0.0, 1.0, 2.0), (0.3, 2.0, 1.0), steps=20, ends="rest")
+            )
+        )
+    )
+    assert (
+        "by a law over 2 s" in law
+        and "over the motion given" in law
+        and " at t = " in law
+    )
     released = block_of(theta_2=0.5, omega_2=0.0, free=fourbar.Free(0.5, 50))
-    assert "released for 0.5 s, without a drive" in released and not re.search("torque|power|motor", released)
+    assert "released for 0.5 s, without a drive" in released and not re.search(
+        "torque|power|motor", released
+    )
     assert re.search(r"^  at       0?\S+ s", released, re.MULTILINE)
 
 
-def test_the_largest_bending_moment_of_each_bar_is_located_between_the_positions() -> None:
+def test_the_largest_bending_moment_of_each_bar_is_located_between_the_positions() -> (
+    None
+):
     """A crank without mass carries the torque of its drive at O2 as the largest moment of all."""
     light = replace(TURN, linkage=replace(TURN.linkage, input=fourbar.Bar(A)), loads=())
     sweeps = (fourbar.Sweep(0.0, math.tau, steps) for steps in (24, 36000))
-    coarse, fine = (replace(light, motion=light.motion.replace(angle=sweep)) for sweep in sweeps)
+    coarse, fine = (
+        replace(light, motion=light.motion.replace(angle=sweep)) for sweep in sweeps
+    )
     facts, s = summarize(coarse, fourbar.solve(coarse)), fourbar.solve(fine)
     for bar, bending in facts.bending.items():
         moment, x = fourbar.internal_forces(fine, s, bar, [0.0]).largest  # type: ignore[arg-type]
         worst = int(np.argmax(np.abs(moment)))
-        assert bending.peak.value == pytest.approx(abs(moment[worst]), rel=BENDING) and not bending.grows
-        assert bending.peak.place == pytest.approx(s.theta_2[worst], abs=math.radians(0.02))
+        assert (
+            bending.peak.value == pytest.approx(abs(moment[worst]), rel=BENDING)
+            and not bending.grows
+        )
+        assert bending.peak.place == pytest.approx(
+            s.theta_2[worst], abs=math.radians(0.02)
+        )
         assert bending.x == pytest.approx(x[worst], abs=1e-5)
-    rows = {line.split("  ")[1]: line[11:].split() for line in block(coarse).splitlines() if line.startswith("  ")}
+    rows = {
+        line.split("  ")[1]: line[11:].split()
+        for line in block(coarse).splitlines()
+        if line.startswith("  ")
+    }
     assert float(rows["moment"][0]) == pytest.approx(np.abs(s.torque).max(), rel=1e-3)
     assert rows["at x"][:2] == ["0", "mm,"] and rows["moment"][1:3] == ["N", "m"]
 
 
 def test_what_grows_without_bound_has_the_peak_of_its_positions() -> None:
     """The force of a cylinder has a pole within the sweep, beside which friction reverses: no position there counts."""
-    scene = fourbar.load(Path(__file__).parents[3] / "models" / "capabilities" / "cylinder_1_4.toml")
+    scene = fourbar.load(
+        Path(__file__).parents[3] / "models" / "capabilities" / "cylinder_1_4.toml"
+    )
     s = fourbar.solve(scene)
     facts, text = summarize(scene, s), block(scene)
-    assert facts.between.growing >= {"drive_force", "F12", "F14"} and facts.between.reversals
-    assert facts.peak is not None and abs(facts.peak.value) == np.nanmax(np.abs(s.drive_force))
+    assert (
+        facts.between.growing >= {"drive_force", "F12", "F14"}
+        and facts.between.reversals
+    )
+    assert facts.peak is not None and abs(facts.peak.value) == np.nanmax(
+        np.abs(s.drive_force)
+    )
     assert facts.duty is not None and facts.duty.peak_force == abs(facts.peak.value)
     assert facts.pins["O4"].peak.value == np.nanmax(np.hypot(*s.F14.T))
     moment = fourbar.internal_forces(scene, s, 4).largest.moment
-    assert facts.bending[4].grows and facts.bending[4].peak.value == np.nanmax(np.abs(moment))
+    assert facts.bending[4].grows and facts.bending[4].peak.value == np.nanmax(
+        np.abs(moment)
+    )
     entry = write_motor(scene, s, {})
     assert entry is not None and entry["peak_force"] == facts.duty.peak_force
     assert entry["pins"]["O4"]["peak"] == facts.pins["O4"].peak.value
-    assert "growing without bound between these positions: the loads of O2, A, B, O4" in text
+    assert (
+        "growing without bound between these positions: the loads of O2, A, B, O4"
+        in text
+    )
 
 
 def test_friction_at_rest_gives_the_range_that_it_holds() -> None:
-    scene = crank_rocker(motion=fourbar.Motion(1.0, 0.0), effects=(fourbar.Gravity(), fourbar.Friction.at(O2=0.5)))
+    scene = crank_rocker(
+        motion=fourbar.Motion(1.0, 0.0),
+        effects=(fourbar.Gravity(), fourbar.Friction.at(O2=0.5)),
+    )
     s = fourbar.solve(scene)
-    row = re.search(r"at rest  (\S+) mN m to (\S+) mN m: dry friction holds it between them", block(scene))
+    row = re.search(
+        r"at rest  (\S+) mN m to (\S+) mN m: dry friction holds it between them",
+        block(scene),
+    )
     assert row is not None
-    assert [float(x) for x in row.groups()] == pytest.approx([1e3 * s.torque_low[0], 1e3 * s.torque_high[0]], rel=6e-4)
+    assert [float(x) for x in row.groups()] == pytest.approx(
+        [1e3 * s.torque_low[0], 1e3 * s.torque_high[0]], rel=6e-4
+    )
     assert s.torque_high[0] - s.torque_low[0] == pytest.approx(1.0)
 
 
 def test_a_stroke_is_answered_in_strokes_with_its_range_and_bore() -> None:
     """The cylinder can have the difference and the sum of its two distances from the pivot of the input."""
-    motion = fourbar.Motion(stroke=fourbar.Sweep(0.17, 0.33, 40), stroke_speed=0.2, side="left")
+    motion = fourbar.Motion(
+        stroke=fourbar.Sweep(0.17, 0.33, 40), stroke_speed=0.2, side="left"
+    )
     scene = crank_rocker(motion=motion, drive=CYLINDER)
     text, s = plain(block(scene, pressure=210e5)), fourbar.solve(scene)
     assert "stroke 170 mm to 330 mm; assembles from 160 mm to 340 mm" in text
-    assert re.search(r"force peak \S+ N at stroke = 330 mm, RMS", text) and "peak 26.88 N" in text.replace("O2 ", "")
+    assert re.search(
+        r"force peak \S+ N at stroke = 330 mm, RMS", text
+    ) and "peak 26.88 N" in text.replace("O2 ", "")
     bore = 1e3 * math.sqrt(4.0 * np.nanmax(s.drive_force) / (math.pi * 210e5))
-    assert f"bore at least {bore:.4g} mm to push {np.nanmax(s.drive_force):.4g} N" in text and "to pull" in text
-    assert "cylinder from bar 1 (ground) to bar 2 (input), 0.2 m/s" in text and "motor" not in text
+    assert (
+        f"bore at least {bore:.4g} mm to push {np.nanmax(s.drive_force):.4g} N" in text
+        and "to pull" in text
+    )
+    assert (
+        "cylinder from bar 1 (ground) to bar 2 (input), 0.2 m/s" in text
+        and "motor" not in text
+    )
     right = replace(scene, motion=motion.replace(side="right"))
-    assert summarize(right, fourbar.solve(right)).stroke_limits == pytest.approx((0.16, 0.34), abs=1e-6)
+    assert summarize(right, fourbar.solve(right)).stroke_limits == pytest.approx(
+        (0.16, 0.34), abs=1e-6
+    )
 
 
 def test_the_command_line_states_the_bore(capsys: pytest.CaptureFixture[str]) -> None:
@@ -182,23 +290,53 @@ def test_the_command_line_states_the_bore(capsys: pytest.CaptureFixture[str]) ->
     assert f"  bore     at least {bore:.4g} mm to push" in capsys.readouterr().out
 
 
-def test_units_follow_the_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_units_follow_the_file(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     for length, shown in (("12 in", "lbf in"), ("1.5ft", "lbf in"), ("300 mm", "mN m")):
         assert ("in" in dict(suit_units(length)).get("m", ("",))) == (shown == "lbf in")
-    assert status(["new", str(tmp_path / "a.toml"), "--lengths", "12in", "4in", "10in", "9in"]) == 0
+    assert (
+        status(
+            ["new", str(tmp_path / "a.toml"), "--lengths", "12in", "4in", "10in", "9in"]
+        )
+        == 0
+    )
     capsys.readouterr()
     assert status(["analyze", str(tmp_path / "a.toml")]) == 0
     imperial = capsys.readouterr().out
-    assert "ground 12, input 4, coupler 10, output 9 in" in imperial and "lbf in" in imperial and "60 rpm" in imperial
+    assert (
+        "ground 12, input 4, coupler 10, output 9 in" in imperial
+        and "lbf in" in imperial
+        and "60 rpm" in imperial
+    )
     assert status(["analyze", str(tmp_path / "a.toml"), "--units", "SI"]) == 0
     si = capsys.readouterr().out
-    assert "ground 304.8" in si and "N m" in si and "6.283 rad/s" in si and "lbf" not in si
+    assert (
+        "ground 304.8" in si and "N m" in si and "6.283 rad/s" in si and "lbf" not in si
+    )
 
 
-def test_a_new_scene_has_weight_and_sixty_turns_a_minute(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert status(["new", str(tmp_path / "a.toml"), "--lengths", "300mm", "100mm", "250mm", "220mm"]) == 0
+def test_a_new_scene_has_weight_and_sixty_turns_a_minute(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert (
+        status(
+            [
+                "new",
+                str(tmp_path / "a.toml"),
+                "--lengths",
+                "300mm",
+                "100mm",
+                "250mm",
+                "220mm",
+            ]
+        )
+        == 0
+    )
     scene = fourbar.load(tmp_path / "a.toml")
-    assert scene.motion.omega_2 == pytest.approx(math.tau) and [effect.key for effect in scene.effects] == ["gravity"]
+    assert scene.motion.omega_2 == pytest.approx(math.tau) and [
+        effect.key for effect in scene.effects
+    ] == ["gravity"]
     capsys.readouterr()
     assert status(["analyze", str(tmp_path / "a.toml")]) == 0
     assert 12 <= len(capsys.readouterr().out.splitlines()) <= 19

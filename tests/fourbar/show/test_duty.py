@@ -27,7 +27,10 @@ def test_shaking_is_the_momentum_that_the_bars_lose() -> None:
     ):
         bar = scene.linkage.bar(number)
         force -= bar.mass * a
-        moment -= bar.mass * (G[:, 0] * a[:, 1] - G[:, 1] * a[:, 0]) + bar.moment_of_inertia * alpha
+        moment -= (
+            bar.mass * (G[:, 0] * a[:, 1] - G[:, 1] * a[:, 0])
+            + bar.moment_of_inertia * alpha
+        )
     assert np.abs(shaking_force(s) - force).max() < ROUND_OFF * np.abs(force).max()
     assert np.abs(shaking_moment(s) - moment).max() < ROUND_OFF * np.abs(moment).max()
 
@@ -36,7 +39,10 @@ def test_the_power_is_the_same_whichever_bar_is_driven() -> None:
     one, *others = (fourbar.solve(crank_rocker(drive_bar=bar)) for bar in (2, 3, 4))
     assert one.power is not None
     for solution in others:
-        assert np.abs(solution.power - one.power).max() < ROUND_OFF * np.abs(one.power).max()
+        assert (
+            np.abs(solution.power - one.power).max()
+            < ROUND_OFF * np.abs(one.power).max()
+        )
     assert fourbar.solve(crank_rocker(), "acceleration").power is None
 
 
@@ -45,7 +51,9 @@ def test_bearing_load() -> None:
     load = np.hypot(s.F43[:-1, 0], s.F43[:-1, 1])
     bearing = bearing_load(s, "B")
     assert bearing.largest == load.max() and bearing.where == s.theta_2[load.argmax()]
-    assert abs(bearing.rms - np.linalg.norm(load) / np.sqrt(60)) < 1e-14 * bearing.rms * 60
+    assert (
+        abs(bearing.rms - np.linalg.norm(load) / np.sqrt(60)) < 1e-14 * bearing.rms * 60
+    )
 
 
 def test_the_duty_of_a_motor() -> None:
@@ -55,27 +63,59 @@ def test_the_duty_of_a_motor() -> None:
     sweep = fourbar.Motion(fourbar.Sweep(0.0, math.tau, 360), 10.0)
     s = fourbar.solve(crank_rocker(motion=sweep, loads=(), effects=damped))
     duty = motor_duty(s)
-    assert duty is not None and duty.energy_in is not None and duty.energy_out is not None and duty.closed
-    heat = (pins["O2"] * 10.0**2 + pins["B"] * (s.omega_3 - s.omega_4) ** 2)[:-1].mean() * math.tau / 10.0
-    assert abs(duty.energy_in - duty.energy_out - heat) < ROUND_OFF * duty.energy_in  # the rule is exact on periods
+    assert (
+        duty is not None
+        and duty.energy_in is not None
+        and duty.energy_out is not None
+        and duty.closed
+    )
+    heat = (
+        (pins["O2"] * 10.0**2 + pins["B"] * (s.omega_3 - s.omega_4) ** 2)[:-1].mean()
+        * math.tau
+        / 10.0
+    )
+    assert (
+        abs(duty.energy_in - duty.energy_out - heat) < ROUND_OFF * duty.energy_in
+    )  # the rule is exact on periods
     assert duty.peak_torque == np.abs(s.torque).max() and duty.peak_speed == 10.0
-    assert abs(duty.rms_torque - np.linalg.norm(s.torque[:-1]) / math.sqrt(360)) < ROUND_OFF * duty.rms_torque
+    assert (
+        abs(duty.rms_torque - np.linalg.norm(s.torque[:-1]) / math.sqrt(360))
+        < ROUND_OFF * duty.rms_torque
+    )
     assert abs(duty.peak_power - 10.0 * duty.peak_torque) < ROUND_OFF * duty.peak_power
     still = motor_duty(fourbar.solve(crank_rocker(motion=fourbar.Motion(1.0, 0.0))))
-    assert still is not None and still.energy_in is None and still.peak_power == 0.0 and not still.closed
+    assert (
+        still is not None
+        and still.energy_in is None
+        and still.peak_power == 0.0
+        and not still.closed
+    )
     assert motor_duty(fourbar.solve(crank_rocker(), "position")) is None
 
 
 def test_the_json_holds_the_duty() -> None:
-    scene = crank_rocker(motion=fourbar.Motion(np.linspace(0.0, math.tau, 61), 10.0))  # between which nothing stands
+    scene = crank_rocker(
+        motion=fourbar.Motion(np.linspace(0.0, math.tau, 61), 10.0)
+    )  # between which nothing stands
     s = fourbar.solve(scene)
     duty, entry = motor_duty(s), write_motor(scene, s, units("imperial"))
     assert duty is not None and entry is not None and duty.energy_out is not None
     inch_pound = 0.0254 * 0.45359237 * 9.80665
-    assert entry["units"]["rms_power"] == "hp" and entry["units"]["energy_out"] == "lbf in"
-    assert abs(entry["rms_power"] * 6600.0 * inch_pound - duty.rms_power) < ROUND_OFF * duty.rms_power
-    assert abs(entry["energy_out"] * inch_pound - duty.energy_out) < ROUND_OFF * duty.energy_out
-    assert abs(entry["pins"]["B"]["rms"] * inch_pound / 0.0254 - bearing_load(s, "B").rms) < ROUND_OFF * 100.0
+    assert (
+        entry["units"]["rms_power"] == "hp" and entry["units"]["energy_out"] == "lbf in"
+    )
+    assert (
+        abs(entry["rms_power"] * 6600.0 * inch_pound - duty.rms_power)
+        < ROUND_OFF * duty.rms_power
+    )
+    assert (
+        abs(entry["energy_out"] * inch_pound - duty.energy_out)
+        < ROUND_OFF * duty.energy_out
+    )
+    assert (
+        abs(entry["pins"]["B"]["rms"] * inch_pound / 0.0254 - bearing_load(s, "B").rms)
+        < ROUND_OFF * 100.0
+    )
 
 
 def test_a_study_has_what_each_of_its_members_has() -> None:
@@ -88,19 +128,43 @@ def test_a_study_has_what_each_of_its_members_has() -> None:
     turn = np.linspace(0.1, 0.1 + 2.0 * np.pi, 61)
     theta_2 = np.array([turn, turn, np.linspace(0.1, 3.0, 61), turn])
     s = fourbar.solve(fourbar.vary(scene, {**values, "motion.theta_2": theta_2}))
-    force, moment, duty, load = shaking_force(s), shaking_moment(s), motor_duty(s), bearing_load(s, "A")
+    force, moment, duty, load = (
+        shaking_force(s),
+        shaking_moment(s),
+        motor_duty(s),
+        bearing_load(s, "A"),
+    )
     assert force.shape == (4, 61, 2) and moment.shape == (4, 61) and duty is not None
     for member in range(3):
         d, angle = (float(array[member]) for array in values.values())
         linkage = replace(scene.linkage, ground=d, ground_angle=angle)
-        alone = fourbar.solve(replace(scene, linkage=linkage, motion=scene.motion.replace(angle=theta_2[member])))
-        assert moment[member] == pytest.approx(shaking_moment(alone), rel=1e-12, abs=1e-12)
-        assert force[member] == pytest.approx(shaking_force(alone), rel=1e-12, abs=1e-12)
-        for of_study, one in ((duty, motor_duty(alone)), (load, bearing_load(alone, "A"))):
+        alone = fourbar.solve(
+            replace(
+                scene,
+                linkage=linkage,
+                motion=scene.motion.replace(angle=theta_2[member]),
+            )
+        )
+        assert moment[member] == pytest.approx(
+            shaking_moment(alone), rel=1e-12, abs=1e-12
+        )
+        assert force[member] == pytest.approx(
+            shaking_force(alone), rel=1e-12, abs=1e-12
+        )
+        for of_study, one in (
+            (duty, motor_duty(alone)),
+            (load, bearing_load(alone, "A")),
+        ):
             assert one is not None
             for array, number in zip(of_study, one, strict=True):  # type: ignore[arg-type]
-                assert number == (None if array is None else pytest.approx(array[member], rel=1e-12))
-    assert np.isnan(load.largest[3]) and np.isnan(duty.rms_power[3]) and np.isnan(moment[3]).all()  # type: ignore[index]
+                assert number == (
+                    None if array is None else pytest.approx(array[member], rel=1e-12)
+                )
+    assert (
+        np.isnan(load.largest[3])
+        and np.isnan(duty.rms_power[3])
+        and np.isnan(moment[3]).all()
+    )  # type: ignore[index]
     assert np.isnan([duty.energy_in[3], duty.energy_out[3]]).all()  # type: ignore[index]
     assert duty.closed.tolist()[:3] == [True, True, False]  # type: ignore[attr-defined]
     speeds = {"motion.omega_2": np.array([0.0, 3.0]), "motion.theta_2": turn}

@@ -24,9 +24,13 @@ HOSTILE = "<script>alert(1)</script>&"
 
 @pytest.mark.slow
 def test_a_scene_shows_itself() -> None:
-    pytest.importorskip("matplotlib", reason="drawing needs matplotlib: pip install matplotlib")
+    pytest.importorskip(
+        "matplotlib", reason="drawing needs matplotlib: pip install matplotlib"
+    )
     shown = thesis()._repr_html_()
-    picture = b64decode(shown.partition("data:image/svg+xml;base64,")[2].partition('"')[0])
+    picture = b64decode(
+        shown.partition("data:image/svg+xml;base64,")[2].partition('"')[0]
+    )
     assert picture.decode() == thesis().plot("linkage")._repr_svg_()
     assert "triple rocker" in shown and "57 kg" in shown and "bar 4 (output)" in shown
     assert HOSTILE not in replace(thesis(), title=HOSTILE)._repr_html_()
@@ -37,7 +41,9 @@ def test_a_scene_that_cannot_be_drawn_shows_why() -> None:
     assert "<img" not in shown and "does not assemble" in shown
 
 
-def test_without_matplotlib_a_scene_shows_its_table_and_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_matplotlib_a_scene_shows_its_table_and_what_to_install(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     shown = thesis()._repr_html_()
     assert "<img" not in shown and "pip install" in shown and "triple rocker" in shown
@@ -74,7 +80,9 @@ def test_csv_goes_to_a_file(tmp_path: Path) -> None:
     assert (tmp_path / "a.csv").read_text() == solution.to_csv(degrees=True)
 
 
-def test_without_pandas_one_line_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_pandas_one_line_says_what_to_install(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setitem(sys.modules, "pandas", None)
     with pytest.raises(DependencyError, match=r"pip install .*pandas"):
         fourbar.solve(thesis()).to_pandas()
@@ -86,7 +94,9 @@ def test_showing_needs_numpy_alone() -> None:
         "sys.modules['matplotlib'] = None; s._repr_html_(); f.solve(s)._repr_html_(); del sys.modules['matplotlib'];"
         " print(*{n.partition('.')[0] for n in sys.modules})"
     )
-    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    loaded = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    ).stdout.split()
     assert not {"pandas", "matplotlib", "pint", "rich", "click", "scipy"} & set(loaded)
 
 
@@ -97,9 +107,15 @@ def test_a_new_scene_is_a_scene_and_its_comments_are_entries(tmp_path: Path) -> 
     assert [scene.linkage.bar(n).mass for n in (2, 3, 4)] == [0.48, 0.55, 0.2]
     assert np.isfinite(fourbar.solve(scene).torque).all()
     opened = []
-    for line in text.splitlines():  # every commented entry is one that a scene file may have
+    for (
+        line
+    ) in text.splitlines():  # every commented entry is one that a scene file may have
         entry = line.removeprefix("# ")
-        opened.append(entry if line != entry and ("=" in entry.split("#")[0] or entry.startswith("[")) else line)
+        opened.append(
+            entry
+            if line != entry and ("=" in entry.split("#")[0] or entry.startswith("["))
+            else line
+        )
     uncommented = "\n".join(line for line in opened if not line.startswith("As many"))
     full = files.loads(uncommented.replace("# As many loads", "#"))
     assert len(full.loads) == 2 and len(full.effects) == 2 and full.motion.branch == -1
@@ -114,37 +130,76 @@ def test_a_new_scene_is_a_scene_and_its_comments_are_entries(tmp_path: Path) -> 
         (("1 m", "2 m", "3 m", "4"), "output.*unit is missing"),
     ],
 )
-def test_a_new_scene_of_bad_lengths_is_refused(lengths: tuple[str, ...], words: str) -> None:
+def test_a_new_scene_of_bad_lengths_is_refused(
+    lengths: tuple[str, ...], words: str
+) -> None:
     with pytest.raises(InputError, match=words):
         write_new_scene(lengths)
 
 
-def test_a_new_scene_never_replaces_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_new_scene_never_replaces_a_file(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     file = tmp_path / "mine.toml"
-    assert status(["new", str(file), "--lengths", "4", "2", "5", "5", "--unit", "m"]) == 0
+    assert (
+        status(["new", str(file), "--lengths", "4", "2", "5", "5", "--unit", "m"]) == 0
+    )
     before = file.read_text()
-    assert status(["new", str(file), "--lengths", "4", "2", "5", "6", "--unit", "m"]) == 2
+    assert (
+        status(["new", str(file), "--lengths", "4", "2", "5", "6", "--unit", "m"]) == 2
+    )
     assert "file exists" in capsys.readouterr().err
     assert file.read_text() == before
 
 
 def test_results_say_in_ten_lines_what_they_hold() -> None:
     scene = crank_rocker(tolerances=(fourbar.Tolerance("lengths.input", 1e-4),))
-    solution, slopes, spread = fourbar.solve(scene), fourbar.sensitivity(scene), fourbar.tolerances(scene, 64)
+    solution, slopes, spread = (
+        fourbar.solve(scene),
+        fourbar.sensitivity(scene),
+        fourbar.tolerances(scene, 64),
+    )
     study = fourbar.vary(scene, {"lengths.input": np.array([0.1, 0.11, 3.0])})
-    for shown in (solution, slopes, spread, study, fourbar.solve(study), fourbar.solve(scene, "position")):
+    for shown in (
+        solution,
+        slopes,
+        spread,
+        study,
+        fourbar.solve(study),
+        fourbar.solve(scene, "position"),
+    ):
         text = repr(shown)
-        assert 2 <= len(text.splitlines()) <= 10 and max(map(len, text.splitlines())) <= 150, text
+        assert (
+            2 <= len(text.splitlines()) <= 10
+            and max(map(len, text.splitlines())) <= 150
+        ), text
         assert scene.title in text and "61" in text
-    assert f"torque: {solution.torque.min():.6g} to {solution.torque.max():.6g} N m" in repr(solution)
+    assert (
+        f"torque: {solution.torque.min():.6g} to {solution.torque.max():.6g} N m"
+        in repr(solution)
+    )
     assert "status: 122 ok, 61 not_assembled" in repr(fourbar.solve(study))
-    one = fourbar.solve(fourbar.vary(fourbar.Scene(scene.linkage, fourbar.Motion(1.0)), {"lengths.input": 0.1}))
-    assert "1 linkage, 1 position each" in repr(one) and "1 linkage, 1 position each" in one._repr_html_()
+    one = fourbar.solve(
+        fourbar.vary(
+            fourbar.Scene(scene.linkage, fourbar.Motion(1.0)), {"lengths.input": 0.1}
+        )
+    )
+    assert (
+        "1 linkage, 1 position each" in repr(one)
+        and "1 linkage, 1 position each" in one._repr_html_()
+    )
     lengths = {
-        key: number for key, number in zip(slopes.keys, slopes.numbers, strict=True) if key.startswith("lengths")
+        key: number
+        for key, number in zip(slopes.keys, slopes.numbers, strict=True)
+        if key.startswith("lengths")
     }
-    changes = {key: np.abs(slopes.of("torque", key)).max() * 0.01 * number for key, number in lengths.items()}
-    changes["lengths.ground_angle"] *= math.radians(1.0) / (0.01 * lengths["lengths.ground_angle"])
+    changes = {
+        key: np.abs(slopes.of("torque", key)).max() * 0.01 * number
+        for key, number in lengths.items()
+    }
+    changes["lengths.ground_angle"] *= math.radians(1.0) / (
+        0.01 * lengths["lengths.ground_angle"]
+    )
     most = max(changes, key=lambda key: changes[key])
     line = next(line for line in repr(slopes).splitlines() if line.startswith("torque"))
     assert f"{most} {changes[most]:.3g}" in line
@@ -153,7 +208,8 @@ def test_results_say_in_ten_lines_what_they_hold() -> None:
         shown = outcome._repr_html_()
         assert (
             shown.count("<tr>") == 8
-            and HOSTILE not in replace(outcome, scene=replace(scene, title=HOSTILE))._repr_html_()
+            and HOSTILE
+            not in replace(outcome, scene=replace(scene, title=HOSTILE))._repr_html_()
         )
 
 
@@ -170,14 +226,25 @@ def test_sensitivities_and_tolerances_as_pandas_and_by_one_set_of_names() -> Non
         np.isfinite(slopes.value(name)).all() for name in spread.spreads
     )
     step = 1e-6
-    sides = [fourbar.solve(fourbar.vary(scene, {"lengths.input": [0.1 + sign * step]})).F12[0] for sign in (1, -1)]
+    sides = [
+        fourbar.solve(fourbar.vary(scene, {"lengths.input": [0.1 + sign * step]})).F12[
+            0
+        ]
+        for sign in (1, -1)
+    ]
     slope = (np.hypot(*sides[0].T) - np.hypot(*sides[1].T)) / (2.0 * step)
-    assert slopes.of("|F12|", "lengths.input") == pytest.approx(slope, abs=1e-6 * np.abs(slope).max())
+    assert slopes.of("|F12|", "lengths.input") == pytest.approx(
+        slope, abs=1e-6 * np.abs(slope).max()
+    )
     wide = spread.to_pandas()
     of_F43 = wide[wide["quantity"] == "|F43|"]
     assert len(wide) == 61 * len(spread.spreads)
-    assert np.array_equal(of_F43["deviation"].to_numpy(), spread.spreads["|F43|"].deviation)
-    assert np.array_equal(of_F43["share of lengths.input"].to_numpy(), spread.spreads["|F43|"].shares[0])
+    assert np.array_equal(
+        of_F43["deviation"].to_numpy(), spread.spreads["|F43|"].deviation
+    )
+    assert np.array_equal(
+        of_F43["share of lengths.input"].to_numpy(), spread.spreads["|F43|"].shares[0]
+    )
     for wrong in ("|A|", "F12_z", "|torque|", "torque_x", 3):
         with pytest.raises(InputError, match="is not known here"):
             slopes.of(wrong, "lengths.input")  # type: ignore[arg-type]

@@ -17,7 +17,9 @@ from fourbar.show.tolerances import PAGE_SAMPLES
 from tests.fourbar.show.test_animate import HOSTILE, PNG, RELEASED, embedded
 from tests.support.scenes import crank_rocker, thesis
 
-pytest.importorskip("selenium", reason="pages are driven by selenium: pip install selenium")
+pytest.importorskip(
+    "selenium", reason="pages are driven by selenium: pip install selenium"
+)
 
 PRINTED = 6e-5
 """Numbers are shown with five significant digits."""
@@ -44,7 +46,9 @@ def pins(driver) -> dict[str, np.ndarray]:
     script = """return Object.fromEntries(["O2", "A", "B", "O4"].map(name => {
         const e = document.getElementById("pin-" + name);
         return [name, [Number(e.getAttribute("cx")), -Number(e.getAttribute("cy"))]]; }));"""
-    points = {name: np.array(point) for name, point in driver.execute_script(script).items()}
+    points = {
+        name: np.array(point) for name, point in driver.execute_script(script).items()
+    }
     return {name: point - points["O2"] for name, point in points.items()}
 
 
@@ -57,13 +61,24 @@ def test_numbers_are_shown_in_the_units_of_the_page(browse) -> None:
     driver = browse(animate.write_page(scene, units=fourbar.units("mm kN N.mm rpm")))
     s = fourbar.solve(scene)
     expected = [s.torque[0] * 1e3, s.F43[0, 0] * 1e-3, s.omega_4[0] * 30.0 / math.pi]
-    assert shown(driver, "torque", "F43_x", "omega_4") == pytest.approx(expected, rel=PRINTED)
+    assert shown(driver, "torque", "F43_x", "omega_4") == pytest.approx(
+        expected, rel=PRINTED
+    )
     text = driver.find_element("tag name", "body").text
     assert "N mm" in text and "kN" in text and "rpm" in text and "rad/s²" in text
-    labels = [option.text for option in driver.find_elements("css selector", "#quantity option")]
-    assert {"torque on bar 2, N mm", "|F₁₂|, kN", "acceleration of G₄, mm/s²"} <= set(labels)
+    labels = [
+        option.text
+        for option in driver.find_elements("css selector", "#quantity option")
+    ]
+    assert {"torque on bar 2, N mm", "|F₁₂|, kN", "acceleration of G₄, mm/s²"} <= set(
+        labels
+    )
     assert len(driver.find_elements("css selector", "#traces .b2, #traces .b4")) == 2
-    top = max(number(text.text) for text in driver.find_elements("css selector", "#chart text")[-3:] if text.text)
+    top = max(
+        number(text.text)
+        for text in driver.find_elements("css selector", "#chart text")[-3:]
+        if text.text
+    )
     assert top == pytest.approx(1e3 * s.torque.max(), rel=0.01)
 
 
@@ -78,8 +93,17 @@ def test_each_step_shows_the_numbers_of_its_position(turning) -> None:
     assert driver.title == "crank-rocker"
     for row in (0, 1, 2, 3):
         angles = np.degrees([s.theta_2[row], s.theta_3[row], s.theta_4[row]])
-        assert shown(driver, "theta_2", "theta_3", "theta_4") == pytest.approx(angles, abs=PRINTED_DEG)
-        rest = [s.omega_3[row], s.alpha_4[row], s.torque[row], s.F12[row, 0], s.F43[row, 0], s.F14[row, 1]]
+        assert shown(driver, "theta_2", "theta_3", "theta_4") == pytest.approx(
+            angles, abs=PRINTED_DEG
+        )
+        rest = [
+            s.omega_3[row],
+            s.alpha_4[row],
+            s.torque[row],
+            s.F12[row, 0],
+            s.F43[row, 0],
+            s.F14[row, 1],
+        ]
         names = ("omega_3", "alpha_4", "torque", "F12_x", "F43_x", "F14_y")
         assert shown(driver, *names) == pytest.approx(rest, rel=PRINTED)
         driver.find_element("id", "forward").click()
@@ -99,7 +123,9 @@ def test_play_moves_the_linkage_and_pause_leaves_true_numbers(turning) -> None:
     driver.find_element("id", "play").click()
     row = state_of(driver, "row")
     assert np.hypot(*(pins(driver)["A"] - start)) > 10
-    assert shown(driver, "torque", "omega_4") == pytest.approx([s.torque[row], s.omega_4[row]], rel=PRINTED)
+    assert shown(driver, "torque", "omega_4") == pytest.approx(
+        [s.torque[row], s.omega_4[row]], rel=PRINTED
+    )
     drawn = pins(driver)
     scale = np.hypot(*drawn["O4"]) / 0.3
     np.testing.assert_allclose(drawn["A"], scale * s.A[row], atol=PIXEL)
@@ -114,7 +140,9 @@ def clockwork(driver, ticks: int) -> list[int]:
     return driver.execute_script(script, ticks)
 
 
-def test_an_input_that_turns_fully_goes_round_and_one_that_does_not_swings(browse) -> None:
+def test_an_input_that_turns_fully_goes_round_and_one_that_does_not_swings(
+    browse,
+) -> None:
     driver = browse(animate.write_page(crank_rocker()))
     rows = clockwork(driver, 241)  # 12 s: two sweeps
     assert set(rows) == set(range(61)) or set(rows) == set(range(60))
@@ -122,9 +150,15 @@ def test_an_input_that_turns_fully_goes_round_and_one_that_does_not_swings(brows
     text = animate.write_page(thesis(fourbar.Sweep(0.0, 2 * math.pi, 360)))
     data = embedded(text)
     driver = browse(text)
-    driver.execute_script("go(200); document.getElementById('speed').value = '0.25'")  # less than a row per frame
+    driver.execute_script(
+        "go(200); document.getElementById('speed').value = '0.25'"
+    )  # less than a row per frame
     rows = clockwork(driver, 1200)
-    closes = [k for k, v in enumerate(data["branches"]["1"]["theta_3"]) if v is not None and k >= 20]
+    closes = [
+        k
+        for k, v in enumerate(data["branches"]["1"]["theta_3"])
+        if v is not None and k >= 20
+    ]
     assert (min(rows), max(rows)) == (min(closes), max(closes))
     assert np.abs(np.diff(rows)).max() <= 1  # it never jumps
 
@@ -136,20 +170,33 @@ def test_a_free_motion_plays_once_in_its_own_time(browse) -> None:
     assert not driver.find_element("id", "branch").is_displayed()
     assert not driver.find_element("id", "torque").is_displayed()
     rows = clockwork(driver, 20)  # 0.95 s: the first frame starts the clock
-    np.testing.assert_allclose(s.time[rows], 0.05 * np.arange(20), atol=0.011)  # half a row
+    np.testing.assert_allclose(
+        s.time[rows], 0.05 * np.arange(20), atol=0.011
+    )  # half a row
     assert clockwork(driver, 41)[-1] == 90 and not state_of(driver, "playing")
     driver.execute_script("go(37)")
     assert driver.find_element("id", "theta-text").text == "0.740 s"
-    assert driver.find_element("id", "theta").get_attribute("aria-valuetext") == "0.740 seconds"
-    assert shown(driver, "omega_2", "alpha_4") == pytest.approx([s.omega_2[37], s.alpha_4[37]], rel=PRINTED)
+    assert (
+        driver.find_element("id", "theta").get_attribute("aria-valuetext")
+        == "0.740 seconds"
+    )
+    assert shown(driver, "omega_2", "alpha_4") == pytest.approx(
+        [s.omega_2[37], s.alpha_4[37]], rel=PRINTED
+    )
     kinetic = embedded(animate.write_page(RELEASED))["branches"]["1"]["energy"][37]
     assert shown(driver, "energy") == pytest.approx([kinetic], rel=PRINTED)
     drawn = pins(driver)
-    np.testing.assert_allclose(drawn["B"], np.hypot(*drawn["O4"]) / 0.3 * s.B[37], atol=PIXEL)
+    np.testing.assert_allclose(
+        drawn["B"], np.hypot(*drawn["O4"]) / 0.3 * s.B[37], atol=PIXEL
+    )
 
 
-DRIVE = fourbar.LinearDrive(SpringEnd(1, 0.25, math.radians(-160.0)), SpringEnd(2, 0.09, 0.17))
-STROKES = fourbar.Motion(stroke=fourbar.Sweep(0.17, 0.33, 40), stroke_speed=0.2, side="left")
+DRIVE = fourbar.LinearDrive(
+    SpringEnd(1, 0.25, math.radians(-160.0)), SpringEnd(2, 0.09, 0.17)
+)
+STROKES = fourbar.Motion(
+    stroke=fourbar.Sweep(0.17, 0.33, 40), stroke_speed=0.2, side="left"
+)
 OUTPUT = fourbar.Motion(theta_4=fourbar.Sweep(1.75, 2.95, 40), omega_4=4.0)
 """Its ends do not assemble."""
 
@@ -157,37 +204,72 @@ OUTPUT = fourbar.Motion(theta_4=fourbar.Sweep(1.75, 2.95, 40), omega_4=4.0)
 @pytest.mark.parametrize(
     ("motion", "name", "place", "over", "pace"),
     [
-        (STROKES, "stroke", "250.00 mm", "Over stroke", "at stroke speed = 0.2 m/s the mechanism takes 0.8 s"),
-        (OUTPUT, "theta_4", "134.65°", "Over θ₄", "at ω₄ = 4 rad/s the mechanism takes 0.3 s"),
+        (
+            STROKES,
+            "stroke",
+            "250.00 mm",
+            "Over stroke",
+            "at stroke speed = 0.2 m/s the mechanism takes 0.8 s",
+        ),
+        (
+            OUTPUT,
+            "theta_4",
+            "134.65°",
+            "Over θ₄",
+            "at ω₄ = 4 rad/s the mechanism takes 0.3 s",
+        ),
     ],
 )
-def test_another_command_is_the_axis_and_the_linkage_follows(browse, motion, name, place, over, pace) -> None:
+def test_another_command_is_the_axis_and_the_linkage_follows(
+    browse, motion, name, place, over, pace
+) -> None:
     scene = crank_rocker(motion=motion, drive=DRIVE)
     driver, s = browse(animate.write_page(scene)), fourbar.solve(scene)
     driver.execute_script("go(20)")
     assert driver.find_element("id", "theta-text").text == place
-    assert driver.find_element("id", "over").text == over and pace in driver.find_element("id", "pace").text
+    assert (
+        driver.find_element("id", "over").text == over
+        and pace in driver.find_element("id", "pace").text
+    )
     assert not driver.find_element("id", "branch").is_displayed()
     names = ("theta_2", "theta_3", "theta_4")
-    assert shown(driver, *names) == pytest.approx([math.degrees(getattr(s, n)[20]) for n in names], abs=PRINTED_DEG)
-    assert shown(driver, "drive_force", "condition") == pytest.approx([s.drive_force[20], s.condition[20]], rel=PRINTED)
-    assert shown(driver, "stroke") == pytest.approx([1000.0 * s.stroke[20]], rel=PRINTED)
+    assert shown(driver, *names) == pytest.approx(
+        [math.degrees(getattr(s, n)[20]) for n in names], abs=PRINTED_DEG
+    )
+    assert shown(driver, "drive_force", "condition") == pytest.approx(
+        [s.drive_force[20], s.condition[20]], rel=PRINTED
+    )
+    assert shown(driver, "stroke") == pytest.approx(
+        [1000.0 * s.stroke[20]], rel=PRINTED
+    )
     drawn = pins(driver)
-    np.testing.assert_allclose(drawn["B"], np.hypot(*drawn["O4"]) / 0.3 * s.B[20], atol=PIXEL)
-    assert state_of(driver, "plotted.over") == pytest.approx(getattr(s.at, "stroke" if name == "stroke" else "angle"))
+    np.testing.assert_allclose(
+        drawn["B"], np.hypot(*drawn["O4"]) / 0.3 * s.B[20], atol=PIXEL
+    )
+    assert state_of(driver, "plotted.over") == pytest.approx(
+        getattr(s.at, "stroke" if name == "stroke" else "angle")
+    )
     driver.find_element("id", "chart").click()  # its middle
     assert abs(state_of(driver, "row") - 20) <= 2
     closed = [i for i in range(41) if s.assembled[i]]
     rows = clockwork(driver, 400)
-    assert (min(rows), max(rows)) == (closed[0], closed[-1]) and np.abs(np.diff(rows)).max() <= 1
+    assert (min(rows), max(rows)) == (closed[0], closed[-1]) and np.abs(
+        np.diff(rows)
+    ).max() <= 1
     driver.execute_script("play(false); go(0)")
     assert driver.find_element("id", "status").is_displayed() == (not s.assembled[0])
 
 
 @pytest.mark.parametrize("width", [360, 400, 480, 1280])
-def test_the_numbers_of_an_axis_stand_clear_of_each_other_and_a_stroke_stays_in_its_column(browse, width: int) -> None:
-    drive = fourbar.LinearDrive(SpringEnd(1, 1.45, math.radians(-160.0)), SpringEnd(2, 0.29, 0.17))
-    motion = fourbar.Motion(stroke=fourbar.Sweep(1.2, 1.7, 40), stroke_speed=0.2, side="left")
+def test_the_numbers_of_an_axis_stand_clear_of_each_other_and_a_stroke_stays_in_its_column(
+    browse, width: int
+) -> None:
+    drive = fourbar.LinearDrive(
+        SpringEnd(1, 1.45, math.radians(-160.0)), SpringEnd(2, 0.29, 0.17)
+    )
+    motion = fourbar.Motion(
+        stroke=fourbar.Sweep(1.2, 1.7, 40), stroke_speed=0.2, side="left"
+    )
     scene = fourbar.Scene(fourbar.uniform(0.9, 0.3, 0.75, 0.66), motion, drive=drive)
     driver = browse(animate.write_page(scene), width)
     wide, room = driver.execute_script(
@@ -202,44 +284,80 @@ def test_the_numbers_of_an_axis_stand_clear_of_each_other_and_a_stroke_stays_in_
     assert all(after - before > 3.0 for (_, before), (after, _) in pairwise(boxes))
 
 
-def test_the_page_replays_the_positions_speeds_and_accelerations_of_fourbar(browse) -> None:
+def test_the_page_replays_the_positions_speeds_and_accelerations_of_fourbar(
+    browse,
+) -> None:
     """A linkage of three bars that swing, on both branches: some of its positions do not assemble."""
     scene = thesis(fourbar.Sweep(0.0, 2.0 * math.pi, 72))
     driver = browse(animate.write_page(scene))
-    assert driver.find_element("id", "type").text == fourbar.classify(scene.linkage).name
+    assert (
+        driver.find_element("id", "type").text == fourbar.classify(scene.linkage).name
+    )
     for sign in (1, -1):
         driver.execute_script("chooseBranch(arguments[0])", sign)
         s = fourbar.solve(replace(scene, motion=scene.motion.replace(branch=sign)))
         drawn = state_of(driver, "grid.map((_, i) => at(i) && [at(i).A, at(i).B])")
         assert [pair is not None for pair in drawn] == s.assembled.tolist()
         here = np.flatnonzero(s.assembled)
-        np.testing.assert_allclose([drawn[i] for i in here], np.stack([s.A, s.B], axis=1)[here], rtol=0.0, atol=ROUNDED)
-        moved = state_of(driver, "grid.map((_, i) => pointMotion(i, POINTS.find(point => point[0] === 'G3')))")
+        np.testing.assert_allclose(
+            [drawn[i] for i in here],
+            np.stack([s.A, s.B], axis=1)[here],
+            rtol=0.0,
+            atol=ROUNDED,
+        )
+        moved = state_of(
+            driver,
+            "grid.map((_, i) => pointMotion(i, POINTS.find(point => point[0] === 'G3')))",
+        )
         for k, vectors in enumerate((s.v_G3, s.a_G3)):
-            np.testing.assert_allclose([moved[i][k] for i in here], vectors[here], rtol=1e-9, atol=1e-9)
+            np.testing.assert_allclose(
+                [moved[i][k] for i in here], vectors[here], rtol=1e-9, atol=1e-9
+            )
 
 
-def test_what_is_downloaded_is_the_scene_on_the_branch_shown(browse, tmp_path: Path) -> None:
-    scene = crank_rocker(title="a\\nb", motion=fourbar.Motion(np.array([0.1, 0.2, 0.3, 0.4]), 10.0, 5.0))
+def test_what_is_downloaded_is_the_scene_on_the_branch_shown(
+    browse, tmp_path: Path
+) -> None:
+    scene = crank_rocker(
+        title="a\\nb", motion=fourbar.Motion(np.array([0.1, 0.2, 0.3, 0.4]), 10.0, 5.0)
+    )
     driver = browse(animate.write_page(scene))
-    assert "at ω₂ = 10 rad/s the mechanism takes 0.03 s." in driver.find_element("id", "pace").text
+    assert (
+        "at ω₂ = 10 rad/s the mechanism takes 0.03 s."
+        in driver.find_element("id", "pace").text
+    )
     assert loads(state_of(driver, "sceneFile()")).motion.branch == 1
     driver.execute_script("chooseBranch(-1)")
-    driver.execute_cdp_cmd("Browser.setDownloadBehavior", {"behavior": "allow", "downloadPath": str(tmp_path)})
+    driver.execute_cdp_cmd(
+        "Browser.setDownloadBehavior",
+        {"behavior": "allow", "downloadPath": str(tmp_path)},
+    )
     driver.find_element("id", "download").click()
     until = time.monotonic() + 10.0
     saved_file = tmp_path / "linkage.toml"
-    while not (saved_file.exists() and saved_file.stat().st_size) and time.monotonic() < until:  # made empty at first
+    while (
+        not (saved_file.exists() and saved_file.stat().st_size)
+        and time.monotonic() < until
+    ):  # made empty at first
         time.sleep(0.02)
     saved = loads(saved_file.read_text())
-    assert saved.linkage == scene.linkage and saved.loads == scene.loads and saved.title == "a\\nb"
-    assert saved.motion.branch == -1 and saved.motion.angle.tolist() == scene.motion.angle.tolist()
+    assert (
+        saved.linkage == scene.linkage
+        and saved.loads == scene.loads
+        and saved.title == "a\\nb"
+    )
+    assert (
+        saved.motion.branch == -1
+        and saved.motion.angle.tolist() == scene.motion.angle.tolist()
+    )
 
 
 def test_what_acts_is_drawn_at_its_place_and_dimensions_on_request(browse) -> None:
     spring = fourbar.Spring(SpringEnd(1, 0.1, -0.5), SpringEnd(4, 0.08, 0.0), 20.0, 0.1)
     load = fourbar.Load(3, (2.0, 0.5), (0.03, 1.0), frame="bar")
-    scene = crank_rocker(loads=(load,), effects=(fourbar.Springs((spring,)), fourbar.Gravity()))
+    scene = crank_rocker(
+        loads=(load,), effects=(fourbar.Springs((spring,)), fourbar.Gravity())
+    )
     driver = browse(animate.write_page(scene))
     driver.execute_script("go(20)")
     s = fourbar.solve(scene)
@@ -248,12 +366,20 @@ def test_what_acts_is_drawn_at_its_place_and_dimensions_on_request(browse) -> No
             m => [(m[1] - view.x) / view.k, (view.y - m[2]) / view.k])])"""
     acting = dict(driver.execute_script(script))
     zigzag, arrow = acting["act act-spring"], acting["act act-force"]
-    end = s.B[20] + (0.08 - 0.22) * np.array([math.cos(s.theta_4[20]), math.sin(s.theta_4[20])])
+    end = s.B[20] + (0.08 - 0.22) * np.array(
+        [math.cos(s.theta_4[20]), math.sin(s.theta_4[20])]
+    )
     np.testing.assert_allclose(zigzag[-1], end, atol=1e-4)
     angle = s.theta_3[20] + 1.0
-    np.testing.assert_allclose(arrow[0], s.G3[20] + 0.03 * np.array([math.cos(angle), math.sin(angle)]), atol=1e-4)
+    np.testing.assert_allclose(
+        arrow[0],
+        s.G3[20] + 0.03 * np.array([math.cos(angle), math.sin(angle)]),
+        atol=1e-4,
+    )
     towards = np.subtract(arrow[1], arrow[0])
-    assert math.atan2(towards[1], towards[0]) == pytest.approx(s.theta_3[20] + 0.5, abs=0.01)
+    assert math.atan2(towards[1], towards[0]) == pytest.approx(
+        s.theta_3[20] + 0.5, abs=0.01
+    )
     assert acting.keys() >= {"act act-drive", "act act-gravity"}
     names = 'return ["1", "3"].map(k => [parts.label[k].textContent, parts.label[k].style.display])'
     assert driver.execute_script(names) == [["1", "none"], ["3", ""]]
@@ -265,7 +391,10 @@ def test_what_acts_is_drawn_at_its_place_and_dimensions_on_request(browse) -> No
     for (x, y), expected in zip(shafts[[0, 5]], (s.v_A[20], s.a_A[20]), strict=True):
         assert math.atan2(y, x) == pytest.approx(math.atan2(*expected[::-1]), abs=0.001)
     driver.execute_script("toggle('show-dimensions'); toggle('show-acting')")
-    assert [text for text, _ in driver.execute_script(names)] == ["1: 300 mm", "3: 250 mm"]
+    assert [text for text, _ in driver.execute_script(names)] == [
+        "1: 300 mm",
+        "3: 250 mm",
+    ]
     assert not driver.find_elements("css selector", "#acting *, #under .act")
 
 
@@ -273,13 +402,19 @@ def test_the_branch_switches_the_picture_and_the_numbers(turning) -> None:
     driver, scene = turning[0], crank_rocker()
     driver.execute_script("chooseBranch(-1)")
     s = fourbar.solve(replace(scene, motion=scene.motion.replace(branch=-1)))
-    assert shown(driver, "torque", "F32_y") == pytest.approx([s.torque[0], s.F32[0, 1]], rel=PRINTED)
+    assert shown(driver, "torque", "F32_y") == pytest.approx(
+        [s.torque[0], s.F32[0, 1]], rel=PRINTED
+    )
     drawn = pins(driver)
-    np.testing.assert_allclose(drawn["B"], np.hypot(*drawn["O4"]) / 0.3 * s.B[0], atol=PIXEL)
+    np.testing.assert_allclose(
+        drawn["B"], np.hypot(*drawn["O4"]) / 0.3 * s.B[0], atol=PIXEL
+    )
 
 
 @pytest.mark.parametrize("scaling", ("sweep", "position"))
-def test_arrows_point_along_the_forces_to_the_scale_of_the_legend(turning, scaling: str) -> None:
+def test_arrows_point_along_the_forces_to_the_scale_of_the_legend(
+    turning, scaling: str
+) -> None:
     driver, s = turning
     choose = """const e = document.getElementById("arrow-scale"); e.value = arguments[0];
         e.dispatchEvent(new Event("change")); go(50)"""
@@ -290,15 +425,26 @@ def test_arrows_point_along_the_forces_to_the_scale_of_the_legend(turning, scali
     length = """const e = document.querySelector("#force-scale line");
         return Number(e.getAttribute("x2")) - Number(e.getAttribute("x1"))"""
     bar = driver.execute_script(length)
-    newtons = float(driver.find_element("css selector", "#force-scale text").text.split()[0])
+    newtons = float(
+        driver.find_element("css selector", "#force-scale text").text.split()[0]
+    )
     for name in ("F12", "F32", "F43", "F14"):
         drawn = np.array(driver.execute_script(script, name))
-        np.testing.assert_allclose(drawn, getattr(s, name)[50] * bar / newtons, atol=PIXEL)
+        np.testing.assert_allclose(
+            drawn, getattr(s, name)[50] * bar / newtons, atol=PIXEL
+        )
 
 
-@pytest.mark.parametrize(("width", "scaling"), [(360, "position"), (1100, "position"), (360, "sweep"), (1100, "sweep")])
-def test_no_arrow_and_no_name_of_one_leaves_the_picture(browse, width: int, scaling: str) -> None:
-    driver = browse(animate.write_page(thesis() if scaling == "position" else crank_rocker()), width)
+@pytest.mark.parametrize(
+    ("width", "scaling"),
+    [(360, "position"), (1100, "position"), (360, "sweep"), (1100, "sweep")],
+)
+def test_no_arrow_and_no_name_of_one_leaves_the_picture(
+    browse, width: int, scaling: str
+) -> None:
+    driver = browse(
+        animate.write_page(thesis() if scaling == "position" else crank_rocker()), width
+    )
     script = """const choice = document.getElementById("arrow-scale"); choice.value = arguments[0];
         choice.dispatchEvent(new Event("change"));
         const least = []; for (let i = 0; i < grid.length; i += 7) { go(i);
@@ -307,7 +453,9 @@ def test_no_arrow_and_no_name_of_one_leaves_the_picture(browse, width: int, scal
             least.push(Math.min(x, y, view.width - x, view.height - y)); } }
         return least;"""
     distances = driver.execute_script(script, scaling)
-    assert len(distances) > 30 and min(distances) > 15.0  # its name stands beyond the tip
+    assert (
+        len(distances) > 30 and min(distances) > 15.0
+    )  # its name stands beyond the tip
 
 
 def test_keyboard_drives_it(turning) -> None:
@@ -325,7 +473,9 @@ def test_keyboard_drives_it(turning) -> None:
     press(Keys.HOME)
     assert state_of(driver, "row") == 0
     press("b")
-    assert state_of(driver, "branch") == 1  # single letters act only on the picture in focus
+    assert (
+        state_of(driver, "branch") == 1
+    )  # single letters act only on the picture in focus
     driver.execute_script("document.getElementById('picture').focus()")
     press("b", "f")
     assert state_of(driver, "branch") == -1
@@ -336,7 +486,14 @@ def test_keyboard_drives_it(turning) -> None:
     for _ in range(6):
         press(Keys.TAB)
         order.append(state_of(driver, "document.activeElement.id"))
-    assert order == ["", "picture", "play", "back", "forward", "reset"]  # first the link that skips to the controls
+    assert order == [
+        "",
+        "picture",
+        "play",
+        "back",
+        "forward",
+        "reset",
+    ]  # first the link that skips to the controls
 
 
 def test_every_control_has_a_name(turning) -> None:
@@ -346,16 +503,31 @@ def test_every_control_has_a_name(turning) -> None:
     for control in (c for c in controls if c.is_displayed()):
         assert control.accessible_name.strip(), control.get_attribute("id")
     driver.execute_script("go(3)")
-    assert driver.find_element("id", "theta").get_attribute("aria-valuetext").endswith("degrees")
+    assert (
+        driver.find_element("id", "theta")
+        .get_attribute("aria-valuetext")
+        .endswith("degrees")
+    )
 
 
 @pytest.mark.parametrize("dark", (False, True))
-@pytest.mark.parametrize("scene", (crank_rocker(), thesis()), ids=("crank-rocker", "thesis"))
-def test_at_360_pixels_nothing_sticks_out_and_all_text_is_readable(browse, scene: fourbar.Scene, dark: bool) -> None:
+@pytest.mark.parametrize(
+    "scene", (crank_rocker(), thesis()), ids=("crank-rocker", "thesis")
+)
+def test_at_360_pixels_nothing_sticks_out_and_all_text_is_readable(
+    browse, scene: fourbar.Scene, dark: bool
+) -> None:
     driver = browse(animate.write_page(scene), 360, dark=dark)
     assert state_of(driver, "document.documentElement.scrollWidth") <= 360
-    assert state_of(driver, "document.getElementById('picture').getBoundingClientRect().width") > 300
-    for control in driver.find_elements("css selector", "button, select, input[type=number], input[type=range]"):
+    assert (
+        state_of(
+            driver, "document.getElementById('picture').getBoundingClientRect().width"
+        )
+        > 300
+    )
+    for control in driver.find_elements(
+        "css selector", "button, select, input[type=number], input[type=range]"
+    ):
         if control.is_displayed():
             assert control.size["height"] >= 40  # large enough for a finger
     script = """return [...document.querySelectorAll("body *")]
@@ -369,13 +541,17 @@ def test_at_360_pixels_nothing_sticks_out_and_all_text_is_readable(browse, scene
     assert len(seen) > 40
     for colour, ground, text in seen:
         assert contrast(colour, ground) >= 4.5, (text, colour, ground)  # WCAG AA
-    page = luminance(state_of(driver, "getComputedStyle(document.body).backgroundColor"))
+    page = luminance(
+        state_of(driver, "getComputedStyle(document.body).backgroundColor")
+    )
     assert page < 0.05 if dark else page > 0.9
 
 
 def luminance(colour: str) -> float:
     parts = [int(v) / 255 for v in colour[colour.index("(") + 1 : -1].split(",")[:3]]
-    linear = [v / 12.92 if v <= 0.03928 else ((v + 0.055) / 1.055) ** 2.4 for v in parts]
+    linear = [
+        v / 12.92 if v <= 0.03928 else ((v + 0.055) / 1.055) ** 2.4 for v in parts
+    ]
     return float(np.dot([0.2126, 0.7152, 0.0722], linear))
 
 
@@ -394,8 +570,13 @@ def test_labels_of_the_picture_do_not_cover_each_other(browse) -> None:
         assert len(boxes) >= 8
         for k, a in enumerate(boxes):
             for b in boxes[k + 1 :]:
-                wide, high = min(a[2], b[2]) - max(a[0], b[0]), min(a[3], b[3]) - max(a[1], b[1])
-                assert wide < 3 or high < 6  # a box leaves space for accents and descenders around the ink
+                wide, high = (
+                    min(a[2], b[2]) - max(a[0], b[0]),
+                    min(a[3], b[3]) - max(a[1], b[1]),
+                )
+                assert (
+                    wide < 3 or high < 6
+                )  # a box leaves space for accents and descenders around the ink
 
 
 def test_hostile_titles_do_nothing_but_appear(browse) -> None:
@@ -407,16 +588,20 @@ def test_hostile_titles_do_nothing_but_appear(browse) -> None:
 
 def test_a_picture_lies_along_its_bar(browse, tmp_path: Path) -> None:
     (tmp_path / "bar.png").write_bytes(PNG)
-    driver = browse(animate.write_page(crank_rocker(), {"output": tmp_path / "bar.png"}))
+    driver = browse(
+        animate.write_page(crank_rocker(), {"output": tmp_path / "bar.png"})
+    )
     driver.execute_script("go(9)")
-    length = state_of(driver, "Number(document.getElementById('picture-4').getAttribute('width'))")
+    length = state_of(
+        driver, "Number(document.getElementById('picture-4').getAttribute('width'))"
+    )
     drawn = pins(driver)
     assert length == pytest.approx(np.hypot(*(drawn["B"] - drawn["O4"])))
     turn = driver.find_element("id", "picture-4").get_attribute("transform")
     angle = float(turn[turn.index("rotate(") + 7 : -1])
-    assert math.remainder(angle + math.degrees(fourbar.solve(crank_rocker()).theta_4[9]), 360) == pytest.approx(
-        0, abs=1e-6
-    )
+    assert math.remainder(
+        angle + math.degrees(fourbar.solve(crank_rocker()).theta_4[9]), 360
+    ) == pytest.approx(0, abs=1e-6)
 
 
 def test_with_reduced_motion_it_moves_twice_a_second(browse) -> None:
@@ -440,7 +625,10 @@ def test_positions_alone_show_no_dynamics(browse) -> None:
 def test_it_says_why_a_position_has_no_forces(browse) -> None:
     """T3 of a parallelogram exists nowhere; on its input the drive has forces everywhere, and no remark is shown."""
     motion = fourbar.Motion(fourbar.Sweep(0.3, 2.0, 4), 1.0)
-    for drive_bar, remark in ((3, "no torque of the drive holds them in balance"), (2, "")):
+    for drive_bar, remark in (
+        (3, "no torque of the drive holds them in balance"),
+        (2, ""),
+    ):
         scene = fourbar.Scene(fourbar.uniform(1.0, 0.5, 1.0, 0.5), motion, drive_bar)
         status = browse(animate.write_page(scene)).find_element("id", "status")
         assert (remark in status.text) and status.is_displayed() == bool(remark)
@@ -448,33 +636,62 @@ def test_it_says_why_a_position_has_no_forces(browse) -> None:
 
 @pytest.mark.slow
 def test_tolerances_have_bands_and_shares_in_the_units_of_the_page(browse) -> None:
-    loose = (fourbar.Tolerance("lengths.input", 5e-5), fourbar.Tolerance("bars.coupler.mass", 0.001, True))
+    loose = (
+        fourbar.Tolerance("lengths.input", 5e-5),
+        fourbar.Tolerance("bars.coupler.mass", 0.001, True),
+    )
     scene = crank_rocker(tolerances=loose, points=(fourbar.Point("P", 3, (0.1, 0.2)),))
     driver = browse(animate.write_page(scene, units=fourbar.units("N.mm")), 360)
     study = fourbar.tolerances(scene, PAGE_SAMPLES)
     driver.execute_script("go(20)")
     rows = {
-        row.find_element("tag name", "th").text: [number(cell.text.replace("±", "")) for cell in cells]
-        for row in driver.find_elements("css selector", "#spreads tbody tr, #shares tbody tr")
+        row.find_element("tag name", "th").text: [
+            number(cell.text.replace("±", "")) for cell in cells
+        ]
+        for row in driver.find_elements(
+            "css selector", "#spreads tbody tr, #shares tbody tr"
+        )
         for cells in [row.find_elements("tag name", "td")]
     }
-    for label, part, factor in (("torque, N mm", "torque", 1e3), ("|F₄₃|, N", "|F43|", 1.0), ("P_x, mm", "P_x", 1e3)):
+    for label, part, factor in (
+        ("torque, N mm", "torque", 1e3),
+        ("|F₄₃|, N", "|F43|", 1.0),
+        ("P_x, mm", "P_x", 1e3),
+    ):
         spread = study.spreads[part]
         names = ("nominal", "deviation", "low", "high", "worst", "least", "greatest")
         expected = np.array([getattr(spread, name)[20] * factor for name in names])
-        np.testing.assert_allclose(rows[label], expected, rtol=0, atol=SPREAD_PRINTED * spread.worst[20] * factor)
+        np.testing.assert_allclose(
+            rows[label],
+            expected,
+            rtol=0,
+            atol=SPREAD_PRINTED * spread.worst[20] * factor,
+        )
     shares = study.spreads["torque"].shares[:, 20]
-    assert [rows[tolerance.key][0] for tolerance in loose] == pytest.approx(100 * shares / shares.sum(), abs=0.51)
+    assert [rows[tolerance.key][0] for tolerance in loose] == pytest.approx(
+        100 * shares / shares.sum(), abs=0.51
+    )
     assert state_of(driver, "document.documentElement.scrollWidth") <= 360
     box = driver.find_element("css selector", "#bands .band").rect
     assert box["height"] > 40 and box["width"] > 200
     driver.execute_script("chooseBranch(-1)")
     assert not driver.find_element("id", "spreads").is_displayed()
-    assert "belong to the branch of the scene" in driver.find_element("id", "tolerance-note").text
+    assert (
+        "belong to the branch of the scene"
+        in driver.find_element("id", "tolerance-note").text
+    )
 
 
 def test_a_scene_without_bands_says_why_or_shows_nothing(browse) -> None:
-    driver = browse(animate.write_page(replace(RELEASED, tolerances=(fourbar.Tolerance("lengths.input", 5e-5),))))
+    driver = browse(
+        animate.write_page(
+            replace(RELEASED, tolerances=(fourbar.Tolerance("lengths.input", 5e-5),))
+        )
+    )
     assert "free motion" in driver.find_element("id", "tolerance-note").text
     assert not driver.find_element("id", "bands").is_displayed()
-    assert not browse(animate.write_page(crank_rocker())).find_element("id", "tolerances").is_displayed()
+    assert (
+        not browse(animate.write_page(crank_rocker()))
+        .find_element("id", "tolerances")
+        .is_displayed()
+    )

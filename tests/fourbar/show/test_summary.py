@@ -50,20 +50,38 @@ FINE = fourbar.Sweep(0.0, math.tau, 36000)
 
 
 def swept(scene: fourbar.Scene, steps: int) -> fourbar.Scene:
-    return replace(scene, motion=scene.motion.replace(angle=fourbar.Sweep(0.0, math.tau, steps)))
+    return replace(
+        scene, motion=scene.motion.replace(angle=fourbar.Sweep(0.0, math.tau, steps))
+    )
 
 
 @pytest.mark.parametrize("steps", (72, 97, 360))
-def test_dry_friction_reverses_at_the_dead_centres_whatever_the_steps(steps: int) -> None:
+def test_dry_friction_reverses_at_the_dead_centres_whatever_the_steps(
+    steps: int,
+) -> None:
     """The output turns back where bars 2 and 3 are in line: cosine rule for O2, B, O4."""
     d, a, b, c = WIPER.linkage.lengths
-    stretched, folded = (math.acos((r * r + d * d - c * c) / (2.0 * r * d)) for r in (b + a, b - a))
+    stretched, folded = (
+        math.acos((r * r + d * d - c * c) / (2.0 * r * d)) for r in (b + a, b - a)
+    )
     scene = swept(WIPER, steps)
     between = locate_between(scene, fourbar.solve(scene))
     assert [pin for _, pin in between.reversals] == ["O4", "O4"]
-    assert np.abs(np.subtract([angle for angle, _ in between.reversals], [stretched, folded + math.pi])).max() < LOCATED
+    assert (
+        np.abs(
+            np.subtract(
+                [angle for angle, _ in between.reversals], [stretched, folded + math.pi]
+            )
+        ).max()
+        < LOCATED
+    )
     located = list_sizes(between.solution)
-    for name in ("F12", "F32", "F43", "F14"):  # each is largest on one side of the first jump
+    for name in (
+        "F12",
+        "F32",
+        "F43",
+        "F14",
+    ):  # each is largest on one side of the first jump
         most = max(_beside(scene, stretched, step)[name] for step in (-1, 1))
         assert located[name].max() == pytest.approx(most, rel=PEAK)
     assert located["F14"].max() == pytest.approx(22.464, abs=5e-4)
@@ -71,15 +89,25 @@ def test_dry_friction_reverses_at_the_dead_centres_whatever_the_steps(steps: int
 
 def _beside(scene: fourbar.Scene, theta_2: float, step: int) -> dict[str, float]:
     """Sizes next to an angle."""
-    command = Command(np.array([theta_2 + step * 1e-8]), np.array([1], dtype=np.int8), scene.motion.omega_2, 0.0)
-    return {name: float(size[0]) for name, size in list_sizes(fourbar.solve(scene, at=command)).items()}
+    command = Command(
+        np.array([theta_2 + step * 1e-8]),
+        np.array([1], dtype=np.int8),
+        scene.motion.omega_2,
+        0.0,
+    )
+    return {
+        name: float(size[0])
+        for name, size in list_sizes(fourbar.solve(scene, at=command)).items()
+    }
 
 
 def test_the_largest_of_coarse_steps_is_that_of_fine_ones() -> None:
     coarse = swept(crank_rocker(), 24)
     between = locate_between(coarse, fourbar.solve(coarse))
     assert not between.growing and not between.reversals
-    fine = list_sizes(fourbar.solve(replace(coarse, motion=coarse.motion.replace(angle=FINE))))
+    fine = list_sizes(
+        fourbar.solve(replace(coarse, motion=coarse.motion.replace(angle=FINE)))
+    )
     for name, size in list_sizes(between.solution).items():
         assert size.max() == pytest.approx(fine[name].max(), rel=PEAK), name
     of_coarse = np.isin(between.solution.theta_2, fourbar.solve(coarse).theta_2)
@@ -90,10 +118,15 @@ def test_towards_a_limit_within_the_last_step_it_grows_too() -> None:
     """A sweep that ends where the loop no longer closes: nothing beyond its last position was looked at."""
     scene = crank_rocker()
     for steps in (9, 20):
-        swept = replace(scene, motion=fourbar.Motion(theta_4=fourbar.Sweep(1.5, 3.5, steps), omega_4=2.0))
+        swept = replace(
+            scene,
+            motion=fourbar.Motion(theta_4=fourbar.Sweep(1.5, 3.5, steps), omega_4=2.0),
+        )
         solution = fourbar.solve(swept)
         assert 0 < solution.assembled.sum() < steps + 1
-        assert {"speed", "power", "F12", "F32", "F43"} <= locate_between(swept, solution).growing
+        assert {"speed", "power", "F12", "F32", "F43"} <= locate_between(
+            swept, solution
+        ).growing
 
 
 def test_towards_a_pole_no_largest_value_is_made_up() -> None:
@@ -101,47 +134,77 @@ def test_towards_a_pole_no_largest_value_is_made_up() -> None:
     solution = fourbar.solve(scene)
     between = locate_between(scene, solution)
     assert "torque" in between.growing
-    assert np.nanmax(np.abs(between.solution.torque)) == np.nanmax(np.abs(solution.torque))
+    assert np.nanmax(np.abs(between.solution.torque)) == np.nanmax(
+        np.abs(solution.torque)
+    )
 
 
-def test_a_motion_law_is_looked_at_between_its_instants_and_a_list_of_angles_is_not() -> None:
+def test_a_motion_law_is_looked_at_between_its_instants_and_a_list_of_angles_is_not() -> (
+    None
+):
     law = Law((0.0, 1.0, 2.0), (0.3, 2.0, 1.0), steps=20, ends="rest")
-    scene = crank_rocker(motion=fourbar.Motion(law=law), effects=(fourbar.Friction.at(O2=0.05),))
+    scene = crank_rocker(
+        motion=fourbar.Motion(law=law), effects=(fourbar.Friction.at(O2=0.05),)
+    )
     between = locate_between(scene, fourbar.solve(scene))
-    fine = list_sizes(fourbar.solve(replace(scene, motion=fourbar.Motion(law=replace(law, steps=20000)))))
+    fine = list_sizes(
+        fourbar.solve(
+            replace(scene, motion=fourbar.Motion(law=replace(law, steps=20000)))
+        )
+    )
     assert [pin for _, pin in between.reversals] == ["O2"]
-    assert np.max(list_sizes(between.solution)["power"]) == pytest.approx(fine["power"].max(), rel=PEAK)
+    assert np.max(list_sizes(between.solution)["power"]) == pytest.approx(
+        fine["power"].max(), rel=PEAK
+    )
     assert np.all(np.diff(between.solution.time) > 0.0)
     listed = crank_rocker(motion=fourbar.Motion(np.linspace(0.0, 6.0, 9), 10.0))
-    assert locate_between(listed, solution := fourbar.solve(listed)).solution is solution
+    assert (
+        locate_between(listed, solution := fourbar.solve(listed)).solution is solution
+    )
 
 
 def test_the_largest_force_of_a_stroke_is_that_of_fine_steps() -> None:
-    drive = fourbar.LinearDrive(SpringEnd(1, 0.25, math.radians(-160.0)), SpringEnd(2, 0.09, 0.17))
+    drive = fourbar.LinearDrive(
+        SpringEnd(1, 0.25, math.radians(-160.0)), SpringEnd(2, 0.09, 0.17)
+    )
 
     def of(steps: int) -> fourbar.Scene:
-        motion = fourbar.Motion(stroke=fourbar.Sweep(0.33, 0.17, steps), stroke_speed=-0.2, side="left")
-        return crank_rocker(motion=motion, drive=drive, effects=(fourbar.Friction((("A", 0.01),)),))
+        motion = fourbar.Motion(
+            stroke=fourbar.Sweep(0.33, 0.17, steps), stroke_speed=-0.2, side="left"
+        )
+        return crank_rocker(
+            motion=motion, drive=drive, effects=(fourbar.Friction((("A", 0.01),)),)
+        )
 
     between = locate_between(of(20), fourbar.solve(of(20)))
-    assert between.solution.at.stroke is not None and (np.diff(between.solution.at.stroke) < 0.0).all()
+    assert (
+        between.solution.at.stroke is not None
+        and (np.diff(between.solution.at.stroke) < 0.0).all()
+    )
     fine = fourbar.solve(of(20000))
     for name, size in list_sizes(fine).items():
-        assert list_sizes(between.solution)[name].max() == pytest.approx(size.max(), rel=PEAK), name
+        assert list_sizes(between.solution)[name].max() == pytest.approx(
+            size.max(), rel=PEAK
+        ), name
     slips = np.flatnonzero(np.diff(np.sign(fine.omega_3 - fine.omega_2)))
     assert [pin for _, pin in between.reversals] == ["A"] * len(slips)
     for (place, _), i in zip(between.reversals, slips, strict=True):
         assert fine.at.stroke[i + 1] <= place <= fine.at.stroke[i]
 
 
-def test_the_summary_beside_a_dead_point_is_as_quick_with_pin_friction(tmp_path: Path) -> None:
+def test_the_summary_beside_a_dead_point_is_as_quick_with_pin_friction(
+    tmp_path: Path,
+) -> None:
     """From 44 in on the linkage does not assemble at first; many couples jam beside the dead point where it begins."""
     seconds = []
     for name, text in (("without", BUCKET), ("with", BUCKET + FRICTION)):
         (scene := tmp_path / f"{name}.toml").write_text(text)
         before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
         done = subprocess.run(
-            [sys.executable, "-m", "fourbar", "analyze", str(scene)], capture_output=True, text=True, check=False
+            [sys.executable, "-m", "fourbar", "analyze", str(scene)],
+            capture_output=True,
+            text=True,
+            check=False,
         )
         assert done.returncode == 0 and "cylinder from bar" in done.stdout, done.stderr
         seconds.append(resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before)

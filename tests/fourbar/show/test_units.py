@@ -20,65 +20,139 @@ from tests.support.scenes import crank_rocker
 MODEL = Path(__file__).parents[3] / "models" / "crank_rocker.toml"
 INCH, POUND = 0.0254, 0.45359237 * 9.80665
 IN_SI = {
-    **{"in": INCH, "in/s": INCH, "in/s^2": INCH, "lbf": POUND, "lbf in": POUND * INCH, "rpm": math.tau / 60.0},
-    **{"deg": math.pi / 180.0, "rad/s^2": 1.0, "1": 1.0, "J": 1.0, "hp": 550.0 * 12.0 * POUND * INCH},
+    **{
+        "in": INCH,
+        "in/s": INCH,
+        "in/s^2": INCH,
+        "lbf": POUND,
+        "lbf in": POUND * INCH,
+        "rpm": math.tau / 60.0,
+    },
+    **{
+        "deg": math.pi / 180.0,
+        "rad/s^2": 1.0,
+        "1": 1.0,
+        "J": 1.0,
+        "hp": 550.0 * 12.0 * POUND * INCH,
+    },
 }
 """Size of each unit that a result of the model has in imperial units, by definition."""
 
 
-def test_every_number_is_in_the_unit_that_is_named(capsys: pytest.CaptureFixture[str]) -> None:
+def test_every_number_is_in_the_unit_that_is_named(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     solution = fourbar.solve(fourbar.load(MODEL), "error")
     for form in ("--json", "--csv"):
         assert status(["analyze", str(MODEL), form, "--units", "imperial"]) == HOLDS
         out = capsys.readouterr().out
         if form == "--json":
             document = json.loads(out)
-            assert document["angle_unit"] == "deg" and set(document["units"]) <= set(document)
-            printed = {name: (np.array(document[name], dtype=float), unit) for name, unit in document["units"].items()}
+            assert document["angle_unit"] == "deg" and set(document["units"]) <= set(
+                document
+            )
+            printed = {
+                name: (np.array(document[name], dtype=float), unit)
+                for name, unit in document["units"].items()
+            }
         else:
             header, *rows = csv.reader(io.StringIO(out))
-            column = next(index for index, name in enumerate(header) if name.startswith("F12_y"))
-            assert header[column] == "F12_y [lbf]" and "torque [lbf in]" in header and "condition" in header
-            assert float(rows[90][column]) * POUND == pytest.approx(solution.F12[90, 1], rel=1e-14)  # type: ignore[index]
+            column = next(
+                index for index, name in enumerate(header) if name.startswith("F12_y")
+            )
+            assert (
+                header[column] == "F12_y [lbf]"
+                and "torque [lbf in]" in header
+                and "condition" in header
+            )
+            assert float(rows[90][column]) * POUND == pytest.approx(
+                solution.F12[90, 1], rel=1e-14
+            )  # type: ignore[index]
     for name, (values, unit) in printed.items():
         if UNITS[name] != unit or unit in ("rad/s^2", "1"):
             expected = getattr(solution, name)
             assert np.allclose(values * IN_SI[unit], np.full_like(values, np.nan) if expected is None else expected,
                                rtol=4e-16 * 4, atol=0.0, equal_nan=True), name  # fmt: skip
-    assert {unit for _, unit in printed.values()} >= {"in", "lbf", "lbf in", "deg", "rpm", "in/s^2", "hp"}
+    assert {unit for _, unit in printed.values()} >= {
+        "in",
+        "lbf",
+        "lbf in",
+        "deg",
+        "rpm",
+        "in/s^2",
+        "hp",
+    }
 
 
-def test_a_spreadsheet_of_decimal_commas_has_magnitudes_power_and_time(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_spreadsheet_of_decimal_commas_has_magnitudes_power_and_time(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     scene = fourbar.load(MODEL)
     assert status(["analyze", str(MODEL), "--csv-comma", "--units", "mm kW"]) == HOLDS
     header, *rows = csv.reader(io.StringIO(capsys.readouterr().out), delimiter=";")
-    assert {len(row) for row in rows} == {len(header)} and not any("." in cell for row in rows for cell in row)
+    assert {len(row) for row in rows} == {len(header)} and not any(
+        "." in cell for row in rows for cell in row
+    )
     solution = fourbar.solve(scene)
-    assert solution.torque is not None and solution.F14 is not None and scene.motion.omega_2 is not None
-    wanted = {"|F14| [N]": np.hypot(*solution.F14.T), "power [kW]": solution.torque * scene.motion.omega_2 / 1000.0}
+    assert (
+        solution.torque is not None
+        and solution.F14 is not None
+        and scene.motion.omega_2 is not None
+    )
+    wanted = {
+        "|F14| [N]": np.hypot(*solution.F14.T),
+        "power [kW]": solution.torque * scene.motion.omega_2 / 1000.0,
+    }
     wanted["time [s]"] = np.linspace(0.0, math.tau / scene.motion.omega_2, 361)
     for name, numbers in wanted.items():
         column = [float(row[header.index(name)].replace(",", ".")) for row in rows]
         assert np.allclose(column, numbers, rtol=1e-14, atol=1e-15), name
-    assert all(" [" in name for name in header[3:] if name not in ("sin_mu", "condition", "drive_condition"))
-    growing = fourbar.Scene(scene.linkage, fourbar.Motion(np.array([1.0, 2.0]), 1.0, 1.0))
+    assert all(
+        " [" in name
+        for name in header[3:]
+        if name not in ("sin_mu", "condition", "drive_condition")
+    )
+    growing = fourbar.Scene(
+        scene.linkage, fourbar.Motion(np.array([1.0, 2.0]), 1.0, 1.0)
+    )
     assert "time" not in (fourbar.solve(growing).to_csv() or "")
 
 
 @pytest.mark.slow
 def test_the_table_names_its_units(capsys: pytest.CaptureFixture[str]) -> None:
-    assert status(["analyze", str(MODEL), "--units", "mm kN N.mm", "--table", "--all"]) == HOLDS
+    assert (
+        status(["analyze", str(MODEL), "--units", "mm kN N.mm", "--table", "--all"])
+        == HOLDS
+    )
     lines = capsys.readouterr().out.splitlines()
-    heading = next(index for index, line in enumerate(lines) if line.startswith(" theta_2"))
+    heading = next(
+        index for index, line in enumerate(lines) if line.startswith(" theta_2")
+    )
     assert lines[heading + 1].split() == [
-        *["deg", "N", "mm", "W", *["kN"] * 4, "deg", "deg", *["rad/s"] * 2, *["rad/s^2"] * 2, "of", "T"]
+        *[
+            "deg",
+            "N",
+            "mm",
+            "W",
+            *["kN"] * 4,
+            "deg",
+            "deg",
+            *["rad/s"] * 2,
+            *["rad/s^2"] * 2,
+            "of",
+            "T",
+        ]
     ]
     torque = [float(line.split()[1]) for line in lines[heading + 3 :]]
-    assert torque == pytest.approx(list(1000.0 * fourbar.solve(fourbar.load(MODEL)).torque), rel=1e-4)
+    assert torque == pytest.approx(
+        list(1000.0 * fourbar.solve(fourbar.load(MODEL)).torque), rel=1e-4
+    )
 
 
 @pytest.mark.parametrize("text", ["furlong", "mm in", "N.mm J", "m^2"])
-def test_what_is_no_list_of_units_is_refused(text: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_is_no_list_of_units_is_refused(
+    text: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     with pytest.raises(InputError):
         units(text)
     assert status(["analyze", str(MODEL), "--units", text]) == 2
@@ -86,14 +160,20 @@ def test_what_is_no_list_of_units_is_refused(text: str, capsys: pytest.CaptureFi
 
 
 def test_units_are_read_as_people_write_them() -> None:
-    assert units("mm, N,lbf-in") == units("mm N lbf-in") and units("Imperial") == units("imperial") and not units("si")
+    assert (
+        units("mm, N,lbf-in") == units("mm N lbf-in")
+        and units("Imperial") == units("imperial")
+        and not units("si")
+    )
     with pytest.raises(InputError, match=r'lb-in.*did you mean "lbf-in"'):
         units("mm lb-in")
 
 
 @pytest.mark.slow
 def test_plots_and_notebooks_say_theirs() -> None:
-    pytest.importorskip("matplotlib", reason="drawing needs matplotlib: pip install matplotlib")
+    pytest.importorskip(
+        "matplotlib", reason="drawing needs matplotlib: pip install matplotlib"
+    )
     from fourbar.show.plot.figures import draw_figure
 
     scene, imperial = crank_rocker(), units("imperial")
@@ -103,7 +183,9 @@ def test_plots_and_notebooks_say_theirs() -> None:
         if name == "torque":
             torque = fourbar.solve(scene).torque
             curve = max((np.asarray(line.get_ydata()) for line in axes.lines), key=len)
-            assert np.nanmax(curve) == pytest.approx(np.max(torque) / (POUND * INCH), rel=0.01)
+            assert np.nanmax(curve) == pytest.approx(
+                np.max(torque) / (POUND * INCH), rel=0.01
+            )
     assert " in" in notebook.in_units(scene, "imperial")._repr_html_()
     table = notebook.in_units(fourbar.solve(scene), "imperial")._repr_html_()
     assert "lbf in" in table and "deg" in table and "N m" not in table

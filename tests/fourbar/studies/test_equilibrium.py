@@ -12,7 +12,20 @@ import pytest
 from scipy.special import ellipk
 
 import fourbar
-from fourbar import Bar, FourBar, Friction, Gravity, Load, Motion, PinFriction, Scene, Spring, Springs, Sweep, Torsion
+from fourbar import (
+    Bar,
+    FourBar,
+    Friction,
+    Gravity,
+    Load,
+    Motion,
+    PinFriction,
+    Scene,
+    Spring,
+    Springs,
+    Sweep,
+    Torsion,
+)
 from fourbar.cli import status
 from fourbar.effects import SpringEnd
 from fourbar.mjcf import write_mjcf
@@ -30,10 +43,14 @@ CLOSE = 1e-12
 """Relative and rad; a dozen operations in doubles, and angles of a few turns."""
 
 
-def crank_as_pendulum(*effects: object, loads: tuple[Load, ...] = (), **motion: object) -> Scene:
+def crank_as_pendulum(
+    *effects: object, loads: tuple[Load, ...] = (), **motion: object
+) -> Scene:
     """A crank-rocker of which the crank alone has mass: theta_2 swings as one body about O2."""
     linkage = FourBar(0.3, Bar(0.1, M, INERTIA, (R, 0.3)), Bar(0.25), Bar(0.22), 0.2)
-    return Scene(linkage, Motion(**{"theta_2": 0.7, **motion}), loads=loads, effects=effects)  # type: ignore[arg-type]
+    return Scene(
+        linkage, Motion(**{"theta_2": 0.7, **motion}), loads=loads, effects=effects
+    )  # type: ignore[arg-type]
 
 
 def one(equilibria: Equilibria, stability: str) -> Equilibrium:
@@ -45,44 +62,86 @@ def one(equilibria: Equilibria, stability: str) -> Equilibrium:
 def test_gazebos_four_bar_hangs_at_the_frequency_of_its_pendulum() -> None:
     scene = fourbar.load(MODELS / "problems" / "gz_physics_987.toml")
     equilibria = equilibrium(scene)
-    assert equilibria.proven and [round(math.degrees(rest.theta_2)) for rest in equilibria.not_decided] == [0, 180]
-    (hanging,) = [rest for rest in equilibria.found if abs(rest.place.theta_2 - 1.5 * math.pi) < CLOSE]
-    assert (hanging.place.branch, hanging.stability, hanging.angle) == (-1, "stable", "theta_2")
+    assert equilibria.proven and [
+        round(math.degrees(rest.theta_2)) for rest in equilibria.not_decided
+    ] == [0, 180]
+    (hanging,) = [
+        rest
+        for rest in equilibria.found
+        if abs(rest.place.theta_2 - 1.5 * math.pi) < CLOSE
+    ]
+    assert (hanging.place.branch, hanging.stability, hanging.angle) == (
+        -1,
+        "stable",
+        "theta_2",
+    )
     bars = scene.linkage
-    swinging = sum(bar.moment_of_inertia + bar.mass * 0.25**2 for bar in (bars.input, bars.output))
+    swinging = sum(
+        bar.moment_of_inertia + bar.mass * 0.25**2 for bar in (bars.input, bars.output)
+    )
     weight = 9.8 * (2 * bars.input.mass * 0.25 + bars.coupler.mass * 0.5)
     J = swinging + bars.coupler.mass * 0.5**2
-    assert hanging.frequency == pytest.approx(math.sqrt(weight / J) / (2 * math.pi), rel=CLOSE)
+    assert hanging.frequency == pytest.approx(
+        math.sqrt(weight / J) / (2 * math.pi), rel=CLOSE
+    )
     assert f"{hanging.frequency:.10f}" == "0.7594391930"
-    released = hanging.frequency * math.pi / (2 * ellipk(math.sin(math.radians(12.5)) ** 2))
+    released = (
+        hanging.frequency * math.pi / (2 * ellipk(math.sin(math.radians(12.5)) ** 2))
+    )
     assert f"{released:.10f}" == "0.7504113317"
 
 
 def test_a_crank_with_mass_alone_is_a_pendulum() -> None:
     equilibria = equilibrium(crank_as_pendulum(DOWN))
     stable, unstable = one(equilibria, "stable"), one(equilibria, "unstable")
-    assert equilibria.proven and len(equilibria.found) == 2 and not equilibria.indifferent
-    assert math.remainder(stable.place.theta_2 + math.pi / 2 + 0.3, 2 * math.pi) == pytest.approx(0.0, abs=CLOSE)
-    assert math.remainder(unstable.place.theta_2 - math.pi / 2 + 0.3, 2 * math.pi) == pytest.approx(0.0, abs=CLOSE)
+    assert (
+        equilibria.proven and len(equilibria.found) == 2 and not equilibria.indifferent
+    )
+    assert math.remainder(
+        stable.place.theta_2 + math.pi / 2 + 0.3, 2 * math.pi
+    ) == pytest.approx(0.0, abs=CLOSE)
+    assert math.remainder(
+        unstable.place.theta_2 - math.pi / 2 + 0.3, 2 * math.pi
+    ) == pytest.approx(0.0, abs=CLOSE)
     J = INERTIA + M * R * R
-    assert (stable.slope, stable.inertia) == pytest.approx((-M * 9.81 * R, J), rel=CLOSE)
-    assert stable.frequency == pytest.approx(math.sqrt(M * 9.81 * R / J) / (2 * math.pi), rel=CLOSE)
-    assert unstable.frequency is None and unstable.slope == pytest.approx(M * 9.81 * R, rel=CLOSE)
+    assert (stable.slope, stable.inertia) == pytest.approx(
+        (-M * 9.81 * R, J), rel=CLOSE
+    )
+    assert stable.frequency == pytest.approx(
+        math.sqrt(M * 9.81 * R / J) / (2 * math.pi), rel=CLOSE
+    )
+    assert unstable.frequency is None and unstable.slope == pytest.approx(
+        M * 9.81 * R, rel=CLOSE
+    )
 
 
 @pytest.mark.slow
 def test_at_a_limit_of_the_input_the_output_is_the_angle() -> None:
     linkage = FourBar(0.3, Bar(0.4), Bar(0.2), Bar(0.25, M, INERTIA, (R, 0.0)), 0.5)
     for limit in fourbar.limit_positions(linkage):
-        beside = [limit.theta_2 + off for off in (0.01, -0.01)]  # on one side the linkage assembles
-        scene = Scene(linkage, Motion(np.array(beside)), effects=(Gravity(9.81, limit.theta_4),))
-        (hanging,) = [rest for rest in equilibrium(scene).found if rest.angle == "theta_4" and rest.place.branch == 0]
+        beside = [
+            limit.theta_2 + off for off in (0.01, -0.01)
+        ]  # on one side the linkage assembles
+        scene = Scene(
+            linkage, Motion(np.array(beside)), effects=(Gravity(9.81, limit.theta_4),)
+        )
+        (hanging,) = [
+            rest
+            for rest in equilibrium(scene).found
+            if rest.angle == "theta_4" and rest.place.branch == 0
+        ]
         assert hanging.stability == "stable"
         assert hanging.angle == "theta_4" and hanging.place.branch == 0
-        assert hanging.place.theta_4 == pytest.approx(limit.theta_4, abs=1e-10)  # theta_2 as a double: root of 2^-53
-        assert math.remainder(hanging.place.theta_2 - limit.theta_2, 2 * math.pi) == pytest.approx(0.0, abs=CLOSE)
+        assert hanging.place.theta_4 == pytest.approx(
+            limit.theta_4, abs=1e-10
+        )  # theta_2 as a double: root of 2^-53
+        assert math.remainder(
+            hanging.place.theta_2 - limit.theta_2, 2 * math.pi
+        ) == pytest.approx(0.0, abs=CLOSE)
         J = INERTIA + M * R * R
-        assert (hanging.slope, hanging.inertia) == pytest.approx((-M * 9.81 * R, J), rel=1e-9)
+        assert (hanging.slope, hanging.inertia) == pytest.approx(
+            (-M * 9.81 * R, J), rel=1e-9
+        )
 
 
 def springy(seed: int) -> Scene:
@@ -92,35 +151,72 @@ def springy(seed: int) -> Scene:
         lengths = random.uniform(0.1, 0.5, 4)
         if 2 * max(lengths) < sum(lengths):
             break
-    bars = [Bar(x, random.uniform(0.1, 2), None, tuple(random.uniform(-0.3, 0.3, 2))) for x in lengths[1:]]
+    bars = [
+        Bar(x, random.uniform(0.1, 2), None, tuple(random.uniform(-0.3, 0.3, 2)))
+        for x in lengths[1:]
+    ]
     linkage = FourBar(lengths[0], *bars, random.uniform(-3, 3))  # type: ignore[arg-type,misc]
     ends = [SpringEnd(bar, *random.uniform(0.05, 0.4, 2)) for bar in (1, 3, 2, 4)]
-    springs = [Spring(ends[i], ends[i + 1], random.uniform(50, 300), random.uniform(0, 0.3)) for i in (0, 2)]
-    loads = (Load(3, tuple(random.uniform(0, 9, 2)), (0.1, 1.0)), Load(4, moment=random.uniform(-1, 1)))
+    springs = [
+        Spring(ends[i], ends[i + 1], random.uniform(50, 300), random.uniform(0, 0.3))
+        for i in (0, 2)
+    ]
+    loads = (
+        Load(3, tuple(random.uniform(0, 9, 2)), (0.1, 1.0)),
+        Load(4, moment=random.uniform(-1, 1)),
+    )
     low, high = fourbar.formulas.mobility.choose_range(linkage)
     branch = int(random.choice([1, -1]))
-    return Scene(linkage, Motion(0.5 * (low + high), branch=branch), 2, loads, (DOWN, Springs(tuple(springs))))
+    return Scene(
+        linkage,
+        Motion(0.5 * (low + high), branch=branch),
+        2,
+        loads,
+        (DOWN, Springs(tuple(springs))),
+    )
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["crank_rocker", "thesis", "gallery/hoecken", "gallery/pump_jack", 0, 1, 2])
-def test_free_bodies_need_no_torque_there_and_its_slope_beside_and_have_no_other(name: str | int) -> None:
+@pytest.mark.parametrize(
+    "name", ["crank_rocker", "thesis", "gallery/hoecken", "gallery/pump_jack", 0, 1, 2]
+)
+def test_free_bodies_need_no_torque_there_and_its_slope_beside_and_have_no_other(
+    name: str | int,
+) -> None:
     """As a run judges it: Newton-Euler on three free bodies with their own closure, no virtual work."""
-    scene = springy(name) if isinstance(name, int) else fourbar.load(MODELS / f"{name}.toml")
+    scene = (
+        springy(name)
+        if isinstance(name, int)
+        else fourbar.load(MODELS / f"{name}.toml")
+    )
     equilibria, rows = equilibrium(scene), rows_of(scene, "equilibria")
     assert equilibria.proven and equilibria.found
-    assert {row.quantity for row in rows} >= {"missed", "torque", "slope", "inertia"} and not failing(rows)
+    assert {row.quantity for row in rows} >= {
+        "missed",
+        "torque",
+        "slope",
+        "inertia",
+    } and not failing(rows)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
-def test_changes_of_sign_find_what_the_proof_finds(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_changes_of_sign_find_what_the_proof_finds(
+    seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
     equilibria = equilibrium(springy(seed))
     monkeypatch.setattr(module, "_prove_zeros", lambda *_: None)
     sampled = equilibrium(springy(seed))
-    assert equilibria.proven and not sampled.proven and len(sampled.found) == len(equilibria.found)
+    assert (
+        equilibria.proven
+        and not sampled.proven
+        and len(sampled.found) == len(equilibria.found)
+    )
     for rest, sampled_rest in zip(equilibria.found, sampled.found, strict=True):
-        assert (rest.stability, rest.place.branch) == (sampled_rest.stability, sampled_rest.place.branch)
+        assert (rest.stability, rest.place.branch) == (
+            sampled_rest.stability,
+            sampled_rest.place.branch,
+        )
         assert rest.place == pytest.approx(sampled_rest.place, abs=1e-9)
 
 
@@ -130,84 +226,140 @@ def test_friction_holds_a_pendulum_within_the_angle_that_it_can() -> None:
     equilibria = equilibrium(crank_as_pendulum(DOWN, Friction.at(O2=f)))
     for rest in equilibria.found:
         assert rest.held is not None
-        ends = [math.remainder(end.theta_2 - rest.place.theta_2, 2 * math.pi) for end in rest.held]
+        ends = [
+            math.remainder(end.theta_2 - rest.place.theta_2, 2 * math.pi)
+            for end in rest.held
+        ]
         assert ends == pytest.approx([-away, away], abs=1e-12)
     assert len(equilibria.held) == 2 and equilibria.proven
     assert all(lower.theta_2 < upper.theta_2 for lower, upper in equilibria.held)
     stays = equilibria.moves == 0
     Q = -M * 9.81 * R * np.cos(equilibria.positions.theta_2 + 0.3)
-    assert (stays == (np.abs(Q) <= f)).all() and (equilibria.moves[~stays] == np.sign(Q[~stays])).all()
+    assert (stays == (np.abs(Q) <= f)).all() and (
+        equilibria.moves[~stays] == np.sign(Q[~stays])
+    ).all()
     stuck = equilibrium(crank_as_pendulum(DOWN, Friction.at(O2=10.0)))
-    assert (stuck.moves == 0).all() and len(stuck.held) == 1 and all(rest.held for rest in stuck.found)
+    assert (
+        (stuck.moves == 0).all()
+        and len(stuck.held) == 1
+        and all(rest.held for rest in stuck.found)
+    )
 
 
 @pytest.mark.slow
 def test_loaded_friction_holds_up_to_where_no_torque_is_needed_to_move() -> None:
     scene = fourbar.load(MODELS / "crank_rocker.toml")
-    scene = replace(scene, loads=(), effects=(DOWN, PinFriction.at(O2=(0.2, 0.01), A=(0.1, 0.01), O4=(0.2, 0.02))))
+    scene = replace(
+        scene,
+        loads=(),
+        effects=(DOWN, PinFriction.at(O2=(0.2, 0.01), A=(0.1, 0.01), O4=(0.2, 0.02))),
+    )
     equilibria = equilibrium(scene)
     assert equilibria.proven and len(equilibria.held) == 2
     for ends in equilibria.held:
         theta = np.array([end.theta_2 for end in ends])
-        command = fourbar.scene.Command(theta, np.array([end.branch for end in ends], dtype=np.int8), 0.0, 0.0)
+        command = fourbar.scene.Command(
+            theta, np.array([end.branch for end in ends], dtype=np.int8), 0.0, 0.0
+        )
         torques = fourbar.solve(scene, at=command)
         assert torques.torque_high is not None and torques.torque_low is not None
         size = np.abs(equilibria.positions.torque).max()
-        assert min(abs(torques.torque_low[0]), abs(torques.torque_high[0])) <= 1e-9 * size
-        assert min(abs(torques.torque_low[1]), abs(torques.torque_high[1])) <= 1e-9 * size
+        assert (
+            min(abs(torques.torque_low[0]), abs(torques.torque_high[0])) <= 1e-9 * size
+        )
+        assert (
+            min(abs(torques.torque_low[1]), abs(torques.torque_high[1])) <= 1e-9 * size
+        )
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("lengths", [(3.0, 3.0, 4.0, 4.0), (4.0, 4.0, 3.0, 3.0), (1.0, 1.0, 3.0, 3.0)])
-def test_beside_a_change_point_nothing_is_taken_for_a_rest(lengths: tuple[float, ...]) -> None:
+@pytest.mark.parametrize(
+    "lengths", [(3.0, 3.0, 4.0, 4.0), (4.0, 4.0, 3.0, 3.0), (1.0, 1.0, 3.0, 3.0)]
+)
+def test_beside_a_change_point_nothing_is_taken_for_a_rest(
+    lengths: tuple[float, ...],
+) -> None:
     """A kite in which A comes to O4, turned with its gravity: as many equilibria, and as many undecided, none."""
     d, a, b, c = lengths
     for turn in (0.0, 0.3, 2.0):
-        linkage = FourBar(d, Bar(a, 50.0, None, (1.2, 2.4)), Bar(b, 1.0), Bar(c, 6.0), turn)
-        equilibria = equilibrium(Scene(linkage, Motion(1.0 + turn), effects=(Gravity(9.81, turn - 1.9),)))
+        linkage = FourBar(
+            d, Bar(a, 50.0, None, (1.2, 2.4)), Bar(b, 1.0), Bar(c, 6.0), turn
+        )
+        equilibria = equilibrium(
+            Scene(linkage, Motion(1.0 + turn), effects=(Gravity(9.81, turn - 1.9),))
+        )
         assert (
             equilibria.proven
-            and sorted(rest.stability for rest in equilibria.found) == ["stable"] * 2 + ["unstable"] * 2
+            and sorted(rest.stability for rest in equilibria.found)
+            == ["stable"] * 2 + ["unstable"] * 2
         )
 
 
 def test_what_has_no_answer_says_so() -> None:
-    assert equilibrium(crank_as_pendulum()).indifferent and not equilibrium(crank_as_pendulum()).found
+    assert (
+        equilibrium(crank_as_pendulum()).indifferent
+        and not equilibrium(crank_as_pendulum()).found
+    )
     balanced = crank_as_pendulum(DOWN)
-    balanced = replace(balanced, linkage=replace(balanced.linkage, input=Bar(0.1, M, INERTIA, (0.0, 0.0))))
+    balanced = replace(
+        balanced,
+        linkage=replace(balanced.linkage, input=Bar(0.1, M, INERTIA, (0.0, 0.0))),
+    )
     (ends,) = equilibrium(balanced).indifferent
     assert ends[1].theta_2 - ends[0].theta_2 == pytest.approx(2 * math.pi)
-    touching = crank_as_pendulum(Gravity(8.0, 0.0), loads=(Load(2, moment=0.5),))  # 0.5 - 0.5 sin theta_2
-    touching = replace(touching, linkage=replace(touching.linkage, input=Bar(0.1, 1.0, 0.0, (0.0625, 0.0))))
+    touching = crank_as_pendulum(
+        Gravity(8.0, 0.0), loads=(Load(2, moment=0.5),)
+    )  # 0.5 - 0.5 sin theta_2
+    touching = replace(
+        touching,
+        linkage=replace(touching.linkage, input=Bar(0.1, 1.0, 0.0, (0.0625, 0.0))),
+    )
     (only,) = equilibrium(touching).found
     assert only.stability == "undecided" and only.frequency is None
-    assert math.remainder(only.place.theta_2 - math.pi / 2, 2 * math.pi) == pytest.approx(0.0, abs=1e-5)
+    assert math.remainder(
+        only.place.theta_2 - math.pi / 2, 2 * math.pi
+    ) == pytest.approx(0.0, abs=1e-5)
     spring = Springs((Spring(SpringEnd(1, 0.3, 1.0), SpringEnd(2, 0.1, 0.0), 100.0),))
-    massless = replace(crank_as_pendulum(spring), linkage=FourBar(0.3, Bar(0.1), Bar(0.25), Bar(0.22)))
+    massless = replace(
+        crank_as_pendulum(spring), linkage=FourBar(0.3, Bar(0.1), Bar(0.25), Bar(0.22))
+    )
     rest = one(equilibrium(massless), "stable")
-    assert (rest.inertia, rest.frequency) == (0.0, None) and rest.place.theta_2 == pytest.approx(1.0, abs=1e-12)
+    assert (rest.inertia, rest.frequency) == (
+        0.0,
+        None,
+    ) and rest.place.theta_2 == pytest.approx(1.0, abs=1e-12)
 
 
 def test_a_load_on_a_bar_that_rests_is_indifferent_in_one_way_of_moving_alone() -> None:
-    equilibria = equilibrium(fourbar.load(MODELS / "textbook" / "gtdynamics_square.toml"))
+    equilibria = equilibrium(
+        fourbar.load(MODELS / "textbook" / "gtdynamics_square.toml")
+    )
     assert equilibria.proven and equilibria.indifferent and not equilibria.found
     assert {end.branch for ends in equilibria.indifferent for end in ends} & {1, -1}
 
 
-def test_a_torsion_spring_is_searched_by_signs_and_its_half_turn_is_no_equilibrium() -> None:
+def test_a_torsion_spring_is_searched_by_signs_and_its_half_turn_is_no_equilibrium() -> (
+    None
+):
     scene = crank_as_pendulum(Torsion.at(O2=(2.0, 0.5, 0.0)))
     equilibria = equilibrium(scene)
     (rest,) = equilibria.found
     assert not equilibria.proven and rest.stability == "stable"
     assert rest.place.theta_2 == pytest.approx(0.5 + 0.2, abs=1e-9)
-    assert rest.frequency == pytest.approx(math.sqrt(2.0 / (INERTIA + M * R * R)) / (2 * math.pi), rel=1e-9)
+    assert rest.frequency == pytest.approx(
+        math.sqrt(2.0 / (INERTIA + M * R * R)) / (2 * math.pi), rel=1e-9
+    )
 
 
 def test_a_sweep_bounds_the_search() -> None:
     sweep = crank_as_pendulum(DOWN, theta_2=Sweep(-3.0, 1.2, 30))
     equilibria = equilibrium(sweep)
-    assert [rest.stability for rest in equilibria.found] == ["stable"] and len(equilibria.positions) == 31
-    assert equilibria.found[0].place.theta_2 == pytest.approx(-math.pi / 2 - 0.3, abs=CLOSE)
+    assert [rest.stability for rest in equilibria.found] == ["stable"] and len(
+        equilibria.positions
+    ) == 31
+    assert equilibria.found[0].place.theta_2 == pytest.approx(
+        -math.pi / 2 - 0.3, abs=CLOSE
+    )
 
 
 def crossings(time: np.ndarray, angle: np.ndarray, middle: float) -> float:
@@ -225,11 +377,18 @@ def test_released_motions_swing_at_the_frequency() -> None:
     assert rest.frequency is not None
     off, period = 1e-3, 1.0 / rest.frequency
     free = Free(8.2 * period, 820)
-    scene = replace(scene, motion=Motion(rest.place.theta_2 + off, 0.0, branch=rest.place.branch, free=free))
+    scene = replace(
+        scene,
+        motion=Motion(
+            rest.place.theta_2 + off, 0.0, branch=rest.place.branch, free=free
+        ),
+    )
     ours = fourbar.solve(scene, "position")
     assert ours.time is not None
     # the amplitude changes the frequency by a part of its square
-    assert crossings(ours.time, ours.theta_2, rest.place.theta_2) == pytest.approx(rest.frequency, rel=10 * off**2)
+    assert crossings(ours.time, ours.theta_2, rest.place.theta_2) == pytest.approx(
+        rest.frequency, rel=10 * off**2
+    )
     model = mujoco.MjModel.from_xml_string(write_mjcf(scene))
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, 0)
@@ -239,40 +398,64 @@ def test_released_motions_swing_at_the_frequency() -> None:
         mujoco.mj_step(model, data, every)
         seen.append((data.time, data.qpos[0]))
     time, angle = np.array(seen).T
-    assert crossings(time, angle, float(rest.place.theta_2)) == pytest.approx(rest.frequency, rel=1e-4)
+    assert crossings(time, angle, float(rest.place.theta_2)) == pytest.approx(
+        rest.frequency, rel=1e-4
+    )
 
 
 def test_released_ones_begin_to_move_as_stated() -> None:
     scene = fourbar.load(MODELS / "crank_rocker.toml")
-    equilibria = equilibrium(replace(scene, effects=(*scene.effects, Friction.at(O2=0.2))))
+    equilibria = equilibrium(
+        replace(scene, effects=(*scene.effects, Friction.at(O2=0.2)))
+    )
     chosen = range(7, len(equilibria.positions), 40)
     for i in chosen:
         motion = Motion(float(equilibria.positions.theta_2[i]), 0.0, free=Free(1e-2, 1))
         released = fourbar.solve(
-            replace(scene, motion=motion, effects=(*scene.effects, Friction.at(O2=0.2))), "position"
+            replace(
+                scene, motion=motion, effects=(*scene.effects, Friction.at(O2=0.2))
+            ),
+            "position",
         )
         assert np.sign(released.theta_2[1] - released.theta_2[0]) == equilibria.moves[i]
-    assert {*equilibria.moves[list(chosen)].tolist()} >= {0} and len(set(equilibria.moves.tolist())) == 3
+    assert {*equilibria.moves[list(chosen)].tolist()} >= {0} and len(
+        set(equilibria.moves.tolist())
+    ) == 3
 
 
 @pytest.mark.slow
-def test_the_command_prints_what_python_finds(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_prints_what_python_finds(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     file = MODELS / "problems" / "gz_physics_987.toml"
     assert status(["equilibrium", str(file)]) == 0
     text = capsys.readouterr().out
     assert "0.759439193" in text and "proven to be all" in text and "stable" in text
-    assert status(["equilibrium", str(file), "--json", "-o", str(tmp_path / "rest.json")]) == 0
+    assert (
+        status(["equilibrium", str(file), "--json", "-o", str(tmp_path / "rest.json")])
+        == 0
+    )
     kept = json.loads((tmp_path / "rest.json").read_text())
     equilibria = equilibrium(fourbar.load(file))
     assert [rest["place"]["theta_2"] for rest in kept["equilibria"]] == [
         rest.place.theta_2 for rest in equilibria.found
     ]
-    assert kept["proven"] and kept["positions"]["theta_2"] == equilibria.positions.theta_2.tolist()
-    friction = MODELS.parent / "tests" / "counterexamples" / "dry_friction_on_a_crank_at_rest.toml"
+    assert (
+        kept["proven"]
+        and kept["positions"]["theta_2"] == equilibria.positions.theta_2.tolist()
+    )
+    friction = (
+        MODELS.parent
+        / "tests"
+        / "counterexamples"
+        / "dry_friction_on_a_crank_at_rest.toml"
+    )
     assert status(["equilibrium", str(friction)]) == 0
     printed = capsys.readouterr().out
     assert "friction alone holds" in printed and "largest without friction: " in printed
-    kite = MODELS.parent / "tests" / "counterexamples" / "kite_with_A_on_O4.toml"  # which has no theta_4 there
+    kite = (
+        MODELS.parent / "tests" / "counterexamples" / "kite_with_A_on_O4.toml"
+    )  # which has no theta_4 there
     assert status(["equilibrium", str(kite), "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["not_decided"][0]["theta_4"] is None
     bad = tmp_path / "bad.toml"
@@ -287,7 +470,9 @@ def test_the_command_prints_what_python_finds(tmp_path: Path, capsys: pytest.Cap
 @pytest.mark.parametrize("unit", [1e-9, 1e120])
 def test_no_unit_of_length_changes_an_equilibrium(unit: float) -> None:
     bars = [Bar(x * unit, M, 1e-3 * unit * unit) for x in (0.1, 0.25, 0.22)]
-    equilibria = equilibrium(Scene(FourBar(0.3 * unit, *bars, 0.2), Motion(0.7), effects=(DOWN,)))  # type: ignore[misc]
+    equilibria = equilibrium(
+        Scene(FourBar(0.3 * unit, *bars, 0.2), Motion(0.7), effects=(DOWN,))
+    )  # type: ignore[misc]
     bars = [Bar(x, M, 1e-3) for x in (0.1, 0.25, 0.22)]
     same = equilibrium(Scene(FourBar(0.3, *bars, 0.2), Motion(0.7), effects=(DOWN,)))  # type: ignore[misc]
     assert equilibria.proven and len(equilibria.found) == len(same.found) == 2
@@ -299,28 +484,40 @@ def test_no_unit_of_length_changes_an_equilibrium(unit: float) -> None:
 def test_a_zero_that_falls_on_a_sample_is_found_by_signs_too() -> None:
     sample = 0.5 * 2 * math.pi / SAMPLES + 700 * (2 * math.pi / SAMPLES)
     linkage = replace(crank_as_pendulum().linkage, ground_angle=0.0)
-    scene = replace(crank_as_pendulum(Torsion.at(O2=(2.0, sample, 0.0))), linkage=linkage)
+    scene = replace(
+        crank_as_pendulum(Torsion.at(O2=(2.0, sample, 0.0))), linkage=linkage
+    )
     (rest,) = equilibrium(scene).found
     assert rest.place.theta_2 == pytest.approx(sample, abs=1e-9)
 
 
-DRIVE = fourbar.LinearDrive(SpringEnd(1, 0.25, math.radians(-160.0)), SpringEnd(2, 0.09, 0.17))
+DRIVE = fourbar.LinearDrive(
+    SpringEnd(1, 0.25, math.radians(-160.0)), SpringEnd(2, 0.09, 0.17)
+)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["theta_3", "theta_4", "stroke"])
-def test_another_command_has_the_equilibria_of_the_positions_that_it_passes(name: str) -> None:
+def test_another_command_has_the_equilibria_of_the_positions_that_it_passes(
+    name: str,
+) -> None:
     """Those of the input swept over the same; a single position has those of its circuit."""
-    swept = {"theta_3": (1.0, 1.25), "theta_4": (1.95, 2.4), "stroke": (0.17, 0.3)}[name]
+    swept = {"theta_3": (1.0, 1.25), "theta_4": (1.95, 2.4), "stroke": (0.17, 0.3)}[
+        name
+    ]
     side: dict[str, Any] = {"side": "left"} if name == "stroke" else {"branch": -1}
     motion = Motion(**{name: Sweep(*swept, 90)}, **side)
     commanded = crank_rocker(motion=motion, effects=(fourbar.Gravity(),), drive=DRIVE)
     theta_2 = fourbar.solve(commanded).theta_2
-    same = replace(commanded, motion=Motion(Sweep(float(theta_2.min()), float(theta_2.max()), 90)))
+    same = replace(
+        commanded, motion=Motion(Sweep(float(theta_2.min()), float(theta_2.max()), 90))
+    )
     equilibria, by_input = equilibrium(commanded), equilibrium(same)
     assert len(by_input.found) == len(equilibria.found) > 0 and equilibria.proven
     for rest, same_rest in zip(equilibria.found, by_input.found, strict=True):
-        assert rest.place == pytest.approx(same_rest.place) and rest.frequency == pytest.approx(same_rest.frequency)
+        assert rest.place == pytest.approx(
+            same_rest.place
+        ) and rest.frequency == pytest.approx(same_rest.frequency)
     single = replace(commanded, motion=Motion(**{name: swept[0]}, **side))
     single_input = replace(commanded, motion=Motion(float(theta_2[0])))
     assert len(equilibrium(single).found) == len(equilibrium(single_input).found) > 0

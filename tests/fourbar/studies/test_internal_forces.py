@@ -24,21 +24,34 @@ def solved(scene: fourbar.Scene, bar: int, stations: object = None) -> object:
 
 def test_a_force_across_the_coupler_bends_it_as_a_beam_on_two_supports() -> None:
     """P a b/L under a load P at a from one end: sagging to the right of the bar, which is clockwise before it."""
-    load = fourbar.Load(3, (8.0, math.radians(-90.0)), (0.05, math.pi), frame="bar")  # 75 mm from A
-    internal = solved(fourbar.Scene(BARE, AT, loads=(load,)), 3, [0.0, 0.03, 0.08, 0.1, 0.25])
+    load = fourbar.Load(
+        3, (8.0, math.radians(-90.0)), (0.05, math.pi), frame="bar"
+    )  # 75 mm from A
+    internal = solved(
+        fourbar.Scene(BARE, AT, loads=(load,)), 3, [0.0, 0.03, 0.08, 0.1, 0.25]
+    )
     M = 8.0 * np.array([0.0, 0.03 * 0.175, 0.075 * 0.17, 0.075 * 0.15, 0.0]) / 0.25
     np.testing.assert_allclose(internal.M[0], M, atol=1e-14)
     np.testing.assert_allclose(internal.V[0], [5.6, 5.6, -2.4, -2.4, 0.0], atol=1e-13)
-    assert internal.largest.moment[0] == pytest.approx(8.0 * 0.075 * 0.175 / 0.25) and internal.uniform
+    assert (
+        internal.largest.moment[0] == pytest.approx(8.0 * 0.075 * 0.175 / 0.25)
+        and internal.uniform
+    )
     assert internal.largest.x[0] == pytest.approx(0.075)
 
 
 def test_a_couple_on_the_output_jumps_where_it_acts() -> None:
-    load = fourbar.Load(4, None, (0.06, math.pi), moment=3.0, frame="bar")  # 50 mm from O4
+    load = fourbar.Load(
+        4, None, (0.06, math.pi), moment=3.0, frame="bar"
+    )  # 50 mm from O4
     internal = solved(fourbar.Scene(BARE, AT, loads=(load,)), 4, [0.049999, 0.05, 0.1])
     before, after = internal.M[0, :2]
-    assert before - after == pytest.approx(3.0, rel=1e-4) and internal.V[0, 0] == pytest.approx(internal.V[0, 2])
-    assert max(abs(before), abs(after)) == pytest.approx(abs(internal.largest.moment[0]), rel=1e-4)
+    assert before - after == pytest.approx(3.0, rel=1e-4) and internal.V[
+        0, 0
+    ] == pytest.approx(internal.V[0, 2])
+    assert max(abs(before), abs(after)) == pytest.approx(
+        abs(internal.largest.moment[0]), rel=1e-4
+    )
 
 
 def test_a_bar_that_hangs_in_its_pins_bends_by_its_own_weight() -> None:
@@ -48,16 +61,24 @@ def test_a_bar_that_hangs_in_its_pins_bends_by_its_own_weight() -> None:
     internal, theta = solved(scene, 3), fourbar.solve(scene).theta_3[0]
     w = 2.0 / 0.25 * 9.81 * math.cos(theta)
     assert internal.uniform and internal.x[20] == pytest.approx(0.125)
-    assert internal.M[0, 20] == pytest.approx(w * 0.25**2 / 8.0) == pytest.approx(internal.largest.moment[0])
+    assert (
+        internal.M[0, 20]
+        == pytest.approx(w * 0.25**2 / 8.0)
+        == pytest.approx(internal.largest.moment[0])
+    )
     assert internal.largest.x[0] == pytest.approx(0.125)
     at_G = replace(linkage, coupler=fourbar.Bar(0.25, 2.0, centre=(0.125, 0.0)))
     concentrated = solved(replace(scene, linkage=at_G), 3)
-    assert not concentrated.uniform and concentrated.M[0, 20] == pytest.approx(w * 0.25**2 / 4.0)
+    assert not concentrated.uniform and concentrated.M[0, 20] == pytest.approx(
+        w * 0.25**2 / 4.0
+    )
 
 
 def test_a_crank_that_turns_is_pulled_by_its_own_mass() -> None:
     """N = m omega^2 (L^2 - x^2)/(2 L), and nothing bends it where nothing else acts."""
-    scene = fourbar.Scene(replace(BARE, input=fourbar.Bar(0.1, 3.0)), fourbar.Motion(1.0, 20.0))
+    scene = fourbar.Scene(
+        replace(BARE, input=fourbar.Bar(0.1, 3.0)), fourbar.Motion(1.0, 20.0)
+    )
     internal = solved(scene, 2, np.linspace(0.0, 0.099, 5))
     expected = 3.0 * 20.0**2 * (0.1**2 - internal.x**2) / (2.0 * 0.1)
     np.testing.assert_allclose(internal.N[0], expected, rtol=ROUNDED)
@@ -66,13 +87,19 @@ def test_a_crank_that_turns_is_pulled_by_its_own_mass() -> None:
 
 def test_a_bar_that_speeds_up_bends_by_its_inertia() -> None:
     """The torque of the drive at O2 is the moment there: m L^2 alpha/3, and V falls to nothing at A."""
-    scene = fourbar.Scene(replace(BARE, input=fourbar.Bar(0.1, 3.0)), fourbar.Motion(1.0, 0.0, 50.0))
+    scene = fourbar.Scene(
+        replace(BARE, input=fourbar.Bar(0.1, 3.0)), fourbar.Motion(1.0, 0.0, 50.0)
+    )
     internal = solved(scene, 2, [0.0, 0.05, 0.1])
     torque = fourbar.solve(scene).torque[0]
-    assert torque == pytest.approx(3.0 * 0.1**2 * 50.0 / 3.0) and internal.M[0, 0] == pytest.approx(-torque)
+    assert torque == pytest.approx(3.0 * 0.1**2 * 50.0 / 3.0) and internal.M[
+        0, 0
+    ] == pytest.approx(-torque)
     m, x = 3.0 * 50.0 / 0.1, 0.05
     assert internal.V[0, 1] == pytest.approx(m * (0.1**2 - x**2) / 2.0)
-    assert internal.M[0, 1] == pytest.approx(-m * (0.1**3 / 3.0 - 0.1**2 * x / 2.0 + x**3 / 6.0))
+    assert internal.M[0, 1] == pytest.approx(
+        -m * (0.1**3 / 3.0 - 0.1**2 * x / 2.0 + x**3 / 6.0)
+    )
 
 
 EVERYTHING = (
@@ -91,12 +118,22 @@ EVERYTHING = (
 LINE = fourbar.LinearDrive(SpringEnd(1, 0.25, -2.8), SpringEnd(3, 0.09, 0.17))
 
 
-@pytest.mark.parametrize("drive", [{"drive_bar": 2}, {"drive_bar": 3}, {"drive_bar": 4}, {"drive": LINE}], ids=str)
-def test_each_part_of_a_bar_up_to_a_cut_is_in_balance_under_all_that_acts(drive: dict[str, object]) -> None:
+@pytest.mark.parametrize(
+    "drive",
+    [{"drive_bar": 2}, {"drive_bar": 3}, {"drive_bar": 4}, {"drive": LINE}],
+    ids=str,
+)
+def test_each_part_of_a_bar_up_to_a_cut_is_in_balance_under_all_that_acts(
+    drive: dict[str, object],
+) -> None:
     """As a run judges it, which asks free bodies for the forces; where friction jams there are none."""
     motion = fourbar.Motion(fourbar.Sweep(0.1, 6.0, 60), 8.0, 5.0)
-    rows = rows_of(crank_rocker(motion=motion, effects=EVERYTHING, **drive), "internal_forces")
-    assert {row.quantity for row in rows} == {f"{part}{bar}" for part in "NVM" for bar in (2, 3, 4)}
+    rows = rows_of(
+        crank_rocker(motion=motion, effects=EVERYTHING, **drive), "internal_forces"
+    )
+    assert {row.quantity for row in rows} == {
+        f"{part}{bar}" for part in "NVM" for bar in (2, 3, 4)
+    }
     assert all(row.compared and not row.failed and row.error <= ROUNDED for row in rows)
 
 
@@ -110,10 +147,14 @@ def test_what_cannot_be_is_refused_and_what_has_no_forces_is_nan() -> None:
             fourbar.internal_forces(moving, fourbar.solve(moving), bar)  # type: ignore[arg-type]
     with pytest.raises(InputError, match="stations"):
         fourbar.internal_forces(moving, fourbar.solve(moving), 2, [math.inf])  # type: ignore[arg-type]
-    open_ = crank_rocker(motion=fourbar.Motion(theta_4=np.array([0.2, 2.0]), omega_4=1.0))
+    open_ = crank_rocker(
+        motion=fourbar.Motion(theta_4=np.array([0.2, 2.0]), omega_4=1.0)
+    )
     internal = fourbar.internal_forces(open_, fourbar.solve(open_), 3)
     assert np.isnan(internal.M[0]).all() and np.isfinite(internal.M[1]).all()
-    assert np.isnan(internal.largest.moment[0]) and np.isfinite(internal.largest.moment[1])
+    assert np.isnan(internal.largest.moment[0]) and np.isfinite(
+        internal.largest.moment[1]
+    )
 
 
 def test_feet_that_differ_by_rounding_are_one() -> None:
@@ -122,9 +163,15 @@ def test_feet_that_differ_by_rounding_are_one() -> None:
     linkage = replace(crank_rocker().linkage, coupler=bar)
     load = fourbar.Load(3, (3.0, 0.7), moment=20.0)
     sweep = fourbar.Motion(fourbar.Sweep(0.0, math.tau, 200), 10.0)
-    scene = replace(crank_rocker(motion=sweep, effects=()), linkage=linkage, loads=(load,))
+    scene = replace(
+        crank_rocker(motion=sweep, effects=()), linkage=linkage, loads=(load,)
+    )
     s = fourbar.solve(scene)
     largest = fourbar.internal_forces(scene, s, 3).largest
     G, far = bar.to_centre.real, 1e-6 * bar.length
-    beside = np.abs(fourbar.internal_forces(scene, s, 3, np.array([0.0, G - far, G + far, bar.length])).M).max(axis=1)
+    beside = np.abs(
+        fourbar.internal_forces(
+            scene, s, 3, np.array([0.0, G - far, G + far, bar.length])
+        ).M
+    ).max(axis=1)
     assert np.abs(largest.moment) == pytest.approx(beside, rel=1e-4)

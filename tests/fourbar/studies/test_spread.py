@@ -27,31 +27,45 @@ QUASI = 0.02
 
 def spread(*stated: Tolerance, samples: int = 2048, **motion: Any) -> Any:
     linkage = FourBar(0.3, Bar(0.1, 0.2), Bar(0.25, 0.5), Bar(0.22, 0.4))
-    case = Scene(linkage, Motion(**({"theta_2": Sweep(0.3, 6.0, 6), "omega_2": 10.0} | motion)), tolerances=stated)
+    case = Scene(
+        linkage,
+        Motion(**({"theta_2": Sweep(0.3, 6.0, 6), "omega_2": 10.0} | motion)),
+        tolerances=stated,
+    )
     return tolerances(case, samples)
 
 
 def test_a_number_that_the_torque_is_proportional_to() -> None:
-    omega = Tolerance("motion.omega_2", 0.3)  # the torque of inertia alone is proportional to its square
+    omega = Tolerance(
+        "motion.omega_2", 0.3
+    )  # the torque of inertia alone is proportional to its square
     study = spread(omega)
     torque = study.spreads["torque"]
     size = np.abs(torque.nominal)
-    np.testing.assert_allclose(np.fmax(np.abs(torque.least), np.abs(torque.greatest)), 1.0609 * size, rtol=1e-4)
+    np.testing.assert_allclose(
+        np.fmax(np.abs(torque.least), np.abs(torque.greatest)), 1.0609 * size, rtol=1e-4
+    )
     np.testing.assert_allclose(torque.worst, 2 * 0.03 * size, rtol=1e-12)
-    np.testing.assert_allclose(torque.first_order, 2 * 0.03 / math.sqrt(3) * size, rtol=1e-12)
+    np.testing.assert_allclose(
+        torque.first_order, 2 * 0.03 / math.sqrt(3) * size, rtol=1e-12
+    )
     np.testing.assert_allclose(torque.deviation, torque.first_order, rtol=QUASI)
     np.testing.assert_allclose(study.spreads["theta_4"].deviation, 0.0, atol=1e-14)
     assert not torque.parted.any() and study.apart == study.invalid == 0
 
 
-def test_samples_and_first_order_agree_where_it_is_straight_and_shares_are_those_of_the_samples() -> None:
+def test_samples_and_first_order_agree_where_it_is_straight_and_shares_are_those_of_the_samples() -> (
+    None
+):
     both = Tolerance("lengths.input", 5e-5), Tolerance("lengths.output", 2e-5, True)
     study, alone = spread(*both), [spread(tolerance) for tolerance in both]
     for name in ("torque", "|F12|", "F43_x", "theta_4"):
         of_both = study.spreads[name]
         np.testing.assert_allclose(of_both.deviation, of_both.first_order, rtol=QUASI)
         for share, one in zip(of_both.shares, alone, strict=True):
-            np.testing.assert_allclose(np.sqrt(share), one.spreads[name].deviation, rtol=QUASI)
+            np.testing.assert_allclose(
+                np.sqrt(share), one.spreads[name].deviation, rtol=QUASI
+            )
         assert (
             (of_both.least <= of_both.low).all()
             and (of_both.low < of_both.nominal).all()
@@ -59,22 +73,32 @@ def test_samples_and_first_order_agree_where_it_is_straight_and_shares_are_those
         )
 
 
-def test_the_same_seed_gives_the_same_samples_in_blocks_of_any_size(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_same_seed_gives_the_same_samples_in_blocks_of_any_size(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     loose = Tolerance("lengths.input", 5e-5), Tolerance("lengths.coupler", 2e-5)
     at_once = spread(*loose, samples=100)
     monkeypatch.setattr(studied, "AT_ONCE", 200)
     pieces = spread(*loose, samples=100)
     for name, in_one in at_once.spreads.items():
         for expected, piece in zip(in_one, pieces.spreads[name], strict=True):
-            np.testing.assert_allclose(expected, piece, rtol=1e-12, atol=1e-12, err_msg=name)
+            np.testing.assert_allclose(
+                expected, piece, rtol=1e-12, atol=1e-12, err_msg=name
+            )
 
 
-def test_members_that_come_apart_are_counted_and_first_order_is_not_trusted_there() -> None:
+def test_members_that_come_apart_are_counted_and_first_order_is_not_trusted_there() -> (
+    None
+):
     linkage = uniform(0.2, 0.48, 0.55, 0.2)
     edge = fourbar.formulas.mobility.limit_positions(linkage)[0].theta_2
-    theta_2 = edge + 2e-4 * np.sign(fourbar.formulas.mobility.choose_range(linkage)[0] - edge)
+    theta_2 = edge + 2e-4 * np.sign(
+        fourbar.formulas.mobility.choose_range(linkage)[0] - edge
+    )
     case = Scene(
-        linkage, Motion(np.array([theta_2, theta_2 + 0.3]), 1.0), tolerances=(Tolerance("lengths.output", 2e-4),)
+        linkage,
+        Motion(np.array([theta_2, theta_2 + 0.3]), 1.0),
+        tolerances=(Tolerance("lengths.output", 2e-4),),
     )
     study = tolerances(case, 256)
     assert 0 < study.apart == study.without[0] < 256 and study.without[1] == 0
@@ -83,7 +107,10 @@ def test_members_that_come_apart_are_counted_and_first_order_is_not_trusted_ther
 
 def test_tolerances_of_a_file_come_back_as_they_were() -> None:
     scene = loads(MODEL + TABLE)
-    assert scene.tolerances == (Tolerance("lengths.input", 5e-5), Tolerance("lengths.coupler", 2e-5, True))
+    assert scene.tolerances == (
+        Tolerance("lengths.input", 5e-5),
+        Tolerance("lengths.coupler", 2e-5, True),
+    )
     assert loads(dump(scene)).tolerances == scene.tolerances
 
 
@@ -112,9 +139,13 @@ def test_a_bad_tolerance_is_one_line(line: str, words: str) -> None:
 def test_the_positions_at_which_first_order_fails_are_named_each() -> None:
     study = SimpleNamespace(
         theta_2=np.radians(np.arange(0.0, 361.0, 5.0)),
-        spreads={"torque": SimpleNamespace(parted=np.isin(np.arange(73), (0, 1, 9, 72)))},
+        spreads={
+            "torque": SimpleNamespace(parted=np.isin(np.arange(73), (0, 1, 9, 72)))
+        },
     )
-    assert "at 4 of 73 positions (theta_2 = 0 to 5, 45, 360 deg)" in describe_parted(study, "torque")  # type: ignore[arg-type]
+    assert "at 4 of 73 positions (theta_2 = 0 to 5, 45, 360 deg)" in describe_parted(
+        study, "torque"
+    )  # type: ignore[arg-type]
 
 
 def test_what_the_study_refuses() -> None:
@@ -131,7 +162,9 @@ def test_what_the_study_refuses() -> None:
 
 
 @pytest.mark.slow
-def test_the_command_prints_draws_and_writes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_prints_draws_and_writes(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     scene, plot = tmp_path / "s.toml", tmp_path / "t.png"
     text = MODEL.replace("steps = 360", "steps = 12")
     scene.write_text(text + TABLE)
@@ -140,18 +173,31 @@ def test_the_command_prints_draws_and_writes(tmp_path: Path, capsys: pytest.Capt
     assert "64 samples (seed 0), 13 positions" in printed and "lengths.input" in printed
     assert plot.read_bytes().startswith(b"\x89PNG")
     nominal = re.search(r"^torque +N m +\S+ +(\S+)", printed, re.M)
-    assert status(["tolerance", str(scene), "--samples", "64", "--units", "N.mm rad"]) == 0
+    assert (
+        status(["tolerance", str(scene), "--samples", "64", "--units", "N.mm rad"]) == 0
+    )
     rows = capsys.readouterr().out
     in_N_mm = re.search(r"^torque N mm +\S+ +(\S+)", rows, re.M)
-    assert nominal and in_N_mm and float(in_N_mm[1]) == pytest.approx(1000.0 * float(nominal[1]), rel=1e-5)
+    assert (
+        nominal
+        and in_N_mm
+        and float(in_N_mm[1]) == pytest.approx(1000.0 * float(nominal[1]), rel=1e-5)
+    )
     assert re.search(r"unit +rad +nominal", rows)
     assert status(["tolerance", str(scene), "--samples", "64", "--json"]) == 0
     document = json.loads(capsys.readouterr().out)
     torque = document["quantities"]["torque"]
-    assert len(torque["deviation"]) == 13 and document["tolerances"]["lengths.coupler"]["distribution"] == "normal"
-    scene.write_text(text + TABLE + '\n[points]\nv = { bar = 3, from_pin = ["5 cm", "20 deg"] }\n')
+    assert (
+        len(torque["deviation"]) == 13
+        and document["tolerances"]["lengths.coupler"]["distribution"] == "normal"
+    )
+    scene.write_text(
+        text + TABLE + '\n[points]\nv = { bar = 3, from_pin = ["5 cm", "20 deg"] }\n'
+    )
     assert status(["tolerance", str(scene), "--samples", "64"]) == 0
-    assert re.search(r"^v_x +m ", capsys.readouterr().out, re.M)  # a place, though v_ begins a velocity
+    assert re.search(
+        r"^v_x +m ", capsys.readouterr().out, re.M
+    )  # a place, though v_ begins a velocity
     assert status(["tolerance", str(scene), "-o", "t.bmp"]) == 2
     scene.write_text(text)
     assert status(["tolerance", str(scene)]) == 2
@@ -163,4 +209,9 @@ def test_the_share_that_is_done_is_told_from_the_start_and_reaches_all_of_it() -
     told: list[float] = []
     scene = crank_rocker(tolerances=(Tolerance("lengths.input", 5e-5),))
     tolerances(scene, 16384, progress=told.append)
-    assert told[0] == 0.0 and told[-1] == 1.0 and len(told) > 3 and np.all(np.diff(told) > 0.0)
+    assert (
+        told[0] == 0.0
+        and told[-1] == 1.0
+        and len(told) > 3
+        and np.all(np.diff(told) > 0.0)
+    )

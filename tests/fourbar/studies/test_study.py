@@ -7,7 +7,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fourbar import Bar, FourBar, InputError, Motion, Scene, Sweep, Tolerance, dump, solve, uniform
+from fourbar import (
+    Bar,
+    FourBar,
+    InputError,
+    Motion,
+    Scene,
+    Sweep,
+    Tolerance,
+    dump,
+    solve,
+    uniform,
+)
 from fourbar.effects import (
     Flywheel,
     Friction,
@@ -29,13 +40,21 @@ from fourbar.studies.keys import list_entries, replace_place
 from fourbar.studies.study import Study, vary
 
 M, ANGLES = 9, np.array([0.2, 0.9, 2.5, 3.9, 5.6])
-LINK = FourBar(0.3, Bar(0.1, 0.2, 0.001, (0.04, 0.2)), Bar(0.25, 0.5), Bar(0.22, 0.4, None, (0.1, -0.3)), 0.4)
+LINK = FourBar(
+    0.3,
+    Bar(0.1, 0.2, 0.001, (0.04, 0.2)),
+    Bar(0.25, 0.5),
+    Bar(0.22, 0.4, None, (0.1, -0.3)),
+    0.4,
+)
 LOADS = (
     Load(3, (10.0, 0.3), (0.05, 0.2)),
     Load(4, None, (0.0, 0.0), -0.15),
     Load(2, (3.0, 0.2), (0.01, 0.1), 0.0, "bar"),
 )
-SPRINGS = Springs((Spring(SpringEnd(1, 0.1, -1.5), SpringEnd(4, 0.08, 0.1), 200.0, 0.12, 3.0),))
+SPRINGS = Springs(
+    (Spring(SpringEnd(1, 0.1, -1.5), SpringEnd(4, 0.08, 0.1), 200.0, 0.12, 3.0),)
+)
 DRIVEN = (
     *(Gravity(9.81, -1.5), Viscous.at(O2=0.01, A=0.02), Friction.at(B=0.05)),
     *(Torsion.at(B=(2.0, 0.5, 0.1)), SPRINGS, Flywheel(0.02, 2)),
@@ -72,13 +91,21 @@ RANGES = {
 
 
 def scene(effects: tuple[Any, ...] = (), drive: int = 2, **motion: Any) -> Scene:
-    return Scene(LINK, Motion(**({"theta_2": ANGLES, "omega_2": 3.0, "alpha_2": 0.5} | motion)), drive, LOADS, effects)
+    return Scene(
+        LINK,
+        Motion(**({"theta_2": ANGLES, "omega_2": 3.0, "alpha_2": 0.5} | motion)),
+        drive,
+        LOADS,
+        effects,
+    )
 
 
 def spread(case: Scene) -> dict[str, Any]:
     """A random array for each key of RANGES that the scene has."""
     random, entries = np.random.default_rng(3), list_entries(case)
-    return {key: random.uniform(*ends, M) for key, ends in RANGES.items() if key in entries}
+    return {
+        key: random.uniform(*ends, M) for key, ends in RANGES.items() if key in entries
+    }
 
 
 def alone(study: Study, values: dict[str, Any], member: int) -> Scene:
@@ -91,9 +118,17 @@ def alone(study: Study, values: dict[str, Any], member: int) -> Scene:
 
 
 @pytest.mark.parametrize(
-    ("effects", "drive", "stage"), [(DRIVEN, 4, "error"), (RUBBING, 2, "force"), (DRIVEN, 3, None), ((), 2, "position")]
+    ("effects", "drive", "stage"),
+    [
+        (DRIVEN, 4, "error"),
+        (RUBBING, 2, "force"),
+        (DRIVEN, 3, None),
+        ((), 2, "position"),
+    ],
 )
-def test_a_member_is_its_linkage_alone(effects: tuple[Any, ...], drive: int, stage: str | None) -> None:
+def test_a_member_is_its_linkage_alone(
+    effects: tuple[Any, ...], drive: int, stage: str | None
+) -> None:
     case = scene(effects, drive)
     values = spread(case)
     study = vary(case, values)
@@ -104,14 +139,22 @@ def test_a_member_is_its_linkage_alone(effects: tuple[Any, ...], drive: int, sta
         assert solution.status[member] == single.status
         for name in single.evaluated():
             array = getattr(solution, name)
-            assert array.shape == ((M, len(ANGLES), 2) if name in VECTORS else (M, len(ANGLES)))
+            assert array.shape == (
+                (M, len(ANGLES), 2) if name in VECTORS else (M, len(ANGLES))
+            )
             if name.endswith("_error"):
-                np.testing.assert_allclose(array[member], getattr(single, name), rtol=BARS, err_msg=name)
+                np.testing.assert_allclose(
+                    array[member], getattr(single, name), rtol=BARS, err_msg=name
+                )
             else:
-                np.testing.assert_array_equal(array[member], getattr(single, name), err_msg=name)
+                np.testing.assert_array_equal(
+                    array[member], getattr(single, name), err_msg=name
+                )
 
 
-def test_blocks_over_members_and_positions_change_no_digit(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_blocks_over_members_and_positions_change_no_digit(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     case = scene(DRIVEN)
     study = vary(case, spread(case))
     at_once = solve(study)
@@ -119,7 +162,9 @@ def test_blocks_over_members_and_positions_change_no_digit(monkeypatch: pytest.M
         monkeypatch.setattr(import_module("fourbar.solve"), "BLOCK", size)
         piece = solve(study)
         for name in at_once.evaluated():
-            np.testing.assert_array_equal(getattr(piece, name), getattr(at_once, name), err_msg=name)
+            np.testing.assert_array_equal(
+                getattr(piece, name), getattr(at_once, name), err_msg=name
+            )
 
 
 def test_angles_of_its_own_for_each_member_and_arrays_to_write_into() -> None:
@@ -138,7 +183,9 @@ def test_angles_of_its_own_for_each_member_and_arrays_to_write_into() -> None:
 
 def test_what_the_scene_leaves_out_follows_the_length() -> None:
     plain = Scene(uniform(0.3, 0.1, 0.25, 0.22), Motion(1.0, 5.0), effects=(Gravity(),))
-    solution = solve(vary(plain, {"lengths.coupler": [0.25, 0.28], "bars.coupler.mass": 0.5}))
+    solution = solve(
+        vary(plain, {"lengths.coupler": [0.25, 0.28], "bars.coupler.mass": 0.5})
+    )
     longer = FourBar(0.3, Bar(0.1, 0.1), Bar(0.28, 0.5), Bar(0.22, 0.22))
     single = solve(Scene(longer, Motion(1.0, 5.0), effects=(Gravity(),)))
     assert solution.torque is not None and single.torque is not None
@@ -148,13 +195,30 @@ def test_what_the_scene_leaves_out_follows_the_length() -> None:
 def test_a_bad_member_has_a_status_and_disturbs_no_other() -> None:
     plain = Scene(uniform(0.3, 0.1, 0.25, 0.22), Motion(Sweep(0.0, 6.0, 3), 5.0))
     lengths = [0.1, -0.1, 0.0, np.nan, 3.0, 0.1]
-    solution = solve(vary(plain, {"lengths.input": lengths, "bars.coupler.mass": [1.0, 1.0, 1.0, 1.0, 1.0, -1.0]}))
-    assert [row[0] for row in solution.status] == ["ok", "invalid", "invalid", "invalid", "not_assembled", "invalid"]
+    solution = solve(
+        vary(
+            plain,
+            {
+                "lengths.input": lengths,
+                "bars.coupler.mass": [1.0, 1.0, 1.0, 1.0, 1.0, -1.0],
+            },
+        )
+    )
+    assert [row[0] for row in solution.status] == [
+        "ok",
+        "invalid",
+        "invalid",
+        "invalid",
+        "not_assembled",
+        "invalid",
+    ]
     for name in solution.evaluated():
         if name != "theta_2":
             assert np.isnan(getattr(solution, name)[[1, 2, 3, 5]]).all(), name
     assert solution.torque is not None
-    np.testing.assert_array_equal(solution.torque[0], solve(vary(plain, {"bars.coupler.mass": 1.0})).torque[0])  # type: ignore[index]
+    np.testing.assert_array_equal(
+        solution.torque[0], solve(vary(plain, {"bars.coupler.mass": 1.0})).torque[0]
+    )  # type: ignore[index]
 
 
 def test_a_law_and_a_path_through_change_points() -> None:
@@ -162,9 +226,16 @@ def test_a_law_and_a_path_through_change_points() -> None:
     values = {"lengths.input": np.array([0.1, 0.11])}
     study = vary(Scene(LINK, Motion(law=law)), values)
     solution = solve(study)
-    np.testing.assert_array_equal(solution.torque[1], solve(alone(study, values, 1)).torque)  # type: ignore[index]
-    kite = Scene(uniform(0.3, 0.1, 0.3, 0.1), Motion(Sweep(2.0, 8.0, 8), 1.0, through="follow"))
-    for values in ({"lengths.input": np.array([0.1, 0.09])}, {"bars.coupler.mass": np.array([1.0, 2.0])}):
+    np.testing.assert_array_equal(
+        solution.torque[1], solve(alone(study, values, 1)).torque
+    )  # type: ignore[index]
+    kite = Scene(
+        uniform(0.3, 0.1, 0.3, 0.1), Motion(Sweep(2.0, 8.0, 8), 1.0, through="follow")
+    )
+    for values in (
+        {"lengths.input": np.array([0.1, 0.09])},
+        {"bars.coupler.mass": np.array([1.0, 2.0])},
+    ):
         study = vary(kite, values)
         solution = solve(study)
         assert -1 in solution.branch[0]
@@ -177,15 +248,27 @@ def test_a_law_and_a_path_through_change_points() -> None:
 REFUSED = {
     "a slip of the pen": ({"lengths.inptu": [1.0]}, 'did you mean "lengths.input"?'),
     "an effect that does not act": ({"effects.viscous.O2": [1.0]}, "unknown key"),
-    "a pair": ({"bars.coupler.centre": [0.1]}, "vary bars.coupler.centre.0, bars.coupler.centre.1"),
+    "a pair": (
+        {"bars.coupler.centre": [0.1]},
+        "vary bars.coupler.centre.0, bars.coupler.centre.1",
+    ),
     "a bar's number": ({"drive.bar": [2, 3]}, "is the same for every member"),
     "the branch": ({"motion.branch": [1, -1]}, "is the same for every member"),
-    "two lengths": ({"lengths.input": [0.1, 0.2], "lengths.output": [0.2, 0.2, 0.2]}, "lengths.input has 2"),
-    "two lengths, of angles": ({"lengths.input": [0.1, 0.2], "motion.theta_2": np.ones((3, 2))}, "has 2"),
+    "two lengths": (
+        {"lengths.input": [0.1, 0.2], "lengths.output": [0.2, 0.2, 0.2]},
+        "lengths.input has 2",
+    ),
+    "two lengths, of angles": (
+        {"lengths.input": [0.1, 0.2], "motion.theta_2": np.ones((3, 2))},
+        "has 2",
+    ),
     "words": ({"lengths.input": ["ten"]}, "there is no finite number"),
     "no unit": ({"lengths.input": ["10"]}, "the unit is missing"),
     "truths": ({"lengths.input": [True]}, "must be an array of numbers"),
-    "rows of different lengths": ({"lengths.input": [[0.1], [0.1, 0.2]]}, "must be an array of numbers"),
+    "rows of different lengths": (
+        {"lengths.input": [[0.1], [0.1, 0.2]]},
+        "must be an array of numbers",
+    ),
     "nothing": ({"lengths.input": []}, "at least one"),
     "a table": ({"lengths.input": np.ones((2, 2))}, "must have the shape (m,)"),
 }
@@ -193,25 +276,47 @@ REFUSED = {
 
 def test_a_key_has_the_unit_that_a_scene_file_has() -> None:
     drive = LinearDrive(SpringEnd(1, 0.1, -1.5), SpringEnd(3, 0.08, 0.1))
-    linkage = FourBar(0.3, *(Bar(size, 0.2, 0.001, (0.04, 0.2)) for size in (0.1, 0.25, 0.22)), 0.4)
-    acting, points = (*DRIVEN, PinFriction.at(A=(0.1, 0.01))), (Point("P", 3, (0.1, 0.2)),)
-    scene = Scene(linkage, Motion(ANGLES, 2.0, alpha_2=0.5), loads=LOADS, effects=acting, points=points, drive=drive)
+    linkage = FourBar(
+        0.3, *(Bar(size, 0.2, 0.001, (0.04, 0.2)) for size in (0.1, 0.25, 0.22)), 0.4
+    )
+    acting, points = (
+        (*DRIVEN, PinFriction.at(A=(0.1, 0.01))),
+        (Point("P", 3, (0.1, 0.2)),),
+    )
+    scene = Scene(
+        linkage,
+        Motion(ANGLES, 2.0, alpha_2=0.5),
+        loads=LOADS,
+        effects=acting,
+        points=points,
+        drive=drive,
+    )
     written = tomllib.loads(dump(scene))
     for key, number in list_entries(scene).items():
         entry: Any = written
         for name in key.split("."):
             entry = entry[int(name) if isinstance(entry, list) else name]
-        assert (entry.partition(" ")[2] if isinstance(entry, str) else "1") == number.unit, key
+        assert (
+            entry.partition(" ")[2] if isinstance(entry, str) else "1"
+        ) == number.unit, key
 
 
 def test_texts_with_units_are_the_numbers() -> None:
     scene = Scene(LINK, Motion(ANGLES, 2.0), effects=DRIVEN)
-    texts = {"lengths.input": ["10 cm", "4 in", 0.1], "bars.coupler.centre.1": "180 deg", "effects.torsion.B.rest": 0.5}
+    texts = {
+        "lengths.input": ["10 cm", "4 in", 0.1],
+        "bars.coupler.centre.1": "180 deg",
+        "effects.torsion.B.rest": 0.5,
+    }
     si = texts | {"lengths.input": [0.1, 0.1016, 0.1], "bars.coupler.centre.1": np.pi}
-    theta: dict[str, Any] = {"motion.theta_2": [["10 deg", "0.5 rev"], [0.1, 0.2], ["1 rad", 0]]}
+    theta: dict[str, Any] = {
+        "motion.theta_2": [["10 deg", "0.5 rev"], [0.1, 0.2], ["1 rad", 0]]
+    }
     from_texts, from_si = vary(scene, texts | theta), vary(scene, si)
     assert all((from_texts.values[key] == from_si.values[key]).all() for key in si)
-    assert (from_texts.at.angle == [[np.radians(10.0), np.pi], [0.1, 0.2], [1.0, 0.0]]).all()
+    assert (
+        from_texts.at.angle == [[np.radians(10.0), np.pi], [0.1, 0.2], [1.0, 0.0]]
+    ).all()
     assert Tolerance("lengths.input", "0.1 mm") == Tolerance("lengths.input", 1e-4)  # type: ignore[arg-type]
     for key, text, words in (
         ("lengths.input", "1 deg", 'lengths.input = .*"deg" does not convert to m'),
@@ -240,7 +345,9 @@ def test_what_cannot_vary_is_refused_in_one_line(name: str) -> None:
         (Motion(1.0, free=Free(1.0, 10)), "is integrated for one linkage"),
     ],
 )
-def test_a_motion_of_one_linkage_is_refused_in_one_line(motion: Motion, words: str) -> None:
+def test_a_motion_of_one_linkage_is_refused_in_one_line(
+    motion: Motion, words: str
+) -> None:
     with pytest.raises(InputError, match=words):
         vary(Scene(LINK, motion), {"bars.coupler.mass": [1.0, 2.0]})
 

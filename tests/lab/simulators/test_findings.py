@@ -10,7 +10,14 @@ from click.testing import CliRunner
 from fourbar.errors import DependencyError
 from fourbar_lab.cli import status
 from fourbar_lab.simulators import findings as module
-from fourbar_lab.simulators.findings import FIELDS, FIXED, FOLDER, find_interpreter, read, read_findings
+from fourbar_lab.simulators.findings import (
+    FIELDS,
+    FIXED,
+    FOLDER,
+    find_interpreter,
+    read,
+    read_findings,
+)
 from fourbar_validation.engines.environments import Entry
 
 ALL = read_findings()
@@ -23,11 +30,15 @@ SECONDS = 100.0
 def test_each_finding_holds_or_says_since_when_not(
     finding: module.Reproduction, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(module, "read_engines", lambda folders: {})  # no test makes an environment
+    monkeypatch.setattr(
+        module, "read_engines", lambda folders: {}
+    )  # no test makes an environment
     if (place := find_interpreter(finding)) is None:
         pytest.skip(f"not run: {finding.engine[0]} is not installed")
     state = finding.run(place[0], SECONDS)
-    assert state == "holds" or (state == FIXED and not finding.fields["Until"].startswith("still")), state
+    assert state == "holds" or (
+        state == FIXED and not finding.fields["Until"].startswith("still")
+    ), state
 
 
 def test_each_finding_is_a_report_and_stands_in_the_list() -> None:
@@ -50,28 +61,49 @@ def test_each_finding_is_a_report_and_stands_in_the_list() -> None:
         ("while True: pass", "not run: no answer within 1 s"),
     ],
 )
-def test_a_script_that_breaks_down_is_not_fixed(code: str, state: str, tmp_path: Path) -> None:
-    (tmp_path / "one.py").write_text(f'"""It is so.\n\nEngine: pip (pip)\nSince: 1.0 and\n  more\n"""\n{code}\n')
+def test_a_script_that_breaks_down_is_not_fixed(
+    code: str, state: str, tmp_path: Path
+) -> None:
+    (tmp_path / "one.py").write_text(
+        f'"""It is so.\n\nEngine: pip (pip)\nSince: 1.0 and\n  more\n"""\n{code}\n'
+    )
     finding = read(tmp_path / "one.py")
     assert finding.sentence == "It is so." and finding.fields["Since"] == "1.0 and more"
     seconds = 1.0 if "while" in code else SECONDS
     assert finding.run(Path(sys.executable), seconds) == state
 
 
-def test_the_command_says_what_could_not_run(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_the_command_says_what_could_not_run(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     script = tmp_path / "one.py"
-    script.write_text('"""It is so.\n\nEngine: nothing-such (nothing_such)\nWith: also=={version}, more\n"""\n')
+    script.write_text(
+        '"""It is so.\n\nEngine: nothing-such (nothing_such)\nWith: also=={version}, more\n"""\n'
+    )
     monkeypatch.setattr(module, "FOLDER", tmp_path)
     done = CliRunner().invoke(module.command)
-    assert "one.py: not run: nothing-such is not installed" in done.output and done.exit_code == 1
-    script.write_text(script.read_text().replace("nothing-such (nothing_such)", "pytest (pytest)"))
+    assert (
+        "one.py: not run: nothing-such is not installed" in done.output
+        and done.exit_code == 1
+    )
+    script.write_text(
+        script.read_text().replace("nothing-such (nothing_such)", "pytest (pytest)")
+    )
     done = CliRunner().invoke(module.command)
-    assert done.exit_code == 0 and f"one.py: holds in pytest {pytest.__version__}, Python" in done.output
+    assert (
+        done.exit_code == 0
+        and f"one.py: holds in pytest {pytest.__version__}, Python" in done.output
+    )
 
 
-def test_a_simulator_is_sought_in_the_environments_of_engines(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_simulator_is_sought_in_the_environments_of_engines(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     packages = ("nothing", "nothing-such", "nothing-such")
-    entries = {f"{n}": Entry(f"{n}", "a:B", requires=(f"{name}[sim]>=1",)) for n, name in enumerate(packages)}
+    entries = {
+        f"{n}": Entry(f"{n}", "a:B", requires=(f"{name}[sim]>=1",))
+        for n, name in enumerate(packages)
+    }
 
     def make(entry: Entry) -> str:
         if entry.name == "1":
@@ -80,10 +112,15 @@ def test_a_simulator_is_sought_in_the_environments_of_engines(monkeypatch: pytes
 
     monkeypatch.setattr(module, "read_engines", lambda _: entries)
     monkeypatch.setattr(module, "make_environment", make)
-    assert list(module._list_interpreters("nothing-such")) == [sys.executable, "python of 2"]
+    assert list(module._list_interpreters("nothing-such")) == [
+        sys.executable,
+        "python of 2",
+    ]
 
 
 @pytest.mark.parametrize("arguments", [[__file__], ["no_such.py"]])
-def test_bad_input_is_one_line(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+def test_bad_input_is_one_line(
+    arguments: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
     assert status(["findings", *arguments]) == 2
     assert capsys.readouterr().err.count("\n") == 1

@@ -35,22 +35,43 @@ def test_newton_s_free_bodies_find_our_answers(quantity: str) -> None:
     numbers = [
         node
         for node in ast.parse(NEWTON.read_text()).body
-        if isinstance(node, ast.Assign) or (isinstance(node, ast.FunctionDef) and node.name.startswith("solve"))
+        if isinstance(node, ast.Assign)
+        or (isinstance(node, ast.FunctionDef) and node.name.startswith("solve"))
     ]
     names: dict[str, Any] = {"np": np}
     exec(compile(ast.Module(numbers, []), str(NEWTON), "exec"), names)
     problem = json.loads((PROBLEMS / "newton_128.json").read_text())
     command, answers = problem["command"], np.array(problem["answers"][quantity])
-    solved = [names["solve_free_bodies"](theta, command["omega_2"], 0.0) for theta in command["theta_2"]]
-    theirs = np.array([torque if quantity == "torque" else force for torque, force in solved])
-    assert len(theirs) == 37 and np.abs(theirs - answers).max() <= DIGITS * np.abs(answers).max()
+    solved = [
+        names["solve_free_bodies"](theta, command["omega_2"], 0.0)
+        for theta in command["theta_2"]
+    ]
+    theirs = np.array(
+        [torque if quantity == "torque" else force for torque, force in solved]
+    )
+    assert (
+        len(theirs) == 37
+        and np.abs(theirs - answers).max() <= DIGITS * np.abs(answers).max()
+    )
 
 
-@pytest.mark.parametrize("path", [path for path in UPSTREAM.glob("*/*.py") if path.name != "conftest.py"], ids=str)
+@pytest.mark.parametrize(
+    "path",
+    [path for path in UPSTREAM.glob("*/*.py") if path.name != "conftest.py"],
+    ids=str,
+)
 def test_every_test_for_another_project_says_what_it_compares(path: Path) -> None:
     tree = ast.parse(path.read_text())
-    tests = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef) and node.name.startswith("test_")]
-    assert tests and all(ast.get_docstring(node) for node in tests) and ast.get_docstring(tree)
+    tests = [
+        node
+        for node in ast.walk(tree)
+        if isinstance(node, ast.FunctionDef) and node.name.startswith("test_")
+    ]
+    assert (
+        tests
+        and all(ast.get_docstring(node) for node in tests)
+        and ast.get_docstring(tree)
+    )
     assert "expectedFailure" not in path.read_text()
     assert not any(name.startswith("fourbar") for name in imported(path))
 
@@ -60,7 +81,9 @@ def test_a_file_for_another_project_states_our_answers(path: Path) -> None:
     text, stated = path.read_text(), literals(path)
     problems = [file.stem for file in PROBLEMS.glob("*.json") if file.stem in text]
     tables = (
-        stated["EXPECTED"] if isinstance(next(iter(stated["EXPECTED"])), str) else {problems[0]: stated["EXPECTED"]}
+        stated["EXPECTED"]
+        if isinstance(next(iter(stated["EXPECTED"])), str)
+        else {problems[0]: stated["EXPECTED"]}
     )
     assert set(tables) <= set(problems)
     compared = 0
@@ -72,7 +95,9 @@ def test_a_file_for_another_project_states_our_answers(path: Path) -> None:
             assert abs(angles[index] - degrees) < 1e-9
             for column, value in zip(stated["COLUMNS"], row, strict=True):
                 ours = np.asarray(problem["answers"][column])
-                assert np.abs(ours[index] - value).max() <= DIGITS * np.abs(ours).max(), (name, degrees, column)
+                assert (
+                    np.abs(ours[index] - value).max() <= DIGITS * np.abs(ours).max()
+                ), (name, degrees, column)
                 compared += 1
     assert compared >= 16
 
@@ -81,4 +106,7 @@ def test_each_project_has_its_file() -> None:
     projects = {path.parent.name for path in UPSTREAM.glob("*/*.py")}
     assert projects == {"drake", "genesis", "mujoco_warp", "newton", "pinocchio"}
     page = (ROOT / "docs/findings.md").read_text()
-    assert all(f"(upstream/{path.relative_to(UPSTREAM).as_posix()})" in page for path in [*FILES, NEWTON])
+    assert all(
+        f"(upstream/{path.relative_to(UPSTREAM).as_posix()})" in page
+        for path in [*FILES, NEWTON]
+    )

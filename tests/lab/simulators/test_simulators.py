@@ -43,11 +43,17 @@ COARSE = 0.05
 JUDGES = {"problems.py"}
 """Modules that state the formulas' answers; every other hands things to a simulator."""
 PROBLEM = read_problem(PROBLEMS / "crank_rocker.json")
-ENTRIES = {name: entry for name, entry in read_engines_of(benchmark.ENGINES).items() if "simulators" in entry.adapter}
+ENTRIES = {
+    name: entry
+    for name, entry in read_engines_of(benchmark.ENGINES).items()
+    if "simulators" in entry.adapter
+}
 
 
 def ask_position() -> tuple[Scene, Command]:
-    return protocol.command_from_json(protocol.scene_from_json(PROBLEM["scene"]), PROBLEM["command"])
+    return protocol.command_from_json(
+        protocol.scene_from_json(PROBLEM["scene"]), PROBLEM["command"]
+    )
 
 
 def find_errors(simulator: Any, **setting: Any) -> dict[str, float]:
@@ -71,25 +77,49 @@ def sealed(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.usefixtures("sealed")
 def test_a_simulator_starts_from_its_own_assembly_without_the_formulas() -> None:
-    paths = [path for path in (ROOT / "lab/fourbar_lab/simulators").glob("*.py") if path.name not in JUDGES]
+    paths = [
+        path
+        for path in (ROOT / "lab/fourbar_lab/simulators").glob("*.py")
+        if path.name not in JUDGES
+    ]
     assert len(paths) > 10
     for path in paths:
-        assert not {name for name in imported(path) if name.startswith(("fourbar.solve", "fourbar.formulas"))}, path
+        assert not {
+            name
+            for name in imported(path)
+            if name.startswith(("fourbar.solve", "fourbar.formulas"))
+        }, path
         assert "fourbar.solve" not in path.read_text(), path
     for branch in (1, -1):
         scene = fourbar.load(PROBLEMS / "crank_rocker.toml")
-        scene = replace(scene, motion=scene.motion.replace(branch=branch, speed=-10.0 * branch))
+        scene = replace(
+            scene, motion=scene.motion.replace(branch=branch, speed=-10.0 * branch)
+        )
         begin = motion.start(scene)
-        assert write_mjcf(scene, start=begin).count("<key ") == 1 and "coupler" in write_sdf(scene, "drake", begin)
+        assert write_mjcf(scene, start=begin).count(
+            "<key "
+        ) == 1 and "coupler" in write_sdf(scene, "drake", begin)
         theta = (begin.qpos[0], begin.qpos[0] + begin.qpos[1], begin.qpos[2])
-        assert motion.compute_gap(scene, theta) < 1e-15 and np.sin(theta[2] - theta[1]) * branch > 0.0
-        assert begin.qpos[0] == (math.tau if branch > 0 else 0.0) and begin.qvel[0] == -10.0 * branch
+        assert (
+            motion.compute_gap(scene, theta) < 1e-15
+            and np.sin(theta[2] - theta[1]) * branch > 0.0
+        )
+        assert (
+            begin.qpos[0] == (math.tau if branch > 0 else 0.0)
+            and begin.qvel[0] == -10.0 * branch
+        )
 
 
 class Rigid(Simulator):
     """A simulator that is the free bodies at the end of each step, but for what a test changes."""
 
-    name, version, device, made_for, changed = "rigid", "1", "abacus", "tests", "nothing"
+    name, version, device, made_for, changed = (
+        "rigid",
+        "1",
+        "abacus",
+        "tests",
+        "nothing",
+    )
     settings: ClassVar[dict[str, Any]] = {"plain": 1.0, "wrong": 1.1}
     left_out = ""
     diverges_at = math.inf
@@ -105,37 +135,68 @@ class Rigid(Simulator):
         def read(theta: float) -> Instant:
             one = np.array([theta])
             branch = np.array([scene.motion.branch], dtype=np.int8)
-            exact = FreeBody().answer(scene, Command(one, branch, speed, 0.0)).quantities
+            exact = (
+                FreeBody().answer(scene, Command(one, branch, speed, 0.0)).quantities
+            )
             angle = math.nan if done > self.diverges_at else float(exact["theta_3"][0])
-            forces = {name: exact[name][0] for name in PIN_FORCES if name != self.left_out}
+            forces = {
+                name: exact[name][0] for name in PIN_FORCES if name != self.left_out
+            }
             torque = self.settings[self.setting] * float(exact["torque"][0])
-            return Instant((theta, angle, float(exact["theta_4"][0])), speed, 0.0, torque, forces)
+            return Instant(
+                (theta, angle, float(exact["theta_4"][0])), speed, 0.0, torque, forces
+            )
 
         return motion.run_through(scene, course, advance, read)
 
 
 def test_a_run_is_judged_at_the_motion_that_it_made() -> None:
     errors = find_errors(Rigid, steps_per_turn=50)
-    assert max(errors.values()) < EXACT and set(errors) == {"theta_3", "theta_4", "torque", *PIN_FORCES}
+    assert max(errors.values()) < EXACT and set(errors) == {
+        "theta_3",
+        "theta_4",
+        "torque",
+        *PIN_FORCES,
+    }
     assert find_errors(Rigid, name="wrong")["torque"] == pytest.approx(0.1, abs=1e-9)
 
 
 def test_a_run_begins_before_its_first_position_where_the_linkage_closes() -> None:
     scene, command = ask_position()
     led, course = motion.lay_out(scene, command, 100)
-    assert motion.start(led).qpos[0] == pytest.approx(-0.5 * math.pi) and course.stops[-1] == 125
-    assert course.timestep == pytest.approx(math.tau / 10.0 / 100) and course.rows.tolist() == list(range(25))
+    assert (
+        motion.start(led).qpos[0] == pytest.approx(-0.5 * math.pi)
+        and course.stops[-1] == 125
+    )
+    assert course.timestep == pytest.approx(
+        math.tau / 10.0 / 100
+    ) and course.rows.tolist() == list(range(25))
     back = replace(scene, motion=scene.motion.replace(speed=-10.0))
     led, course = motion.lay_out(back, command._replace(speed=-10.0), 100)
-    assert motion.start(led).qpos[0] == pytest.approx(2.5 * math.pi) and course.rows.tolist() == list(range(24, -1, -1))
-    upright = read_problem(PROBLEMS / "pinocchio_2729.json")  # 30 degrees from a change point
-    scene, command = protocol.command_from_json(protocol.scene_from_json(upright["scene"]), upright["command"])
+    assert motion.start(led).qpos[0] == pytest.approx(
+        2.5 * math.pi
+    ) and course.rows.tolist() == list(range(24, -1, -1))
+    upright = read_problem(
+        PROBLEMS / "pinocchio_2729.json"
+    )  # 30 degrees from a change point
+    scene, command = protocol.command_from_json(
+        protocol.scene_from_json(upright["scene"]), upright["command"]
+    )
     led, course = motion.lay_out(scene, command, 628)
-    assert 0.1 < motion.start(led).qpos[0] < command.theta_2[0] - 0.1 and course.stops[0] > 1
+    assert (
+        0.1 < motion.start(led).qpos[0] < command.theta_2[0] - 0.1
+        and course.stops[0] > 1
+    )
 
 
 @pytest.mark.parametrize(
-    "changes", [{"alpha_2": 1.0}, {"branch": [1, -1] * 12 + [1]}, {"omega_2": 0.0}, {"theta_2": [1.0, 1.0001] * 12}]
+    "changes",
+    [
+        {"alpha_2": 1.0},
+        {"branch": [1, -1] * 12 + [1]},
+        {"omega_2": 0.0},
+        {"theta_2": [1.0, 1.0001] * 12},
+    ],
 )
 def test_a_motion_that_no_simulator_makes_is_a_refusal(changes: dict[str, Any]) -> None:
     scene, command = protocol.command_from_json(
@@ -145,7 +206,9 @@ def test_a_motion_that_no_simulator_makes_is_a_refusal(changes: dict[str, Any]) 
     assert answer.refusal is not None and answer.setting == "plain, 628/rev"
 
 
-def test_a_run_that_diverges_or_stops_is_no_answer(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_run_that_diverges_or_stops_is_no_answer(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setattr(Rigid, "diverges_at", 100)
     with pytest.raises(ArithmeticError, match="diverged"):
         Rigid().answer(*ask_position())
@@ -154,64 +217,103 @@ def test_a_run_that_diverges_or_stops_is_no_answer(monkeypatch: pytest.MonkeyPat
         Rigid().answer(*ask_position())
 
 
-def test_a_force_that_is_not_read_is_missing_and_the_others_count(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_force_that_is_not_read_is_missing_and_the_others_count(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setattr(Rigid, "left_out", "F43")
     errors = find_errors(Rigid)
     assert np.isnan(errors.pop("F43")) and max(errors.values()) < EXACT
 
 
-def test_the_host_serves_a_simulator_its_settings_and_derivatives(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_host_serves_a_simulator_its_settings_and_derivatives(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     def tell(question: dict[str, Any]) -> dict[str, Any]:
         replies = BytesIO()
-        serve(f"{__name__}:Rigid", BytesIO(json.dumps({"id": 1, **question}).encode()), replies)
+        serve(
+            f"{__name__}:Rigid",
+            BytesIO(json.dumps({"id": 1, **question}).encode()),
+            replies,
+        )
         reply: dict[str, Any] = json.loads(replies.getvalue())
         return reply
 
     told = {key: PROBLEM[key] for key in ("scene", "command")}
     hello = open_engine(f"{__name__}:Rigid")[1]
-    assert (hello["settings"], hello["device"], hello["made_for"]) == (["plain", "wrong"], "abacus", "tests")
+    assert (hello["settings"], hello["device"], hello["made_for"]) == (
+        ["plain", "wrong"],
+        "abacus",
+        "tests",
+    )
     for setting, made in (
         (None, "plain, 628/rev"),
         ({"name": "wrong"}, "wrong, 628/rev"),
         ({"name": "wrong", "steps_per_turn": 50}, "wrong, 50/rev"),
     ):
         assert tell({"ask": "answer", **told, "setting": setting})["setting"] == made
-    refusals = [tell({"ask": "answer", **told, "setting": setting}) for setting in ({"name": "no"}, {"error": 0.1})]
+    refusals = [
+        tell({"ask": "answer", **told, "setting": setting})
+        for setting in ({"name": "no"}, {"error": 0.1})
+    ]
     assert [reply["refusal"].partition(":")[0] for reply in refusals] == [
         *("it has no setting 'no'; it has", "it knows no law of its error"),
     ]
-    assert tell({"ask": "slopes", **told}) == {"id": 1, "refusal": "it has no derivatives"}
+    assert tell({"ask": "slopes", **told}) == {
+        "id": 1,
+        "refusal": "it has no derivatives",
+    }
     monkeypatch.setattr(Rigid, "slopes", lambda *_: [{"how": "by hand"}], raising=False)
     assert tell({"ask": "slopes", **told}) == {"id": 1, "slopes": [{"how": "by hand"}]}
-    assert "setting = {'steps': 3}" in tell({"ask": "answer", **told, "setting": {"steps": 3}})["error"]
+    assert (
+        "setting = {'steps': 3}"
+        in tell({"ask": "answer", **told, "setting": {"steps": 3}})["error"]
+    )
 
 
 @pytest.mark.usefixtures("sealed")
 def test_mujoco_answers_at_states_and_through_a_turn() -> None:
-    module = pytest.importorskip("fourbar_lab.simulators.mujoco_c", exc_type=ImportError)
-    at_states, through = find_errors(module.MujocoFile), find_errors(module.MujocoFile, steps_per_turn=157)
-    assert set(at_states) == {"theta_3", "theta_4", "torque", *PIN_FORCES} == set(through)
+    module = pytest.importorskip(
+        "fourbar_lab.simulators.mujoco_c", exc_type=ImportError
+    )
+    at_states, through = (
+        find_errors(module.MujocoFile),
+        find_errors(module.MujocoFile, steps_per_turn=157),
+    )
+    assert (
+        set(at_states) == {"theta_3", "theta_4", "torque", *PIN_FORCES} == set(through)
+    )
     assert max(at_states.values()) < EXACT < max(through.values()) < THROUGH
     assert find_errors(module.MujocoFile, name="its defaults")["torque"] > THROUGH
 
 
 @pytest.mark.usefixtures("sealed")
 def test_each_solver_of_pinocchio_carries_the_loop() -> None:
-    module = pytest.importorskip("fourbar_lab.simulators.pinocchio_simulated", exc_type=ImportError)
+    module = pytest.importorskip(
+        "fourbar_lab.simulators.pinocchio_simulated", exc_type=ImportError
+    )
     for setting in module.PinocchioSolvers.settings:
         accurate = setting in ("constraintDynamics", "lcaba")
         errors = find_errors(module.PinocchioSolvers, name=setting, steps_per_turn=314)
         assert max(errors.values()) < IN_PINOCCHIO[accurate], setting
         if accurate:
-            assert max(find_errors(module.PinocchioSolvers, name=setting).values()) < IN_PINOCCHIO[True], setting
+            assert (
+                max(find_errors(module.PinocchioSolvers, name=setting).values())
+                < IN_PINOCCHIO[True]
+            ), setting
         else:
-            answer = module.PinocchioSolvers().at_setting(name=setting).answer(*ask_position())
+            answer = (
+                module.PinocchioSolvers()
+                .at_setting(name=setting)
+                .answer(*ask_position())
+            )
             assert answer.refusal == "an impulse solver has no single states"
 
 
 def test_derivatives_of_the_torque_are_compared_at_the_simulators_own_state() -> None:
     """By differences of what MuJoCo itself answers along the changes that a differentiable simulator is given."""
-    mujoco_c = pytest.importorskip("fourbar_lab.simulators.mujoco_c", exc_type=ImportError)
+    mujoco_c = pytest.importorskip(
+        "fourbar_lab.simulators.mujoco_c", exc_type=ImportError
+    )
     scene = fourbar.load(PROBLEMS / "crank_rocker.toml")
     _, theta_2 = gradients.choose_quarter(scene)
 
@@ -222,7 +324,10 @@ def test_derivatives_of_the_torque_are_compared_at_the_simulators_own_state() ->
 
     now, by = answered(gradients.assemble(scene, theta_2, "mujoco")), {}
     for key in gradients.list_keys(scene):
-        more, less = (answered(state).torque for state in gradients.assemble_either_side(scene, theta_2, key, "mujoco"))
+        more, less = (
+            answered(state).torque
+            for state in gradients.assemble_either_side(scene, theta_2, key, "mujoco")
+        )
         by[key] = gradients.change(more, less)
     state = (theta_2, now.omega_2, now.alpha_2, now.torque)
     right = gradients.collect_answer(scene, "differences", state, by)
@@ -230,34 +335,64 @@ def test_derivatives_of_the_torque_are_compared_at_the_simulators_own_state() ->
     zero = {**right, "by": dict.fromkeys(by, 0.0)}
     slopes = json.loads(json.dumps([right, wrong, zero, {"how": "refused"}, {}]))
     compared = benchmark.compare_slopes(PROBLEM, slopes)
-    assert set(compared[0][1]) == {"torque", "lengths.coupler", "bars.coupler.mass", "motion.theta_2"}
+    assert set(compared[0][1]) == {
+        "torque",
+        "lengths.coupler",
+        "bars.coupler.mass",
+        "motion.theta_2",
+    }
     assert all(float(error) < DIFFERENCES for error in compared[0][1].values())
     assert all(float(compared[1][1][key]) == pytest.approx(0.1, abs=1e-3) for key in by)
-    assert {compared[2][1][key] for key in by} == {"zero"} and compared[3] == ("refused", {})
+    assert {compared[2][1][key] for key in by} == {"zero"} and compared[3] == (
+        "refused",
+        {},
+    )
     assert compared[4] == ("no derivatives that can be read: KeyError: 'how'", {})
 
 
 @pytest.mark.nightly
 def test_exudyn_refuses_what_it_has_no_element_for() -> None:
-    module = pytest.importorskip("fourbar_lab.simulators.exudyn_simulated", exc_type=ImportError)
+    module = pytest.importorskip(
+        "fourbar_lab.simulators.exudyn_simulated", exc_type=ImportError
+    )
     (scene, command), (_, setting) = ask_position(), module.ExudynIntegrators.settings
-    assert max(find_errors(module.ExudynIntegrators, name=setting, steps_per_turn=314).values()) < IN_EXUDYN
+    assert (
+        max(
+            find_errors(
+                module.ExudynIntegrators, name=setting, steps_per_turn=314
+            ).values()
+        )
+        < IN_EXUDYN
+    )
     simulator = module.ExudynIntegrators().at_setting(name=setting, steps_per_turn=314)
     damped = replace(scene, effects=(*scene.effects, Viscous.at(B=0.01)))
     answer = simulator.answer(damped, command)
     ours = fourbar.solve(damped, "force", at=answer.at)
-    assert np.abs(answer.quantities["torque"] - ours.torque).max() < IN_EXUDYN * np.abs(ours.torque).max()
+    assert (
+        np.abs(answer.quantities["torque"] - ours.torque).max()
+        < IN_EXUDYN * np.abs(ours.torque).max()
+    )
     with pytest.raises(LimitError, match="alone"):
-        simulator.through(*motion.lay_out(replace(scene, effects=(Friction.at(B=0.01),)), command, 314))
+        simulator.through(
+            *motion.lay_out(
+                replace(scene, effects=(Friction.at(B=0.01),)), command, 314
+            )
+        )
 
 
 @pytest.mark.nightly
 @pytest.mark.usefixtures("sealed")
-@pytest.mark.parametrize("name", [name for name, entry in ENTRIES.items() if entry.steps])
+@pytest.mark.parametrize(
+    "name", [name for name, entry in ENTRIES.items() if entry.steps]
+)
 def test_each_simulator_that_is_installed_carries_the_loop(name: str) -> None:
     entry = ENTRIES[name]
     module, _, cls = entry.adapter.partition(":")
     assert find_spec(module) is not None
     simulator = getattr(pytest.importorskip(module, exc_type=ImportError), cls)
-    errors = find_errors(simulator, name=entry.setting or None, steps_per_turn=entry.steps[1])
-    assert errors["torque"] < (simulator.tolerance[0] if "tolerance" in vars(simulator) else COARSE)
+    errors = find_errors(
+        simulator, name=entry.setting or None, steps_per_turn=entry.steps[1]
+    )
+    assert errors["torque"] < (
+        simulator.tolerance[0] if "tolerance" in vars(simulator) else COARSE
+    )

@@ -26,27 +26,49 @@ from fourbar_validation.scenes.suites import MODELS
 from tests.validation.cost.test_cost import turning
 
 
-@pytest.mark.parametrize(("omega", "required", "most"), [(10.0, 1e-4, 75), (1000.0, 1e-6, 300), (100.0, 2e-9, 1000)])
+@pytest.mark.parametrize(
+    ("omega", "required", "most"),
+    [(10.0, 1e-4, 75), (1000.0, 1e-6, 300), (100.0, 2e-9, 1000)],
+)
 def test_figures_of_the_crank_rocker(omega: float, required: float, most: int) -> None:
     advice = advise.advise(turning(omega, 72), required)
     assert advice.reached and advice.best.steps_per_revolution <= most, advice.reason
-    assert advice.best.errors.worst <= required and advice.best.settings.integrator == "RK4"
-    serves = [attempt for attempt in advice.attempts if attempt.errors.worst <= advise.MARGIN * required]
-    assert advice.best.steps == min(attempt.steps for attempt in serves) < max(attempt.steps for attempt in serves)
+    assert (
+        advice.best.errors.worst <= required
+        and advice.best.settings.integrator == "RK4"
+    )
+    serves = [
+        attempt
+        for attempt in advice.attempts
+        if attempt.errors.worst <= advise.MARGIN * required
+    ]
+    assert (
+        advice.best.steps
+        == min(attempt.steps for attempt in serves)
+        < max(attempt.steps for attempt in serves)
+    )
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["double_rocker", "triple_rocker", "thesis"])
 def test_figures_of_rockers_and_the_thesis(name: str) -> None:
     advice = advise.advise(fourbar.load(MODELS / f"{name}.toml"), 1e-5)
-    assert advice.reached and advice.best.steps <= 1000 and advice.best.steps_per_revolution <= 1000, advice.reason
+    assert (
+        advice.reached
+        and advice.best.steps <= 1000
+        and advice.best.steps_per_revolution <= 1000
+    ), advice.reason
 
 
 def test_the_file_alone_keeps_the_error(tmp_path: Path) -> None:
     """What -o writes, loaded by nothing but its text: reset to the keyframe and stepped for a revolution."""
     scene, out = tmp_path / "scene.toml", tmp_path / "out.xml"
     scene.write_text(fourbar.dump(turning(positions=72)))
-    process = CliRunner().invoke(advise.command, [str(scene), "--error", "1e-5", "-o", str(out)], standalone_mode=False)
+    process = CliRunner().invoke(
+        advise.command,
+        [str(scene), "--error", "1e-5", "-o", str(out)],
+        standalone_mode=False,
+    )
     assert process.return_value == 0, process.output
     loop = ClosedLoop(out.read_text())
     mujoco.mj_resetDataKeyframe(loop.model, loop.data, 0)
@@ -55,11 +77,24 @@ def test_the_file_alone_keeps_the_error(tmp_path: Path) -> None:
     for _ in range(steps):
         mujoco.mj_step(loop.model, loop.data)
         loop.forward()
-        seen = {"theta_2": loop.data.qpos[O2], "omega_2": loop.data.qvel[O2], "alpha_2": loop.data.qacc[O2]}
-        for key, value in {**seen, "torque": loop.crank_torque(), **loop.forces()}.items():
+        seen = {
+            "theta_2": loop.data.qpos[O2],
+            "omega_2": loop.data.qvel[O2],
+            "alpha_2": loop.data.qacc[O2],
+        }
+        for key, value in {
+            **seen,
+            "torque": loop.crank_torque(),
+            **loop.forces(),
+        }.items():
             rows.setdefault(key, []).append(value)
     columns = {key: np.array(values) for key, values in rows.items()}
-    commanded = Command(columns["theta_2"], np.ones(steps, dtype=np.int8), columns["omega_2"], columns["alpha_2"])
+    commanded = Command(
+        columns["theta_2"],
+        np.ones(steps, dtype=np.int8),
+        columns["omega_2"],
+        columns["alpha_2"],
+    )
     assert steps < 100 and compute_errors(turning(), commanded, columns).worst <= 1e-5
 
 
@@ -68,7 +103,10 @@ def test_what_lies_between_two_steps_is_judged_too() -> None:
     scene = replace(turning(), motion=fourbar.Motion(fourbar.Sweep(0.0, 1.0, 36), 10.0))
     setup = TrialSetup(scene, advise.choose_positions(scene))
     trial = setup.try_out(advise.make_settings(12.0, 6.0))
-    assert trial.steps == 2 and compute_errors(scene, trial.at, trial.quantities).worst < 2e-3
+    assert (
+        trial.steps == 2
+        and compute_errors(scene, trial.at, trial.quantities).worst < 2e-3
+    )
     assert matters.judge_trial(scene, trial).worst > 0.1
     advice = advise.advise(scene, 1e-2, setup)
     assert advice.reached and advice.best.steps > 4
@@ -77,22 +115,33 @@ def test_what_lies_between_two_steps_is_judged_too() -> None:
     assert largest[1] == pytest.approx(largest[0], rel=1e-2)
 
 
-def test_out_of_reach_is_reported_with_what_would_reach_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_out_of_reach_is_reported_with_what_would_reach_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(advise, "MOST_STEPS", 1500)
     scene = tmp_path / "scene.toml"
     scene.write_text(fourbar.dump(turning(positions=12)))
     out = tmp_path / "none.xml"
     process = CliRunner().invoke(
-        advise.command, [str(scene), "--error", "1e-14", "-o", str(out)], standalone_mode=False
+        advise.command,
+        [str(scene), "--error", "1e-14", "-o", str(out)],
+        standalone_mode=False,
     )
     assert process.return_value == 1 and not out.exists()
-    assert "No setting of plain MJCF" in process.output and "inverse dynamics" in process.output
+    assert (
+        "No setting of plain MJCF" in process.output
+        and "inverse dynamics" in process.output
+    )
     still = replace(turning(), motion=fourbar.Motion(1.0, 10.0))
     scene.write_text(fourbar.dump(still))
-    process = CliRunner().invoke(advise.command, [str(scene), "--error", "1e-3"], standalone_mode=False)
+    process = CliRunner().invoke(
+        advise.command, [str(scene), "--error", "1e-3"], standalone_mode=False
+    )
     assert process.return_value == 1 and "nothing to run through" in process.output
     scene.write_text(fourbar.dump(FAULT_SCENES["law"]))
-    process = CliRunner().invoke(advise.command, [str(scene), "--error", "1e-3"], standalone_mode=False)
+    process = CliRunner().invoke(
+        advise.command, [str(scene), "--error", "1e-3"], standalone_mode=False
+    )
     assert process.return_value == 1 and "motion law" in process.output
 
 
@@ -119,9 +168,16 @@ def test_a_run_is_no_more_precise_than_required(required: float) -> None:
     record = judge("s", scene, adjust_engines(engines, required))
     assert not [row for row in record.rows if row.verdict == FAILS]
     (answer,) = record.answers
-    answers = [row for row in record.rows if row.engine == "mujoco-simulated" and row.quantity != "as shipped"]
+    answers = [
+        row
+        for row in record.rows
+        if row.engine == "mujoco-simulated" and row.quantity != "as shipped"
+    ]
     worst = max(row.error for row in answers)
-    assert answer.evidence["wanted_error"] == required and answer.evidence["expected_error"] <= required
+    assert (
+        answer.evidence["wanted_error"] == required
+        and answer.evidence["expected_error"] <= required
+    )
     # the engine's own prediction is what the formulas find, though it never saw them
     assert worst == pytest.approx(answer.evidence["expected_error"], rel=0.5)
     assert answer.evidence["steps"] < 628
@@ -130,13 +186,22 @@ def test_a_run_is_no_more_precise_than_required(required: float) -> None:
 def test_a_guest_is_asked_for_the_error_and_not_answered_for_by_the_harness() -> None:
     (simulated,) = (engine for engine in ENGINES if engine.through_time)
     guest = Guest("mujoco 3.3.7", partial(dict), simulated.tolerance, through_time=True)
-    ours, theirs, exact = adjust_engines((simulated, guest, replace(guest, through_time=False)), 1e-3)
-    assert ours.start != simulated.start and theirs.start() == {"setting": {"error": 1e-3}} == exact.start()
+    ours, theirs, exact = adjust_engines(
+        (simulated, guest, replace(guest, through_time=False)), 1e-3
+    )
+    assert (
+        ours.start != simulated.start
+        and theirs.start() == {"setting": {"error": 1e-3}} == exact.start()
+    )
     assert theirs.tolerance == ours.tolerance != exact.tolerance == guest.tolerance
 
 
 def test_exact_engines_stay_exact() -> None:
-    changed = [new for old, new in zip(ENGINES, adjust_engines(ENGINES, 1e-3), strict=True) if new != old]
+    changed = [
+        new
+        for old, new in zip(ENGINES, adjust_engines(ENGINES, 1e-3), strict=True)
+        if new != old
+    ]
     assert [engine.name for engine in changed] == ["mujoco-simulated"]
     assert changed[0].tolerance.factor == 1e-3 and changed[0].answers == next(
         w.answers for w in ENGINES if w.through_time
@@ -145,14 +210,26 @@ def test_exact_engines_stay_exact() -> None:
 
 def test_what_matters_for_a_scene_is_measured_and_stated_with_its_reason() -> None:
     """Each scene is made so that one setting carries it."""
-    bars = (fourbar.Bar(0.10, 0.01), fourbar.Bar(0.08, 14.5, 5.0, (1.0, 0.2)), fourbar.Bar(0.12, 0.01))
+    bars = (
+        fourbar.Bar(0.10, 0.01),
+        fourbar.Bar(0.08, 14.5, 5.0, (1.0, 0.2)),
+        fourbar.Bar(0.12, 0.01),
+    )
     motion = fourbar.Motion(fourbar.Sweep(0.8, 1.8, 12), 0.5)
-    hood = fourbar.Scene(fourbar.FourBar(0.11, *bars), motion, effects=(fourbar.Gravity(),))
+    hood = fourbar.Scene(
+        fourbar.FourBar(0.11, *bars), motion, effects=(fourbar.Gravity(),)
+    )
     for scene, setting, why in ((hood, "the stiffness by pads", "lighter of coupler and output"),
                                 (turning(10.0, 36), "the timestep", "fourth power")):  # fmt: skip
         setup = TrialSetup(scene, advise.choose_positions(scene))
-        first, *others = influences = matters.measure_influences(scene, setup, advise.make_settings(40.0, 12.0))
-        assert first.setting == setting and first.times > 10.0 and why in matters.write_sentence(influences)
+        first, *others = influences = matters.measure_influences(
+            scene, setup, advise.make_settings(40.0, 12.0)
+        )
+        assert (
+            first.setting == setting
+            and first.times > 10.0
+            and why in matters.write_sentence(influences)
+        )
         assert all(first.times >= influence.times for influence in others)
     quiet = [replace(influence, times=1.5) for influence in influences]
     assert matters.write_sentence(quiet).startswith("No setting matters by itself")
@@ -166,11 +243,18 @@ def test_several_scenes_have_one_table(tmp_path: Path) -> None:
     ):
         files.append(str(tmp_path / f"{name}.toml"))
         Path(files[-1]).write_text(fourbar.dump(scene))
-    process = CliRunner().invoke(advise.command, [*files, "--error", "1e-4"], standalone_mode=False)
+    process = CliRunner().invoke(
+        advise.command, [*files, "--error", "1e-4"], standalone_mode=False
+    )
     assert process.return_value == 1  # one of them cannot be run through
     lines = process.output.splitlines()
-    assert lines[1].startswith("The timestep matters most here. If it is twice as long, the error is")
-    assert lines[-2].split()[0] == "one.toml" and lines[-1].split()[:2] == ["still.toml", "-"]
+    assert lines[1].startswith(
+        "The timestep matters most here. If it is twice as long, the error is"
+    )
+    assert lines[-2].split()[0] == "one.toml" and lines[-1].split()[:2] == [
+        "still.toml",
+        "-",
+    ]
     with pytest.raises(fourbar.InputError, match="MJCF of one scene, not of 2"):
         CliRunner().invoke(advise.command, [*files, "--error", "1e-4", "-o", "x.xml"], standalone_mode=False,
                            catch_exceptions=False)  # fmt: skip

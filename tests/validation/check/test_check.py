@@ -32,7 +32,8 @@ SCENES = {
     "crank_rocker": fourbar.load(MODELS / "crank_rocker.toml"),
 }
 SCENES["accelerating"] = replace(
-    SCENES["crank_rocker"], motion=fourbar.Motion(SCENES["crank_rocker"].motion.angle, 10.0, 30.0)
+    SCENES["crank_rocker"],
+    motion=fourbar.Motion(SCENES["crank_rocker"].motion.angle, 10.0, 30.0),
 )
 FORCES = ("torque", "F12", "F32", "F43", "F14")
 ALL = ("theta_3", "theta_4", "omega_3", "omega_4", "alpha_3", "alpha_4", *FORCES)
@@ -47,18 +48,29 @@ def right(scene: Scene, **changed: object) -> Numbers:
     fields = {"theta_2": "angle", "omega_2": "speed", "alpha_2": "acceleration"}
     changed = {fields.get(name, name): value for name, value in changed.items()}
     commanded = Command(
-        commanded.theta_2[::EVERY], commanded.branch[::EVERY], commanded.omega_2, commanded.alpha_2
+        commanded.theta_2[::EVERY],
+        commanded.branch[::EVERY],
+        commanded.omega_2,
+        commanded.alpha_2,
     )._replace(**changed)
     solution = solve(scene, at=commanded)
     assert np.all(solution.status_code == OK)
     return {name: np.array(getattr(solution, name)) for name in ("theta_2", *ALL)}
 
 
-def write(path: Path, numbers: Numbers, names: tuple[str, ...] = ALL, digits: int | None = None) -> Path:
+def write(
+    path: Path,
+    numbers: Numbers,
+    names: tuple[str, ...] = ALL,
+    digits: int | None = None,
+) -> Path:
     columns = {"theta_2": numbers["theta_2"]}
     for name in names:
         if name in VECTORS:
-            columns |= {f"{name}_x": numbers[name][:, 0], f"{name}_y": numbers[name][:, 1]}
+            columns |= {
+                f"{name}_x": numbers[name][:, 0],
+                f"{name}_y": numbers[name][:, 1],
+            }
         else:
             columns[name] = numbers[name]
     with path.open("w", newline="") as file:
@@ -67,7 +79,13 @@ def write(path: Path, numbers: Numbers, names: tuple[str, ...] = ALL, digits: in
         for row in zip(*columns.values(), strict=True):
             # the angle stays exact: rounding it would ask for another position
             writer.writerow(
-                [repr(float(row[0])), *(repr(float(x)) if digits is None else f"{x:.{digits}e}" for x in row[1:])]
+                [
+                    repr(float(row[0])),
+                    *(
+                        repr(float(x)) if digits is None else f"{x:.{digits}e}"
+                        for x in row[1:]
+                    ),
+                ]
             )
     return path  # fmt: skip
 
@@ -78,13 +96,17 @@ def judged(scene: Scene, path: Path) -> Judgement:
 
 @pytest.mark.parametrize("name", SCENES)
 @pytest.mark.parametrize("digits", [None, 5])
-def test_the_right_numbers_agree_also_when_rounded(name: str, digits: int | None, tmp_path: Path) -> None:
+def test_the_right_numbers_agree_also_when_rounded(
+    name: str, digits: int | None, tmp_path: Path
+) -> None:
     path = write(tmp_path / "theirs.csv", right(SCENES[name]), digits=digits)
     assert judged(SCENES[name], path).differing == []
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_a_torque_off_by_one_in_the_last_of_six_digits_is_found(name: str, tmp_path: Path) -> None:
+def test_a_torque_off_by_one_in_the_last_of_six_digits_is_found(
+    name: str, tmp_path: Path
+) -> None:
     numbers = right(SCENES[name])
     numbers["torque"] = numbers["torque"] * (1.0 + 3e-5)
     judgement = judged(SCENES[name], write(tmp_path / "theirs.csv", numbers, digits=5))
@@ -92,11 +114,20 @@ def test_a_torque_off_by_one_in_the_last_of_six_digits_is_found(name: str, tmp_p
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_a_theta_2_rounded_as_the_rest_is_allowed_for_and_excuses_no_more(name: str, tmp_path: Path) -> None:
+def test_a_theta_2_rounded_as_the_rest_is_allowed_for_and_excuses_no_more(
+    name: str, tmp_path: Path
+) -> None:
     numbers = right(SCENES[name])
-    rounded = numbers | {"theta_2": np.array([float(f"{x:.6g}") for x in numbers["theta_2"]])}
+    rounded = numbers | {
+        "theta_2": np.array([float(f"{x:.6g}") for x in numbers["theta_2"]])
+    }
     assert np.any(rounded["theta_2"] != numbers["theta_2"])
-    assert judged(SCENES[name], write(tmp_path / "theirs.csv", rounded, digits=5)).differing == []
+    assert (
+        judged(
+            SCENES[name], write(tmp_path / "theirs.csv", rounded, digits=5)
+        ).differing
+        == []
+    )
     wrong = rounded | {"F43": rounded["F43"] * (1.0 + 1e-4)}
     judgement = judged(SCENES[name], write(tmp_path / "wrong.csv", wrong, digits=5))
     assert {finding.quantity for finding in judgement.differing} == {"F43"}
@@ -106,8 +137,12 @@ def test_whole_degrees_are_positions_that_somebody_chose(tmp_path: Path) -> None
     path = tmp_path / "theirs.csv"
     path.write_text("theta_2 [deg],torque\n10,1.0\n20.5,1.0\n")
     assert not read_table(path).theta_2_rounding.any()
-    path.write_text("theta_2 [deg],torque\n10,1.0\n20.5003,1.0\n")  # zeros left off: the column has four decimals
-    assert read_table(path).theta_2_rounding == pytest.approx(np.radians(0.00005), rel=1e-9)
+    path.write_text(
+        "theta_2 [deg],torque\n10,1.0\n20.5003,1.0\n"
+    )  # zeros left off: the column has four decimals
+    assert read_table(path).theta_2_rounding == pytest.approx(
+        np.radians(0.00005), rel=1e-9
+    )
 
 
 def bars(scene: Scene, **changes: object) -> Scene:
@@ -122,7 +157,9 @@ def units(*names: str, factor: float) -> Callable[[Scene], Numbers]:
     return planted
 
 
-def solved(change: Callable[[Scene], Scene], **command: object) -> Callable[[Scene], Numbers]:
+def solved(
+    change: Callable[[Scene], Scene], **command: object
+) -> Callable[[Scene], Numbers]:
     return lambda scene: right(change(scene), **command)
 
 
@@ -139,10 +176,19 @@ def inertial_times(scene: Scene, by_mass: float, by_inertia: float) -> Numbers:
         for bar in (2, 3, 4):
             described = scene.linkage.bar(bar)
             x, y = (by_mass - 1.0) * -described.mass * getattr(motion, f"a_G{bar}")[i]
-            couple = (by_inertia - 1.0) * -described.moment_of_inertia * float(getattr(motion, f"alpha_{bar}")[i])
+            couple = (
+                (by_inertia - 1.0)
+                * -described.moment_of_inertia
+                * float(getattr(motion, f"alpha_{bar}")[i])
+            )
             force = (math.hypot(x, y), math.atan2(y, x))
             extra.append(fourbar.Load(bar, force, moment=couple))
-        here = Command(commanded.theta_2[i : i + 1], commanded.branch[i : i + 1], commanded.omega_2, commanded.alpha_2)
+        here = Command(
+            commanded.theta_2[i : i + 1],
+            commanded.branch[i : i + 1],
+            commanded.omega_2,
+            commanded.alpha_2,
+        )
         one = solve(replace(scene, loads=(*scene.loads, *extra)), at=here)
         for name, values in numbers.items():
             values.append(getattr(one, name)[0])
@@ -153,12 +199,19 @@ def other_pin(scene: Scene) -> Scene:
     bar = scene.linkage.coupler
     r, phi = bar.mass_centre
     x, y = bar.length - r * math.cos(phi), r * math.sin(phi)
-    return bars(scene, coupler=replace(bar, centre=(math.hypot(x, y), math.atan2(y, x))))
+    return bars(
+        scene, coupler=replace(bar, centre=(math.hypot(x, y), math.atan2(y, x)))
+    )
 
 
 def about_pin(scene: Scene) -> Scene:
     bar = scene.linkage.output
-    return bars(scene, output=replace(bar, inertia=bar.moment_of_inertia + bar.mass * bar.mass_centre[0] ** 2))
+    return bars(
+        scene,
+        output=replace(
+            bar, inertia=bar.moment_of_inertia + bar.mass * bar.mass_centre[0] ** 2
+        ),
+    )
 
 
 def half_a_turn(bar: fourbar.Bar) -> tuple[float, float]:
@@ -166,11 +219,17 @@ def half_a_turn(bar: fourbar.Bar) -> tuple[float, float]:
 
 
 def reversed_load(load: fourbar.Load) -> fourbar.Load:
-    return replace(load, force=load.force and (-load.force[0], load.force[1]), moment=-load.moment)
+    return replace(
+        load, force=load.force and (-load.force[0], load.force[1]), moment=-load.moment
+    )
 
 
 def tenth(load: fourbar.Load) -> fourbar.Load:
-    return replace(load, force=load.force and (0.1 * load.force[0], load.force[1]), moment=0.1 * load.moment)
+    return replace(
+        load,
+        force=load.force and (0.1 * load.force[0], load.force[1]),
+        moment=0.1 * load.moment,
+    )
 
 
 def exchanged(scene: Scene) -> Numbers:
@@ -278,8 +337,14 @@ def test_every_hypothesis_has_a_case_and_no_two_have_one_text() -> None:
     def kind(text: str) -> str:
         return re.sub(r"input|coupler|output|load \d|bar \d", "ONE", text)
 
-    texts = {kind(mistake.text) for scene in SCENES.values() for mistake in list_hypotheses(scene, command(scene))}
-    unnamed = {text for text in texts if not any(kind(words) in text for *_, words in MISTAKES)}
+    texts = {
+        kind(mistake.text)
+        for scene in SCENES.values()
+        for mistake in list_hypotheses(scene, command(scene))
+    }
+    unnamed = {
+        text for text in texts if not any(kind(words) in text for *_, words in MISTAKES)
+    }
     assert unnamed == set()
     for scene in SCENES.values():
         listed = [mistake.text for mistake in list_hypotheses(scene, command(scene))]
@@ -287,30 +352,61 @@ def test_every_hypothesis_has_a_case_and_no_two_have_one_text() -> None:
 
 
 @pytest.mark.parametrize("digits", [4, 5])
-def test_a_ratio_fitted_to_rounded_numbers_and_one_to_SI_are_named(digits: int, tmp_path: Path) -> None:
+def test_a_ratio_fitted_to_rounded_numbers_and_one_to_SI_are_named(
+    digits: int, tmp_path: Path
+) -> None:
     scene = SCENES["crank_rocker"]
     numbers = right(scene)
     for name in ("torque", "F12"):
         numbers[name] = numbers[name] / 9.81
-    explanations = judged(scene, write(tmp_path / "theirs.csv", numbers, ("torque", "F12"), digits=digits)).explanations
-    assert [explanation.quantities for explanation in explanations] == [("torque", "F12")]
+    explanations = judged(
+        scene, write(tmp_path / "theirs.csv", numbers, ("torque", "F12"), digits=digits)
+    ).explanations
+    assert [explanation.quantities for explanation in explanations] == [
+        ("torque", "F12")
+    ]
     path = tmp_path / "angles.csv"
     rows = zip(numbers["theta_2"].tolist(), numbers["theta_4"].tolist(), strict=True)
-    path.write_text("\n".join(["theta_2,theta_4 [deg]", *(f"{x!r},{y:.{digits}f}" for x, y in rows), ""]))
-    assert judged(scene, path).explanations[0].text.startswith("units: numbers in rad where deg was announced")
+    path.write_text(
+        "\n".join(
+            ["theta_2,theta_4 [deg]", *(f"{x!r},{y:.{digits}f}" for x, y in rows), ""]
+        )
+    )
+    assert (
+        judged(scene, path)
+        .explanations[0]
+        .text.startswith("units: numbers in rad where deg was announced")
+    )
 
 
-def test_a_position_that_agrees_by_chance_does_not_hide_a_mistake(tmp_path: Path) -> None:
+def test_a_position_that_agrees_by_chance_does_not_hide_a_mistake(
+    tmp_path: Path,
+) -> None:
     scene = SCENES["crank_rocker"]
     numbers = right(scene)
-    slip = numbers | {"torque": numbers["torque"] * np.where(np.arange(12) == 5, -1.0, 1.0)}
-    assert not judged(scene, write(tmp_path / "slip.csv", slip, ("torque",))).explanations
-    numbers["theta_2"] = np.array([float(f"{x:.5f}") for x in np.radians(numbers["theta_2"])])
-    explanations = judged(scene, write(tmp_path / "theirs.csv", numbers, ("torque",))).explanations
-    assert numbers["theta_2"][0] == 0.0 and "in radians where degrees" in explanations[0].text
+    slip = numbers | {
+        "torque": numbers["torque"] * np.where(np.arange(12) == 5, -1.0, 1.0)
+    }
+    assert not judged(
+        scene, write(tmp_path / "slip.csv", slip, ("torque",))
+    ).explanations
+    numbers["theta_2"] = np.array(
+        [float(f"{x:.5f}") for x in np.radians(numbers["theta_2"])]
+    )
+    explanations = judged(
+        scene, write(tmp_path / "theirs.csv", numbers, ("torque",))
+    ).explanations
+    assert (
+        numbers["theta_2"][0] == 0.0
+        and "in radians where degrees" in explanations[0].text
+    )
 
 
-@pytest.mark.parametrize(("what", "scene", "columns", "planted", "words"), MISTAKES, ids=[m[0] for m in MISTAKES])
+@pytest.mark.parametrize(
+    ("what", "scene", "columns", "planted", "words"),
+    MISTAKES,
+    ids=[m[0] for m in MISTAKES],
+)
 def test_a_known_mistake_is_the_first_explanation(
     what: str,
     scene: str,
@@ -319,7 +415,9 @@ def test_a_known_mistake_is_the_first_explanation(
     words: str,
     tmp_path: Path,
 ) -> None:
-    judgement = judged(SCENES[scene], write(tmp_path / "theirs.csv", planted(SCENES[scene]), columns))
+    judgement = judged(
+        SCENES[scene], write(tmp_path / "theirs.csv", planted(SCENES[scene]), columns)
+    )
     assert judgement.differing
     first = judgement.explanations[0]
     assert words in first.text
@@ -331,25 +429,44 @@ def test_two_mistakes_in_two_columns_are_both_named(tmp_path: Path) -> None:
     numbers = right(scene)
     numbers |= {"torque": numbers["torque"] * 100.0, "F43": -numbers["F43"]}
     judgement = judged(scene, write(tmp_path / "theirs.csv", numbers))
-    found_causes = {explanation.text[:14]: explanation for explanation in judgement.explanations}
+    found_causes = {
+        explanation.text[:14]: explanation for explanation in judgement.explanations
+    }
     assert found_causes["units: numbers"].quantities == ("torque",)
     assert found_causes["sign reversed,"].quantities == ("F43",)
     assert not any(explanation.complete for explanation in judgement.explanations)
 
 
-EVERY_QUANTITY = [name for name in UNITS if name not in (*NOT_JUDGED, *LINE_QUANTITIES, "theta_2")]
+EVERY_QUANTITY = [
+    name for name in UNITS if name not in (*NOT_JUDGED, *LINE_QUANTITIES, "theta_2")
+]
 
 
-@pytest.mark.parametrize("quantity", [name for name in EVERY_QUANTITY if not name.startswith("torque_")])
+@pytest.mark.parametrize(
+    "quantity", [name for name in EVERY_QUANTITY if not name.startswith("torque_")]
+)
 @pytest.mark.parametrize("name", SCENES)
-def test_every_quantity_is_judged_at_its_own_scale(name: str, quantity: str, tmp_path: Path) -> None:
+def test_every_quantity_is_judged_at_its_own_scale(
+    name: str, quantity: str, tmp_path: Path
+) -> None:
     """Off by 1e-9 of its largest value it differs, whatever its unit: A_x was once judged in newtons."""
     scene = SCENES[name]
     commanded = command(scene)
-    commanded = Command(commanded.theta_2[::EVERY], commanded.branch[::EVERY], commanded.omega_2, commanded.alpha_2)
+    commanded = Command(
+        commanded.theta_2[::EVERY],
+        commanded.branch[::EVERY],
+        commanded.omega_2,
+        commanded.alpha_2,
+    )
     solution = solve(scene, at=commanded)
-    numbers = {"theta_2": commanded.theta_2, quantity: np.array(getattr(solution, quantity))}
-    assert judged(scene, write(tmp_path / "right.csv", numbers, (quantity,))).differing == []
+    numbers = {
+        "theta_2": commanded.theta_2,
+        quantity: np.array(getattr(solution, quantity)),
+    }
+    assert (
+        judged(scene, write(tmp_path / "right.csv", numbers, (quantity,))).differing
+        == []
+    )
     size = np.abs(numbers[quantity]).max()
     off = numbers | {quantity: numbers[quantity] + 1e-9 * (size or 1.0)}
     judgement = judged(scene, write(tmp_path / "off.csv", off, (quantity,)))
@@ -372,7 +489,10 @@ def test_one_component_is_judged_by_itself(letter: str, tmp_path: Path) -> None:
     column = numbers["F12"][:, "xy".index(letter)]
 
     def found(values: np.ndarray) -> Judgement:
-        rows = [f"{t!r},{x!r}" for t, x in zip(numbers["theta_2"].tolist(), values.tolist(), strict=True)]
+        rows = [
+            f"{t!r},{x!r}"
+            for t, x in zip(numbers["theta_2"].tolist(), values.tolist(), strict=True)
+        ]
         path.write_text("\n".join([f"theta_2,F12_{letter}", *rows]))
         return judged(scene, path)
 
@@ -380,20 +500,40 @@ def test_one_component_is_judged_by_itself(letter: str, tmp_path: Path) -> None:
     off = found(column + 1e-6 * np.abs(column).max())
     assert {finding.quantity for finding in off.differing} == {f"F12_{letter}"}
     first = found(-column).explanations[0]
-    assert "sign reversed" in first.text and first.complete and first.quantities == (f"F12_{letter}",)
+    assert (
+        "sign reversed" in first.text
+        and first.complete
+        and first.quantities == (f"F12_{letter}",)
+    )
 
 
-@pytest.mark.parametrize(("torque", "code"), [("0.0", HOLDS), ("0.04", FAILED), ("5.0", FAILED)])
-def test_what_is_zero_by_all_its_terms_is_judged_in_its_own_unit(torque: str, code: int, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("torque", "code"), [("0.0", HOLDS), ("0.04", FAILED), ("5.0", FAILED)]
+)
+def test_what_is_zero_by_all_its_terms_is_judged_in_its_own_unit(
+    torque: str, code: int, tmp_path: Path
+) -> None:
     """Bars without mass or load take no torque; half a printed digit over a scale of 0 once excused any number."""
-    linkage = fourbar.FourBar(0.3, fourbar.Bar(0.1), fourbar.Bar(0.25), fourbar.Bar(0.22))
-    (tmp_path / "scene.toml").write_text(fourbar.dump(Scene(linkage, fourbar.Motion(1.0, 2.0))))
+    linkage = fourbar.FourBar(
+        0.3, fourbar.Bar(0.1), fourbar.Bar(0.25), fourbar.Bar(0.22)
+    )
+    (tmp_path / "scene.toml").write_text(
+        fourbar.dump(Scene(linkage, fourbar.Motion(1.0, 2.0)))
+    )
     (tmp_path / "theirs.csv").write_text(f"theta_2,torque\n1.0,{torque}\n")
-    assert status(["check", str(tmp_path / "scene.toml"), str(tmp_path / "theirs.csv")]) == code
+    assert (
+        status(["check", str(tmp_path / "scene.toml"), str(tmp_path / "theirs.csv")])
+        == code
+    )
 
 
-def test_a_released_scene_is_not_judged_at_the_speed_of_its_start(tmp_path: Path) -> None:
-    released = replace(SCENES["crank_rocker"], motion=fourbar.Motion(1.0, 2.0, free=fourbar.Free(1.0, 10)))
+def test_a_released_scene_is_not_judged_at_the_speed_of_its_start(
+    tmp_path: Path,
+) -> None:
+    released = replace(
+        SCENES["crank_rocker"],
+        motion=fourbar.Motion(1.0, 2.0, free=fourbar.Free(1.0, 10)),
+    )
     path = write(tmp_path / "theirs.csv", right(SCENES["crank_rocker"]))
     with pytest.raises(fourbar.InputError, match="not judged while released"):
         judged(released, path)
@@ -418,7 +558,9 @@ PUBLISHED = {
 """The thesis's section 5.7 at theta_2 = 135 deg, N and N cm, digits as printed."""
 
 
-def test_a_number_at_the_end_of_the_range_differs_without_a_warning(tmp_path: Path) -> None:
+def test_a_number_at_the_end_of_the_range_differs_without_a_warning(
+    tmp_path: Path,
+) -> None:
     path = tmp_path / "theirs.csv"
     path.write_text("theta_2,torque\n1e308,1e308\n")
     assert status(["check", str(MODELS / "crank_rocker.toml"), str(path)]) == FAILED
@@ -431,11 +573,15 @@ def test_the_thesis_itself_differs_and_its_unit_slip_is_hinted(
     path = tmp_path / "thesis.csv"
     heading = ",".join(f"{name}_x,{name}_y" for name in forces)
     cells = ",".join(x for name in forces for x in PUBLISHED[name])
-    path.write_text(f"theta_2 [deg],torque [N cm],{heading}\n135,{PUBLISHED['T4']},{cells}\n")
+    path.write_text(
+        f"theta_2 [deg],torque [N cm],{heading}\n135,{PUBLISHED['T4']},{cells}\n"
+    )
     assert status(["check", str(MODELS / "thesis.toml"), str(path)]) == FAILED
     printed = capsys.readouterr().out
     assert "0 of 5 numbers agree" in printed
-    hint = next(line for line in printed.splitlines() if line.startswith("looks like: m a"))
+    hint = next(
+        line for line in printed.splitlines() if line.startswith("looks like: m a")
+    )
     assert "kg cm/s^2 added to N" in hint
     assert "F12" in hint
 
@@ -446,10 +592,22 @@ BAD_TABLES = [
     ("no angle", "torque\n1\n", "theta_2"),
     ("no result", "theta_2\n1\n", "needs a result"),
     ("error bars alone", "theta_2,torque_error\n1,0\n", "needs a result"),
-    ("a row without its angle", "theta_2,torque\n,2\n", "line 2 = ['', '2']: needs a theta_2"),
+    (
+        "a row without its angle",
+        "theta_2,torque\n,2\n",
+        "line 2 = ['', '2']: needs a theta_2",
+    ),
     ("blank column alone", "theta_2,torque\n1,\n", "needs a result"),
-    ("one cell more", "theta_2,torque\n1,2,3\n", "needs 2 cells; with decimal commas, semicolons"),
-    ("unit of another kind in a line of its own", "theta_2,torque\nrad,kg\n1,2\n", "kg"),
+    (
+        "one cell more",
+        "theta_2,torque\n1,2,3\n",
+        "needs 2 cells; with decimal commas, semicolons",
+    ),
+    (
+        "unit of another kind in a line of its own",
+        "theta_2,torque\nrad,kg\n1,2\n",
+        "kg",
+    ),
     ("of dry friction", "theta_2,torque_low\n1,2\n", "no dry friction"),
     ("unknown column", "theta_2,wheel\n1,2\n", "known are theta_2"),
     ("unit of another kind", "theta_2,torque [kg]\n1,2\n", "kg"),
@@ -458,7 +616,11 @@ BAD_TABLES = [
     ("NaN", "theta_2,torque\n1,nan\n", "finite"),
     ("too large", "theta_2,torque\n1,1e999\n", "larger than a double"),
     ("cells missing", "theta_2,torque\n\n1,2\n3\n", "line 4"),
-    ("decimal comma", 'theta_2,torque\n1,"2,5"\n', "line 2, torque = '2,5': must be a number"),
+    (
+        "decimal comma",
+        'theta_2,torque\n1,"2,5"\n',
+        "line 2, torque = '2,5': must be a number",
+    ),
     ("binary", b"\xff\xfe\x00\x01", "UTF-8"),
     ("null byte", "theta_2,torque\n1,2\x00\n", "table"),
     ("escape", "theta_2,\x1b[31mtorque\n1,2\n", "known are"),
@@ -466,15 +628,23 @@ BAD_TABLES = [
 ]
 
 
-@pytest.mark.parametrize(("what", "text", "words"), BAD_TABLES, ids=[case[0] for case in BAD_TABLES])
+@pytest.mark.parametrize(
+    ("what", "text", "words"), BAD_TABLES, ids=[case[0] for case in BAD_TABLES]
+)
 def test_a_bad_table_is_one_line(
-    what: str, text: str | bytes, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    what: str,
+    text: str | bytes,
+    words: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     path = tmp_path / "theirs.csv"
     path.write_bytes(text if isinstance(text, bytes) else text.encode())
     code = status(["check", str(MODELS / "thesis.toml"), str(path)])
     printed = capsys.readouterr()
-    if what == "endless exponent":  # a zero, printed to many digits: judged like any other
+    if (
+        what == "endless exponent"
+    ):  # a zero, printed to many digits: judged like any other
         assert code == FAILED
         return
     assert code == BAD_INPUT
@@ -483,11 +653,17 @@ def test_a_bad_table_is_one_line(
     assert "\x1b" not in printed.err
 
 
-def test_a_table_that_is_too_large_or_missing_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_table_that_is_too_large_or_missing_is_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     large = tmp_path / "large.csv"
     with large.open("wb") as file:
         file.truncate(LARGEST_FILE + 1)
-    for path, words in ((large, "must not exceed"), (tmp_path / "none.csv", "file not found"), (tmp_path, "directory")):
+    for path, words in (
+        (large, "must not exceed"),
+        (tmp_path / "none.csv", "file not found"),
+        (tmp_path, "directory"),
+    ):
         assert status(["check", str(MODELS / "thesis.toml"), str(path)]) == BAD_INPUT
         assert words in capsys.readouterr().err
 
@@ -503,10 +679,19 @@ def test_positions_that_do_not_assemble_are_named_by_their_line(tmp_path: Path) 
 def test_agreement_is_exit_0_in_every_unit(tmp_path: Path) -> None:
     numbers = right(SCENES["thesis"])
     path = tmp_path / "theirs.csv"
-    rows = zip(np.degrees(numbers["theta_2"]), numbers["torque"] * 100.0, numbers["F12"] / 9.80665, strict=True)
-    lines = [f"{theta!r},{torque:.9e},{x:.9e},{y:.9e}" for theta, torque, (x, y) in rows]
+    rows = zip(
+        np.degrees(numbers["theta_2"]),
+        numbers["torque"] * 100.0,
+        numbers["F12"] / 9.80665,
+        strict=True,
+    )
+    lines = [
+        f"{theta!r},{torque:.9e},{x:.9e},{y:.9e}" for theta, torque, (x, y) in rows
+    ]
     heading = "theta_2 [deg],torque [N cm],F12_x [kgf],F12_y [kgf]"
-    path.write_text("\n".join([heading, *lines]).replace("np.float64(", "").replace(")", ""))
+    path.write_text(
+        "\n".join([heading, *lines]).replace("np.float64(", "").replace(")", "")
+    )
     assert status(["check", str(MODELS / "thesis.toml"), str(path)]) == HOLDS
 
 
@@ -520,7 +705,10 @@ def rows_of(name: str, *options: str) -> list[list[str]]:
 @pytest.mark.parametrize("options", [(), ("--degrees",)])
 @pytest.mark.parametrize("delimiter", [",", ";", "\t"])
 def test_the_file_of_analyze_is_read_as_it_is_and_as_a_spreadsheet_saves_it(
-    delimiter: str, options: tuple[str, ...], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    delimiter: str,
+    options: tuple[str, ...],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     rows = [row[:14] + row[-10:] for row in rows_of("thesis", *options)[:40]]
     if delimiter == ";":  # decimal commas, and what is left of a deleted column
@@ -531,21 +719,33 @@ def test_the_file_of_analyze_is_read_as_it_is_and_as_a_spreadsheet_saves_it(
     out = capsys.readouterr().out
     assert "left out (stated by the scene): status, branch, drive_bar" in out
     out = out.replace(" [N m]", "")
-    assert "left out (blank): torque_low, torque_high" in out and "429 of 429 numbers agree" in out
+    assert (
+        "left out (blank): torque_low, torque_high" in out
+        and "429 of 429 numbers agree" in out
+    )
 
 
-def test_blank_cells_state_nothing_and_the_rest_of_their_row_is_judged(tmp_path: Path) -> None:
+def test_blank_cells_state_nothing_and_the_rest_of_their_row_is_judged(
+    tmp_path: Path,
+) -> None:
     numbers = right(SCENES["thesis"])
     path = tmp_path / "theirs.csv"
-    (one, two), (first, second) = numbers["theta_2"][:2].tolist(), numbers["torque"][:2].tolist()
+    (one, two), (first, second) = (
+        numbers["theta_2"][:2].tolist(),
+        numbers["torque"][:2].tolist(),
+    )
     third = numbers["F12"][1, 0].item()
-    path.write_text(f"theta_2,torque,F12_x,F12_y,note\n{one},{first},,,a\n{two},{2 * second},{third},,b\n")
+    path.write_text(
+        f"theta_2,torque,F12_x,F12_y,note\n{one},{first},,,a\n{two},{2 * second},{third},,b\n"
+    )
     judgement = judged(SCENES["thesis"], path)
     assert [(f.line, f.quantity, f.agrees) for f in judgement.findings] == [
         (2, "torque", True), (3, "torque", False), (3, "F12_x", True)
     ]  # fmt: skip
     (wrong,) = judgement.differing
-    assert wrong.theirs == (2 * second,) and wrong.ours == pytest.approx((second,), rel=1e-12)
+    assert wrong.theirs == (2 * second,) and wrong.ours == pytest.approx(
+        (second,), rel=1e-12
+    )
 
 
 def test_magnitudes_and_a_whole_imperial_table(tmp_path: Path) -> None:
@@ -562,10 +762,16 @@ def test_magnitudes_and_a_whole_imperial_table(tmp_path: Path) -> None:
         columns["|F43| [kN]"] *= 1.0 + 1e-6 * wrong
         rows = zip(*columns.values(), strict=True)
         under = ",,,,lbf in"  # a line of units under the names
-        lines = [",".join(columns), under, *(",".join(f"{x:.12g}" for x in row) for row in rows)]
+        lines = [
+            ",".join(columns),
+            under,
+            *(",".join(f"{x:.12g}" for x in row) for row in rows),
+        ]
         path = tmp_path / f"theirs{wrong}.csv"
         path.write_text("\n".join(lines))
-        assert {f.quantity for f in judged(SCENES["crank_rocker"], path).differing} == ({"|F43|"} if wrong else set())
+        assert {f.quantity for f in judged(SCENES["crank_rocker"], path).differing} == (
+            {"|F43|"} if wrong else set()
+        )
 
 
 def test_a_stated_tolerance_decides_and_the_exact_count_stands_next_to_it(
@@ -578,58 +784,107 @@ def test_a_stated_tolerance_decides_and_the_exact_count_stands_next_to_it(
     rows, count = len(numbers["theta_2"]), len(ALL) * len(numbers["theta_2"])
     assert status(["check", model, path, *reports]) == FAILED
     report = json.loads((tmp_path / "out.json").read_text())
-    assert (report["compared"], report["agree"], report["holds"]) == (count, count - rows, False)
+    assert (report["compared"], report["agree"], report["holds"]) == (
+        count,
+        count - rows,
+        False,
+    )
     assert {finding["quantity"] for finding in report["differing"]} == {"torque"}
     first = report["differing"][0]
-    assert first["theirs"] == pytest.approx([off["torque"][0]], rel=1e-15) and first["ours"] != first["theirs"]
+    assert (
+        first["theirs"] == pytest.approx([off["torque"][0]], rel=1e-15)
+        and first["ours"] != first["theirs"]
+    )
     suites = ET.parse(tmp_path / "out.xml").getroot()
-    assert [case.get("name") for case in suites.iter("testcase") if case.find("failure") is not None] == ["torque"]
+    assert [
+        case.get("name")
+        for case in suites.iter("testcase")
+        if case.find("failure") is not None
+    ] == ["torque"]
     capsys.readouterr()
     assert status(["check", model, path, "--rtol", "1e-3", *reports]) == HOLDS
     sentence = f"{count} of {count} numbers agree within rtol 0.001, atol 0; {count - rows} to round-off"
     assert sentence in capsys.readouterr().out
-    assert json.loads((tmp_path / "out.json").read_text())["agree_to_round_off"] == count - rows
+    assert (
+        json.loads((tmp_path / "out.json").read_text())["agree_to_round_off"]
+        == count - rows
+    )
     assert ET.parse(tmp_path / "out.xml").getroot().find(".//failure") is None
     assert status(["check", model, path, "--atol", "1e-9"]) == FAILED
     assert status(["check", model, path, "--rtol", "-1"]) == BAD_INPUT
 
 
-def test_a_mistake_is_recognised_in_numbers_that_are_right_only_to_the_stated_tolerance(tmp_path: Path) -> None:
+def test_a_mistake_is_recognised_in_numbers_that_are_right_only_to_the_stated_tolerance(
+    tmp_path: Path,
+) -> None:
     """A simulation's torque, a ten-thousandth off, under the wrong unit."""
     numbers = right(SCENES["crank_rocker"])
-    numbers["torque"] = numbers["torque"] * 1e3 * (1.0 + 1e-4 * np.sin(np.arange(len(numbers["torque"]))))
+    numbers["torque"] = (
+        numbers["torque"]
+        * 1e3
+        * (1.0 + 1e-4 * np.sin(np.arange(len(numbers["torque"]))))
+    )
     table = read_table(write(tmp_path / "theirs.csv", numbers))
     judgement = judge_table(SCENES["crank_rocker"], table, Allowance(rtol=1e-3))
-    assert "N mm where N m" in judgement.explanations[0].text and judgement.explanations[0].complete
+    assert (
+        "N mm where N m" in judgement.explanations[0].text
+        and judgement.explanations[0].complete
+    )
 
 
-def test_a_law_and_a_changing_branch_are_judged_at_the_positions_of_the_scene(tmp_path: Path) -> None:
-    parallelogram = fourbar.FourBar(0.3, fourbar.Bar(0.1, 0.2), fourbar.Bar(0.3, 0.5), fourbar.Bar(0.1, 0.2))
-    scene = Scene(parallelogram, fourbar.Motion(fourbar.Sweep(0.5, 4.0, 21), 2.0, through="follow"))
+def test_a_law_and_a_changing_branch_are_judged_at_the_positions_of_the_scene(
+    tmp_path: Path,
+) -> None:
+    parallelogram = fourbar.FourBar(
+        0.3, fourbar.Bar(0.1, 0.2), fourbar.Bar(0.3, 0.5), fourbar.Bar(0.1, 0.2)
+    )
+    scene = Scene(
+        parallelogram,
+        fourbar.Motion(fourbar.Sweep(0.5, 4.0, 21), 2.0, through="follow"),
+    )
     (tmp_path / "theirs.csv").write_text(str(fourbar.solve(scene).to_csv()))
     judgement = judged(scene, tmp_path / "theirs.csv")
     assert {*solve(scene).branch.tolist()} == {1, -1}
-    assert judgement.differing == [] and judgement.not_assembled == [] and judgement.compared > 100
+    assert (
+        judgement.differing == []
+        and judgement.not_assembled == []
+        and judgement.compared > 100
+    )
 
 
-def test_a_log_is_judged_at_the_speed_of_each_row_where_the_scene_states_none(tmp_path: Path) -> None:
+def test_a_log_is_judged_at_the_speed_of_each_row_where_the_scene_states_none(
+    tmp_path: Path,
+) -> None:
     scene = SCENES["crank_rocker"]
     speed, acceleration = np.linspace(2.0, 9.0, 12), np.linspace(-30.0, 40.0, 12)
-    log = right(scene, omega_2=speed, alpha_2=acceleration) | {"omega_2": speed, "alpha_2": acceleration}
+    log = right(scene, omega_2=speed, alpha_2=acceleration) | {
+        "omega_2": speed,
+        "alpha_2": acceleration,
+    }
     table = write(tmp_path / "log.csv", log, ("omega_2", "alpha_2", *ALL))
     still = replace(scene, motion=scene.motion.replace(speed=None, acceleration=0.0))
-    assert judge_table(scene, read_table(table)).status == FAILED  # at the scene's one speed
+    assert (
+        judge_table(scene, read_table(table)).status == FAILED
+    )  # at the scene's one speed
     judgement = judge_table(still, read_table(table))
-    assert judgement.status == HOLDS and {f.quantity for f in judgement.findings} == {*ALL}
+    assert judgement.status == HOLDS and {f.quantity for f in judgement.findings} == {
+        *ALL
+    }
     log["torque"][5] *= 1.0 + 1e-9
     assert [
-        f.line for f in judge_table(still, read_table(write(table, log, ("omega_2", "alpha_2", *ALL)))).differing
+        f.line
+        for f in judge_table(
+            still, read_table(write(table, log, ("omega_2", "alpha_2", *ALL)))
+        ).differing
     ] == [7]
     assert (
-        judge_table(still, read_table(write(table, log, ("omega_2", "alpha_2")))).status == FAILED
+        judge_table(still, read_table(write(table, log, ("omega_2", "alpha_2")))).status
+        == FAILED
     )  # nothing compared
     log["omega_2"][3] = np.nan
-    text = write(table, log, ("omega_2", "alpha_2", "F12")).read_text().replace("nan", "")
+    text = (
+        write(table, log, ("omega_2", "alpha_2", "F12")).read_text().replace("nan", "")
+    )
     table.write_text(text)
     assert judge_table(still, read_table(table)).not_assembled == [5]
 
@@ -637,12 +892,21 @@ def test_a_log_is_judged_at_the_speed_of_each_row_where_the_scene_states_none(tm
 @pytest.mark.parametrize(
     ("motion", "words"),
     [
-        ({"theta_4": "140 deg", "omega_4": "1 rad/s"}, "motion.theta_4: a table of results takes a command of theta_2"),
-        ({"law": Law((0.0, 0.5, 1.0, 1.5), (0.0, 1.0, 2.0, 3.0))}, "along a law at the scene's own positions"),
+        (
+            {"theta_4": "140 deg", "omega_4": "1 rad/s"},
+            "motion.theta_4: a table of results takes a command of theta_2",
+        ),
+        (
+            {"law": Law((0.0, 0.5, 1.0, 1.5), (0.0, 1.0, 2.0, 3.0))},
+            "along a law at the scene's own positions",
+        ),
     ],
 )
 def test_a_motion_that_rows_are_not_found_by_is_refused_in_one_line(
-    motion: dict[str, object], words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    motion: dict[str, object],
+    words: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     table = write(tmp_path / "theirs.csv", right(SCENES["crank_rocker"]))
     scene = replace(SCENES["crank_rocker"], motion=fourbar.Motion(**motion))  # type: ignore[arg-type]

@@ -23,8 +23,18 @@ from fourbar.quantities import PIN_FORCES, UNKNOWNS
 from fourbar.scene import Scene
 from fourbar.solve import solve
 from fourbar_validation.check import mjcf
-from fourbar_validation.check.differences import Difference, find_differences, order, price
-from fourbar_validation.check.screen import DEEPEST, LARGEST_MJCF, list_unread, read_mjcf
+from fourbar_validation.check.differences import (
+    Difference,
+    find_differences,
+    order,
+    price,
+)
+from fourbar_validation.check.screen import (
+    DEEPEST,
+    LARGEST_MJCF,
+    list_unread,
+    read_mjcf,
+)
 from fourbar_validation.cli import status
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.columns import read_columns
@@ -32,13 +42,24 @@ from fourbar_validation.compare.compare import Comparison, Held
 from fourbar_validation.compare.rows import FAILS, Row
 from fourbar_validation.compare.tolerance import SIMULATED
 from fourbar_validation.engines.description import ModelEntry, Value
-from fourbar_validation.engines.mujoco.theirs import ONE_STATE, THROUGH_TIME, Examined, examine, examine_changed
+from fourbar_validation.engines.mujoco.theirs import (
+    ONE_STATE,
+    THROUGH_TIME,
+    Examined,
+    examine,
+    examine_changed,
+)
 from fourbar_validation.engines.processes import WORKER_MEMORY
 
 CRANK_ROCKER = fourbar.load(Path(__file__).parents[3] / "models" / "crank_rocker.toml")
 GENERATED = write_mjcf(CRANK_ROCKER)
 MINE = {"input": "crank", "coupler": "rod", "output": "rocker"}
-BARE = Scene(CRANK_ROCKER.linkage, CRANK_ROCKER.motion, effects=CRANK_ROCKER.effects, title="no loads")
+BARE = Scene(
+    CRANK_ROCKER.linkage,
+    CRANK_ROCKER.motion,
+    effects=CRANK_ROCKER.effects,
+    title="no loads",
+)
 SPRING = Spring(SpringEnd(1, 0.1, -1.5), SpringEnd(4, 0.08, 0.2), 200.0, 0.05)
 TORQUE_AND_PINS = ("torque", *PIN_FORCES)
 STIFF = 'solref="0.02 1" solimp="0.9999 0.9999 0.001 0.5 2"'
@@ -58,7 +79,9 @@ def values(examined: Examined) -> dict[str, Value]:
 
 
 def differences(scene: Scene, theirs: Examined) -> dict[str, Difference]:
-    return {d.key: d for d in find_differences(generated(scene).described, theirs.described)}
+    return {
+        d.key: d for d in find_differences(generated(scene).described, theirs.described)
+    }
 
 
 def keys(scene: Scene, theirs: Examined) -> set[str]:
@@ -69,14 +92,20 @@ def rows_of(scene: Scene, answers: Sequence[Answer]) -> list[Row]:
     return [
         row
         for answer in answers
-        for row in Comparison("", scene, answer, solve(scene, at=answer.at), Held(SIMULATED, UNKNOWNS)).rows()
+        for row in Comparison(
+            "", scene, answer, solve(scene, at=answer.at), Held(SIMULATED, UNKNOWNS)
+        ).rows()
     ]
 
 
 def errors(scene: Scene, examined: Examined, how: str) -> dict[str, float]:
     (answer,) = (answer for answer in examined.answers if answer.engine == how)
     assert answer.refusal is None, answer.refusal
-    return {row.quantity: row.error for row in rows_of(scene, [answer]) if row.quantity != "assembled"}
+    return {
+        row.quantity: row.error
+        for row in rows_of(scene, [answer])
+        if row.quantity != "assembled"
+    }
 
 
 def test_the_generated_file_differs_in_nothing_and_agrees() -> None:
@@ -92,7 +121,10 @@ def test_the_description_is_that_of_the_scene() -> None:
         bar = linkage.bar(number)
         expected = (bar.length, bar.mass, bar.moment_of_inertia, *bar.mass_centre)
         parts = ("mass", "inertia", "centre.distance", "centre.angle")
-        described = (numbers[f"lengths.{name}"], *(numbers[f"bars.{name}.{part}"] for part in parts))
+        described = (
+            numbers[f"lengths.{name}"],
+            *(numbers[f"bars.{name}.{part}"] for part in parts),
+        )
         assert described == pytest.approx(expected, rel=1e-14)
 
 
@@ -100,11 +132,18 @@ def test_what_is_welded_to_a_bar_is_part_of_it() -> None:
     """Two masses m at distance s of each other: G in the middle, inertia 2 I + m s^2/2."""
     half = '<body pos="{} 0 0"><inertial pos="0 0 0" mass="0.2" diaginertia="1e-3 1e-3 1e-3"/></body>'
     text = re.sub(
-        '(name="rocker"[^>]*><joint/>)<inertial[^>]*>', r"\1" + half.format(0.05) + half.format(0.15), other_plane()
+        '(name="rocker"[^>]*><joint/>)<inertial[^>]*>',
+        r"\1" + half.format(0.05) + half.format(0.15),
+        other_plane(),
     )
     numbers = values(examine(BARE, text, MINE))
-    described = [numbers[f"bars.output.{part}"] for part in ("mass", "centre.distance", "centre.angle", "inertia")]
-    assert described == pytest.approx([0.4, 0.1, 0.0, 2e-3 + 0.2 * 0.1**2 / 2.0], rel=1e-12, abs=1e-14)
+    described = [
+        numbers[f"bars.output.{part}"]
+        for part in ("mass", "centre.distance", "centre.angle", "inertia")
+    ]
+    assert described == pytest.approx(
+        [0.4, 0.1, 0.0, 2e-3 + 0.2 * 0.1**2 / 2.0], rel=1e-12, abs=1e-14
+    )
 
 
 STOP = 'range="0 1" solreflimit="0.1 1"'
@@ -133,19 +172,30 @@ EDITS = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("what", "old", "new", "key", "word"), EDITS, ids=[edit[0] for edit in EDITS])
-def test_a_planted_difference_is_named(what: str, old: str, new: str, key: str, word: str) -> None:
+@pytest.mark.parametrize(
+    ("what", "old", "new", "key", "word"), EDITS, ids=[edit[0] for edit in EDITS]
+)
+def test_a_planted_difference_is_named(
+    what: str, old: str, new: str, key: str, word: str
+) -> None:
     assert old in GENERATED
     text = GENERATED.replace(old, new) if new else re.sub(old + "[^>]*>", "", GENERATED)
     if "range" in new:
         text = text.replace('limit="disable"', "")
     text = text.replace('damper="disable"', "")
-    remarks = {d.key: d.remark for d in find_differences(generated(CRANK_ROCKER).described, described(text))}
+    remarks = {
+        d.key: d.remark
+        for d in find_differences(generated(CRANK_ROCKER).described, described(text))
+    }
     assert word in remarks[key]
 
 
 UNREAD = [
-    ('joint name="O4"', 'joint name="O4" actuatorfrcrange="-1 1"', "joint actuatorfrcrange"),
+    (
+        'joint name="O4"',
+        'joint name="O4" actuatorfrcrange="-1 1"',
+        "joint actuatorfrcrange",
+    ),
     ('body name="coupler"', 'body name="coupler" gravcomp="1"', "body gravcomp"),
     ('island="disable"', 'island="disable" eulerdamp="disable"', "flag eulerdamp"),
     ("<statistic ", '<statistic meaninertia="2" ', "statistic meaninertia"),
@@ -162,17 +212,27 @@ def test_what_the_check_does_not_know_is_named_as_not_looked_at() -> None:
     assert list_unread(text) == sorted(name for _, _, name in UNREAD)
 
 
-DRY = replace(CRANK_ROCKER, effects=(*CRANK_ROCKER.effects, Friction((("A", 0.05), ("O4", 0.05)))))
+DRY = replace(
+    CRANK_ROCKER, effects=(*CRANK_ROCKER.effects, Friction((("A", 0.05), ("O4", 0.05))))
+)
 
 
 def test_how_softly_dry_friction_slips_is_named_and_costs() -> None:
     """By default its couple rises over 0.02 s of slip."""
     text = re.sub(' sol(ref|imp)friction="[^"]*"', "", write_mjcf(DRY))
     examination = examine(
-        DRY, text.replace('joint name="A"', 'joint name="rod"').replace('joint="A"', 'joint="rod"'), {}
+        DRY,
+        text.replace('joint name="A"', 'joint name="rod"').replace(
+            'joint="A"', 'joint="rod"'
+        ),
+        {},
     )
     by_key = differences(DRY, examination)
-    fields = {f"pins.{pin}.{field}" for pin in ("A", "O4") for field in ("solreffriction", "solimpfriction")}
+    fields = {
+        f"pins.{pin}.{field}"
+        for pin in ("A", "O4")
+        for field in ("solreffriction", "solimpfriction")
+    }
     assert by_key.keys() == fields
     assert by_key["pins.A.solreffriction"].written == 'joint "rod" solreffriction'
     assert by_key["pins.A.solreffriction"].theirs == (0.02, 1.0)
@@ -182,9 +242,16 @@ def test_how_softly_dry_friction_slips_is_named_and_costs() -> None:
 def test_a_cause_is_named_without_what_hangs_on_it() -> None:
     """Solver parameters of friction that a file does not have, and what MuJoCo derives from a mass."""
     soft = GENERATED.replace('type="hinge"', 'type="hinge" solreffriction="0.1 1"')
-    assert {d.key for d in find_differences(generated(CRANK_ROCKER).described, described(soft))} == set()
+    assert {
+        d.key
+        for d in find_differences(generated(CRANK_ROCKER).described, described(soft))
+    } == set()
     heavy = {
-        d.key for d in find_differences(generated(CRANK_ROCKER).described, described(GENERATED.replace('"0.5"', '"1"')))
+        d.key
+        for d in find_differences(
+            generated(CRANK_ROCKER).described,
+            described(GENERATED.replace('"0.5"', '"1"')),
+        )
     }
     assert heavy == {"bars.coupler.mass", "closure.softness"}
 
@@ -192,9 +259,13 @@ def test_a_cause_is_named_without_what_hangs_on_it() -> None:
 def test_loads_under_other_names_and_in_another_order_are_the_same_loads() -> None:
     text = GENERATED.replace("load_1", "couple").replace("load_2", "push")
     first, second = re.findall("    <general [^>]*(?:couple|push)[^>]*/>\n", text)
-    examination = examine(CRANK_ROCKER, text.replace(first + second, second + first), {})
+    examination = examine(
+        CRANK_ROCKER, text.replace(first + second, second + first), {}
+    )
     assert keys(CRANK_ROCKER, examination) == set()
-    assert max(errors(CRANK_ROCKER, examination, ONE_STATE).values()) <= SIMULATED.factor
+    assert (
+        max(errors(CRANK_ROCKER, examination, ONE_STATE).values()) <= SIMULATED.factor
+    )
 
 
 def described(text: str) -> Mapping[str, ModelEntry]:
@@ -205,14 +276,18 @@ def described(text: str) -> Mapping[str, ModelEntry]:
     return describe(Topology(compile_text(text), {}))
 
 
-@pytest.mark.parametrize(("old", "new"), [("-9.81", "-9.80"), ('mass="0.5"', 'mass="0.501"')])
+@pytest.mark.parametrize(
+    ("old", "new"), [("-9.81", "-9.80"), ('mass="0.5"', 'mass="0.501"')]
+)
 def test_what_a_difference_costs_is_seen(old: str, new: str) -> None:
     examination = examine(CRANK_ROCKER, GENERATED.replace(old, new), {})
     assert errors(CRANK_ROCKER, examination, ONE_STATE)["F12"] > SIMULATED.factor
     assert errors(CRANK_ROCKER, examination, THROUGH_TIME)["F12"] > SIMULATED.factor
 
 
-def other_plane(closure: str = 'site1="r" site2="q"', axis: str = "0 -1 0", option: str = "") -> str:
+def other_plane(
+    closure: str = 'site1="r" site2="q"', axis: str = "0 -1 0", option: str = ""
+) -> str:
     """The crank-rocker by another hand: x-z plane, away from the origin, other names, default closure."""
     linkage = BARE.linkage
 
@@ -231,7 +306,9 @@ def other_plane(closure: str = 'site1="r" site2="q"', axis: str = "0 -1 0", opti
 
 
 @pytest.mark.parametrize("closure", ['site1="r" site2="q"', ""])
-def test_bodies_and_sites_are_guessed_from_what_hangs_together_and_from_the_lengths(closure: str) -> None:
+def test_bodies_and_sites_are_guessed_from_what_hangs_together_and_from_the_lengths(
+    closure: str,
+) -> None:
     """The rocker is as good a crank by its hinges alone; without a connect the sites of pin B are looked for too."""
     text = other_plane(closure)
     rocker = re.search(' *<body name="rocker".*?</body>', text)
@@ -239,8 +316,13 @@ def test_bodies_and_sites_are_guessed_from_what_hangs_together_and_from_the_leng
     text = text.replace(rocker[0], "").replace("<worldbody>", "<worldbody>" + rocker[0])
     examination = examine(BARE, text, {})
     assert examination.names.items() >= MINE.items()
-    assert ({"B3": "r", "B4": "q"}.items() <= examination.names.items()) == (not closure)
-    assert "guessed" in examination.notes[0] and "input=crank, coupler=rod, output=rocker" in examination.notes[0]
+    assert ({"B3": "r", "B4": "q"}.items() <= examination.names.items()) == (
+        not closure
+    )
+    assert (
+        "guessed" in examination.notes[0]
+        and "input=crank, coupler=rod, output=rocker" in examination.notes[0]
+    )
     assert errors(BARE, examination, ONE_STATE)["theta_4"] < STIFF_ENOUGH
 
 
@@ -261,8 +343,12 @@ COSTLY = [
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("key", "old", "new"), COSTLY, ids=[case[0] for case in COSTLY])
-def test_the_one_thing_that_is_wrong_costs_as_much_alone_in_the_generated_file(key: str, old: str, new: str) -> None:
+@pytest.mark.parametrize(
+    ("key", "old", "new"), COSTLY, ids=[case[0] for case in COSTLY]
+)
+def test_the_one_thing_that_is_wrong_costs_as_much_alone_in_the_generated_file(
+    key: str, old: str, new: str
+) -> None:
     """Another tree in another plane, made wrong in one entry: its price is the error of that file, by another model."""
     text = other_plane(f'site1="r" site2="q" {STIFF}')
     assert old in text
@@ -270,21 +356,39 @@ def test_the_one_thing_that_is_wrong_costs_as_much_alone_in_the_generated_file(k
     listed = differences(BARE, spoilt)
     chosen = [listed[key], listed["option.tolerance"]]
     unchanged, *changed = (
-        rows_of(BARE, answers or []) for answers in examine_changed(BARE, [(d.key, d.theirs) for d in chosen])
+        rows_of(BARE, answers or [])
+        for answers in examine_changed(BARE, [(d.key, d.theirs) for d in chosen])
     )
-    first, second = order([price(*pair, unchanged) for pair in zip(chosen, changed, strict=True)])
+    first, second = order(
+        [price(*pair, unchanged) for pair in zip(chosen, changed, strict=True)]
+    )
     assert first.key == key and first.cost is not None and second.cost is not None
     expected = errors(BARE, spoilt, ONE_STATE)[first.quantity]
-    assert first.cost == pytest.approx(expected, rel=0.2) and second.cost < 0.01 * first.cost
+    assert (
+        first.cost == pytest.approx(expected, rel=0.2)
+        and second.cost < 0.01 * first.cost
+    )
 
 
-SPRUNG = replace(CRANK_ROCKER, effects=(Gravity(), Torsion.at(O4=(0.3, 0.4, 0.0)), Springs((SPRING,))))
+SPRUNG = replace(
+    CRANK_ROCKER,
+    effects=(Gravity(), Torsion.at(O4=(0.3, 0.4, 0.0)), Springs((SPRING,))),
+)
 SPOILT = {  # loads of the generated file itself, and what is attached to it
     "loads.output, world axes.couple": ('0 0 0 0 0 -0.05"', '0 0 0 0 0 -0.5"'),
-    "loads.coupler, axes of the coupler.force": ("3.061616997868383e-17 -0.5", "-0.5 0.0"),
-    "loads.coupler, axes of the coupler.point": ('name="load_2" pos="0.15', 'name="load_2" pos="0.05'),
+    "loads.coupler, axes of the coupler.force": (
+        "3.061616997868383e-17 -0.5",
+        "-0.5 0.0",
+    ),
+    "loads.coupler, axes of the coupler.point": (
+        'name="load_2" pos="0.15',
+        'name="load_2" pos="0.05',
+    ),
     "tendons.ground output.stiffness": ('stiffness="200"', 'stiffness="300"'),
-    "tendons.ground output.springlength": ('springlength="0.05"', 'springlength="0.06"'),
+    "tendons.ground output.springlength": (
+        'springlength="0.05"',
+        'springlength="0.06"',
+    ),
     "pins.O4.spring angle": ('springref="', 'springref="1'),
 }
 
@@ -298,18 +402,29 @@ def test_what_is_attached_costs_what_it_does_in_the_file_itself(key: str) -> Non
     spoilt = examine(SPRUNG, text.replace(old, new), {})
     (difference,) = differences(SPRUNG, spoilt).values()
     assert difference.key == key
-    unchanged, changed = (rows_of(SPRUNG, rows or []) for rows in examine_changed(SPRUNG, [(key, difference.theirs)]))
+    unchanged, changed = (
+        rows_of(SPRUNG, rows or [])
+        for rows in examine_changed(SPRUNG, [(key, difference.theirs)])
+    )
     priced = price(difference, changed, unchanged)
     rows = errors(SPRUNG, spoilt, ONE_STATE)
-    assert priced.cost == pytest.approx(max(rows[name] for name in TORQUE_AND_PINS), abs=FLOOR)
+    assert priced.cost == pytest.approx(
+        max(rows[name] for name in TORQUE_AND_PINS), abs=FLOOR
+    )
 
 
-def test_a_servo_on_a_tendon_pulls_also_where_it_is_told_nothing_and_a_motor_does_not() -> None:
+def test_a_servo_on_a_tendon_pulls_also_where_it_is_told_nothing_and_a_motor_does_not() -> (
+    None
+):
     text = write_mjcf(SPRUNG)
-    servo = text.replace("</actuator>", '<position tendon="spring_1" kp="100"/></actuator>')
+    servo = text.replace(
+        "</actuator>", '<position tendon="spring_1" kp="100"/></actuator>'
+    )
     assert keys(SPRUNG, examine(SPRUNG, servo, {})) == {"tendons.ground output.tension"}
     motors = '<motor tendon="spring_1"/><motor joint="A"/></actuator>'
-    assert keys(SPRUNG, examine(SPRUNG, text.replace("</actuator>", motors), {})) == set()
+    assert (
+        keys(SPRUNG, examine(SPRUNG, text.replace("</actuator>", motors), {})) == set()
+    )
 
 
 def test_a_load_that_is_missing_and_an_entry_that_cannot_stand_alone() -> None:
@@ -322,8 +437,13 @@ def test_a_load_that_is_missing_and_an_entry_that_cannot_stand_alone() -> None:
     assert missing is not None and others == [None] * 3
     text = re.sub('<general [^>]*name="load_2"[^>]*>', "", GENERATED)
     expected = errors(CRANK_ROCKER, examine(CRANK_ROCKER, text, {}), ONE_STATE)
-    errors_by_quantity = {row.quantity: row.error for row in rows_of(CRANK_ROCKER, missing[:1])}
-    assert all(errors_by_quantity[name] == pytest.approx(expected[name], abs=FLOOR) for name in TORQUE_AND_PINS)
+    errors_by_quantity = {
+        row.quantity: row.error for row in rows_of(CRANK_ROCKER, missing[:1])
+    }
+    assert all(
+        errors_by_quantity[name] == pytest.approx(expected[name], abs=FLOOR)
+        for name in TORQUE_AND_PINS
+    )
 
 
 @pytest.mark.parametrize("axis", ["0 -1 0", "0 1 0"])
@@ -341,35 +461,54 @@ def test_the_default_softness_costs_a_percent_or_so() -> None:
 
 
 def test_body_anchors_on_an_open_rest_state_build_another_linkage() -> None:
-    examination = examine(BARE, other_plane('body1="rod" body2="rocker" anchor="0.25 0 0"'), MINE)
-    assert "in the pose of the file" in differences(BARE, examination)["lengths.output"].remark
+    examination = examine(
+        BARE, other_plane('body1="rod" body2="rocker" anchor="0.25 0 0"'), MINE
+    )
+    assert (
+        "in the pose of the file"
+        in differences(BARE, examination)["lengths.output"].remark
+    )
     assert values(examination)["lengths.output"] == pytest.approx(0.05)
 
 
 def test_cut_at_another_pin_it_is_the_same_linkage() -> None:
     """The rocker hangs on the coupler, and the loop closes at O4."""
-    text = other_plane().replace('<site name="r" pos="0.25 0 0"/></body></body>', "<ROCKER/></body></body>")
+    text = other_plane().replace(
+        '<site name="r" pos="0.25 0 0"/></body></body>', "<ROCKER/></body></body>"
+    )
     rocker = re.search('    <body name="rocker".*?</body>', text)
     assert rocker is not None
     hanging = rocker[0].replace('pos="1.3 2 3"', 'pos="0.25 0 0"')
     # its own line runs from O4 to B: turned round, B is its origin
     hanging = re.sub(
-        r'<inertial pos="(\S+) 0 (\S+)"', lambda m: f'<inertial pos="{float(m[1]) - 0.22!r} 0 {m[2]}"', hanging
+        r'<inertial pos="(\S+) 0 (\S+)"',
+        lambda m: f'<inertial pos="{float(m[1]) - 0.22!r} 0 {m[2]}"',
+        hanging,
     ).replace('<site name="q" pos="0.22 0 0"/>', '<site name="q" pos="-0.22 0 0"/>')
-    text = text.replace(rocker[0], '<site name="r" pos="1.3 2 3"/>').replace("<ROCKER/>", hanging)
-    examination = examine(BARE, text.replace('site1="r" site2="q"', f'site1="r" site2="q" {STIFF}'), MINE)
+    text = text.replace(rocker[0], '<site name="r" pos="1.3 2 3"/>').replace(
+        "<ROCKER/>", hanging
+    )
+    examination = examine(
+        BARE, text.replace('site1="r" site2="q"', f'site1="r" site2="q" {STIFF}'), MINE
+    )
     assert values(examination)["closure.pin"] == "O4"
-    assert not {key for key in keys(BARE, examination) if key.startswith(("bars.", "lengths."))}
+    assert not {
+        key for key in keys(BARE, examination) if key.startswith(("bars.", "lengths."))
+    }
     assert max(errors(BARE, examination, ONE_STATE).values()) < STIFF_ENOUGH
 
 
 def test_a_servo_and_another_equality_are_taken_off_and_reported() -> None:
-    text = GENERATED.replace("</actuator>", '<velocity name="servo" joint="O2" kv="10"/></actuator>')
+    text = GENERATED.replace(
+        "</actuator>", '<velocity name="servo" joint="O2" kv="10"/></actuator>'
+    )
     text = text.replace("</equality>", '<joint joint1="O2" joint2="O4"/></equality>')
     examination = examine(CRANK_ROCKER, text, {})
     assert any("servo" in note for note in examination.notes)
     assert any("switched off" in note for note in examination.notes)
-    assert max(errors(CRANK_ROCKER, examination, ONE_STATE).values()) <= SIMULATED.factor
+    assert (
+        max(errors(CRANK_ROCKER, examination, ONE_STATE).values()) <= SIMULATED.factor
+    )
 
 
 def test_a_cylinder_of_ones_own_is_what_the_force_is_solved_for() -> None:
@@ -384,18 +523,30 @@ def test_a_cylinder_of_ones_own_is_what_the_force_is_solved_for() -> None:
             worst_errors = errors(scene, examined, how)
             assert (
                 "torque" not in worst_errors
-                and max(worst_errors[name] for name in ("drive_force", "F12", "F43", "F14")) < most
+                and max(
+                    worst_errors[name] for name in ("drive_force", "F12", "F43", "F14")
+                )
+                < most
             )
     start = 'name="cylinder_end" pos="'
     moved = text.replace(start + "0.0", start + "0.1")
-    assert moved != text and errors(scene, examine(scene, moved, {}), ONE_STATE)["drive_force"] > 1e-2
-    assert any(key.startswith("tendons.") for key in keys(scene, examine(scene, moved, {})))
+    assert (
+        moved != text
+        and errors(scene, examine(scene, moved, {}), ONE_STATE)["drive_force"] > 1e-2
+    )
+    assert any(
+        key.startswith("tendons.") for key in keys(scene, examine(scene, moved, {}))
+    )
     with pytest.raises(InputError, match="0 actuators with a control on tendons"):
         examine(scene, text.replace(driven, ""), {})
 
 
 def test_a_loop_that_nothing_closes_is_seen_in_the_numbers() -> None:
-    text = other_plane("").replace('site name="r"', 'site name="B3"').replace('site name="q"', 'site name="B4"')
+    text = (
+        other_plane("")
+        .replace('site name="r"', 'site name="B3"')
+        .replace('site name="q"', 'site name="B4"')
+    )
     examination = examine(BARE, text, MINE)
     assert values(examination)["closure.by"] == "nothing"
     assert np.isnan(errors(BARE, examination, ONE_STATE)["F43"])
@@ -403,40 +554,84 @@ def test_a_loop_that_nothing_closes_is_seen_in_the_numbers() -> None:
 
 
 def test_colliding_bars_are_seen() -> None:
-    text = GENERATED.replace('contype="0" conaffinity="0"', "").replace('contact="disable"', "")
+    text = GENERATED.replace('contype="0" conaffinity="0"', "").replace(
+        'contact="disable"', ""
+    )
     examination = examine(CRANK_ROCKER, text, {})
     assert "contacts" in keys(CRANK_ROCKER, examination)
 
 
 HOSTILE = [
     ("include", "<mujoco><include file='/etc/passwd'/></mujoco>", "<include>"),
-    ("mesh file", "<mujoco><asset><mesh file='../m.stl'/></asset></mujoco>", "no other file"),
-    ("texture side", "<mujoco><asset><texture fileup='u.png'/></asset></mujoco>", "no other file"),
+    (
+        "mesh file",
+        "<mujoco><asset><mesh file='../m.stl'/></asset></mujoco>",
+        "no other file",
+    ),
+    (
+        "texture side",
+        "<mujoco><asset><texture fileup='u.png'/></asset></mujoco>",
+        "no other file",
+    ),
     ("directory", "<mujoco><compiler meshdir='/'/></mujoco>", "no other file"),
-    ("plugin", "<mujoco><extension><plugin plugin='x'/></extension></mujoco>", "<extension>"),
-    ("thousand", "<mujoco><worldbody><replicate count='1000000'/></worldbody></mujoco>", "<replicate>"),
+    (
+        "plugin",
+        "<mujoco><extension><plugin plugin='x'/></extension></mujoco>",
+        "<extension>",
+    ),
+    (
+        "thousand",
+        "<mujoco><worldbody><replicate count='1000000'/></worldbody></mujoco>",
+        "<replicate>",
+    ),
     ("entities", "<!DOCTYPE a [<!ENTITY b 'c'>]><mujoco/>", "document type"),
-    ("endless solver", "<mujoco><option iterations='2000000000'/></mujoco>", "up to 1000"),
-    ("endless line search", "<mujoco><option ls_iterations=' 1001'/></mujoco>", "up to 1000"),
-    ("endless slip", "<mujoco><option noslip_iterations='0x7fffffff'/></mujoco>", "up to 1000"),
-    ("endless collisions", "<mujoco><option ccd_iterations='1e9'/></mujoco>", "up to 1000"),
+    (
+        "endless solver",
+        "<mujoco><option iterations='2000000000'/></mujoco>",
+        "up to 1000",
+    ),
+    (
+        "endless line search",
+        "<mujoco><option ls_iterations=' 1001'/></mujoco>",
+        "up to 1000",
+    ),
+    (
+        "endless slip",
+        "<mujoco><option noslip_iterations='0x7fffffff'/></mujoco>",
+        "up to 1000",
+    ),
+    (
+        "endless collisions",
+        "<mujoco><option ccd_iterations='1e9'/></mujoco>",
+        "up to 1000",
+    ),
     ("other XML", "<robot/>", "<mujoco>"),
     ("no XML", "four bars", "no XML"),
     ("no text", b"\xff\xfe\x00", "UTF-8"),
     ("null byte", "<mujoco model='a\0b'/>", "no XML"),
     ("large", " " * (LARGEST_MJCF + 1), "must not exceed"),
     ("deep", "<mujoco>" + "<body>" * 10 * DEEPEST, "deeper"),
-    ("deep and closed", "<mujoco>" + "<b>" * 5000 + "</b>" * 5000 + "</mujoco>", "deeper"),
+    (
+        "deep and closed",
+        "<mujoco>" + "<b>" * 5000 + "</b>" * 5000 + "</mujoco>",
+        "deeper",
+    ),
 ]
 
 
-@pytest.mark.parametrize(("what", "text", "word"), HOSTILE, ids=[case[0] for case in HOSTILE])
-def test_what_an_mjcf_may_not_hold(what: str, text: str | bytes, word: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("what", "text", "word"), HOSTILE, ids=[case[0] for case in HOSTILE]
+)
+def test_what_an_mjcf_may_not_hold(
+    what: str, text: str | bytes, word: str, tmp_path: Path
+) -> None:
     path = tmp_path / "theirs.xml"
     path.write_bytes(text if isinstance(text, bytes) else text.encode())
     with pytest.raises(InputError) as caught:
         read_mjcf(path)
-    assert word in str(caught.value) or (what == "deep" and "no XML" in str(caught.value))
+    assert word in str(caught.value) or (
+        what == "deep" and "no XML" in str(caught.value)
+    )
     assert "\n" not in str(caught.value)
 
 
@@ -446,7 +641,10 @@ def test_an_absurd_timestep_is_reported_and_not_run_through(timestep: str) -> No
     text = re.sub('timestep="[^"]*"', f'timestep="{timestep}"', GENERATED)
     assert text != GENERATED
     _, through = examine(CRANK_ROCKER, text, {}).answers
-    assert through.refusal is not None and "steps of the motion; must be 1 to 400000" in through.refusal
+    assert (
+        through.refusal is not None
+        and "steps of the motion; must be 1 to 400000" in through.refusal
+    )
 
 
 OVERDONE = [
@@ -463,9 +661,16 @@ OVERDONE = [
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("what", "old", "new", "words"), OVERDONE, ids=[case[0] for case in OVERDONE])
+@pytest.mark.parametrize(
+    ("what", "old", "new", "words"), OVERDONE, ids=[case[0] for case in OVERDONE]
+)
 def test_a_file_that_overdoes_it_is_one_line_with_its_name(
-    what: str, old: str, new: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    what: str,
+    old: str,
+    new: str,
+    words: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     text, path = re.sub(old, new, GENERATED), tmp_path / "mine.xml"
     assert text != GENERATED
@@ -474,13 +679,17 @@ def test_a_file_that_overdoes_it_is_one_line_with_its_name(
     arguments = ["check-mjcf", scene, str(path), "--out", str(tmp_path / "out")]
     assert status(arguments) == 2
     message = capsys.readouterr().err.strip().splitlines()[-1]
-    assert message.startswith(f"error: {path}: MJCF = 'mine.xml': ") and words in message
+    assert (
+        message.startswith(f"error: {path}: MJCF = 'mine.xml': ") and words in message
+    )
     assert not (tmp_path / "out").exists()
 
 
 def test_a_ratio_beyond_the_range_of_doubles_has_its_remark() -> None:
     heavy = examine(CRANK_ROCKER, GENERATED.replace('mass="0.4"', 'mass="4e307"'), {})
-    assert differences(CRANK_ROCKER, heavy)["bars.output.mass"].remark.startswith("10^308 times")
+    assert differences(CRANK_ROCKER, heavy)["bars.output.mass"].remark.startswith(
+        "10^308 times"
+    )
 
 
 FIFTH = '<body name="fan"><joint/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body>'
@@ -498,8 +707,12 @@ REFUSED = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("what", "text", "names", "word"), REFUSED, ids=[case[0] for case in REFUSED])
-def test_a_file_that_is_no_four_bar_is_one_line(what: str, text: str, names: dict[str, str], word: str) -> None:
+@pytest.mark.parametrize(
+    ("what", "text", "names", "word"), REFUSED, ids=[case[0] for case in REFUSED]
+)
+def test_a_file_that_is_no_four_bar_is_one_line(
+    what: str, text: str, names: dict[str, str], word: str
+) -> None:
     with pytest.raises(InputError) as caught:
         examine(BARE, text, names)
     assert word in str(caught.value)
@@ -526,7 +739,10 @@ def test_ctrl_c_does_not_wait_for_the_file() -> None:
     began = time.monotonic()
     threading.Timer(3.0, os.kill, (os.getpid(), signal.SIGINT)).start()
     try:
-        with pytest.raises(KeyboardInterrupt), mjcf.examine_guarded(Path("mine.xml")) as examined:
+        with (
+            pytest.raises(KeyboardInterrupt),
+            mjcf.examine_guarded(Path("mine.xml")) as examined,
+        ):
             examined(f"{__name__}:hang", BARE, "<mujoco/>", {})
     finally:
         signal.signal(signal.SIGINT, before)
@@ -536,11 +752,22 @@ def test_ctrl_c_does_not_wait_for_the_file() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("what", "word"),
-    [(crash, "crashed"), (hang, "did not come back"), pytest.param(devour, "memory", marks=pytest.mark.linux)],
+    [
+        (crash, "crashed"),
+        (hang, "did not come back"),
+        pytest.param(devour, "memory", marks=pytest.mark.linux),
+    ],
 )
-def test_a_file_that_breaks_the_engine_is_one_line(what: object, word: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(mjcf, "SECONDS", 4.0 if what is hang else 60.0)  # a busy machine starts a process slowly
-    with pytest.raises(InputError, match=word), mjcf.examine_guarded(Path("mine.xml")) as examined:
+def test_a_file_that_breaks_the_engine_is_one_line(
+    what: object, word: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(
+        mjcf, "SECONDS", 4.0 if what is hang else 60.0
+    )  # a busy machine starts a process slowly
+    with (
+        pytest.raises(InputError, match=word),
+        mjcf.examine_guarded(Path("mine.xml")) as examined,
+    ):
         examined(f"{__name__}:{what.__name__}", BARE, "<mujoco/>", {})  # type: ignore[attr-defined]
 
 
@@ -550,7 +777,9 @@ def test_the_command_writes_and_prints_what_it_found(tmp_path: Path) -> None:
     path.write_text(other_plane().replace('name="rod"', 'name="rod&#60;b&#62;|"'))
     scene = tmp_path / "scene.toml"
     scene.write_text(fourbar.dump(BARE))
-    names = [f"--name={role}={name}" for role, name in {**MINE, "coupler": "rod<b>|"}.items()]
+    names = [
+        f"--name={role}={name}" for role, name in {**MINE, "coupler": "rod<b>|"}.items()
+    ]
     arguments = [str(scene), str(path), *names, "--out", str(tmp_path / "out")]
     process = CliRunner().invoke(mjcf.command, arguments, standalone_mode=False)
     assert process.return_value == 1, process.output
@@ -559,7 +788,8 @@ def test_the_command_writes_and_prints_what_it_found(tmp_path: Path) -> None:
     report = (tmp_path / "out" / "theirs.md").read_text()
     assert "\x1b" not in report
     assert any(
-        row.verdict == FAILS and row.engine == ONE_STATE for row in read_columns(tmp_path / "out" / "results.csv")
+        row.verdict == FAILS and row.engine == ONE_STATE
+        for row in read_columns(tmp_path / "out" / "results.csv")
     )
 
 
@@ -579,7 +809,11 @@ def run(tmp_path: Path, text: str, *options: str) -> tuple[int | None, list[floa
     if process.exception is not None:
         raise process.exception
     return process.return_value, sorted(
-        {row.allowed for row in read_columns(out / "results.csv") if row.quantity != "undecided"}
+        {
+            row.allowed
+            for row in read_columns(out / "results.csv")
+            if row.quantity != "undecided"
+        }
     )
 
 

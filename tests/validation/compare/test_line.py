@@ -18,7 +18,11 @@ from fourbar_validation.run.judge import judge
 from tests.support.scenes import crank_rocker
 
 FREE_BODY = [engine for engine in ENGINES if engine.name == "free-body"]
-EXACT = [engine for engine in (*ENGINES, *load_further()) if not engine.through_time and engine not in FREE_BODY]
+EXACT = [
+    engine
+    for engine in (*ENGINES, *load_further())
+    if not engine.through_time and engine not in FREE_BODY
+]
 PAIRS = list(combinations((1, 2, 3, 4), 2))
 PINS = fourbar.PinFriction.at(A=(0.1, 0.005), O4=(0.2, 0.004))
 
@@ -30,60 +34,126 @@ def driven(one: int, other: int, **changes: Any) -> Scene:
 
 
 @pytest.mark.parametrize(("one", "other"), PAIRS)
-def test_every_pair_of_bars_agrees_with_thirteen_equations(one: int, other: int) -> None:
-    for effects in ((fourbar.Gravity(), fourbar.Viscous.at(B=0.02)), (fourbar.Gravity(), PINS)):
+def test_every_pair_of_bars_agrees_with_thirteen_equations(
+    one: int, other: int
+) -> None:
+    for effects in (
+        (fourbar.Gravity(), fourbar.Viscous.at(B=0.02)),
+        (fourbar.Gravity(), PINS),
+    ):
         for branch in (1, -1):
             scene = driven(one, other, effects=effects)
-            rows = judge("", replace(scene, motion=scene.motion.replace(branch=branch)), FREE_BODY).rows
+            rows = judge(
+                "",
+                replace(scene, motion=scene.motion.replace(branch=branch)),
+                FREE_BODY,
+            ).rows
             assert not [row for row in rows if row.failed]
-            agreeing = {row.quantity for row in rows if row.engine == "free-body" and row.verdict == AGREES}
-            assert agreeing >= {"drive_force", "stroke", "drive_line", "stroke_speed", "drive_condition", "F12"}
+            agreeing = {
+                row.quantity
+                for row in rows
+                if row.engine == "free-body" and row.verdict == AGREES
+            }
+            assert agreeing >= {
+                "drive_force",
+                "stroke",
+                "drive_line",
+                "stroke_speed",
+                "drive_condition",
+                "F12",
+            }
             assert "drive_force_inertia" in agreeing and "torque" not in agreeing
 
 
 @pytest.mark.parametrize("engine", EXACT, ids=lambda engine: engine.name)
 @pytest.mark.parametrize(("one", "other"), PAIRS)
-def test_every_pair_of_bars_agrees_with_the_multipliers_of_an_engine(engine: Engine, one: int, other: int) -> None:
+def test_every_pair_of_bars_agrees_with_the_multipliers_of_an_engine(
+    engine: Engine, one: int, other: int
+) -> None:
     if missing := engine.missing():
         pytest.skip(missing)
-    for effects in ((fourbar.Gravity(), fourbar.Viscous.at(B=0.02)), (fourbar.Gravity(), PINS)):
+    for effects in (
+        (fourbar.Gravity(), fourbar.Viscous.at(B=0.02)),
+        (fourbar.Gravity(), PINS),
+    ):
         rows = judge("", driven(one, other, effects=effects), [*FREE_BODY, engine]).rows
         assert not [row for row in rows if row.failed]
-        agreeing = {row.quantity for row in rows if row.engine == engine.name and row.verdict == AGREES}
-        assert agreeing >= {"drive_force", "stroke", "stroke_speed", "drive_force_inertia", "F12", "F32", "F43", "F14"}
+        agreeing = {
+            row.quantity
+            for row in rows
+            if row.engine == engine.name and row.verdict == AGREES
+        }
+        assert agreeing >= {
+            "drive_force",
+            "stroke",
+            "stroke_speed",
+            "drive_force_inertia",
+            "F12",
+            "F32",
+            "F43",
+            "F14",
+        }
 
 
 @pytest.mark.parametrize("engine", [*FREE_BODY, *EXACT], ids=lambda engine: engine.name)
 @pytest.mark.parametrize("gap", [1e-2, 1e-4, 1e-6])
-def test_the_direction_of_a_line_is_as_uncertain_as_its_ends_are_near(engine: Engine, gap: float) -> None:
+def test_the_direction_of_a_line_is_as_uncertain_as_its_ends_are_near(
+    engine: Engine, gap: float
+) -> None:
     if missing := engine.missing():
         pytest.skip(missing)
     linkage = crank_rocker().linkage
-    (theta_4,) = fourbar.solve(crank_rocker(motion=fourbar.Motion(1.0)), "position").theta_4
+    (theta_4,) = fourbar.solve(
+        crank_rocker(motion=fourbar.Motion(1.0)), "position"
+    ).theta_4
     on_bar = linkage.ground + 0.2 * np.exp(1j * (theta_4 + 0.4 - linkage.ground_angle))
-    drive = LinearDrive(SpringEnd(1, abs(on_bar + gap), np.angle(on_bar + gap)), SpringEnd(4, 0.2, 0.4))
-    scene = crank_rocker(motion=fourbar.Motion(1.0 + gap * np.linspace(-1.0, 1.0, 7), 10.0), drive=drive)
+    drive = LinearDrive(
+        SpringEnd(1, abs(on_bar + gap), np.angle(on_bar + gap)), SpringEnd(4, 0.2, 0.4)
+    )
+    scene = crank_rocker(
+        motion=fourbar.Motion(1.0 + gap * np.linspace(-1.0, 1.0, 7), 10.0), drive=drive
+    )
     assert fourbar.solve(scene, "position").stroke == pytest.approx(gap, rel=0.5)
-    rows = {row.quantity: row for row in judge("", scene, [engine]).rows if row.engine == engine.name}
+    rows = {
+        row.quantity: row
+        for row in judge("", scene, [engine]).rows
+        if row.engine == engine.name
+    }
     for quantity in ("stroke", "drive_line", "stroke_speed", "drive_force", "F14"):
-        assert rows[quantity].verdict == AGREES and rows[quantity].allowed < 1e-12 / gap, quantity
+        assert (
+            rows[quantity].verdict == AGREES and rows[quantity].allowed < 1e-12 / gap
+        ), quantity
 
 
 def test_positions_alone_have_a_stroke_that_is_judged() -> None:
     scene = driven(3, 4)
-    rows = judge("", replace(scene, motion=scene.motion.replace(speed=None)), FREE_BODY).rows
+    rows = judge(
+        "", replace(scene, motion=scene.motion.replace(speed=None)), FREE_BODY
+    ).rows
     assert not [row for row in rows if row.failed]
-    assert {"stroke", "drive_line"} <= {row.quantity for row in rows if row.verdict == AGREES}
+    assert {"stroke", "drive_line"} <= {
+        row.quantity for row in rows if row.verdict == AGREES
+    }
 
 
 def test_statics_and_friction_at_rest_agree_too() -> None:
-    scene = driven(1, 3, effects=(fourbar.Gravity(), fourbar.Friction.at(A=0.05, O4=0.02)))
-    rows = judge("", replace(scene, motion=scene.motion.replace(speed=0.0, acceleration=0.0)), FREE_BODY).rows
+    scene = driven(
+        1, 3, effects=(fourbar.Gravity(), fourbar.Friction.at(A=0.05, O4=0.02))
+    )
+    rows = judge(
+        "",
+        replace(scene, motion=scene.motion.replace(speed=0.0, acceleration=0.0)),
+        FREE_BODY,
+    ).rows
     assert not [row for row in rows if row.failed]
-    assert {"drive_force_low", "drive_force_high"} <= {row.quantity for row in rows if row.verdict == AGREES}
+    assert {"drive_force_low", "drive_force_high"} <= {
+        row.quantity for row in rows if row.verdict == AGREES
+    }
 
 
-def _reversed(self: LinearDrive, actions: Any, force: Any, act: Any = LinearDrive.act) -> None:
+def _reversed(
+    self: LinearDrive, actions: Any, force: Any, act: Any = LinearDrive.act
+) -> None:
     act(self, actions, -force)
 
 
@@ -102,16 +172,24 @@ FAULTS = {
     "line reversed": ("act", _reversed),
     "one of its two ends": ("act", _of_one_end),
     "lever of the wrong bar": ("act", _of_the_wrong_bar),
-    "sign of the speed": ("gain", lambda self, state, true=LinearDrive.gain: -true(self, state)),
+    "sign of the speed": (
+        "gain",
+        lambda self, state, true=LinearDrive.gain: -true(self, state),
+    ),
     "half the leverage": (
         "leverage",
-        lambda *arguments, true=LinearDrive.leverage: (0.5 * true(*arguments)[0], true(*arguments)[1]),
+        lambda *arguments, true=LinearDrive.leverage: (
+            0.5 * true(*arguments)[0],
+            true(*arguments)[1],
+        ),
     ),
 }
 
 
 @pytest.mark.parametrize("fault", FAULTS)
-def test_a_fault_in_the_drive_is_caught(monkeypatch: pytest.MonkeyPatch, fault: str) -> None:
+def test_a_fault_in_the_drive_is_caught(
+    monkeypatch: pytest.MonkeyPatch, fault: str
+) -> None:
     monkeypatch.setattr(LinearDrive, *FAULTS[fault])
     rows = judge("", driven(2, 4), FREE_BODY).rows
     assert [row for row in rows if row.verdict == FAILS]
@@ -119,7 +197,10 @@ def test_a_fault_in_the_drive_is_caught(monkeypatch: pytest.MonkeyPatch, fault: 
 
 def test_who_cannot_do_it_refuses_in_one_line_that_names_it() -> None:
     scene = driven(1, 4)
-    assert "the linear drive (drive.from, drive.to)" in BallArithmetic().answer(scene, fourbar.command(scene)).refusal
+    assert (
+        "the linear drive (drive.from, drive.to)"
+        in BallArithmetic().answer(scene, fourbar.command(scene)).refusal
+    )
     outside = GuestClient("outside", Program(("none",)), Hello("outside"))
     assert (
         outside.answer(scene, fourbar.command(scene)).refusal

@@ -16,14 +16,18 @@ from fourbar_validation.run.judge import judge
 
 D, A, B, C = 0.3, 0.1, 0.25, 0.22
 FRICTION = 0.5
-LINKAGE = fourbar.FourBar(D, fourbar.Bar(A, 0.2), fourbar.Bar(B, 0.5), fourbar.Bar(C, 0.4))
+LINKAGE = fourbar.FourBar(
+    D, fourbar.Bar(A, 0.2), fourbar.Bar(B, 0.5), fourbar.Bar(C, 0.4)
+)
 ROUNDING = 1e-13
 """rad; near the reversal the speed that vanishes carries some hundred roundings."""
 
 
 def scene(pin: str, drive: int = 2, start: float = 0.1) -> Scene:
     sweep = Sweep(start, start + 2 * math.pi, 36)
-    return Scene(LINKAGE, Motion(sweep, 10.0), drive, effects=(Friction.at(**{pin: FRICTION}),))
+    return Scene(
+        LINKAGE, Motion(sweep, 10.0), drive, effects=(Friction.at(**{pin: FRICTION}),)
+    )
 
 
 def dead_centres() -> list[float]:
@@ -33,12 +37,17 @@ def dead_centres() -> list[float]:
     return [stretched, folded]
 
 
-@pytest.mark.parametrize(("pin", "places"), [("O4", dead_centres()), ("B", [math.pi, 2 * math.pi]), ("O2", [])])
+@pytest.mark.parametrize(
+    ("pin", "places"),
+    [("O4", dead_centres()), ("B", [math.pi, 2 * math.pi]), ("O2", [])],
+)
 def test_they_are_where_geometry_puts_them(pin: str, places: list[float]) -> None:
     """The rocker turns at its dead centres; bars 3 and 4 turn together where A lies on the line of centres."""
     posed = scene(pin)
     reversals = find_reversals(posed, command(posed), solve(posed))
-    assert [reversal.theta_2 for reversal in reversals] == pytest.approx(places, abs=ROUNDING)
+    assert [reversal.theta_2 for reversal in reversals] == pytest.approx(
+        places, abs=ROUNDING
+    )
     assert {reversal.pin for reversal in reversals} <= {pin}
 
 
@@ -47,7 +56,9 @@ def test_the_jump_is_that_of_statics() -> None:
     posed = scene("O4")
     for reversal in find_reversals(posed, command(posed), solve(posed)):
         sine = abs(float(reversal.before.sin_mu[0]))
-        assert reversal.jump("F43") == pytest.approx(2 * FRICTION / (C * sine), rel=1e-9)
+        assert reversal.jump("F43") == pytest.approx(
+            2 * FRICTION / (C * sine), rel=1e-9
+        )
         assert reversal.jump("torque") < 1e-9  # its power f |slip| is continuous
         assert "O4" in str(reversal) and "jumps from" in str(reversal)
 
@@ -55,11 +66,19 @@ def test_the_jump_is_that_of_statics() -> None:
 @pytest.mark.parametrize("start", [0.1, 0.0])
 def test_both_sides_are_judged_and_the_reversal_itself_is_not(start: float) -> None:
     """From 0 the sweep meets both reversals of pin B exactly; the engines' rounding decides their sense there."""
-    record = judge("scene", scene("B", start=start), [engine for engine in ENGINES if not engine.through_time])
-    assert all(row.passed for row in record.rows), [row for row in record.rows if not row.passed]
+    record = judge(
+        "scene",
+        scene("B", start=start),
+        [engine for engine in ENGINES if not engine.through_time],
+    )
+    assert all(row.passed for row in record.rows), [
+        row for row in record.rows if not row.passed
+    ]
     noted = [row.reason for row in record.rows if "reverses not judged" in row.reason]
     assert bool(noted) == (start == 0.0)
-    assert len(record.jumps) == (2 if start else 1)  # the ends of a sweep that starts in one have a single side
+    assert len(record.jumps) == (
+        2 if start else 1
+    )  # the ends of a sweep that starts in one have a single side
 
 
 def test_a_curve_is_not_drawn_across_the_jump() -> None:
@@ -67,7 +86,9 @@ def test_a_curve_is_not_drawn_across_the_jump() -> None:
     solution = solve(posed)
     reversals = find_reversals(posed, command(posed), solution)
     assert solution.F43 is not None
-    x, y = break_curve(solution.theta_2, solution.F43[:, 0], reversals, lambda side: side.F43[:, 0])  # type: ignore[index]
+    x, y = break_curve(
+        solution.theta_2, solution.F43[:, 0], reversals, lambda side: side.F43[:, 0]
+    )  # type: ignore[index]
     gaps = np.flatnonzero(np.isnan(y))
     assert len(gaps) == len(reversals) == 2 and len(x) == len(y) == len(solution) + 6
     for gap, reversal in zip(gaps, reversals, strict=True):

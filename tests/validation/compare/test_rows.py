@@ -48,29 +48,61 @@ NAN = math.nan
 
 def rows(**counts: int) -> list[Row]:
     """So many rows of each verdict."""
-    names = {"agree": AGREES, "degraded": DEGRADED, "undecided": UNDECIDED, "refuse": REFUSES, "fail": FAILS}
-    return [replace(ROW, verdict=names[name]) for name, many in counts.items() for _ in range(many)]
+    names = {
+        "agree": AGREES,
+        "degraded": DEGRADED,
+        "undecided": UNDECIDED,
+        "refuse": REFUSES,
+        "fail": FAILS,
+    }
+    return [
+        replace(ROW, verdict=names[name])
+        for name, many in counts.items()
+        for _ in range(many)
+    ]
 
 
 def test_a_quantity_that_every_row_calls_degraded_is_counted_and_named() -> None:
-    def row(scene: str, engine: str, quantity: str, verdict: str, allowed: float) -> Row:
-        return replace(ROW, scene=scene, engine=engine, quantity=quantity, verdict=verdict, allowed=allowed)
+    def row(
+        scene: str, engine: str, quantity: str, verdict: str, allowed: float
+    ) -> Row:
+        return replace(
+            ROW,
+            scene=scene,
+            engine=engine,
+            quantity=quantity,
+            verdict=verdict,
+            allowed=allowed,
+        )
 
     scenes = {
-        "one": [("a", "F12", DEGRADED, 1e-3), ("b", "F12", DEGRADED, 2e-4), ("a", "F43", AGREES, 1e-14)],
-        "two": [("a", "F12", DEGRADED, 1.0), ("b", "F12", AGREES, 1e-14), ("b", "F43", FAILS, NAN)],
+        "one": [
+            ("a", "F12", DEGRADED, 1e-3),
+            ("b", "F12", DEGRADED, 2e-4),
+            ("a", "F43", AGREES, 1e-14),
+        ],
+        "two": [
+            ("a", "F12", DEGRADED, 1.0),
+            ("b", "F12", AGREES, 1e-14),
+            ("b", "F43", FAILS, NAN),
+        ],
         "three": [("a", "torque", DEGRADED, 0.5), ("b", "torque", REFUSES, NAN)],
     }
     judged = judge_for_report("", crank_rocker(), (), draw=False)
     records = [
-        replace(judged, name=name, rows=[row(name, *values) for values in many]) for name, many in scenes.items()
+        replace(judged, name=name, rows=[row(name, *values) for values in many])
+        for name, many in scenes.items()
     ]
     summary = summary_of(records)
     assert (summary.loose, summary.pairs) == (2, 5)
     stated = "2 of 5 quantities of a scene are at best"
     for form in (write_markdown(summary), page_of(summary, dict.fromkeys(scenes, 2))):
         text = html.unescape(form)
-        assert stated in text and "torque of three (allowed 5.0e-01), F12 of one (allowed 2.0e-04)" in text
+        assert (
+            stated in text
+            and "torque of three (allowed 5.0e-01), F12 of one (allowed 2.0e-04)"
+            in text
+        )
     assert stated not in write_markdown(summary_of(records[1:2]))
 
 
@@ -94,16 +126,26 @@ IDENTITY = replace(ROW, engine="formulas", quantity="closure")
         (rows(refuse=2), "Nothing was compared: 2 refuse", FAILED),
         (rows(undecided=1), "Nothing was compared: 1 undecided", FAILED),
         ([], "Nothing was compared", FAILED),
-        ([IDENTITY], "Nothing was compared: 1 of the formulas' own identities hold", FAILED),
+        (
+            [IDENTITY],
+            "Nothing was compared: 1 of the formulas' own identities hold",
+            FAILED,
+        ),
         (
             [replace(IDENTITY, verdict=FAILS)],
             "FAILS: 1 of 1 comparisons do not hold: 1 fails",
             FAILED,
         ),
-        ([replace(IDENTITY, quantity="theta_2")], "All 1 comparisons hold: 1 agrees", HOLDS),  # with an exact solution
+        (
+            [replace(IDENTITY, quantity="theta_2")],
+            "All 1 comparisons hold: 1 agrees",
+            HOLDS,
+        ),  # with an exact solution
     ],
 )
-def test_all_hold_counts_what_was_compared_alone(rows: list[Row], sentence: str, status: int) -> None:
+def test_all_hold_counts_what_was_compared_alone(
+    rows: list[Row], sentence: str, status: int
+) -> None:
     counts = Counts(rows)
     assert (counts.sentence(), counts.status) == (sentence, status)
 
@@ -113,7 +155,11 @@ def test_a_row_passes_where_it_was_compared_and_holds() -> None:
         **dict.fromkeys((AGREES, DEGRADED), True),
         **dict.fromkeys((UNDECIDED, REFUSES, FAILS), False),
     }
-    for changed in ({"error": NAN}, {"verdict": DEGRADED, "error": NAN}, {"verdict": "passes"}):
+    for changed in (
+        {"error": NAN},
+        {"verdict": DEGRADED, "error": NAN},
+        {"verdict": "passes"},
+    ):
         with pytest.raises(ValueError, match="no verdict"):
             replace(ROW, **changed)  # type: ignore[arg-type]
 
@@ -159,30 +205,49 @@ class SilentWithoutEffects(Echo):
     [
         (OnlyWithEffects, REFUSES, "nothing acts"),
         (AlarmedWithoutEffects, FAILS, "watch: it shakes"),
-        (SilentWithoutEffects, FAILS, "assembled: the engine did not say where the loop closes"),
+        (
+            SilentWithoutEffects,
+            FAILS,
+            "assembled: the engine did not say where the loop closes",
+        ),
     ],
 )
-def test_what_is_wrong_with_the_inertia_alone_is_a_row(adapter: type, verdict: str, reason: str) -> None:
+def test_what_is_wrong_with_the_inertia_alone_is_a_row(
+    adapter: type, verdict: str, reason: str
+) -> None:
     engine = Engine("echo", adapter, EQUIVALENCE)
-    inertial_rows = [row for row in judge("scene", crank_rocker(), [engine]).rows if row.quantity == "torque_inertia"]
+    inertial_rows = [
+        row
+        for row in judge("scene", crank_rocker(), [engine]).rows
+        if row.quantity == "torque_inertia"
+    ]
     assert [(row.verdict, row.reason) for row in inertial_rows] == [(verdict, reason)]
 
 
 def test_where_no_loop_closes_no_identity_is_counted_as_held() -> None:
-    apart = fourbar.Motion(fourbar.Sweep(2.0, 4.0, 5), 1.0)  # beyond the limits of this input
+    apart = fourbar.Motion(
+        fourbar.Sweep(2.0, 4.0, 5), 1.0
+    )  # beyond the limits of this input
     scene = Scene(fourbar.uniform(0.3, 0.25, 0.1, 0.22), apart)
     assert not fourbar.solve(scene).assembled.any()
     rows = judge("scene", scene, [w for w in ENGINES if w.name == "free-body"]).rows
     verdicts = {(row.engine, row.quantity): row.verdict for row in rows}
-    assert verdicts["formulas", "closure"] == verdicts["free-body", "torque"] == UNDECIDED
+    assert (
+        verdicts["formulas", "closure"] == verdicts["free-body", "torque"] == UNDECIDED
+    )
     assert verdicts["free-body", "assembled"] == AGREES
 
 
-def test_an_identity_that_is_due_nowhere_is_not_counted_as_held(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_identity_that_is_due_nowhere_is_not_counted_as_held(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setattr(
-        "fourbar_validation.run.question.mark_reversing", lambda scene, solution, _: np.ones(len(solution), bool)
+        "fourbar_validation.run.question.mark_reversing",
+        lambda scene, solution, _: np.ones(len(solution), bool),
     )
-    verdicts = {row.quantity: row.verdict for row in judge("scene", crank_rocker(), []).rows}
+    verdicts = {
+        row.quantity: row.verdict for row in judge("scene", crank_rocker(), []).rows
+    }
     expected = {"closure": AGREES, "force_sum": UNDECIDED, "moment_sum": UNDECIDED}
     assert verdicts.items() >= expected.items()
 
@@ -194,7 +259,9 @@ def test_formulas_without_an_answer_fail() -> None:
     positions = fourbar.solve(scene, "position", at=commanded)
     (row,) = [
         r
-        for r in Comparison("", scene, answer, positions, Held(EQUIVALENCE, ("torque",))).rows()
+        for r in Comparison(
+            "", scene, answer, positions, Held(EQUIVALENCE, ("torque",))
+        ).rows()
         if r.quantity == "torque"
     ]
     assert (row.verdict, row.reason) == (FAILS, "the formulas have no answer")
@@ -219,13 +286,24 @@ def test_a_run_in_which_nothing_was_compared_says_so_everywhere_and_ends_with_1(
     judge_here(monkeypatch)
     (tmp_path / "scene.toml").write_text(ONE_POSITION)
     out = tmp_path / "out"
-    arguments = ["run", str(tmp_path / "scene.toml"), "--no-pictures", "--out", str(out)]
-    assert status([*arguments, "--engines", "mujoco-simulated"]) == FAILED  # a simulation needs more than one position
+    arguments = [
+        "run",
+        str(tmp_path / "scene.toml"),
+        "--no-pictures",
+        "--out",
+        str(out),
+    ]
+    assert (
+        status([*arguments, "--engines", "mujoco-simulated"]) == FAILED
+    )  # a simulation needs more than one position
     sentence = "Nothing was compared on 1 scene: 8 of the formulas' own identities hold"
     assert sentence in " ".join(capsys.readouterr().out.split())
     assert sentence in (out / "report.md").read_text()
     page = html.unescape((out / "report.html").read_text())
-    assert f'<h1 class="bad">{sentence}</h1>' in page and '<span class="bad">nothing compared</span>' in page
+    assert (
+        f'<h1 class="bad">{sentence}</h1>' in page
+        and '<span class="bad">nothing compared</span>' in page
+    )
     assert status([*arguments, "--engines", "mujoco-simulated,free-body"]) == HOLDS
 
 
@@ -239,16 +317,22 @@ def test_every_form_of_a_report_says_the_same_counts() -> None:
     )
     summary = summary_of([good, bad])
     # the rows of the formulas themselves stand on both scenes; the others are of the free bodies
-    sentence = "All 54 comparisons on 1 of 2 scenes hold: 54 agree; not compared: 2 refuse"
+    sentence = (
+        "All 54 comparisons on 1 of 2 scenes hold: 54 agree; not compared: 2 refuse"
+    )
     assert summary.verdict == sentence == summary.counts.sentence() and summary.good
     assert sentence in write_markdown(summary)
     page = page_of(summary, {})
     assert sentence in html.unescape(page)
-    assert page.count('class="cell refuses"') == 4 and ">nothing compared</span>" in page
+    assert (
+        page.count('class="cell refuses"') == 4 and ">nothing compared</span>" in page
+    )
     assert ModelReport([], [], []).counts.status == FAILED
 
 
-def test_a_free_motion_that_every_engine_refuses_is_not_held(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_free_motion_that_every_engine_refuses_is_not_held(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     class Refusing:
         def __init__(self, step: float) -> None:
             self.step = step
@@ -256,7 +340,11 @@ def test_a_free_motion_that_every_engine_refuses_is_not_held(monkeypatch: pytest
         def release(self, scene: Scene, times: object) -> ReleasedAnswer:
             return ReleasedAnswer.refused("refusing", "-", "a declared limit")
 
-    monkeypatch.setattr(free, "FORWARD", {name: (Refusing, *rest) for name, (_, *rest) in free.FORWARD.items()})
+    monkeypatch.setattr(
+        free,
+        "FORWARD",
+        {name: (Refusing, *rest) for name, (_, *rest) in free.FORWARD.items()},
+    )
     scene = crank_rocker(motion=fourbar.Motion(1.0, 0.0, free=fourbar.Free(0.2, 20)))
     page = judge_for_report("free", scene, (), draw=False)
     sentence = "Nothing was compared on 1 scene: 1 of the formulas' own identities hold; 2 refuse"
@@ -269,15 +357,40 @@ def junit(old: list[Row], new: list[Row]) -> ET.Element:
 
 def test_junit_skips_what_was_not_compared_and_fails_what_fails_as_before() -> None:
     def of(quantity: str, verdict: str) -> Row:
-        return replace(ROW, quantity=quantity, verdict=verdict, error=1e-15 if verdict == AGREES else NAN)
+        return replace(
+            ROW,
+            quantity=quantity,
+            verdict=verdict,
+            error=1e-15 if verdict == AGREES else NAN,
+        )
 
-    both = [of("torque", AGREES), of("all", REFUSES), of("F12", UNDECIDED), of("F14", FAILS)]
+    both = [
+        of("torque", AGREES),
+        of("all", REFUSES),
+        of("F12", UNDECIDED),
+        of("F14", FAILS),
+    ]
     suites = junit(both, both)
-    kinds = {case.get("name"): [child.tag for child in case] for case in suites.iter("testcase")}
-    assert kinds == {"torque": [], "all": ["skipped"], "F12": ["skipped"], "F14": ["failure"]}
-    assert (suites.get("tests"), suites.get("failures"), suites.get("skipped")) == ("4", "1", "2")
+    kinds = {
+        case.get("name"): [child.tag for child in case]
+        for case in suites.iter("testcase")
+    }
+    assert kinds == {
+        "torque": [],
+        "all": ["skipped"],
+        "F12": ["skipped"],
+        "F14": ["failure"],
+    }
+    assert (suites.get("tests"), suites.get("failures"), suites.get("skipped")) == (
+        "4",
+        "1",
+        "2",
+    )
     worse = junit([of("torque", AGREES)], [of("torque", REFUSES)])
-    assert next(child.tag for case in worse.iter("testcase") for child in case) == "failure"
+    assert (
+        next(child.tag for case in worse.iter("testcase") for child in case)
+        == "failure"
+    )
     nothing = junit(both[1:2], both[1:2])
     assert nothing.get("failures") == "1" and nothing.get("skipped") == "1"
 
@@ -285,21 +398,50 @@ def test_junit_skips_what_was_not_compared_and_fails_what_fails_as_before() -> N
 @pytest.mark.parametrize(
     ("old", "new", "sentence", "code"),
     [
-        (rows(agree=1), rows(agree=1), "No regression in 1 rows: 1 same. New run: All 1 comparisons hold", HOLDS),
-        (rows(refuse=1), rows(refuse=1), "Nothing was compared with the old run in 1 rows: 1 same", FAILED),
-        (rows(fail=1), rows(fail=1), "No regression in 1 rows: 1 same. New run: FAILS: 1 of 1", HOLDS),
-        (rows(agree=1), rows(refuse=1), "1 regression in 1 rows: 1 verdict got worse", FAILED),
+        (
+            rows(agree=1),
+            rows(agree=1),
+            "No regression in 1 rows: 1 same. New run: All 1 comparisons hold",
+            HOLDS,
+        ),
+        (
+            rows(refuse=1),
+            rows(refuse=1),
+            "Nothing was compared with the old run in 1 rows: 1 same",
+            FAILED,
+        ),
+        (
+            rows(fail=1),
+            rows(fail=1),
+            "No regression in 1 rows: 1 same. New run: FAILS: 1 of 1",
+            HOLDS,
+        ),
+        (
+            rows(agree=1),
+            rows(refuse=1),
+            "1 regression in 1 rows: 1 verdict got worse",
+            FAILED,
+        ),
     ],
 )
 def test_two_runs_without_a_comparison_in_common_are_no_success(
-    old: list[Row], new: list[Row], sentence: str, code: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    old: list[Row],
+    new: list[Row],
+    sentence: str,
+    code: int,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
-    folders = [str(save(tmp_path / name, rows)) for name, rows in (("old", old), ("new", new))]
+    folders = [
+        str(save(tmp_path / name, rows)) for name, rows in (("old", old), ("new", new))
+    ]
     assert status(["compare", *folders]) == code
     assert sentence in capsys.readouterr().out
     changes = compare_rows((HERE, old), (HERE, new))
     sentence = render.write_verdict(changes)
-    assert sentence in html.unescape(render.write_html(changes)) and sentence in render.write_markdown(changes)
+    assert sentence in html.unescape(
+        render.write_html(changes)
+    ) and sentence in render.write_markdown(changes)
 
 
 def test_of_two_rows_of_one_name_the_worse_one_counts() -> None:
@@ -307,27 +449,49 @@ def test_of_two_rows_of_one_name_the_worse_one_counts() -> None:
     assert compare_rows((HERE, rows(agree=1)), (HERE, both)).regressed
 
 
-def test_numbers_without_a_digit_do_not_agree(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_numbers_without_a_digit_do_not_agree(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     # 1e-13 rad from a limit of theta_2 the condition of the accelerations is about 1e-13
     rocker = fourbar.uniform(0.3, 0.25, 0.1, 0.22)
     limit = limit_positions(rocker)[0].theta_2
-    near = (Scene(rocker, fourbar.Motion(limit + side * 1e-13, 1.0)) for side in (1.0, -1.0))
-    scene = next(candidate for candidate in near if fourbar.solve(candidate).assembled.all())
+    near = (
+        Scene(rocker, fourbar.Motion(limit + side * 1e-13, 1.0)) for side in (1.0, -1.0)
+    )
+    scene = next(
+        candidate for candidate in near if fourbar.solve(candidate).assembled.all()
+    )
     (tmp_path / "scene.toml").write_text(fourbar.dump(scene))
-    (tmp_path / "theirs.csv").write_text(f"theta_2, torque\n{scene.motion.theta_2!r}, 17.0\n")
-    assert status(["check", str(tmp_path / "scene.toml"), str(tmp_path / "theirs.csv")]) == FAILED
-    assert "Nothing was compared; no digit left to judge 1 more by" in capsys.readouterr().out
+    (tmp_path / "theirs.csv").write_text(
+        f"theta_2, torque\n{scene.motion.theta_2!r}, 17.0\n"
+    )
+    assert (
+        status(["check", str(tmp_path / "scene.toml"), str(tmp_path / "theirs.csv")])
+        == FAILED
+    )
+    assert (
+        "Nothing was compared; no digit left to judge 1 more by"
+        in capsys.readouterr().out
+    )
 
 
 @pytest.mark.slow
 def test_a_study_in_which_no_law_is_fitted_is_no_success(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("fourbar_validation.cost.study.CostStudy.points", lambda _: iter(()))
+    monkeypatch.setattr(
+        "fourbar_validation.cost.study.CostStudy.points", lambda _: iter(())
+    )
     monkeypatch.setattr("fourbar_validation.cost.cost.write", lambda *_: [])
     law = ErrorLaw("order", "torque", 4.0, 0.1, 4.0, 9)
-    for found, code in (([], FAILED), ([replace(law, points=1)], FAILED), ([law], HOLDS)):
-        monkeypatch.setattr("fourbar_validation.cost.cost.fit_laws", lambda _, found=found: found)
+    for found, code in (
+        ([], FAILED),
+        ([replace(law, points=1)], FAILED),
+        ([law], HOLDS),
+    ):
+        monkeypatch.setattr(
+            "fourbar_validation.cost.cost.fit_laws", lambda _, found=found: found
+        )
         assert status(["cost", "--out", str(tmp_path)]) == code
         assert ("Nothing was compared" in capsys.readouterr().out) == (code == FAILED)
 
@@ -346,9 +510,15 @@ def test_a_study_in_which_no_law_is_fitted_is_no_success(
     ],
 )
 def test_one_rule_of_agreement(
-    error: list[float], allowed: float | list[float], mask: list[bool] | None, verdict: str, worst: int
+    error: list[float],
+    allowed: float | list[float],
+    mask: list[bool] | None,
+    verdict: str,
+    worst: int,
 ) -> None:
     mask, places = None if mask is None else np.array(mask), np.array([1.0, 2.0, 3.0])
     bound = np.array(allowed) if isinstance(allowed, list) else allowed
-    row = Row.judged(("a", "b", "c"), "F12", np.array(error), bound, "", places, 1.0, mask)
+    row = Row.judged(
+        ("a", "b", "c"), "F12", np.array(error), bound, "", places, 1.0, mask
+    )
     assert (row.verdict, row.theta_2) == (verdict, worst + 1.0)

@@ -14,11 +14,22 @@ from fourbar_validation.compare.tolerance import WELL_CONDITIONED
 ROCKER = uniform(0.3, 0.25, 0.1, 0.22)
 
 
-def test_the_scale_is_the_greatest_value_of_the_well_conditioned_positions_and_elsewhere_the_value_itself() -> None:
+def test_the_scale_is_the_greatest_value_of_the_well_conditioned_positions_and_elsewhere_the_value_itself() -> (
+    None
+):
     """Of terms that cancel it would be larger, and near a limit, where forces diverge, too."""
-    low, high = sorted(x.theta_2 for x in limit_positions(ROCKER) if 0.0 < x.theta_2 < np.pi)
+    low, high = sorted(
+        x.theta_2 for x in limit_positions(ROCKER) if 0.0 < x.theta_2 < np.pi
+    )
     scene = Scene(
-        ROCKER, Motion(np.append(np.linspace(0.6 * low + 0.4 * high, 0.4 * low + 0.6 * high, 7), high - 1e-7), 10.0)
+        ROCKER,
+        Motion(
+            np.append(
+                np.linspace(0.6 * low + 0.4 * high, 0.4 * low + 0.6 * high, 7),
+                high - 1e-7,
+            ),
+            10.0,
+        ),
     )
     solution = solve(scene)
     assert solution.condition[-1] < WELL_CONDITIONED <= solution.condition[:-1].min()
@@ -26,7 +37,9 @@ def test_the_scale_is_the_greatest_value_of_the_well_conditioned_positions_and_e
         values = getattr(solution, quantity)
         size = np.abs(values) if values.ndim == 1 else np.hypot(*values.T)
         expected = np.append(np.full(7, size[:-1].max()), size[-1])
-        np.testing.assert_allclose(scale_of(quantity, scene, solution, values), expected)
+        np.testing.assert_allclose(
+            scale_of(quantity, scene, solution, values), expected
+        )
 
 
 def test_where_everything_cancels_the_scale_is_that_of_the_forces_that_cancel() -> None:

@@ -18,7 +18,12 @@ from fourbar.scene import command
 from fourbar.show.plot.style import apply_style
 from fourbar_lab.contenders import LINKAGE
 from fourbar_lab.fault_scenes import FAULT_SCENES
-from fourbar_validation.advise.worst_errors import NO_ANSWER, QUANTITIES, WorstErrors, compute_errors
+from fourbar_validation.advise.worst_errors import (
+    NO_ANSWER,
+    QUANTITIES,
+    WorstErrors,
+    compute_errors,
+)
 from fourbar_validation.cost import formulas, laws, pictures, study
 from fourbar_validation.cost.cost import cost, list_front
 from fourbar_validation.cost.series import BEST
@@ -31,15 +36,23 @@ from tests.support.scenes import crank_rocker, thesis
 def turning(omega: float = 10.0, positions: int = 36) -> fourbar.Scene:
     """The crank-rocker a = 0.1, b = 0.25, c = 0.22, d = 0.3 m with gravity, over a revolution."""
     sweep = fourbar.Sweep(0.0, 2.0 * math.pi, positions)
-    return fourbar.Scene(LINKAGE, fourbar.Motion(sweep, omega), effects=(fourbar.Gravity(),))
+    return fourbar.Scene(
+        LINKAGE, fourbar.Motion(sweep, omega), effects=(fourbar.Gravity(),)
+    )
 
 
-def tried(scene: fourbar.Scene, build: Build | None = None) -> Callable[[Settings], WorstErrors]:
+def tried(
+    scene: fourbar.Scene, build: Build | None = None
+) -> Callable[[Settings], WorstErrors]:
     setup = TrialSetup(scene, command(scene))
 
     def error(settings: Settings) -> WorstErrors:
         trial = setup.try_out(settings, build)
-        return NO_ANSWER if trial.broken else compute_errors(scene, trial.at, trial.quantities)
+        return (
+            NO_ANSWER
+            if trial.broken
+            else compute_errors(scene, trial.at, trial.quantities)
+        )
 
     return error
 
@@ -53,14 +66,27 @@ def tried(scene: fourbar.Scene, build: Build | None = None) -> Callable[[Setting
         ("RK4", 4.0, (40, 80, 160, 320)),
     ],
 )
-def test_each_integrator_shows_its_order(integrator: str, order: float, steps: tuple[int, ...]) -> None:
+def test_each_integrator_shows_its_order(
+    integrator: str, order: float, steps: tuple[int, ...]
+) -> None:
     error = tried(turning())
     points = [
-        error(replace(BEST, integrator=integrator, steps_per_revolution=n, time_constant_steps=n / 4)).worst
+        error(
+            replace(
+                BEST,
+                integrator=integrator,
+                steps_per_revolution=n,
+                time_constant_steps=n / 4,
+            )
+        ).worst
         for n in steps
     ]
     exponent, sigma = laws.fit([1.0 / n for n in steps], points)
-    assert abs(exponent - order) <= max(2.0 * sigma, laws.WITHIN), (exponent, sigma, points)
+    assert abs(exponent - order) <= max(2.0 * sigma, laws.WITHIN), (
+        exponent,
+        sigma,
+        points,
+    )
 
 
 def test_softness_is_proportional_to_1_minus_d_and_sags_with_the_square_of_tc() -> None:
@@ -68,10 +94,15 @@ def test_softness_is_proportional_to_1_minus_d_and_sags_with_the_square_of_tc() 
     d = (0.99, 0.999, 0.9999)
     fast, slow = tried(turning()), tried(turning(0.1))
     for error in (fast, slow):
-        slope, _ = laws.fit([1.0 - x for x in d[1:]], [error(replace(plain, impedance=x)).worst for x in d[1:]])
+        slope, _ = laws.fit(
+            [1.0 - x for x in d[1:]],
+            [error(replace(plain, impedance=x)).worst for x in d[1:]],
+        )
         assert abs(slope - 1.0) <= laws.WITHIN
     tc = (5.0, 10.0, 20.0)
-    slope, _ = laws.fit(tc, [slow(replace(plain, time_constant_steps=x)).worst for x in tc])
+    slope, _ = laws.fit(
+        tc, [slow(replace(plain, time_constant_steps=x)).worst for x in tc]
+    )
     assert abs(slope - 2.0) <= laws.WITHIN
     # without gravity and at speed the second group is not there
     assert (
@@ -82,11 +113,19 @@ def test_softness_is_proportional_to_1_minus_d_and_sags_with_the_square_of_tc() 
 
 def test_the_defaults_stay_at_their_floor_at_every_timestep(tmp_path: Path) -> None:
     made = study.CostStudy("s", turning(), tmp_path)
-    (curve,) = [c for c in study.design_curves(turning()) if c.name == "RK4, MuJoCo's defaults"]
-    ladder = made._try_curve(replace(curve, spots=tuple(spot for spot in curve.spots if spot.x in (320, 2560))))
+    (curve,) = [
+        c for c in study.design_curves(turning()) if c.name == "RK4, MuJoCo's defaults"
+    ]
+    ladder = made._try_curve(
+        replace(
+            curve, spots=tuple(spot for spot in curve.spots if spot.x in (320, 2560))
+        )
+    )
     coarse, fine = (p.worst for p in ladder)
     assert fine > laws.FLOORED * coarse
-    assert ladder[1].torque == pytest.approx(4e-3, rel=0.3) and ladder[1].force == pytest.approx(7e-3, rel=0.3)
+    assert ladder[1].torque == pytest.approx(4e-3, rel=0.3) and ladder[
+        1
+    ].force == pytest.approx(7e-3, rel=0.3)
 
 
 def test_pads_do_what_an_edit_of_the_compiled_model_does() -> None:
@@ -113,27 +152,49 @@ def test_only_tolerance_0_is_tight_with_a_heavy_flywheel() -> None:
         # first order: 0.13 omega h and more
         (
             drives.Servo,
-            Settings(steps_per_revolution=6280, integrator="implicitfast", time_constant_steps=3.0, flywheel=1.0),
+            Settings(
+                steps_per_revolution=6280,
+                integrator="implicitfast",
+                time_constant_steps=3.0,
+                flywheel=1.0,
+            ),
             2e-3,
         ),
         (
             drives.VelocityActuator,
-            Settings(steps_per_revolution=6280, integrator="implicitfast", time_constant_steps=3.0, flywheel=1.0),
+            Settings(
+                steps_per_revolution=6280,
+                integrator="implicitfast",
+                time_constant_steps=3.0,
+                flywheel=1.0,
+            ),
             1e-2,
         ),
     ],
 )
-def test_every_drive_exerts_the_torque_of_the_formulas(build: Build, settings: Settings, allowed: float) -> None:
+def test_every_drive_exerts_the_torque_of_the_formulas(
+    build: Build, settings: Settings, allowed: float
+) -> None:
     assert tried(turning(), build)(settings).worst <= allowed
 
 
 def test_one_state_is_wrong_in_proportion_and_right_in_the_limit() -> None:
-    for scene in (turning(positions=12), crank_rocker(), thesis(np.radians([100.0, 135.0, 220.0, 300.0]))):
+    for scene in (
+        turning(positions=12),
+        crank_rocker(),
+        thesis(np.radians([100.0, 135.0, 220.0, 300.0])),
+    ):
         commanded = command(scene)
 
-        def wrong(*impedances: float, scene: fourbar.Scene = scene, commanded: object = commanded) -> float:
+        def wrong(
+            *impedances: float,
+            scene: fourbar.Scene = scene,
+            commanded: object = commanded,
+        ) -> float:
             return compute_errors(
-                scene, commanded, MujocoOneState(impedances).answer(scene, commanded).quantities
+                scene,
+                commanded,
+                MujocoOneState(impedances).answer(scene, commanded).quantities,
             ).worst  # type: ignore[arg-type]
 
         soft, stiff = wrong(0.999), wrong(0.9999)
@@ -142,11 +203,17 @@ def test_one_state_is_wrong_in_proportion_and_right_in_the_limit() -> None:
 
 
 def test_formulas_in_four_precisions() -> None:
-    for scene in (turning(positions=8), crank_rocker(), thesis(np.radians([100.0, 135.0, 220.0]))):
+    for scene in (
+        turning(positions=8),
+        crank_rocker(),
+        thesis(np.radians([100.0, 135.0, 220.0])),
+    ):
         commanded = formulas.choose_few(command(scene))
         exact = formulas.evaluate_balls(scene, commanded, 2 * formulas.FIFTY_DIGITS)
         wrong = {
-            name: formulas.compare_with_reference(scene, commanded, method(scene, commanded), exact).worst
+            name: formulas.compare_with_reference(
+                scene, commanded, method(scene, commanded), exact
+            ).worst
             for name, method in formulas.METHODS.items()
         }
         assert wrong["formulas, double"] < 1e-13 and wrong["13x13"] < 1e-12
@@ -155,30 +222,64 @@ def test_formulas_in_four_precisions() -> None:
 
 
 def test_single_precision_slides_too() -> None:
-    scene = replace(crank_rocker(), effects=(fourbar.PinFriction.at(A=(0.2, 0.02), O4=(0.3, 0.03)),))
-    assert compute_errors(scene, command(scene), formulas.evaluate_single(scene, command(scene))).worst < 1e-4
-    with pytest.raises(NotImplementedError, match="pin forces"):  # thirteen equations that are not linear
+    scene = replace(
+        crank_rocker(), effects=(fourbar.PinFriction.at(A=(0.2, 0.02), O4=(0.3, 0.03)),)
+    )
+    assert (
+        compute_errors(
+            scene, command(scene), formulas.evaluate_single(scene, command(scene))
+        ).worst
+        < 1e-4
+    )
+    with pytest.raises(
+        NotImplementedError, match="pin forces"
+    ):  # thirteen equations that are not linear
         formulas.solve_thirteen_equations(scene, command(scene))
 
 
 def test_what_is_no_number_or_not_compared_has_no_small_error() -> None:
     scene = turning(positions=8)
     commanded = formulas.choose_few(command(scene))
-    exact, ours = formulas.evaluate_balls(scene, commanded), formulas.evaluate_double(scene, commanded)
+    exact, ours = (
+        formulas.evaluate_balls(scene, commanded),
+        formulas.evaluate_double(scene, commanded),
+    )
     ours["torque"][3], ours["F12"][2, 1] = math.nan, math.nan
-    worst_errors = formulas.compare_with_reference(scene, commanded, ours, {**exact, "F14": [(None, None)] * 9})
-    assert worst_errors.torque == worst_errors.F12 == worst_errors.F14 == math.inf and worst_errors.F43 < 1e-13
+    worst_errors = formulas.compare_with_reference(
+        scene, commanded, ours, {**exact, "F14": [(None, None)] * 9}
+    )
+    assert (
+        worst_errors.torque == worst_errors.F12 == worst_errors.F14 == math.inf
+        and worst_errors.F43 < 1e-13
+    )
     still = replace(scene, motion=scene.motion.replace(speed=0.0), drive_bar=4)
     solution = fourbar.solve(still, "force")
     assert (
-        compute_errors(still, command(still), {name: getattr(solution, name) for name in QUANTITIES}).torque == math.inf
+        compute_errors(
+            still,
+            command(still),
+            {name: getattr(solution, name) for name in QUANTITIES},
+        ).torque
+        == math.inf
     )
 
 
-def point(steps: float, worst: float, curve: str = "c", kind: str = study.STEPPED) -> study.CostPoint:
+def point(
+    steps: float, worst: float, curve: str = "c", kind: str = study.STEPPED
+) -> study.CostPoint:
     errors = [worst] * len(QUANTITIES)
     return study.CostPoint(
-        curve, kind, f"{steps:g}/rev", steps, int(steps), steps, *errors, steps * 1e-6, 1e-6, steps, 0.03
+        curve,
+        kind,
+        f"{steps:g}/rev",
+        steps,
+        int(steps),
+        steps,
+        *errors,
+        steps * 1e-6,
+        1e-6,
+        steps,
+        0.03,
     )
 
 
@@ -191,8 +292,12 @@ def test_fit_floor_and_warning() -> None:
     assert laws.find_floor(floored, "F12") == 9e-7
     (line,) = laws.list_warnings({"c": floored})
     for quantity in QUANTITIES:
-        assert f"{quantity} beyond 320 (9.0e-07)" in line  # 320 has 9.5e-7: within a fifth of the floor
-    wrong = laws.fit_laws({"RK4, tc held": [point(10.0 * 2**k, 0.05 * 2.0 ** (-2 * k)) for k in range(6)]})
+        assert (
+            f"{quantity} beyond 320 (9.0e-07)" in line
+        )  # 320 has 9.5e-7: within a fifth of the floor
+    wrong = laws.fit_laws(
+        {"RK4, tc held": [point(10.0 * 2**k, 0.05 * 2.0 ** (-2 * k)) for k in range(6)]}
+    )
     assert [law.quantity for law in wrong] == list(QUANTITIES)
     assert all(not law.holds and law.decided and "FAILS" in str(law) for law in wrong)
 
@@ -202,28 +307,50 @@ JUMPING = (6.4e-2, 3.2e-2, 1.6e-2, 8e-3, 4e-3, 0.44, 1e-3, 5e-4)
 
 
 @pytest.mark.parametrize(
-    "jumping", [JUMPING, (*JUMPING[:5], 9e-2, *JUMPING[6:]), (*JUMPING[:5], math.inf, *JUMPING[6:])]
+    "jumping",
+    [
+        JUMPING,
+        (*JUMPING[:5], 9e-2, *JUMPING[6:]),
+        (*JUMPING[:5], math.inf, *JUMPING[6:]),
+    ],
 )
-def test_a_jump_in_one_pin_force_is_named_and_its_law_fails(jumping: tuple[float, ...]) -> None:
+def test_a_jump_in_one_pin_force_is_named_and_its_law_fails(
+    jumping: tuple[float, ...],
+) -> None:
     ladder = [point(20.0 * 2**k, 0.05 / 2**k) for k in range(8)]
-    ladder = [replace(rung, F43=error) for rung, error in zip(ladder, jumping, strict=True)]
-    laws_found = {law.quantity: law for law in laws.fit_laws({"Euler, tc held": ladder})}
-    assert {name for name, law in laws_found.items() if not law.holds} == {"F43"} and laws_found["F43"].decided
+    ladder = [
+        replace(rung, F43=error) for rung, error in zip(ladder, jumping, strict=True)
+    ]
+    laws_found = {
+        law.quantity: law for law in laws.fit_laws({"Euler, tc held": ladder})
+    }
+    assert {name for name, law in laws_found.items() if not law.holds} == {
+        "F43"
+    } and laws_found["F43"].decided
     jump = f"jumps from 4.0e-03 to {jumping[5]:.1e} at 640/rev"
-    assert laws.list_warnings({"Euler, tc held": ladder}) == [f"Euler, tc held: F43: {jump}"]
+    assert laws.list_warnings({"Euler, tc held": ladder}) == [
+        f"Euler, tc held: F43: {jump}"
+    ]
     assert "F43 jumps" in pictures.state_jumps({"Euler, tc held": ladder})
     drawn = {line.get_gid(): len(line.get_xdata()) for axes in pictures.draw_orders({"Euler, tc held": ladder}, "").axes
              for line in axes.lines if line.get_gid() and len(line.get_xdata())}  # fmt: skip
     assert drawn == {"jump-F43": 1}
     (line,) = laws.write_laws(list(laws_found.values()))
-    assert f"; F43: FAILS, {jump}" in line and "torque, F12, F32, F14: holds, 1.00" in line
+    assert (
+        f"; F43: FAILS, {jump}" in line and "torque, F12, F32, F14: holds, 1.00" in line
+    )
 
 
 def test_each_quantity_has_its_own_order_and_floor() -> None:
-    ladder = [replace(point(20.0 * 2**k, 2.0 ** (-4 * k - 8)), F14=0.05 / 2**k, F32=1e-3) for k in range(8)]
+    ladder = [
+        replace(point(20.0 * 2**k, 2.0 ** (-4 * k - 8)), F14=0.05 / 2**k, F32=1e-3)
+        for k in range(8)
+    ]
     laws_found = {law.quantity: law for law in laws.fit_laws({"RK4, tc held": ladder})}
     assert (
-        laws_found["torque"].holds and laws_found["F14"].exponent == pytest.approx(1.0) and not laws_found["F14"].holds
+        laws_found["torque"].holds
+        and laws_found["F14"].exponent == pytest.approx(1.0)
+        and not laws_found["F14"].holds
     )
     (line,) = laws.list_warnings({"RK4, tc held": ladder})
     assert line.endswith("F32 beyond 20 (1.0e-03)") and "torque" not in line
@@ -231,23 +358,44 @@ def test_each_quantity_has_its_own_order_and_floor() -> None:
 
 def test_a_quantity_that_no_timestep_brings_down_is_no_law_and_is_reported() -> None:
     """In the thesis's mechanism the torque falls by its order with Euler, and the pin forces are wrong throughout."""
-    ladder = [replace(point(160.0 * 2**k, 0.05 / 2**k), F12=error) for k, error in enumerate((1.8, 0.9, 1.1, 0.7))]
-    laws_found = {law.quantity: law for law in laws.fit_laws({"Euler, tc held": ladder})}
-    assert laws_found["torque"].holds and not laws_found["F12"].decided and not laws_found["F12"].holds
+    ladder = [
+        replace(point(160.0 * 2**k, 0.05 / 2**k), F12=error)
+        for k, error in enumerate((1.8, 0.9, 1.1, 0.7))
+    ]
+    laws_found = {
+        law.quantity: law for law in laws.fit_laws({"Euler, tc held": ladder})
+    }
+    assert (
+        laws_found["torque"].holds
+        and not laws_found["F12"].decided
+        and not laws_found["F12"].holds
+    )
     assert laws.list_warnings({"Euler, tc held": ladder}) == [
         "Euler, tc held: no timestep of the ladder brings F12 below 0.1"
     ]
-    assert pictures.state_jumps({"Euler, tc held": ladder}) == "No time step brings F12 below 0.1 with Euler"
+    assert (
+        pictures.state_jumps({"Euler, tc held": ladder})
+        == "No time step brings F12 below 0.1 with Euler"
+    )
 
 
 def test_a_dip_and_a_motion_lost_at_coarse_steps_are_no_jump() -> None:
     """Where two sources cancel the error dips; the softest closures, and the fewest steps, carry no motion at all."""
-    ladder = [point(20.0 * 2**k, error) for k, error in enumerate((0.9, math.inf, 0.3, 3e-2, 1e-4, 1.2e-2, 6e-3, 3e-3))]
+    ladder = [
+        point(20.0 * 2**k, error)
+        for k, error in enumerate((0.9, math.inf, 0.3, 3e-2, 1e-4, 1.2e-2, 6e-3, 3e-3))
+    ]
     assert not any(laws.find_jumps(ladder, quantity) for quantity in QUANTITIES)
 
 
 def test_the_front_holds_what_nothing_beats() -> None:
-    points = [point(10, 1e-2), point(20, 1e-3), point(30, 5e-3), point(40, 1e-5), point(50, float("inf"))]
+    points = [
+        point(10, 1e-2),
+        point(20, 1e-3),
+        point(30, 5e-3),
+        point(40, 1e-5),
+        point(50, float("inf")),
+    ]
     assert [p.steps for p in laws.find_pareto(points, "torque")] == [10, 20, 40]
 
 
@@ -269,27 +417,46 @@ def test_a_study_is_resumed_where_it_was_interrupted(tmp_path: Path) -> None:
     with pytest.raises(KeyboardInterrupt):
         list(units("b").points())
     points = dict(units(None).points())
-    assert done == ["a", "b", "c"] and [p.curve for row in points.values() for p in row] == ["a", "b", "c"]
+    assert done == ["a", "b", "c"] and [
+        p.curve for row in points.values() for p in row
+    ] == ["a", "b", "c"]
     assert json.loads((tmp_path / "run.json").read_text())["study"] == study.VERSION
-    second_study = study.CostStudy("s", turning(20.0), tmp_path)  # another scene in the same folder starts over
+    second_study = study.CostStudy(
+        "s", turning(20.0), tmp_path
+    )  # another scene in the same folder starts over
     second_study.units = {}
     assert not list(second_study.points()) and not list((tmp_path / "parts").iterdir())
 
 
 @pytest.mark.slow
-def test_the_command_writes_table_report_and_pictures(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_command_writes_table_report_and_pictures(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     scene = tmp_path / "small.toml"
     scene.write_text(fourbar.dump(turning(positions=12)))
-    few = {"RK4, tc held", "RK4, MuJoCo's defaults", "tolerance, Newton", "softness d", "sag d, slow"}
+    few = {
+        "RK4, tc held",
+        "RK4, MuJoCo's defaults",
+        "tolerance, Newton",
+        "softness d",
+        "sag d, slow",
+    }
     every = study.design_curves
-    monkeypatch.setattr(study, "design_curves", lambda scene: [c for c in every(scene) if c.name in few])
+    monkeypatch.setattr(
+        study, "design_curves", lambda scene: [c for c in every(scene) if c.name in few]
+    )
     monkeypatch.setattr(study, "REQUIRED", (1e-3, 1e-5))
     monkeypatch.setattr(study, "ROUNDS", 1)
-    process = CliRunner().invoke(cost, [str(scene), "--out", str(tmp_path / "out")], standalone_mode=False)
+    process = CliRunner().invoke(
+        cost, [str(scene), "--out", str(tmp_path / "out")], standalone_mode=False
+    )
     assert process.exception is None and process.return_value == 0, process.output
     assert "matters most here. " in process.output and ", because " in process.output
     assert re.search(r"RK4 steps +ms/turn +\+-", process.output)
-    assert any(re.search(r": .* \d+e-\d+ +\d+ +\S+ +\d+ % *$", line) for line in process.output.splitlines())
+    assert any(
+        re.search(r": .* \d+e-\d+ +\d+ +\S+ +\d+ % *$", line)
+        for line in process.output.splitlines()
+    )
     folder = tmp_path / "out" / "small"
     rows = (folder / "cost.csv").read_text().splitlines()
     assert rows[0] == ",".join(study.COLUMNS) and len(rows) > 40
@@ -303,38 +470,71 @@ def test_the_command_writes_table_report_and_pictures(tmp_path: Path, monkeypatc
         ).stat().st_size > 20_000
 
 
-def test_a_scene_that_cannot_be_run_through_is_refused_before_anything_is_measured(tmp_path: Path) -> None:
+def test_a_scene_that_cannot_be_run_through_is_refused_before_anything_is_measured(
+    tmp_path: Path,
+) -> None:
     scene, out = tmp_path / "law.toml", tmp_path / "out"
     scene.write_text(fourbar.dump(FAULT_SCENES["law"]))
-    process = CliRunner().invoke(cost, [str(scene), "--out", str(out)], standalone_mode=False)
-    assert isinstance(process.exception, fourbar.errors.LimitError) and "motion law" in str(process.exception)
+    process = CliRunner().invoke(
+        cost, [str(scene), "--out", str(out)], standalone_mode=False
+    )
+    assert isinstance(
+        process.exception, fourbar.errors.LimitError
+    ) and "motion law" in str(process.exception)
     assert not out.exists()
 
 
 def test_the_scatter_of_timings_is_that_of_their_middle_half() -> None:
     middle, scatter = study.summarise_timings([1.0, 9.0, 2.0, 2.2, 1.8])
     assert middle == 2.0 and scatter == pytest.approx(0.5 * (2.2 - 1.8) / 2.0)
-    rows = list_front({"c": [point(10, 1e-2), replace(point(20, 1e-3), scatter=math.nan)]})
-    assert rows == [("c: 10/rev", "1e-02", "10", "0.01", "3 %"), ("c: 20/rev", "1e-03", "20", "0.02", "-")]
+    rows = list_front(
+        {"c": [point(10, 1e-2), replace(point(20, 1e-3), scatter=math.nan)]}
+    )
+    assert rows == [
+        ("c: 10/rev", "1e-02", "10", "0.01", "3 %"),
+        ("c: 20/rev", "1e-03", "20", "0.02", "-"),
+    ]
 
 
 def test_names_in_a_picture_cover_no_other_and_are_not_cut() -> None:
     near = {"kind": "exact", "torque": 1e-12, "seconds_per_revolution": 0.3}
     curves = {
-        "inverse": [replace(point(1, 1e-12), setting=name, **near) for name in ("pinocchio-inverse", "mujoco-inverse")],
-        "one state": [replace(point(1, 1e-12), setting="one state, extrapolated", setting_value=0.0, **near)],
-        "Euler": [replace(point(20, 0.2), setting=pictures.DEFAULT, seconds_per_revolution=0.3)],
-        "recommended": [replace(point(20 * 2**k, 1e-3 / 8**k), setting="tc = 20 h") for k in range(4)],
+        "inverse": [
+            replace(point(1, 1e-12), setting=name, **near)
+            for name in ("pinocchio-inverse", "mujoco-inverse")
+        ],
+        "one state": [
+            replace(
+                point(1, 1e-12),
+                setting="one state, extrapolated",
+                setting_value=0.0,
+                **near,
+            )
+        ],
+        "Euler": [
+            replace(
+                point(20, 0.2), setting=pictures.DEFAULT, seconds_per_revolution=0.3
+            )
+        ],
+        "recommended": [
+            replace(point(20 * 2**k, 1e-3 / 8**k), setting="tc = 20 h")
+            for k in range(4)
+        ],
     }
     with apply_style():
         figure = pictures._draw_work_precision(curves, "torque", "title")
     boxes = [text.get_window_extent() for text in figure.axes[0].texts]
-    assert len(boxes) == 7 and not any(box.overlaps(next_box) for box, next_box in combinations(boxes, 2))
+    assert len(boxes) == 7 and not any(
+        box.overlaps(next_box) for box, next_box in combinations(boxes, 2)
+    )
     assert all(figure.bbox.x0 <= box.x0 <= box.x1 <= figure.bbox.x1 for box in boxes)
 
 
 def test_statement_of_a_picture() -> None:
-    curves = {"recommended": [point(30, 5e-5)], "d": [replace(point(300, 4e-3), setting=pictures.DEFAULT)]}
+    curves = {
+        "recommended": [point(30, 5e-5)],
+        "d": [replace(point(300, 4e-3), setting=pictures.DEFAULT)],
+    }
     assert pictures.write_statement(curves, "torque") == (
         "Four digits of torque cost 0.03 ms a revolution; the defaults pay 0.3 ms for an error of 4e-3"
     )

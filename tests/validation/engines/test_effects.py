@@ -39,13 +39,17 @@ ACTING: dict[str, Effect] = {
     "gravity": Gravity(9.81, 0.3),
     "viscous": Viscous.at(O2=0.02, A=0.03, B=0.04, O4=0.05),
     "friction": Friction.at(O2=0.02, A=0.03, B=0.04, O4=0.05),
-    "pin_friction": PinFriction.at(O2=(0.2, 0.01), A=(0.3, 0.01), B=(0.1, 0.02), O4=(0.2, 0.01)),
+    "pin_friction": PinFriction.at(
+        O2=(0.2, 0.01), A=(0.3, 0.01), B=(0.1, 0.02), O4=(0.2, 0.01)
+    ),
     "torsion": Torsion.at(O4=(2.0, 1.9, 0.1), B=(1.0, 0.8, -0.2)),
     "springs": Springs(
         (
             Spring(SpringEnd(1, 0.1, -1.5), SpringEnd(4, 0.08, 0.2), 200.0, 0.05, 3.0),
             Spring(SpringEnd(2, 0.05, 0.5), SpringEnd(3, 0.1, 0.3), 50.0, 0.05, 1.0),
-            Spring.gas(SpringEnd(1, 0.2, 2.0), SpringEnd(3, 0.05, 1.0), 0.5, 0.3, 4.0, 7.0),
+            Spring.gas(
+                SpringEnd(1, 0.2, 2.0), SpringEnd(3, 0.05, 1.0), 0.5, 0.3, 4.0, 7.0
+            ),
             Spring(SpringEnd(1, 0.15, -0.6), SpringEnd(4, 0.1, 0.4), 0.0, preload=-2.0),
             Spring(SpringEnd(1, 0.12, -2.0), SpringEnd(2, 0.05, 0.4), 30.0, 0.0, 2.0),
         )
@@ -74,7 +78,9 @@ def scene(*names: str) -> Scene:
     )
 
 
-def outcome(posed: Scene, engines: list[Any]) -> tuple[list[tuple[str, str, str]], set[str]]:
+def outcome(
+    posed: Scene, engines: list[Any]
+) -> tuple[list[tuple[str, str, str]], set[str]]:
     """What fails, and who refuses."""
     rows = judge("scene", posed, engines).rows
     return [(r.engine, r.quantity, r.reason) for r in rows if r.failed], {
@@ -87,26 +93,38 @@ def failing(posed: Scene, engines: list[Any]) -> list[tuple[str, str, str]]:
 
 
 def list_pairs(names: Iterable[str]) -> list[Any]:
-    return [pytest.param(pair, marks=pytest.mark.slow) for pair in combinations(sorted(names), 2)]
+    return [
+        pytest.param(pair, marks=pytest.mark.slow)
+        for pair in combinations(sorted(names), 2)
+    ]
 
 
 def test_every_effect_of_the_registry_is_here() -> None:
     assert set(list_kinds()) <= set(ACTING)
 
 
-@pytest.mark.parametrize("names", [(name,) for name in ACTING] + list_pairs(ACTING), ids="+".join)
+@pytest.mark.parametrize(
+    "names", [(name,) for name in ACTING] + list_pairs(ACTING), ids="+".join
+)
 def test_exact_engines_agree(names: tuple[str, ...]) -> None:
     assert outcome(scene(*names), EXACT) == ([], set())
 
 
 @pytest.mark.parametrize(
     "names",
-    [(name,) for name in ACTING] + [tuple(ACTING)] + list_pairs(ACTING.keys() - NO_COUNTERPART["mujoco-simulated"]),
+    [(name,) for name in ACTING]
+    + [tuple(ACTING)]
+    + list_pairs(ACTING.keys() - NO_COUNTERPART["mujoco-simulated"]),
     ids="+".join,
 )
-def test_the_simulation_agrees_or_says_what_it_has_no_counterpart_for(names: tuple[str, ...]) -> None:
+def test_the_simulation_agrees_or_says_what_it_has_no_counterpart_for(
+    names: tuple[str, ...],
+) -> None:
     missing = NO_COUNTERPART["mujoco-simulated"] & set(names)
-    assert outcome(scene(*names), SIMULATED) == ([], {"mujoco-simulated"} if missing else set())
+    assert outcome(scene(*names), SIMULATED) == (
+        [],
+        {"mujoco-simulated"} if missing else set(),
+    )
 
 
 @pytest.mark.slow
@@ -121,7 +139,9 @@ def test_all_at_once_on_every_drive_and_branch(drive: int, branch: int) -> None:
 def test_a_turned_frame_turns_gravity_with_it() -> None:
     """Ground, input and gravity turned by one angle: the same torque and the same forces, turned."""
     posed, by = scene("gravity"), 0.7
-    motion = posed.motion.replace(angle=fourbar.Sweep(0.13 + by, 0.13 + by + 2 * np.pi, 12))
+    motion = posed.motion.replace(
+        angle=fourbar.Sweep(0.13 + by, 0.13 + by + 2 * np.pi, 12)
+    )
     turned = replace(
         posed,
         linkage=replace(posed.linkage, ground_angle=posed.linkage.ground_angle + by),
@@ -129,14 +149,23 @@ def test_a_turned_frame_turns_gravity_with_it() -> None:
         effects=(Gravity(9.81, 0.3 + by),),
     )
     posed_solution, turned_solution = fourbar.solve(posed), fourbar.solve(turned)
-    assert posed_solution.torque is not None and posed_solution.F32 is not None and turned_solution.F32 is not None
+    assert (
+        posed_solution.torque is not None
+        and posed_solution.F32 is not None
+        and turned_solution.F32 is not None
+    )
     # 60 roundings of numbers of the size of the largest
     assert turned_solution.torque == pytest.approx(
-        posed_solution.torque, abs=60 * 2.0**-52 * np.abs(posed_solution.torque).max(), rel=0
+        posed_solution.torque,
+        abs=60 * 2.0**-52 * np.abs(posed_solution.torque).max(),
+        rel=0,
     )
     spin = np.exp(1j * by)
     expected = (posed_solution.F32 @ [1, 1j]) * spin
-    assert np.abs(turned_solution.F32 @ [1, 1j] - expected).max() <= 60 * 2.0**-52 * np.abs(expected).max()
+    assert (
+        np.abs(turned_solution.F32 @ [1, 1j] - expected).max()
+        <= 60 * 2.0**-52 * np.abs(expected).max()
+    )
 
 
 # faults
@@ -153,9 +182,16 @@ def moved(effect: Effect) -> Effect:
         case Friction():
             return Friction.at(**{OTHER_PIN[pin]: f for pin, f in effect.torques})
         case PinFriction():
-            return PinFriction.at(**{OTHER_PIN[pin]: (mu, r) for pin, mu, r in effect.pins})
+            return PinFriction.at(
+                **{OTHER_PIN[pin]: (mu, r) for pin, mu, r in effect.pins}
+            )
         case Torsion():
-            return Torsion.at(**{OTHER_PIN[pin]: (k, rest, preload) for pin, k, rest, preload in effect.springs})
+            return Torsion.at(
+                **{
+                    OTHER_PIN[pin]: (k, rest, preload)
+                    for pin, k, rest, preload in effect.springs
+                }
+            )
         case Springs():
             first, *others = effect.springs
             return Springs((replace(first, end=first.end._replace(bar=3)), *others))
@@ -170,10 +206,15 @@ def test_an_effect_that_acts_elsewhere_in_the_formulas_fails_the_run(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The formulas have it at another pin, on another bar or in another direction; the engines where it is."""
-    true, kind = question.solve, "loads" if isinstance(ACTING[name], Load) else "effects"
+    true, kind = (
+        question.solve,
+        "loads" if isinstance(ACTING[name], Load) else "effects",
+    )
     elsewhere = replace(scene(name), **{kind: (moved(ACTING[name]),)})
     monkeypatch.setattr(question, "solve", lambda _, *a, **k: true(elsewhere, *a, **k))
-    failed = failing(scene(name), [engine for engine in EXACT if engine.name in INVERSE])
+    failed = failing(
+        scene(name), [engine for engine in EXACT if engine.name in INVERSE]
+    )
     assert {engine for engine, _, _ in failed} >= INVERSE
     assert "torque" in {quantity for _, quantity, _ in failed}
 
@@ -198,12 +239,16 @@ class FaultyTree:
 
 
 @pytest.mark.parametrize("name", [name for name in ACTING if name != "pin_friction"])
-@pytest.mark.parametrize("factor", [-1.0, 2.0, 0.0], ids=["wrong sign", "applied twice", "missing"])
+@pytest.mark.parametrize(
+    "factor", [-1.0, 2.0, 0.0], ids=["wrong sign", "applied twice", "missing"]
+)
 def test_a_fault_in_the_wrench_on_the_free_bodies_fails_the_run(
     name: str, factor: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def faulty(right: Callable[..., None]) -> Callable[..., None]:
-        def act(effect: Any, motion: Any, wrenches: free_body_effects.BodyWrenches) -> None:
+        def act(
+            effect: Any, motion: Any, wrenches: free_body_effects.BodyWrenches
+        ) -> None:
             alone = free_body_effects.BodyWrenches(len(motion.theta_2))
             right(effect, motion, alone)
             for bar in (2, 3, 4):
@@ -213,24 +258,42 @@ def test_a_fault_in_the_wrench_on_the_free_bodies_fails_the_run(
         return act
 
     if isinstance(ACTING[name], Load):
-        monkeypatch.setattr(free_body_effects, "apply_load", faulty(free_body_effects.apply_load))
+        monkeypatch.setattr(
+            free_body_effects, "apply_load", faulty(free_body_effects.apply_load)
+        )
     else:
-        monkeypatch.setitem(free_body_effects.WRENCH_OF, name, faulty(free_body_effects.WRENCH_OF[name]))
-    failed = failing(scene(name), [engine for engine in EXACT if engine.name == "free-body"])
+        monkeypatch.setitem(
+            free_body_effects.WRENCH_OF, name, faulty(free_body_effects.WRENCH_OF[name])
+        )
+    failed = failing(
+        scene(name), [engine for engine in EXACT if engine.name == "free-body"]
+    )
     assert "torque" in {quantity for _, quantity, _ in failed}
 
 
-def test_what_the_formulas_make_of_a_spring_does_not_reach_the_engines(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_the_formulas_make_of_a_spring_does_not_reach_the_engines(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setattr(Spring, "slack", 0.0)
-    failed = failing(scene("springs"), [engine for engine in EXACT if engine.name in ON_TREES])
+    failed = failing(
+        scene("springs"), [engine for engine in EXACT if engine.name in ON_TREES]
+    )
     assert {engine for engine, _, _ in failed} >= ON_TREES
 
 
 @pytest.mark.parametrize("name", ACTING)
-@pytest.mark.parametrize("factor", [-1.0, 2.0, 0.0], ids=["wrong sign", "applied twice", "missing"])
-def test_a_fault_in_the_engine_term_fails_the_run(name: str, factor: float, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(
+    "factor", [-1.0, 2.0, 0.0], ids=["wrong sign", "applied twice", "missing"]
+)
+def test_a_fault_in_the_engine_term_fails_the_run(
+    name: str, factor: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
     key = ACTING[name].key
     right = TERM_OF[key]
-    monkeypatch.setitem(TERM_OF, key, lambda effect, tree: right(effect, FaultyTree(tree, factor)))
-    failed = failing(scene(name), [engine for engine in EXACT if engine.name in ON_TREES])
+    monkeypatch.setitem(
+        TERM_OF, key, lambda effect, tree: right(effect, FaultyTree(tree, factor))
+    )
+    failed = failing(
+        scene(name), [engine for engine in EXACT if engine.name in ON_TREES]
+    )
     assert {engine for engine, _, _ in failed} >= ON_TREES

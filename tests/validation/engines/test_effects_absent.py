@@ -35,14 +35,21 @@ def called(**acting: Any) -> set[str]:
 
 def test_a_term_of_an_effect_runs_where_a_scene_names_it_and_nowhere_else() -> None:
     names = {*FILE_OF, "Load", "torque_interval", "solve_sliding"}
-    bare, viscous = called(loads=(), effects=()), called(loads=(), effects=(Viscous.at(O2=0.1),))
-    assert "inertia_wrenches" in bare and not [call for call in bare if names & set(call.split("."))]
+    bare, viscous = (
+        called(loads=(), effects=()),
+        called(loads=(), effects=(Viscous.at(O2=0.1),)),
+    )
+    assert "inertia_wrenches" in bare and not [
+        call for call in bare if names & set(call.split("."))
+    ]
     assert "Viscous.act" in viscous and "Gravity.act" not in viscous
 
 
 def compiled(*names: str) -> mujoco.MjModel:
     effects = tuple(ACTING[name] for name in names)
-    return mujoco.MjModel.from_xml_string(write_mjcf(crank_rocker(loads=(), effects=effects)))
+    return mujoco.MjModel.from_xml_string(
+        write_mjcf(crank_rocker(loads=(), effects=effects))
+    )
 
 
 def rows(model: mujoco.MjModel) -> int:
@@ -57,7 +64,8 @@ def disabled(model: mujoco.MjModel) -> set[str]:
     return {
         name.removeprefix("mjDSBL_").lower()
         for name in flags.__members__
-        if name != "mjNDISABLE" and model.opt.disableflags & int(flags.__members__[name])
+        if name != "mjNDISABLE"
+        and model.opt.disableflags & int(flags.__members__[name])
     }
 
 
@@ -66,11 +74,24 @@ BARE = {"contact", "limit", "island", "sensor", "spring", "damper", "frictionlos
 
 def test_the_bare_model_has_the_closed_loop_and_nothing_else() -> None:
     model = compiled()
-    assert (model.nv, model.neq, model.nu, model.ntendon, model.nsensor, model.njnt) == (3, 1, 1, 0, 0, 3)
+    assert (
+        model.nv,
+        model.neq,
+        model.nu,
+        model.ntendon,
+        model.nsensor,
+        model.njnt,
+    ) == (3, 1, 1, 0, 0, 3)
     assert rows(model) == 3  # connect has three, the third of them empty in the plane
     assert disabled(model) == BARE
-    assert not model.opt.gravity.any() and not model.dof_damping.any() and not model.dof_frictionloss.any()
-    assert not (model.opt.enableflags or model.geom_contype.any() or model.jnt_limited.any())
+    assert (
+        not model.opt.gravity.any()
+        and not model.dof_damping.any()
+        and not model.dof_frictionloss.any()
+    )
+    assert not (
+        model.opt.enableflags or model.geom_contype.any() or model.jnt_limited.any()
+    )
 
 
 @pytest.mark.parametrize(
@@ -80,7 +101,13 @@ def test_the_bare_model_has_the_closed_loop_and_nothing_else() -> None:
         ("viscous", {"damper"}, 0, 1, 1),
         ("friction", {"frictionloss"}, 4, 1, 1),
         ("torsion", {"spring"}, 0, 1, 1),
-        ("springs", {"spring"}, 0, 5, 3),  # a constant force, and one that pulls at every length, is an actuator
+        (
+            "springs",
+            {"spring"},
+            0,
+            5,
+            3,
+        ),  # a constant force, and one that pulls at every length, is an actuator
         ("flywheel", set(), 0, 0, 1),
     ],
 )
@@ -97,7 +124,9 @@ def test_each_effect_adds_what_it_needs_and_no_more(
 def test_an_effect_of_zero_size_is_still_named() -> None:
     """A torque of 0 that the scene writes down is the scene's; what it leaves out is not there at all."""
     mjcf = write_mjcf(crank_rocker(loads=(), effects=(Friction.at(A=0.0),)))
-    assert "frictionloss=" in mjcf and 'frictionloss="0.0"' not in write_mjcf(crank_rocker(loads=(), effects=()))
+    assert "frictionloss=" in mjcf and 'frictionloss="0.0"' not in write_mjcf(
+        crank_rocker(loads=(), effects=())
+    )
 
 
 POSITIONS_ONLY = """
@@ -114,29 +143,55 @@ print(*sorted({row.engine for row in record.rows}))
 
 @pytest.mark.slow
 def test_positions_alone_start_no_force_engine() -> None:
-    done = subprocess.run([sys.executable, "-c", POSITIONS_ONLY], capture_output=True, text=True, check=True, cwd=ROOT)
+    done = subprocess.run(
+        [sys.executable, "-c", POSITIONS_ONLY],
+        capture_output=True,
+        text=True,
+        check=True,
+        cwd=ROOT,
+    )
     engines, *left_out, answered = done.stdout.splitlines()
     assert engines == "[]" and answered == "formulas free-body"
-    assert {line.split(":")[0] for line in left_out} == {"pinocchio-inverse", "mujoco-inverse", "mujoco-simulated"}
+    assert {line.split(":")[0] for line in left_out} == {
+        "pinocchio-inverse",
+        "mujoco-inverse",
+        "mujoco-simulated",
+    }
     assert all("the scene states positions only" in line for line in left_out)
 
 
 def moved(*motion: Any) -> Record:
-    return judge("scene", fourbar.Scene(fourbar.uniform(0.3, 0.1, 0.25, 0.22), fourbar.Motion(*motion)))
+    return judge(
+        "scene",
+        fourbar.Scene(fourbar.uniform(0.3, 0.1, 0.25, 0.22), fourbar.Motion(*motion)),
+    )
 
 
 @pytest.mark.parametrize(
     ("motion", "reason"),
     [
-        ((fourbar.Sweep(0.0, 6.0, 20), 0.0), "omega_2 is 0: nothing moves through time"),
+        (
+            (fourbar.Sweep(0.0, 6.0, 20), 0.0),
+            "omega_2 is 0: nothing moves through time",
+        ),
         ((1.0, 2.0), "a simulation needs more than one position"),
     ],
 )
-def test_what_does_not_move_through_time_is_not_simulated(motion: tuple[Any, float], reason: str) -> None:
+def test_what_does_not_move_through_time_is_not_simulated(
+    motion: tuple[Any, float], reason: str
+) -> None:
     record = moved(*motion)
     assert record.left_out == [f"mujoco-simulated: {reason}"]
-    assert {row.engine for row in record.rows} == {"formulas", "free-body", "mujoco-inverse", "pinocchio-inverse"}
+    assert {row.engine for row in record.rows} == {
+        "formulas",
+        "free-body",
+        "mujoco-inverse",
+        "pinocchio-inverse",
+    }
 
 
 def test_equal_positions_are_evaluated_once() -> None:
-    assert "positions: all are the same, one is evaluated" in moved([1.0, 1.0, 1.0], 2.0).left_out
+    assert (
+        "positions: all are the same, one is evaluated"
+        in moved([1.0, 1.0, 1.0], 2.0).left_out
+    )

@@ -11,7 +11,17 @@ import numpy as np
 import pytest
 
 import fourbar
-from fourbar.effects import Flywheel, Friction, Gravity, Load, PinFriction, Spring, SpringEnd, Springs, Viscous
+from fourbar.effects import (
+    Flywheel,
+    Friction,
+    Gravity,
+    Load,
+    PinFriction,
+    Spring,
+    SpringEnd,
+    Springs,
+    Viscous,
+)
 from fourbar.linkage import PINS
 from fourbar.quantities import LINE_QUANTITIES, STAGE_OF
 from fourbar.scene import Scene, command
@@ -31,7 +41,11 @@ RECTANGLE = fourbar.FourBar(0.3, fourbar.Bar(0.1), fourbar.Bar(0.3), fourbar.Bar
 
 def answered(scene: Scene) -> dict[str, Any]:
     answer = FreeBody().answer(scene, command(scene))
-    assert answer.refusal is None and answer.assembled is not None and answer.assembled.all()
+    assert (
+        answer.refusal is None
+        and answer.assembled is not None
+        and answer.assembled.all()
+    )
     return answer.quantities
 
 
@@ -43,22 +57,40 @@ def test_it_imports_the_description_and_nothing_of_the_formulas() -> None:
         "fourbar_validation.engines.free_body",
         "numpy",
     )
-    allowed += ("fourbar_validation.engines.description", "fourbar_validation.compare.line")  # which import these alone
+    allowed += (
+        "fourbar_validation.engines.description",
+        "fourbar_validation.compare.line",
+    )  # which import these alone
     allowed += ("fourbar.quantities",)  # names
     standard = {"collections", "dataclasses", "math", "typing"}
     for module in (free_body, free_body_closure, free_body_effects):
-        modules = imported(ROOT / "validation/fourbar_validation/engines" / f"{module.__name__.split('.')[-1]}.py")
+        modules = imported(
+            ROOT
+            / "validation/fourbar_validation/engines"
+            / f"{module.__name__.split('.')[-1]}.py"
+        )
         assert modules
-        assert not {name for name in modules if not name.startswith(allowed) and name.split(".")[0] not in standard}
+        assert not {
+            name
+            for name in modules
+            if not name.startswith(allowed) and name.split(".")[0] not in standard
+        }
 
 
 # the closure
 
 
-def gap(lengths: tuple[float, ...], theta_2: Any, theta_3: Any, theta_4: Any) -> list[Any]:
+def gap(
+    lengths: tuple[float, ...], theta_2: Any, theta_3: Any, theta_4: Any
+) -> list[Any]:
     """Both closure equations, theta_1 = 0, m."""
     d, a, b, c = lengths
-    z = a * mp.exp(1j * theta_2) + b * mp.exp(1j * theta_3) - d - c * mp.exp(1j * theta_4)
+    z = (
+        a * mp.exp(1j * theta_2)
+        + b * mp.exp(1j * theta_3)
+        - d
+        - c * mp.exp(1j * theta_4)
+    )
     return [mp.re(z), mp.im(z)]
 
 
@@ -72,11 +104,16 @@ def test_the_angles_solve_the_closure_equations_to_50_digits() -> None:
             if 2.0 * max(d, a, b, c) > 0.99 * (d + a + b + c):
                 continue
             linkage = fourbar.uniform(d, a, b, c)
-            theta_2, branch = rng.uniform(-7.0, 7.0, 5), rng.choice([-1, 1], 5).astype(np.int8)
+            theta_2, branch = (
+                rng.uniform(-7.0, 7.0, 5),
+                rng.choice([-1, 1], 5).astype(np.int8),
+            )
             closed = free_body_closure.close(linkage, theta_2, branch)
             for i in np.flatnonzero(closed.assembled):
                 near = [mp.mpf(float(closed.theta[k, i])) for k in (0, 1)]
-                x, y = mp.findroot(partial(gap, (d, a, b, c), mp.mpf(float(theta_2[i]))), near)
+                x, y = mp.findroot(
+                    partial(gap, (d, a, b, c), mp.mpf(float(theta_2[i]))), near
+                )
                 sine = float(mp.sin(y - x))
                 assert sine * branch[i] > 0.0
                 allowed = DIGITS * max(d, a, b, c) / (min(b, c) * abs(sine))
@@ -90,10 +127,18 @@ def test_the_angles_solve_the_closure_equations_to_50_digits() -> None:
 
 @pytest.mark.parametrize(
     ("drive", "torque", "F12", "F32", "F43", "F14"),
-    [(2, 1.0, (-10, 0), (10, 0), (10, 0), (0, 0)), (4, 1.0, (0, 0), (0, 0), (0, 0), (-10, 0))],
+    [
+        (2, 1.0, (-10, 0), (10, 0), (10, 0), (0, 0)),
+        (4, 1.0, (0, 0), (0, 0), (0, 0), (-10, 0)),
+    ],
 )
 def test_a_lever_of_an_upright_rectangle(
-    drive: int, torque: float, F12: tuple[int, int], F32: tuple[int, int], F43: tuple[int, int], F14: tuple[int, int]
+    drive: int,
+    torque: float,
+    F12: tuple[int, int],
+    F32: tuple[int, int],
+    F43: tuple[int, int],
+    F14: tuple[int, int],
 ) -> None:
     """10 N push bar 4 at B along the coupler; the bars are upright and 0.1 m long, and the coupler a two-force bar."""
     load = Load(4, (10.0, 0.0), (0.05, math.pi / 2))
@@ -107,16 +152,22 @@ def test_weight_of_a_crank_and_a_flywheel() -> None:
     """Bar 2 alone has mass: T = (I + m r^2 + J) alpha + m g r cos theta_2, and O2 carries its weight and m a_G."""
     bar = fourbar.Bar(0.1, 2.0, 0.003, (0.04, 0.0))
     linkage = replace(RECTANGLE, input=bar)
-    scene = Scene(linkage, fourbar.Motion(0.7, 3.0, 5.0), 2, (), (Gravity(), Flywheel(0.02)))
+    scene = Scene(
+        linkage, fourbar.Motion(0.7, 3.0, 5.0), 2, (), (Gravity(), Flywheel(0.02))
+    )
     got = answered(scene)
-    assert got["torque"][0] == pytest.approx((0.003 + 2.0 * 0.04**2 + 0.02) * 5.0 + 2.0 * 9.81 * 0.04 * math.cos(0.7))
+    assert got["torque"][0] == pytest.approx(
+        (0.003 + 2.0 * 0.04**2 + 0.02) * 5.0 + 2.0 * 9.81 * 0.04 * math.cos(0.7)
+    )
     a_G = 0.04 * np.exp(0.7j) * (5.0j - 9.0)
     assert got["F12"][0] == pytest.approx([2.0 * a_G.real, 2.0 * (a_G.imag + 9.81)])
     for name in ("F32", "F43", "F14"):
         assert got[name][0] == pytest.approx([0.0, 0.0], abs=1e-14)
 
 
-SPRING = Springs((Spring(SpringEnd(1, 0.1, -1.5), SpringEnd(4, 0.08, 0.2), 200.0, 0.05, 3.0),))
+SPRING = Springs(
+    (Spring(SpringEnd(1, 0.1, -1.5), SpringEnd(4, 0.08, 0.2), 200.0, 0.05, 3.0),)
+)
 TORSION = fourbar.effects.Torsion.at(O4=(2.0, 1.9, 0.1))
 
 
@@ -124,11 +175,24 @@ TORSION = fourbar.effects.Torsion.at(O4=(2.0, 1.9, 0.1))
 def test_over_a_turn_what_stores_energy_gives_it_back(drive: int) -> None:
     """The work of the drive over a revolution at constant speed is zero; the sum over a period converges like n^-n."""
     motion = fourbar.Motion(np.arange(512) * (2.0 * math.pi / 512), 10.0)
-    got = answered(crank_rocker(motion=motion, loads=(), effects=(Gravity(), SPRING, TORSION), drive_bar=2))
+    got = answered(
+        crank_rocker(
+            motion=motion, loads=(), effects=(Gravity(), SPRING, TORSION), drive_bar=2
+        )
+    )
     if drive == 4:
-        four = answered(crank_rocker(motion=motion, loads=(), effects=(Gravity(), SPRING, TORSION), drive_bar=4))
+        four = answered(
+            crank_rocker(
+                motion=motion,
+                loads=(),
+                effects=(Gravity(), SPRING, TORSION),
+                drive_bar=4,
+            )
+        )
         power = four["torque"] * four["omega_4"]
-        assert power == pytest.approx(got["torque"] * 10.0, abs=1e-10 * np.abs(power).max(), rel=0)
+        assert power == pytest.approx(
+            got["torque"] * 10.0, abs=1e-10 * np.abs(power).max(), rel=0
+        )
     assert abs(got["torque"].sum()) < 512 * 1e-14 * np.abs(got["torque"]).max()
     assert np.abs(got["torque"]).max() > 0.1
 
@@ -144,23 +208,39 @@ def test_over_a_turn_what_stores_energy_gives_it_back(drive: int) -> None:
 )
 def test_what_brakes_takes_the_power_that_the_drive_gives_more(effect: Any) -> None:
     """Couple times slip at each pin, at every position; of pin friction with the forces that it changes itself."""
-    with_, without = answered(crank_rocker(effects=(effect,))), answered(crank_rocker(effects=()))
+    with_, without = (
+        answered(crank_rocker(effects=(effect,))),
+        answered(crank_rocker(effects=())),
+    )
     omega = {1: 0.0, 2: 10.0, 3: with_["omega_3"], 4: with_["omega_4"]}
     loss = np.zeros(len(with_["torque"]))
-    for pin, *numbers in getattr(effect, {"viscous": "coefficients", "friction": "torques"}.get(effect.key, "pins")):
+    for pin, *numbers in getattr(
+        effect,
+        {"viscous": "coefficients", "friction": "torques"}.get(effect.key, "pins"),
+    ):
         i, j = PINS[pin]
         slip = np.abs(omega[j] - omega[i])
-        load = np.hypot(*with_[{"O2": "F12", "A": "F32", "B": "F43", "O4": "F14"}[pin]].T)
-        loss += math.prod(numbers) * slip * {"viscous": slip, "friction": 1.0, "pin_friction": load}[effect.key]
+        load = np.hypot(
+            *with_[{"O2": "F12", "A": "F32", "B": "F43", "O4": "F14"}[pin]].T
+        )
+        loss += (
+            math.prod(numbers)
+            * slip
+            * {"viscous": slip, "friction": 1.0, "pin_friction": load}[effect.key]
+        )
     more = 10.0 * (with_["torque"] - without["torque"])
     assert (loss > 0.0).all()
-    assert more == pytest.approx(loss, abs=1e-12 * 10.0 * np.abs(with_["torque"]).max(), rel=0)
+    assert more == pytest.approx(
+        loss, abs=1e-12 * 10.0 * np.abs(with_["torque"]).max(), rel=0
+    )
 
 
 def test_dry_friction_does_nothing_at_rest() -> None:
     dry = (Friction.at(A=1.0), PinFriction.at(B=(0.2, 0.1)))
     still = crank_rocker(motion=fourbar.Motion([0.3, 2.0], 0.0), effects=dry)
-    assert answered(still)["torque"] == pytest.approx(answered(replace(still, effects=()))["torque"], rel=1e-14)
+    assert answered(still)["torque"] == pytest.approx(
+        answered(replace(still, effects=()))["torque"], rel=1e-14
+    )
 
 
 @pytest.mark.parametrize(
@@ -176,13 +256,20 @@ def test_dry_friction_does_nothing_at_rest() -> None:
 )
 def test_friction_of_one_pin(F: complex, C: complex, x: float) -> None:
     """x = |F + C x| by hand; where the couple adds to its own load by as much as it is, the pin jams."""
-    couples = continue_couples(np.array([[F]], dtype=complex), np.array([[[C]]], dtype=complex), np.array([1.0]))
+    couples = continue_couples(
+        np.array([[F]], dtype=complex),
+        np.array([[[C]]], dtype=complex),
+        np.array([1.0]),
+    )
     assert couples[0, 0] == pytest.approx(x, rel=1e-14, nan_ok=True)
 
 
 def test_friction_of_several_pins_fulfils_its_equations() -> None:
     rng = np.random.default_rng(0)
-    F, C = (rng.normal(size=(200, *shape)) + 1j * rng.normal(size=(200, *shape)) for shape in ((3,), (3, 3)))
+    F, C = (
+        rng.normal(size=(200, *shape)) + 1j * rng.normal(size=(200, *shape))
+        for shape in ((3,), (3, 3))
+    )
     k = np.array([0.05, 0.1, 0.02])
     x = continue_couples(F, C, k)
     load = np.abs(F + (C * x[:, None, :]).sum(axis=-1))
@@ -191,16 +278,39 @@ def test_friction_of_several_pins_fulfils_its_equations() -> None:
 
 
 def test_a_singular_position_costs_no_other() -> None:
-    matrix = np.array([[[1.0, 2.0], [2.0, 4.0]], [[2.0, 0.0], [0.0, 4.0]], [[np.nan, 1.0], [1.0, 1.0]]])
+    matrix = np.array(
+        [
+            [[1.0, 2.0], [2.0, 4.0]],
+            [[2.0, 0.0], [0.0, 4.0]],
+            [[np.nan, 1.0], [1.0, 1.0]],
+        ]
+    )
     x, residual = free_body.solve_system(matrix, np.ones((3, 2, 1)))
-    assert np.isnan(x[[0, 2]]).all() and np.array_equal(x[1, :, 0], [0.5, 0.25]) and residual == 0.0
+    assert (
+        np.isnan(x[[0, 2]]).all()
+        and np.array_equal(x[1, :, 0], [0.5, 0.25])
+        and residual == 0.0
+    )
 
 
 def test_positions_alone_are_judged_with_what_is_stated_of_the_linkage() -> None:
-    rows = judge("scene", crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.0, 6.0, 20))), ONE).rows
+    rows = judge(
+        "scene", crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.0, 6.0, 20))), ONE
+    ).rows
     quantities = {row.quantity for row in rows if row.engine == "free-body"}
-    of_the_linkage = {"assembled", "undecided", "closure", "range", "limit_positions", "transmission"}
-    of_positions = {name for name, stage in STAGE_OF.items() if stage == "position" and name not in LINE_QUANTITIES}
+    of_the_linkage = {
+        "assembled",
+        "undecided",
+        "closure",
+        "range",
+        "limit_positions",
+        "transmission",
+    }
+    of_positions = {
+        name
+        for name, stage in STAGE_OF.items()
+        if stage == "position" and name not in LINE_QUANTITIES
+    }
     assert quantities == of_the_linkage | of_positions
     assert all(row.passed for row in rows)
 
@@ -235,7 +345,10 @@ def test_faults_in_the_free_bodies_show(monkeypatch: pytest.MonkeyPatch) -> None
         return made
 
     def still(motion: Any, wrenches: Any) -> None:
-        inertia(motion._replace(omega=dict.fromkeys(motion.omega, 0.0 * motion.omega[2])), wrenches)
+        inertia(
+            motion._replace(omega=dict.fromkeys(motion.omega, 0.0 * motion.omega[2])),
+            wrenches,
+        )
 
     faults: dict[str, tuple[Callable[..., Any], set[str]]] = {
         "close": (
@@ -244,7 +357,10 @@ def test_faults_in_the_free_bodies_show(monkeypatch: pytest.MonkeyPatch) -> None
         ),
         "_make_matrix": (arm_turned, {"torque"}),
         "_add_inertia": (still, {"F12", "F32", "F43", "F14", "torque"}),
-        "sum_acting": (lambda scene, motion: acting(replace(scene, loads=()), motion), {"F43", "torque"}),
+        "sum_acting": (
+            lambda scene, motion: acting(replace(scene, loads=()), motion),
+            {"F43", "torque"},
+        ),
     }
     for name, (fault, expected) in faults.items():
         with monkeypatch.context() as patch:
@@ -252,7 +368,9 @@ def test_faults_in_the_free_bodies_show(monkeypatch: pytest.MonkeyPatch) -> None
             assert failing() >= expected, name
 
 
-def test_blocks_of_positions_make_no_difference(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_blocks_of_positions_make_no_difference(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     full_answer = answered(crank_rocker())
     monkeypatch.setattr(free_body, "BLOCK", 7)
     for name, values in answered(crank_rocker()).items():

@@ -47,8 +47,13 @@ def _ended() -> Iterator[None]:
 
 def judged(scene: fourbar.Scene, *entries: str, seconds: float = 60.0) -> Verdicts:
     """Verdict and reason by engine and quantity; a name without a colon is a class of tests.support."""
-    entries = tuple(entry if re.search("[: ]", entry) else HERE + entry for entry in entries)
-    engines = (*guests.read_guests(entries, [engine.name for engine in FREE_BODY], seconds), *FREE_BODY)
+    entries = tuple(
+        entry if re.search("[: ]", entry) else HERE + entry for entry in entries
+    )
+    engines = (
+        *guests.read_guests(entries, [engine.name for engine in FREE_BODY], seconds),
+        *FREE_BODY,
+    )
     by_engine: Verdicts = {}
     for row in judge("scene", scene, engines).rows:
         by_engine.setdefault(row.engine, {})[row.quantity] = row.verdict, row.reason
@@ -60,59 +65,141 @@ def verdicts(rows: dict[str, tuple[str, str]]) -> set[str]:
 
 
 def others_agree(by_engine: Verdicts) -> bool:
-    return verdicts(by_engine["formulas"]) == verdicts(by_engine["free-body"]) == {AGREES}
+    return (
+        verdicts(by_engine["formulas"]) == verdicts(by_engine["free-body"]) == {AGREES}
+    )
 
 
 @pytest.mark.parametrize("language", ["python", "node"])
 def test_a_program_in_any_language_agrees(language: str, tmp_path: Path) -> None:
     if language == "node" and shutil.which("node") is None:
         pytest.skip("no node")
-    rows = judged(SCENE, f"node {SCRIPT}" if language == "node" else write_program(tmp_path, "plain"))["plain"]
+    rows = judged(
+        SCENE,
+        f"node {SCRIPT}" if language == "node" else write_program(tmp_path, "plain"),
+    )["plain"]
     assert verdicts(rows) == {AGREES}
     assert {"theta_3", "theta_4", "torque", "torque_inertia", "closure"} <= rows.keys()
 
 
 LAST = '    print(json.dumps({"id": question["id"], **reply}), flush=True)\n'
-AFTER_HELLO = '    if question["ask"] == "hello":\n    ' + LAST + "        continue\n    import os, signal, time\n"
+AFTER_HELLO = (
+    '    if question["ask"] == "hello":\n    '
+    + LAST
+    + "        continue\n    import os, signal, time\n"
+)
 WHOLE = '    text = json.dumps({"id": question["id"], **reply})\n'
 SAY = "    print(text, flush=True)\n"
-NO_JSON, ENDLESS = "said what is no JSON", "    while True:\n        print(end='x' * 2**20)\n"
+NO_JSON, ENDLESS = (
+    "said what is no JSON",
+    "    while True:\n        print(end='x' * 2**20)\n",
+)
 PROGRAMS: dict[str, tuple[str, str, str]] = {
-    "one number short": ("values in solved]", "values in solved[1:]]", "answers.theta_3 = "),
-    "log line": ("for question in", 'print("started")\nfor question in', f"{NO_JSON} (Expecting value"),
+    "one number short": (
+        "values in solved]",
+        "values in solved[1:]]",
+        "answers.theta_3 = ",
+    ),
+    "log line": (
+        "for question in",
+        'print("started")\nfor question in',
+        f"{NO_JSON} (Expecting value",
+    ),
     "dead": (LAST, f"{AFTER_HELLO}    sys.exit(3)\n", "exit status 3"),
     "another hello": (
         '["gravity"]}',
         '["gravity"], "version": str(__import__("os").getpid())}',
         "the engine's hello changed",
     ),
-    "raises": (LAST, f"{AFTER_HELLO}    1 / 0\n", "exit status 1: ZeroDivisionError: division"),
+    "raises": (
+        LAST,
+        f"{AFTER_HELLO}    1 / 0\n",
+        "exit status 1: ZeroDivisionError: division",
+    ),
     "early": (LAST, LAST + LAST, "answered question 1 where 2 was asked"),
-    "for another": (LAST, LAST.replace('question["id"],', 'question["id"] + 1,'), "answered question 2 where 1 was"),
-    "no id": (LAST, LAST.replace('"id": question["id"], ', ""), "said what is no object with an id"),
-    "a list": (LAST, "    print([1], flush=True)\n", "said what is no object with an id: [1]"),
+    "for another": (
+        LAST,
+        LAST.replace('question["id"],', 'question["id"] + 1,'),
+        "answered question 2 where 1 was",
+    ),
+    "no id": (
+        LAST,
+        LAST.replace('"id": question["id"], ', ""),
+        "said what is no object with an id",
+    ),
+    "a list": (
+        LAST,
+        "    print([1], flush=True)\n",
+        "said what is no object with an id: [1]",
+    ),
     "NaN": (TORQUE, '"torque": math.nan', f"{NO_JSON} (NaN is no number"),
-    "1e400": (LAST, f"{WHOLE}    text = text.replace('0.33', '1e400')\n{SAY}", "answers.torque = "),
+    "1e400": (
+        LAST,
+        f"{WHOLE}    text = text.replace('0.33', '1e400')\n{SAY}",
+        "answers.torque = ",
+    ),
     "texts": (TORQUE, '"torque": "1.0"', "answers.torque = "),
     "booleans": (TORQUE, '"torque": theta > 2', "answers.torque = "),
     "long integers": (TORQUE, '"torque": 10**400', "answers.torque = "),
-    "repeated key": (LAST, f"{WHOLE}    text = text[:-1] + ', \"id\": 1}}'\n{SAY}", f"{NO_JSON} (a key"),
-    "another code": (LAST, f"{AFTER_HELLO}    sys.stdout.buffer.write(b'\\xff\\n')\n    sys.stdout.flush()\n", NO_JSON),
-    "empty refusal": ('{"answers": {name', '{"refusal": " "} or {"answers": {name', "refusal = "),
-    "own words": ('{"answers": {name', '{"error": "no\\nlicence"} or {"answers": {name', "no licence"),
-    "mid-line": (LAST, f"{WHOLE}    print(end=text[:20])\n    sys.exit()\n", "exit status 0 in the middle of a line"),
-    "closes": (LAST, f"{AFTER_HELLO}    os.close(1)\n    time.sleep(60)\n", "closed its standard output"),
+    "repeated key": (
+        LAST,
+        f"{WHOLE}    text = text[:-1] + ', \"id\": 1}}'\n{SAY}",
+        f"{NO_JSON} (a key",
+    ),
+    "another code": (
+        LAST,
+        f"{AFTER_HELLO}    sys.stdout.buffer.write(b'\\xff\\n')\n    sys.stdout.flush()\n",
+        NO_JSON,
+    ),
+    "empty refusal": (
+        '{"answers": {name',
+        '{"refusal": " "} or {"answers": {name',
+        "refusal = ",
+    ),
+    "own words": (
+        '{"answers": {name',
+        '{"error": "no\\nlicence"} or {"answers": {name',
+        "no licence",
+    ),
+    "mid-line": (
+        LAST,
+        f"{WHOLE}    print(end=text[:20])\n    sys.exit()\n",
+        "exit status 0 in the middle of a line",
+    ),
+    "closes": (
+        LAST,
+        f"{AFTER_HELLO}    os.close(1)\n    time.sleep(60)\n",
+        "closed its standard output",
+    ),
     "endless": (LAST, ENDLESS, "said more than 1000000 bytes without an end"),
-    "eats memory": (LAST, f"{AFTER_HELLO}    x = [b'x' * 10**6 * i for i in range(999)]\n", "exit status 1: MemoryEr"),
-    "kills its parent": (LAST, f"{AFTER_HELLO}    os.kill(os.getppid(), 9)\n", "was killed"),
+    "eats memory": (
+        LAST,
+        f"{AFTER_HELLO}    x = [b'x' * 10**6 * i for i in range(999)]\n",
+        "exit status 1: MemoryEr",
+    ),
+    "kills its parent": (
+        LAST,
+        f"{AFTER_HELLO}    os.kill(os.getppid(), 9)\n",
+        "was killed",
+    ),
     "kills itself": (LAST, f"{AFTER_HELLO}    os.kill(os.getpid(), 9)\n", "was killed"),
-    "crashes": (LAST, f"{AFTER_HELLO}    os.kill(os.getpid(), 11)\n", "ended by signal 11"),
+    "crashes": (
+        LAST,
+        f"{AFTER_HELLO}    os.kill(os.getpid(), 11)\n",
+        "ended by signal 11",
+    ),
 }
 """Replacement in the plain engine, and the reason of its row."""
 SILENT: dict[str, tuple[str, str]] = {
     "silent": (LAST, f"{AFTER_HELLO}    time.sleep(1000)\n"),
-    "ignores termination": (LAST, f"{AFTER_HELLO}    signal.signal(15, signal.SIG_IGN)\n    time.sleep(1000)\n"),
-    "floods its errors": (LAST, f"{AFTER_HELLO}    while True: print('x' * 2**20, file=sys.stderr)\n"),
+    "ignores termination": (
+        LAST,
+        f"{AFTER_HELLO}    signal.signal(15, signal.SIG_IGN)\n    time.sleep(1000)\n",
+    ),
+    "floods its errors": (
+        LAST,
+        f"{AFTER_HELLO}    while True: print('x' * 2**20, file=sys.stderr)\n",
+    ),
 }
 FORK = """
     import os, time
@@ -123,25 +210,41 @@ FORK = """
         os._exit(0)
 """
 FINE: dict[str, tuple[str, str]] = {
-    "byte by byte": (LAST, f"{WHOLE}    for c in text + chr(10): print(end=c, flush=True)\n"),
-    "patches the clock": (LAST, f"    import time; time.time = time.monotonic = lambda: 0.0\n{LAST}"),
+    "byte by byte": (
+        LAST,
+        f"{WHOLE}    for c in text + chr(10): print(end=c, flush=True)\n",
+    ),
+    "patches the clock": (
+        LAST,
+        f"    import time; time.time = time.monotonic = lambda: 0.0\n{LAST}",
+    ),
     "leaves its session": (LAST, FORK + LAST),
-    "deaf": (LAST, f"{LAST}    if question['ask'] == 'answer': import os; os.close(2)\n"),
+    "deaf": (
+        LAST,
+        f"{LAST}    if question['ask'] == 'answer': import os; os.close(2)\n",
+    ),
 }
 
 
 def test_a_torque_that_is_a_thousandth_off_fails_alone(tmp_path: Path) -> None:
     by_engine = judged(
-        SCENE, write_program(tmp_path, "off", (TORQUE, '"torque": 1.001 * (moments[0] - cross(r2, F32))'))
+        SCENE,
+        write_program(
+            tmp_path, "off", (TORQUE, '"torque": 1.001 * (moments[0] - cross(r2, F32))')
+        ),
     )
-    assert {name for name, (verdict, _) in by_engine["off"].items() if verdict == FAILS} == {"torque", "torque_inertia"}
+    assert {
+        name for name, (verdict, _) in by_engine["off"].items() if verdict == FAILS
+    } == {"torque", "torque_inertia"}
     assert others_agree(by_engine)
 
 
 @pytest.mark.slow
 @pytest.mark.linux
 @pytest.mark.timeout(300)
-def test_whatever_a_program_does_costs_its_own_rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_whatever_a_program_does_costs_its_own_rows(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(processes, "WORKER_MEMORY", 2 * 10**8)
     monkeypatch.setenv("MARK_OF_TEST", str(tmp_path))
     entries = {}
@@ -156,8 +259,13 @@ def test_whatever_a_program_does_costs_its_own_rows(tmp_path: Path, monkeypatch:
         rows = by_engine[
             name if name in by_engine else name.replace(" ", "_")
         ]  # of one whose hello fails the file's name
-        ((verdict, said),) = [row for quantity, row in rows.items() if quantity == "all"]
-        assert verdict == FAILS and said.startswith(reason) and "\n" not in said, (name, rows)
+        ((verdict, said),) = [
+            row for quantity, row in rows.items() if quantity == "all"
+        ]
+        assert verdict == FAILS and said.startswith(reason) and "\n" not in said, (
+            name,
+            rows,
+        )
     end_guests()
     assert not list_processes(f"MARK_OF_TEST={tmp_path}")
 
@@ -165,7 +273,9 @@ def test_whatever_a_program_does_costs_its_own_rows(tmp_path: Path, monkeypatch:
 @pytest.mark.slow
 @pytest.mark.linux
 @pytest.mark.timeout(120)
-def test_a_program_that_is_silent_ends_at_its_limit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_program_that_is_silent_ends_at_its_limit(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """With what it started, and is not asked again for that scene."""
     monkeypatch.setenv("MARK_OF_TEST", str(tmp_path))
     monkeypatch.setattr(processes, "MOST_ERRORS", 10**7)
@@ -175,7 +285,9 @@ def test_a_program_that_is_silent_ends_at_its_limit(tmp_path: Path, monkeypatch:
     assert time.monotonic() - began < 60.0 and others_agree(by_engine)
     for name in ("silent", "ignores termination"):
         assert by_engine[name] == {"all": (FAILS, "no answer within 3 s")}
-    assert by_engine["floods its errors"]["all"][1].startswith(("wrote more than", "no answer within"))
+    assert by_engine["floods its errors"]["all"][1].startswith(
+        ("wrote more than", "no answer within")
+    )
     assert not list_processes(f"MARK_OF_TEST={tmp_path}")
 
 
@@ -186,7 +298,9 @@ def test_what_is_killed_from_outside_is_asked_again(tmp_path: Path) -> None:
     lives.write_text("xxxx")
     body = f"    n = os.path.getsize({str(lives)!r})\n"
     body += f"    if n: os.truncate({str(lives)!r}, n - 1); os.kill(os.getpid(), 9)\n"
-    by_engine = judged(SCENE, write_program(tmp_path, "unlucky", (LAST, AFTER_HELLO + body + LAST)))
+    by_engine = judged(
+        SCENE, write_program(tmp_path, "unlucky", (LAST, AFTER_HELLO + body + LAST))
+    )
     assert verdicts(by_engine["unlucky"]) == {AGREES} and not lives.stat().st_size
 
 
@@ -194,14 +308,26 @@ def test_a_class_is_served_by_our_host() -> None:
     classes = "Right Angle Changes Prints Empty Leaves Lacks Shapes Elsewhere Complex"
     by_engine = judged(SCENE, *classes.split())
     assert others_agree(by_engine) and verdicts(by_engine["right"]) == {AGREES}
-    assert by_engine["right"].keys() >= {*fourbar.quantities.UNKNOWNS, "assembled", "closure", "torque_inertia"}
-    assert set(by_engine["angle"]) == {"assembled", "theta_3", "undecided"} and verdicts(by_engine["angle"]) == {AGREES}
+    assert by_engine["right"].keys() >= {
+        *fourbar.quantities.UNKNOWNS,
+        "assembled",
+        "closure",
+        "torque_inertia",
+    }
+    assert set(by_engine["angle"]) == {
+        "assembled",
+        "theta_3",
+        "undecided",
+    } and verdicts(by_engine["angle"]) == {AGREES}
     failing = {
-        name: {quantity for quantity, row in rows.items() if row[0] == FAILS} for name, rows in by_engine.items()
+        name: {quantity for quantity, row in rows.items() if row[0] == FAILS}
+        for name, rows in by_engine.items()
     }
     assert failing["changes"] == {"torque"}
     assert failing["lacks"] == {"theta_4", "torque", "closure", "torque_inertia"}
-    reasons = {name: rows["all"][1] for name, rows in by_engine.items() if "all" in rows}
+    reasons = {
+        name: rows["all"][1] for name, rows in by_engine.items() if "all" in rows
+    }
     assert reasons == {
         "prints": "ValueError: no licence",
         "empty": "TypeError: the answer is a NoneType, not a fourbar_validation.Answer",
@@ -210,13 +336,21 @@ def test_a_class_is_served_by_our_host() -> None:
         "shapes": reasons["shapes"],
         "elsewhere": reasons["elsewhere"],
     }
-    assert reasons["shapes"].startswith("answers.F12") and reasons["elsewhere"].startswith("at.omega_2")
+    assert reasons["shapes"].startswith("answers.F12") and reasons[
+        "elsewhere"
+    ].startswith("at.omega_2")
 
 
 def test_a_guest_is_asked_for_what_its_hello_names(tmp_path: Path) -> None:
-    four = crank_rocker(motion=fourbar.Motion(theta_4=fourbar.Sweep(1.8, 2.5, 8), omega_4=3.0))
-    three = crank_rocker(motion=fourbar.Motion(theta_3=fourbar.Sweep(0.4, 0.8, 8), omega_3=3.0))
-    stroke = fourbar.Motion(stroke=fourbar.Sweep(0.25, 0.35, 8), stroke_speed=0.2, side="left")
+    four = crank_rocker(
+        motion=fourbar.Motion(theta_4=fourbar.Sweep(1.8, 2.5, 8), omega_4=3.0)
+    )
+    three = crank_rocker(
+        motion=fourbar.Motion(theta_3=fourbar.Sweep(0.4, 0.8, 8), omega_3=3.0)
+    )
+    stroke = fourbar.Motion(
+        stroke=fourbar.Sweep(0.25, 0.35, 8), stroke_speed=0.2, side="left"
+    )
     drive = fourbar.LinearDrive(SpringEnd(1, 0.3, 2.2), SpringEnd(2, 0.12, 0.4))
     for scene in (four, crank_rocker(motion=stroke, drive=drive)):
         by_engine = judged(scene, "OfAnyBar", "Right")
@@ -224,26 +358,49 @@ def test_a_guest_is_asked_for_what_its_hello_names(tmp_path: Path) -> None:
             verdicts(by_engine["of any bar"]) == {AGREES}
             and {"theta_3", "alpha_4", "F12"} <= by_engine["of any bar"].keys()
         )
-        assert by_engine["right"].keys() == {"all"} and by_engine["right"]["all"][0] == REFUSES
+        assert (
+            by_engine["right"].keys() == {"all"}
+            and by_engine["right"]["all"][0] == REFUSES
+        )
     assert judged(three, "OfAnyBar")["of any bar"]["all"][0] == REFUSES
     loaded = judged(crank_rocker(), write_program(tmp_path, "plain"))["plain"]
-    assert loaded["all"] == (REFUSES, "the engine's hello does not list loads in effects")
+    assert loaded["all"] == (
+        REFUSES,
+        "the engine's hello does not list loads in effects",
+    )
 
 
-def test_a_guest_that_integrates_is_asked_for_released_motions(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_guest_that_integrates_is_asked_for_released_motions(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     pytest.importorskip("mujoco")
-    monkeypatch.setattr("fourbar_validation.run.released.LONGEST_STEP", 1e-3)  # MuJoCo's here
+    monkeypatch.setattr(
+        "fourbar_validation.run.released.LONGEST_STEP", 1e-3
+    )  # MuJoCo's here
     motion = fourbar.Motion(1.0, 2.0, free=Free(0.2, 10))
     by_engine = judged(crank_rocker(motion=motion, loads=()), "Releases", "Right")
-    assert verdicts(by_engine["releases"]) <= {AGREES, DEGRADED} and verdicts(by_engine["right"]) <= {AGREES, DEGRADED}
-    assert {"theta_2", "omega_2", "energy", "stopped_at", "F12"} <= by_engine["releases"].keys()
+    assert verdicts(by_engine["releases"]) <= {AGREES, DEGRADED} and verdicts(
+        by_engine["right"]
+    ) <= {AGREES, DEGRADED}
+    assert {"theta_2", "omega_2", "energy", "stopped_at", "F12"} <= by_engine[
+        "releases"
+    ].keys()
     assert "energy" not in by_engine["right"]
-    assert {name: by_engine["releases"][name] for name in by_engine["mujoco-forward"]} == by_engine["mujoco-forward"]
+    assert {
+        name: by_engine["releases"][name] for name in by_engine["mujoco-forward"]
+    } == by_engine["mujoco-forward"]
 
 
 def test_names_stand_apart() -> None:
     """Of another engine, of two guests, and of those whose hello fails: by entry, class or file."""
-    entries = [HERE + "OfAnother", HERE + "Right", HERE + "Right", HERE + "Nameless", "false", "sh -c 'exit 3'"]
+    entries = [
+        HERE + "OfAnother",
+        HERE + "Right",
+        HERE + "Right",
+        HERE + "Nameless",
+        "false",
+        "sh -c 'exit 3'",
+    ]
     names = [guest.name for guest in guests.read_guests(entries, ["free-body"])]
     assert names == ["free-body-2", "right", "right-2", "Nameless", "false", "sh"]
 
@@ -260,20 +417,44 @@ def test_names_stand_apart() -> None:
 def test_what_is_not_there_is_refused_in_one_line(entry: str, part: str) -> None:
     with pytest.raises(InputError) as error:
         select_scenes(Request(witness=(entry,)))
-    assert str(error.value).startswith("--witness = ") and part in str(error.value) and "\n" not in str(error.value)
+    assert (
+        str(error.value).startswith("--witness = ")
+        and part in str(error.value)
+        and "\n" not in str(error.value)
+    )
 
 
-@pytest.mark.parametrize(("name", "reason"), [("Nameless", "engine"), ("Loose", "tolerance"), ("Else", "answers")])
+@pytest.mark.parametrize(
+    ("name", "reason"),
+    [("Nameless", "engine"), ("Loose", "tolerance"), ("Else", "answers")],
+)
 def test_a_hello_that_fails_is_one_failing_row(name: str, reason: str) -> None:
     by_engine = judged(SCENE, name)
-    ((engine, rows),) = [item for item in by_engine.items() if item[0] not in ("formulas", "free-body")]
-    assert others_agree(by_engine) and rows.keys() == {"all"} and rows["all"][0] == FAILS
+    ((engine, rows),) = [
+        item for item in by_engine.items() if item[0] not in ("formulas", "free-body")
+    ]
+    assert (
+        others_agree(by_engine) and rows.keys() == {"all"} and rows["all"][0] == FAILS
+    )
     assert engine == name and rows["all"][1].startswith(reason)
 
 
 def command_line(out: Path, *options: str) -> "subprocess.CompletedProcess[str]":
-    line = [sys.executable, "-m", "validation", "run", str(out / "scene.toml"), str(out / "second.toml")]
-    line += ["--engines=free-body", "--workers=1", f"--out={out / 'out'}", "--no-pictures", *options]
+    line = [
+        sys.executable,
+        "-m",
+        "validation",
+        "run",
+        str(out / "scene.toml"),
+        str(out / "second.toml"),
+    ]
+    line += [
+        "--engines=free-body",
+        "--workers=1",
+        f"--out={out / 'out'}",
+        "--no-pictures",
+        *options,
+    ]
     return subprocess.run(line, cwd=ROOT, capture_output=True, text=True, check=False)
 
 
@@ -289,16 +470,26 @@ def test_a_run_with_guests_ends_with_their_rows_and_none_of_their_processes(
     leaves = write_program(tmp_path, "leaves", FINE["leaves its session"])
     classes = [f"--witness={HERE}{name}" for name in ("Right", "Prints")]
     began = time.monotonic()
-    done = command_line(tmp_path, "--time-limit=5", f"--witness={silent}", f"--witness={leaves}", *classes)
+    done = command_line(
+        tmp_path,
+        "--time-limit=5",
+        f"--witness={silent}",
+        f"--witness={leaves}",
+        *classes,
+    )
     assert done.returncode == 1 and time.monotonic() - began < 200.0, done.stderr
     assert "owned" not in done.stdout + done.stderr
     rows: dict[str, set[tuple[str, str]]] = {}
     for row in read_columns(tmp_path / "out" / "results.csv"):
-        rows.setdefault(row.engine, set()).add((row.verdict, row.reason if row.quantity == "all" else ""))
+        rows.setdefault(row.engine, set()).add(
+            (row.verdict, row.reason if row.quantity == "all" else "")
+        )
     for name in ("formulas", "free-body", "right", "leaves"):
         assert rows[name] == {(AGREES, "")}, name
     assert rows["silent"] == {(FAILS, "no answer within 5 s")}
-    assert rows["prints"] == {(FAILS, "ValueError: no licence; what it printed: output.txt")}
+    assert rows["prints"] == {
+        (FAILS, "ValueError: no licence; what it printed: output.txt")
+    }
     text = (tmp_path / "out" / "output.txt").read_text()
     assert text.count("\\x1b]0;owned\\x07begin\nfrom a shell") == 2
     if sys.platform == "linux":
@@ -315,7 +506,12 @@ def test_a_report_shows_the_versions_that_guests_state(tmp_path: Path) -> None:
     ]
     save(SCENE, tmp_path / "scene.toml")
     suite = read_scene_files([tmp_path / "scene.toml"])
-    summary = run(suite, tmp_path / "out", guests.read_guests(entries, ()), RunOptions(drawn=False))
+    summary = run(
+        suite,
+        tmp_path / "out",
+        guests.read_guests(entries, ()),
+        RunOptions(drawn=False),
+    )
     shown = {line.name: line.version for line in summary.engines if line.name in stated}
     assert shown == {"numpy-like": "", "own": "2.1", "own 3.0": ""}
     assert "| own 2.1 |" in (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
@@ -331,7 +527,9 @@ def answer(scene, at):
 """
 
 
-def test_parts_judged_by_another_code_are_made_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_parts_judged_by_another_code_are_made_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Runs that are interrupted once the first part is there; what the second one says of its parts."""
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     (tmp_path / "mine.py").write_text(
@@ -350,19 +548,34 @@ def test_parts_judged_by_another_code_are_made_again(tmp_path: Path, monkeypatch
     def notes(entries: Sequence[str]) -> list[str]:
         heard, engines = Interrupting(), guests.read_guests(entries, ())
         with pytest.raises(KeyboardInterrupt):
-            run(suite, tmp_path / "out", engines, RunOptions(drawn=False), progress=heard)
+            run(
+                suite,
+                tmp_path / "out",
+                engines,
+                RunOptions(drawn=False),
+                progress=heard,
+            )
         return heard.lines
 
     program = write_program(tmp_path, "program")
     for factor, expected in (("1.0", 0), ("1.0", 0), ("1.01", 1), ("1.01", 0)):
         (tmp_path / "near.py").write_text(NEAR.replace("FACTOR", factor))
-        assert notes(["mine:Mine", program]) == ["made again: the parts of another run (engines)"] * expected
-    write_program(tmp_path, "program", (TORQUE, '"torque": 1.01 * (moments[0] - cross(r2, F32))'))
-    assert notes(["mine:Mine", program]) == ["made again: the parts of another run (engines)"]
+        assert (
+            notes(["mine:Mine", program])
+            == ["made again: the parts of another run (engines)"] * expected
+        )
+    write_program(
+        tmp_path, "program", (TORQUE, '"torque": 1.01 * (moments[0] - cross(r2, F32))')
+    )
+    assert notes(["mine:Mine", program]) == [
+        "made again: the parts of another run (engines)"
+    ]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("engine", [*ENGINES, *load_further()], ids=lambda engine: engine.name)
+@pytest.mark.parametrize(
+    "engine", [*ENGINES, *load_further()], ids=lambda engine: engine.name
+)
 def test_our_own_adapters_answer_the_same_bytes_through_the_host(engine: Any) -> None:
     if missing := engine.missing():
         pytest.skip(missing)
@@ -370,9 +583,16 @@ def test_our_own_adapters_answer_the_same_bytes_through_the_host(engine: Any) ->
     start = partial(guests.GuestClient, engine.name, program, guests.ask_hello(program))
     outside = replace(engine, start=start)
     loaded = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.1, 6.38, 40), 10.0))
-    stroke = fourbar.Motion(stroke=fourbar.Sweep(0.25, 0.35, 8), stroke_speed=0.2, side="left")
+    stroke = fourbar.Motion(
+        stroke=fourbar.Sweep(0.25, 0.35, 8), stroke_speed=0.2, side="left"
+    )
     drive = fourbar.LinearDrive(SpringEnd(1, 0.3, 2.2), SpringEnd(2, 0.12, 0.4))
     theta_4 = fourbar.Motion(theta_4=fourbar.Sweep(1.8, 2.5, 8), omega_4=3.0)
-    for scene in (loaded, SCENE, crank_rocker(motion=stroke, drive=drive), crank_rocker(motion=theta_4)):
+    for scene in (
+        loaded,
+        SCENE,
+        crank_rocker(motion=stroke, drive=drive),
+        crank_rocker(motion=theta_4),
+    ):
         inside = judge("scene", scene, (engine,), order=False).rows
         assert repr(judge("scene", scene, (outside,), order=False).rows) == repr(inside)

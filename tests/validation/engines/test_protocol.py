@@ -38,9 +38,19 @@ def through_text(data):
 
 def stated(scene):
     """What a guest is told: no words, pictures, points, tolerances, the motion apart, and no place of no force."""
-    loads = tuple(load if load.force else replace(load, at=(0.0, 0.0)) for load in scene.loads)
+    loads = tuple(
+        load if load.force else replace(load, at=(0.0, 0.0)) for load in scene.loads
+    )
     scene = replace(scene, loads=loads)
-    return replace(scene, motion=fourbar.Motion(), title="", source="", pictures=(), points=(), tolerances=())
+    return replace(
+        scene,
+        motion=fourbar.Motion(),
+        title="",
+        source="",
+        pictures=(),
+        points=(),
+        tolerances=(),
+    )
 
 
 def numbers_of(data):
@@ -68,7 +78,9 @@ def test_every_scene_and_command_comes_back_bit_for_bit():
             assert protocol.release_from_json(back, **sent).motion == scene.motion
             continue
         commanded = list_positions(scene)
-        told, command = protocol.command_from_json(back, through_text(protocol.command_to_json(scene, commanded)))
+        told, command = protocol.command_from_json(
+            back, through_text(protocol.command_to_json(scene, commanded))
+        )
         if scene.motion.stroke is not None:
             commanded = commanded._replace(
                 angle=np.full_like(commanded.angle, np.nan),
@@ -76,57 +88,108 @@ def test_every_scene_and_command_comes_back_bit_for_bit():
                 condition=None,
             )
             commanded = commanded._replace(
-                speed=None if commanded.speed is None else np.full_like(commanded.angle, np.nan), lost=None
+                speed=None
+                if commanded.speed is None
+                else np.full_like(commanded.angle, np.nan),
+                lost=None,
             )
             assert told.motion.side == scene.motion.side
         elif commanded.speed is None:
             commanded = commanded._replace(acceleration=0.0)
-        differing = [name for name in commanded._fields if not same(getattr(command, name), getattr(commanded, name))]
+        differing = [
+            name
+            for name in commanded._fields
+            if not same(getattr(command, name), getattr(commanded, name))
+        ]
         assert not differing, (scene.title, differing)
-        assert protocol.command_to_json(told, command) == protocol.command_to_json(scene, commanded)
+        assert protocol.command_to_json(told, command) == protocol.command_to_json(
+            scene, commanded
+        )
         seen += 1
     assert seen > 100
 
 
 def test_nothing_travels_that_the_formulas_computed():
     """Every number of a scene's JSON stands in its file's text; what the file leaves out is left out."""
-    scene = replace(crank_rocker(), effects=(fourbar.Gravity(), fourbar.Viscous((("O2", 0.01),))))
+    scene = replace(
+        crank_rocker(), effects=(fourbar.Gravity(), fourbar.Viscous((("O2", 0.01),)))
+    )
     data = protocol.scene_to_json(scene)
     text = dump(scene)
     for number in numbers_of(data):
         assert repr(number).strip("'") in text, number
     assert data["bars"]["input"] == {"mass": 0.2}
-    assert data["bars"]["coupler"] == {"mass": 0.5, "inertia": 0.004, "centre": [0.13, 0.3]}
-    assert data["loads"][0] == {"bar": 4, "force": [3.0, 0.7], "at": [0.05, 1.0], "moment": 0.0, "frame": "world"}
+    assert data["bars"]["coupler"] == {
+        "mass": 0.5,
+        "inertia": 0.004,
+        "centre": [0.13, 0.3],
+    }
+    assert data["loads"][0] == {
+        "bar": 4,
+        "force": [3.0, 0.7],
+        "at": [0.05, 1.0],
+        "moment": 0.0,
+        "frame": "world",
+    }
     assert data["effects"] == {"gravity": [9.81, -math.pi / 2], "viscous": {"O2": 0.01}}
-    massless = replace(scene, linkage=fourbar.FourBar(0.3, *(fourbar.Bar(x) for x in (0.1, 0.25, 0.22))), loads=())
-    assert set(protocol.scene_to_json(replace(massless, effects=()))) == {"lengths", "drive"}
+    massless = replace(
+        scene,
+        linkage=fourbar.FourBar(0.3, *(fourbar.Bar(x) for x in (0.1, 0.25, 0.22))),
+        loads=(),
+    )
+    assert set(protocol.scene_to_json(replace(massless, effects=()))) == {
+        "lengths",
+        "drive",
+    }
 
 
 def test_a_gas_spring_travels_as_its_file_is_written_and_a_table_in_radians():
     ends = fourbar.SpringEnd(1, 0.1, -1.0), fourbar.SpringEnd(4, 0.05, 0.2)
     gas = fourbar.Spring.gas(*ends, 0.4, 0.1, 100.0, 150.0)
     table = fourbar.Table((0.0, math.pi, 2 * math.pi), (1.0, 0.5, 1.0))
-    scene = crank_rocker(effects=(fourbar.Springs((gas,)),), loads=(fourbar.Load(4, moment=1.0, table=table),))
+    scene = crank_rocker(
+        effects=(fourbar.Springs((gas,)),),
+        loads=(fourbar.Load(4, moment=1.0, table=table),),
+    )
     data = protocol.scene_to_json(scene)
     spring = data["effects"]["springs"][0]
-    assert (spring["stiffness"], spring["length"], spring["preload"]) == (gas.stiffness, gas.length, gas.preload)
-    assert data["loads"][0]["table"] == {"theta_2": list(table.theta_2), "factor": [1.0, 0.5, 1.0]}
+    assert (spring["stiffness"], spring["length"], spring["preload"]) == (
+        gas.stiffness,
+        gas.length,
+        gas.preload,
+    )
+    assert data["loads"][0]["table"] == {
+        "theta_2": list(table.theta_2),
+        "factor": [1.0, 0.5, 1.0],
+    }
 
 
 def test_an_engine_answers_alike_from_both_ends():
-    for file in ("crank_rocker.toml", "gallery/excavator_bucket.toml", "gallery/tailgate.toml"):
+    for file in (
+        "crank_rocker.toml",
+        "gallery/excavator_bucket.toml",
+        "gallery/tailgate.toml",
+    ):
         scene = fourbar.load(MODELS / file)
         commanded = list_positions(scene)
         told, command = protocol.command_from_json(
-            protocol.scene_from_json(protocol.scene_to_json(scene)), protocol.command_to_json(scene, commanded)
+            protocol.scene_from_json(protocol.scene_to_json(scene)),
+            protocol.command_to_json(scene, commanded),
         )
-        direct, received = ask_at(FreeBody(), scene, commanded), FreeBody().answer(told, command)
+        direct, received = (
+            ask_at(FreeBody(), scene, commanded),
+            FreeBody().answer(told, command),
+        )
         back = protocol.answer_from_json(
-            "free-body", commanded, through_text(protocol.answer_to_json(told, command, received))
+            "free-body",
+            commanded,
+            through_text(protocol.answer_to_json(told, command, received)),
         )
         assert back.quantities.keys() == direct.quantities.keys()
-        assert all(same(back.quantities[name], array) for name, array in direct.quantities.items())
+        assert all(
+            same(back.quantities[name], array)
+            for name, array in direct.quantities.items()
+        )
         assert same(back.assembled, direct.assembled) and back.at is commanded
 
 
@@ -134,31 +197,62 @@ def test_an_answer_comes_back_with_all_that_it_says():
     scene = crank_rocker()
     commanded = list_positions(scene)
     n = len(commanded.angle)
-    moved = commanded._replace(angle=commanded.angle + 1e-3, speed=np.full(n, 10.01), acceleration=5.0)
+    moved = commanded._replace(
+        angle=commanded.angle + 1e-3, speed=np.full(n, 10.01), acceleration=5.0
+    )
     torque, force = np.linspace(0.0, 1.0, n), np.ones((n, 2))
     torque[3] = np.nan
     answer = Answer(
         "mine", "RK4", moved, np.arange(n) != 3, {"torque": torque, "F12": force}, None, {"torque": torque},
         ["it slipped"], {"gap": 1e-9}, "nothing", "everything", 0.25,
     )  # fmt: skip
-    back = protocol.answer_from_json("mine", commanded, through_text(protocol.answer_to_json(scene, commanded, answer)))
-    for name in ("setting", "alarms", "evidence", "shared", "own", "seconds", "refusal"):
+    back = protocol.answer_from_json(
+        "mine",
+        commanded,
+        through_text(protocol.answer_to_json(scene, commanded, answer)),
+    )
+    for name in (
+        "setting",
+        "alarms",
+        "evidence",
+        "shared",
+        "own",
+        "seconds",
+        "refusal",
+    ):
         assert getattr(back, name) == getattr(answer, name)
     assert all(same(one, two) for one, two in zip(back.at, moved, strict=True))
-    assert same(back.quantities["torque"], torque) and same(back.predicted["torque"], torque)
-    assert same(back.quantities["F12"], force) and same(back.assembled, answer.assembled)
+    assert same(back.quantities["torque"], torque) and same(
+        back.predicted["torque"], torque
+    )
+    assert same(back.quantities["F12"], force) and same(
+        back.assembled, answer.assembled
+    )
 
 
 def test_what_an_answer_leaves_out_has_defaults():
-    commanded = list_positions(crank_rocker(motion=fourbar.Motion(np.array([0.0, 1.0, 2.0]), 1.0)))
-    answer = protocol.answer_from_json(
-        "mine", commanded, {"answers": {"torque": [1, None, 3], "F12": [[1, 2], None, None]}}
+    commanded = list_positions(
+        crank_rocker(motion=fourbar.Motion(np.array([0.0, 1.0, 2.0]), 1.0))
     )
-    assert answer.assembled.tolist() == [True, False, True] and answer.setting == "exact" and answer.at is commanded
+    answer = protocol.answer_from_json(
+        "mine",
+        commanded,
+        {"answers": {"torque": [1, None, 3], "F12": [[1, 2], None, None]}},
+    )
+    assert (
+        answer.assembled.tolist() == [True, False, True]
+        and answer.setting == "exact"
+        and answer.at is commanded
+    )
     assert np.isnan(answer.quantities["F12"][1:]).all()
     with pytest.raises(EngineError, match="no licence"):
         protocol.answer_from_json("mine", commanded, {"error": "no licence"})
-    assert protocol.answer_from_json("mine", commanded, {"refusal": "no springs here"}).refusal == "no springs here"
+    assert (
+        protocol.answer_from_json(
+            "mine", commanded, {"refusal": "no springs here"}
+        ).refusal
+        == "no springs here"
+    )
 
 
 WRONG_SCENES = [
@@ -170,9 +264,18 @@ WRONG_SCENES = [
     {"lengths": {"ground": 10**400, "input": 0.1, "coupler": 0.25, "output": 0.22}},
     {"lengths": {"ground": math.inf, "input": 0.1, "coupler": 0.25, "output": 0.22}},
     {"lengths": {"ground": 9.0, "input": 0.1, "coupler": 0.25, "output": 0.22}},
-    {"lengths": {"ground": 0.3, "input": 0.1, "coupler": 0.25, "output": 0.22}, "bars": {"input": {"mass": -1.0}}},
-    {"lengths": {"ground": 0.3, "input": 0.1, "coupler": 0.25, "output": 0.22}, "effects": {"gravity": [9.81]}},
-    {"lengths": {"ground": 0.3, "input": 0.1, "coupler": 0.25, "output": 0.22}, "motion": {}},
+    {
+        "lengths": {"ground": 0.3, "input": 0.1, "coupler": 0.25, "output": 0.22},
+        "bars": {"input": {"mass": -1.0}},
+    },
+    {
+        "lengths": {"ground": 0.3, "input": 0.1, "coupler": 0.25, "output": 0.22},
+        "effects": {"gravity": [9.81]},
+    },
+    {
+        "lengths": {"ground": 0.3, "input": 0.1, "coupler": 0.25, "output": 0.22},
+        "motion": {},
+    },
 ]
 WRONG_COMMANDS = [
     None,
@@ -220,7 +323,9 @@ WRONG_SETTINGS = [[], {"name": 1}, {"steps_per_turn": 3.5}, {"steps_per_turn": 0
 
 
 def read_answer(data):
-    commanded = list_positions(crank_rocker(motion=fourbar.Motion(np.array([0.0, 1.0, 2.0]), 1.0)))
+    commanded = list_positions(
+        crank_rocker(motion=fourbar.Motion(np.array([0.0, 1.0, 2.0]), 1.0))
+    )
     return protocol.answer_from_json("mine", commanded, data)
 
 
@@ -232,7 +337,8 @@ READ = {
 
 
 @pytest.mark.parametrize(
-    ("part", "number"), [(part, n) for part, (_, wrong) in READ.items() for n in range(len(wrong))]
+    ("part", "number"),
+    [(part, n) for part, (_, wrong) in READ.items() for n in range(len(wrong))],
 )
 def test_what_is_none_is_refused_in_one_line(part, number):
     read, wrong = READ[part]
@@ -243,18 +349,33 @@ def test_what_is_none_is_refused_in_one_line(part, number):
 
 @pytest.mark.parametrize("data", WRONG_SETTINGS, ids=str)
 def test_a_setting_that_is_none_is_refused_in_one_line(data) -> None:
-    with pytest.raises(InputError, match=r"^setting = [^\n]*: must be an object with name, and steps_per_turn"):
+    with pytest.raises(
+        InputError,
+        match=r"^setting = [^\n]*: must be an object with name, and steps_per_turn",
+    ):
         protocol.read_setting(data)
-    assert protocol.read_setting(None) == {} and protocol.read_setting({"error": 0.5}) == {"error": 0.5}
-    assert protocol.read_setting({"name": "a", "steps_per_turn": 1}) == {"name": "a", "steps_per_turn": 1}
+    assert protocol.read_setting(None) == {} and protocol.read_setting(
+        {"error": 0.5}
+    ) == {"error": 0.5}
+    assert protocol.read_setting({"name": "a", "steps_per_turn": 1}) == {
+        "name": "a",
+        "steps_per_turn": 1,
+    }
 
 
 def test_an_engine_through_time_may_be_faster_by_what_the_acceleration_gives() -> None:
     """omega^2 = omega_0^2 + 2 alpha theta: of a stroke too, whose bar has the motion that the formulas state."""
-    command = list_positions(fourbar.load(MODELS / "capabilities" / "stroke_input.toml"))
-    faster = command._replace(stroke=None, speed=1.2 * command.speed, acceleration=1.2 * command.acceleration)
+    command = list_positions(
+        fourbar.load(MODELS / "capabilities" / "stroke_input.toml")
+    )
+    faster = command._replace(
+        stroke=None, speed=1.2 * command.speed, acceleration=1.2 * command.acceleration
+    )
     protocol.require_near(faster, command)
     steady = command._replace(acceleration=0.0 * command.acceleration)
-    for made, asked in ((faster._replace(speed=0.0 * faster.speed), command), (faster, steady)):
+    for made, asked in (
+        (faster._replace(speed=0.0 * faster.speed), command),
+        (faster, steady),
+    ):
         with pytest.raises(InputError, match=r"must be within .* of the command"):
             protocol.require_near(made, asked)

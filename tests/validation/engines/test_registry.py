@@ -15,7 +15,9 @@ from tests.whole.test_imports import ROOT
 def installed(folder: Path, name: str, entries: str) -> None:
     info = folder / f"{name.replace('-', '_')}-1.0.dist-info"
     info.mkdir(parents=True)
-    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n")
+    (info / "METADATA").write_text(
+        f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n"
+    )
     (info / "entry_points.txt").write_text(entries)
 
 
@@ -42,15 +44,33 @@ def load() -> tuple[Engine, ...]:
 NAMES = ["exudyn-constraints", "opensim-constraints", "drake-inverse"]
 
 
-def test_the_lab_alone_adds_engines(only: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert [engine.name for engine in load()] == NAMES  # of the checkout, where it lies on the path
+def test_the_lab_alone_adds_engines(
+    only: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert [
+        engine.name for engine in load()
+    ] == NAMES  # of the checkout, where it lies on the path
     monkeypatch.setattr(registry, "CHECKOUT", None)
     assert load() == ()
     installed(only, "stranger", "[fourbar.engines]\nmine = os:abort\n")
     assert load() == ()
     project = (ROOT / "lab" / "pyproject.toml").read_text()
-    lines = project.partition('entry-points."fourbar.engines"]')[2].partition("[")[0].replace('"', "").splitlines()[1:]
-    installed(only, "fourbar-lab", "[fourbar.engines]\n" + "\n".join(lines) + "\n[other]\nmine = os:abort\n")
+    lines = (
+        project.partition('entry-points."fourbar.engines"]')[2]
+        .partition("[")[0]
+        .replace('"', "")
+        .splitlines()[1:]
+    )
+    installed(
+        only,
+        "fourbar-lab",
+        "[fourbar.engines]\n" + "\n".join(lines) + "\n[other]\nmine = os:abort\n",
+    )
     engines = load()
     assert [engine.name for engine in engines] == NAMES
-    assert all(isinstance(engine, Engine) and engine.code in engine.fingerprint() and engine.code for engine in engines)
+    assert all(
+        isinstance(engine, Engine)
+        and engine.code in engine.fingerprint()
+        and engine.code
+        for engine in engines
+    )

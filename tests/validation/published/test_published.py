@@ -35,7 +35,12 @@ from fourbar_validation.published.program import (
     read_printed,
     round_off,
 )
-from fourbar_validation.published.textbook import SCENES, compare_textbooks, compute_value, list_answers
+from fourbar_validation.published.textbook import (
+    SCENES,
+    compare_textbooks,
+    compute_value,
+    list_answers,
+)
 from tests.support import scenes
 
 LISTED = 0.5e-12
@@ -48,20 +53,34 @@ T4 = (
     309.30935923198564, 309.330779939797, 309.313000742774, 309.304477356844,
     309.002005400392, 308.804407126702, 308.8044071267012, 308.80440716278196,
 )  # fmt: skip
-F12X = (7.033117757022, 7.033839565011, 161.418472567466, 161.418320162565, 161.418168408309)
+F12X = (
+    7.033117757022,
+    7.033839565011,
+    161.418472567466,
+    161.418320162565,
+    161.418168408309,
+)
 MODELS = Path(__file__).parents[3] / "models"
 ALL = tuple(list_figures())
 
 
 def test_the_published_torque_error_by_error() -> None:
     for name, listed in (("T4", T4), ("F12x", F12X)):
-        for figure, (_, x), (_, *step) in zip(listed, climb_ladder(), STEPS, strict=name == "T4"):
-            assert x[name] == pytest.approx(figure, rel=0.0, abs=LISTED + round_off(*step)[name])
+        for figure, (_, x), (_, *step) in zip(
+            listed, climb_ladder(), STEPS, strict=name == "T4"
+        ):
+            assert x[name] == pytest.approx(
+                figure, rel=0.0, abs=LISTED + round_off(*step)[name]
+            )
 
 
 def test_the_thesis_without_its_errors_is_ours() -> None:
     """The 13 x 13 system in kg, cm, s against our formulas in SI."""
-    right, program, apart = compute_right_unknowns(), climb_ladder()[0][1], round_off(ProgramErrors())
+    right, program, apart = (
+        compute_right_unknowns(),
+        climb_ladder()[0][1],
+        round_off(ProgramErrors()),
+    )
     assert program.keys() == right.keys()
     for name, unknown in program.items():
         assert unknown == pytest.approx(right[name], rel=0.0, abs=apart[name])
@@ -71,11 +90,19 @@ def test_round_off_holds_for_other_pivots_and_inputs_typed_otherwise() -> None:
     """Against fifty digits: rows in any order, each number moved by a rounding; the bound is not idle either."""
     matrix, sides = make_equations(ProgramErrors())
     with mpmath.workdps(50):
-        exact = [float(x) for x in mpmath.lu_solve(mpmath.matrix(matrix.tolist()), mpmath.matrix(sides.tolist()))]
+        exact = [
+            float(x)
+            for x in mpmath.lu_solve(
+                mpmath.matrix(matrix.tolist()), mpmath.matrix(sides.tolist())
+            )
+        ]
     order, worst = np.random.default_rng(0), np.zeros(13)
     for _ in range(200):
         rows = order.permutation(13)
-        typed, right = (x * (1.0 + EPS * order.choice((-1.0, 0.0, 1.0), x.shape)) for x in (matrix[rows], sides[rows]))
+        typed, right = (
+            x * (1.0 + EPS * order.choice((-1.0, 0.0, 1.0), x.shape))
+            for x in (matrix[rows], sides[rows])
+        )
         worst = np.maximum(worst, np.abs(np.linalg.solve(typed, right) - exact))
     ratio = worst / list(round_off(ProgramErrors()).values())
     assert ratio.min() > 0.01 and ratio.max() < 1.0
@@ -84,10 +111,21 @@ def test_round_off_holds_for_other_pivots_and_inputs_typed_otherwise() -> None:
 def test_rows_for_the_report() -> None:
     rows = list_ladder_rows()
     ladder = [row for row in rows if row[0]]
-    assert [did.partition(" ")[0] for did, *_ in ladder] == ["nothing", "#3", "#1", "#2", "#4", "#5", "I_G3,", "#5b"]
+    assert [did.partition(" ")[0] for did, *_ in ladder] == [
+        "nothing",
+        "#3",
+        "#1",
+        "#2",
+        "#4",
+        "#5",
+        "I_G3,",
+        "#5b",
+    ]
     assert rows[0][2:] == ("309.309359232", "7.033", "-2.121")
     assert rows[-2][2:] == rows[-1][2:] == ("308.804407163", "161.418", "-156.506")
-    assert all(did and right for did, right, *_ in ladder) and len(rows) == len(ladder) + 2
+    assert (
+        all(did and right for did, right, *_ in ladder) and len(rows) == len(ladder) + 2
+    )
 
 
 @pytest.mark.parametrize(
@@ -129,24 +167,50 @@ def test_every_difference_is_what_its_errata_make_of_ours() -> None:
     """Save three misprints, for which no computation is known; an agreement needs no misprint to explain it."""
     differ = [figure for figure in ALL if figure.verdict() == "differs"]
     assert all(is_explained(figure) for figure in differ)
-    misprints = {figure.name: figure.errata for figure in differ if not figure.reproduced()}
-    assert misprints == {"k3_2_in_eq_5_6": ("12b",), "k4_1": ("12b",), "tetaDos_deg": ("17",)}
-    assert {name for name, entry in ERRATA.items() if not entry.reproduced} == {"12b", "17"}
+    misprints = {
+        figure.name: figure.errata for figure in differ if not figure.reproduced()
+    }
+    assert misprints == {
+        "k3_2_in_eq_5_6": ("12b",),
+        "k4_1": ("12b",),
+        "tetaDos_deg": ("17",),
+    }
+    assert {name for name, entry in ERRATA.items() if not entry.reproduced} == {
+        "12b",
+        "17",
+    }
     unknowns = [figure for figure in differ if "unknowns" in figure.table]
     recipe = [figure for figure in differ if set(figure.errata) <= {"1", "2", "3"}]
-    assert (len(unknowns), len(recipe), len(differ)) == (26, 10, 60)  # as data/README.md says
+    assert (len(unknowns), len(recipe), len(differ)) == (
+        26,
+        10,
+        60,
+    )  # as data/README.md says
 
 
 def test_each_erratum_named_is_needed() -> None:
     """No figure names an erratum and yet is right before it is made (one entry of the matrix is, by its two digits)."""
-    idle = [f"{figure.table} {figure.name}" for figure in ALL if figure.errata and figure.verdict() != "differs"]
+    idle = [
+        f"{figure.table} {figure.name}"
+        for figure in ALL
+        if figure.errata and figure.verdict() != "differs"
+    ]
     assert idle == ["5.7 matrix k4_5"]
 
 
 def test_errata_are_complete() -> None:
     assert {str(n) for n in range(1, 41)} <= set(ERRATA)
     for entry in ERRATA.values():
-        assert all((entry.where, entry.title, entry.printed, entry.right, entry.derivation, entry.effect))
+        assert all(
+            (
+                entry.where,
+                entry.title,
+                entry.printed,
+                entry.right,
+                entry.derivation,
+                entry.effect,
+            )
+        )
 
 
 def solve_as_printed(sides: list[str], arms: list[list[str]]) -> float:
@@ -157,7 +221,9 @@ def solve_as_printed(sides: list[str], arms: list[list[str]]) -> float:
         for pin in (0, 1):
             column = 4 * k + 2 * pin
             matrix[3 * k, column] = matrix[3 * k + 1, column + 1] = 1.0
-            matrix[3 * k + 2, column : column + 2] = [float(text) for text in row[2 * pin : 2 * pin + 2]]
+            matrix[3 * k + 2, column : column + 2] = [
+                float(text) for text in row[2 * pin : 2 * pin + 2]
+            ]
     matrix[8, 12] = 1.0
     for row, first, second in ((9, 2, 4), (10, 3, 5), (11, 6, 10), (12, 7, 11)):
         matrix[row, [first, second]] = 1.0
@@ -166,24 +232,43 @@ def solve_as_printed(sides: list[str], arms: list[list[str]]) -> float:
 
 def test_torques_that_the_errata_state() -> None:
     def program(*made: int) -> float:
-        return compute_thesis_program(ProgramErrors(*(number in made for number in (3, 1, 2, 4, 5))))["T4"]
+        return compute_thesis_program(
+            ProgramErrors(*(number in made for number in (3, 1, 2, 4, 5)))
+        )["T4"]
 
     right = program()
     states = {name: entry.effect for name, entry in ERRATA.items()}
     assert f"{program(1) - right:.5f}" in states["1"]
-    assert f"{program(3, 2) - program(3):.5f}" in states["2"] and f"{program(2) - right:.4f}" in states["2"]
-    assert f"{program(3) - right:+.5f}" in states["3"] and f"{program(1, 2, 4, 5):.3f}" in states["3"]
-    assert f"{program(4) - right:.6f}" in states["4"] and f"{program(1, 4) - program(1):.6f}" in states["4"]
-    assert f"{program(5) - right:.6f}" in states["5"] and f"{program(1, 5) - program(1):.6f}" in states["5"]
+    assert (
+        f"{program(3, 2) - program(3):.5f}" in states["2"]
+        and f"{program(2) - right:.4f}" in states["2"]
+    )
+    assert (
+        f"{program(3) - right:+.5f}" in states["3"]
+        and f"{program(1, 2, 4, 5):.3f}" in states["3"]
+    )
+    assert (
+        f"{program(4) - right:.6f}" in states["4"]
+        and f"{program(1, 4) - program(1):.6f}" in states["4"]
+    )
+    assert (
+        f"{program(5) - right:.6f}" in states["5"]
+        and f"{program(1, 5) - program(1):.6f}" in states["5"]
+    )
 
     source = read_printed()["published"]
-    k, matrix = source["section_5_7_hand_constants"], source["section_5_7_matrix_as_printed"]
+    k, matrix = (
+        source["section_5_7_hand_constants"],
+        source["section_5_7_matrix_as_printed"],
+    )
     names = [f"k{bar}{key}" for bar in (2, 3, 4) for key in ("x", "y", "_5")]
     arms = [[k[f"k{bar}_{n}"] for n in (1, 2, 3, 4)] for bar in (2, 3, 4)]
     used = {"k3_5": "14.99169304", "k4x": str(0.2 * -0.02840253815)}
 
     def hand(*put_right: str) -> float:
-        return solve_as_printed([used[name] if name in put_right else k[name] for name in names], arms)
+        return solve_as_printed(
+            [used[name] if name in put_right else k[name] for name in names], arms
+        )
 
     assert f"{hand('k4x'):.4f}" in states["7"]
     assert f"{hand():.4f}" in states["8"] and f"{hand('k3_5'):.4f}" in states["8"]
@@ -195,12 +280,19 @@ def test_torques_that_the_errata_state() -> None:
 
 def test_open_loops_that_the_errata_state() -> None:
     """Closure of the angles as printed, in the thesis's polygon, cm."""
-    table = np.genfromtxt(DATA / "positions.csv", delimiter=",", skip_header=1, usecols=range(5))
+    table = np.genfromtxt(
+        DATA / "positions.csv", delimiter=",", skip_header=1, usecols=range(5)
+    )
     d, a, b, c = LENGTHS
     unit = np.exp(1j * np.radians(table))
 
     def gaps(third: int, fourth: int) -> np.ndarray:
-        return np.abs(d * np.exp(1j * THETA_1) + a * unit[:, 0] + b * unit[:, third] + c * unit[:, fourth])
+        return np.abs(
+            d * np.exp(1j * THETA_1)
+            + a * unit[:, 0]
+            + b * unit[:, third]
+            + c * unit[:, fourth]
+        )
 
     first, second = gaps(1, 4), gaps(2, 3)
     assert f"{first.max():.3f} cm" in ERRATA["6"].derivation
@@ -212,14 +304,23 @@ def test_open_loops_that_the_errata_state() -> None:
 def test_limits_that_the_errata_state() -> None:
     linkage = make_scene(THETA_2).linkage
     for bar, title in ((4, "limits"), (2, "dead centres")):
-        angles = {f"{np.degrees(limit.theta_2) % 360.0:.4f}" for limit in limit_positions(linkage, bar)}
+        angles = {
+            f"{np.degrees(limit.theta_2) % 360.0:.4f}"
+            for limit in limit_positions(linkage, bar)
+        }
         stated = ERRATA["16"].right.split(title)[1].split(" deg")[0]
         assert angles == {part.strip() for part in stated.split(" and ")}
 
 
 def test_public_test_cases_agree_to_the_last_digit() -> None:
-    assert {figure.name: figure.verdict() for figure in compare_textbooks() if figure.verdict() != "rounded"} == {}
-    assert {answer.scene for answer in list_answers()} == {path.stem for path in SCENES.glob("*.toml")}
+    assert {
+        figure.name: figure.verdict()
+        for figure in compare_textbooks()
+        if figure.verdict() != "rounded"
+    } == {}
+    assert {answer.scene for answer in list_answers()} == {
+        path.stem for path in SCENES.glob("*.toml")
+    }
     assert len({answer.where.split(",")[0] for answer in list_answers()}) >= 3
 
 
@@ -233,8 +334,14 @@ def test_answers_that_sympy_leaves_to_be_solved() -> None:
         ]
     )
     forcing = np.array([-0.031211821321648, -0.00066022608181, 0.001813559741243])
-    relative = [answer for answer in list_answers() if answer.note.startswith("the printed mass matrix")]
-    assert [f"{x:.8f}" for x in np.linalg.solve(mass, forcing)] == [answer.printed for answer in relative]
+    relative = [
+        answer
+        for answer in list_answers()
+        if answer.note.startswith("the printed mass matrix")
+    ]
+    assert [f"{x:.8f}" for x in np.linalg.solve(mass, forcing)] == [
+        answer.printed for answer in relative
+    ]
 
 
 def test_quantities_of_an_answer() -> None:
@@ -242,21 +349,37 @@ def test_quantities_of_an_answer() -> None:
     assert s.F14 is not None and s.omega_2 is not None and s.omega_3 is not None
     assert compute_value(s, "-F14_y", 0) == -s.F14[0, 1]
     assert compute_value(s, "omega_3 - omega_2", 0) == s.omega_3[0] - s.omega_2[0]
-    assert compute_value(s, "v_A_x", 0) == pytest.approx(-0.2244 * 0.48 * np.sin(THETA_2), rel=TYPED)
+    assert compute_value(s, "v_A_x", 0) == pytest.approx(
+        -0.2244 * 0.48 * np.sin(THETA_2), rel=TYPED
+    )
 
 
-@pytest.mark.parametrize("scene", [scenes.thesis(), fourbar.load(MODELS / "thesis.toml")], ids=["code", "file"])
+@pytest.mark.parametrize(
+    "scene",
+    [scenes.thesis(), fourbar.load(MODELS / "thesis.toml")],
+    ids=["code", "file"],
+)
 def test_inputs_are_those_of_the_model(scene: fourbar.Scene) -> None:
     ours = make_scene(THETA_2)
     assert ours.linkage.lengths == pytest.approx(scene.linkage.lengths, rel=TYPED)
-    assert ours.linkage.ground_angle == pytest.approx(scene.linkage.ground_angle, rel=TYPED)
+    assert ours.linkage.ground_angle == pytest.approx(
+        scene.linkage.ground_angle, rel=TYPED
+    )
     for number in (2, 3, 4):
         mine, theirs = ours.linkage.bar(number), scene.linkage.bar(number)
         assert mine.mass == theirs.mass
-        assert mine.moment_of_inertia == pytest.approx(theirs.moment_of_inertia, rel=TYPED)
+        assert mine.moment_of_inertia == pytest.approx(
+            theirs.moment_of_inertia, rel=TYPED
+        )
         assert mine.mass_centre == pytest.approx(theirs.mass_centre, rel=TYPED)
-    assert (ours.drive_bar, ours.motion.omega_2) == (scene.drive_bar, scene.motion.omega_2)
-    assert ours.motion.branch == scene.motion.branch and ours.effects == scene.effects == ()
+    assert (ours.drive_bar, ours.motion.omega_2) == (
+        scene.drive_bar,
+        scene.motion.omega_2,
+    )
+    assert (
+        ours.motion.branch == scene.motion.branch
+        and ours.effects == scene.effects == ()
+    )
     assert len(ours.loads) == len(scene.loads)
     for load, their in zip(ours.loads, scene.loads, strict=True):
         assert (load.bar, load.frame) == (their.bar, their.frame)
@@ -274,12 +397,26 @@ def test_the_command_explains_every_difference() -> None:
     for figure in ALL:
         line = f"{figure.table}: {figure.name}  printed {figure.printed}"
         assert (line in process.output) == (figure.verdict() == "differs")
-    assert CliRunner().invoke(published, ["--all"]).output.count("  printed ") == len(ALL)
+    assert CliRunner().invoke(published, ["--all"]).output.count("  printed ") == len(
+        ALL
+    )
 
 
 def test_a_difference_without_an_erratum_fails(monkeypatch: pytest.MonkeyPatch) -> None:
-    wrong = PublishedFigure("2.4 positions", "1 theta3_1", "167.877224", 167.8772234, ("4",), 167.8)
-    for figure in (wrong, wrong._replace(errata=()), wrong._replace(errata=("99",), made=167.877224)):
-        assert figure.verdict() == "differs" and not is_explained(figure) and explain_difference(figure)
-        monkeypatch.setattr(command, "list_figures", lambda figure=figure: iter([figure]))
+    wrong = PublishedFigure(
+        "2.4 positions", "1 theta3_1", "167.877224", 167.8772234, ("4",), 167.8
+    )
+    for figure in (
+        wrong,
+        wrong._replace(errata=()),
+        wrong._replace(errata=("99",), made=167.877224),
+    ):
+        assert (
+            figure.verdict() == "differs"
+            and not is_explained(figure)
+            and explain_difference(figure)
+        )
+        monkeypatch.setattr(
+            command, "list_figures", lambda figure=figure: iter([figure])
+        )
         assert CliRunner().invoke(published, standalone_mode=False).return_value == 1

@@ -24,11 +24,21 @@ def test_nothing_got_worse_since_the_accepted_state() -> None:
     record, accepted = read_run(find_baseline(ACCEPTED))
     scenes = {SUITE.name(index): SUITE.scene(index) for index in range(len(SUITE))}
     assert {row.scene for row in accepted} == set(scenes)
-    assert {row.engine for row in accepted} >= {"formulas", *(engine.name for engine in ENGINES), *SHIPPED}
-    prescribed = {name: scene for name, scene in scenes.items() if scene.motion.free is None}
+    assert {row.engine for row in accepted} >= {
+        "formulas",
+        *(engine.name for engine in ENGINES),
+        *SHIPPED,
+    }
+    prescribed = {
+        name: scene for name, scene in scenes.items() if scene.motion.free is None
+    }
     exact = {"formulas", *(engine.name for engine in EXACT)}
     kept = [row for row in accepted if row.engine in exact and row.scene in prescribed]
-    rows = [row for name, scene in prescribed.items() for row in judge(name, scene, EXACT).rows]
+    rows = [
+        row
+        for name, scene in prescribed.items()
+        for row in judge(name, scene, EXACT).rows
+    ]
     differences = compare_rows((record, kept), (describe_run((), "models"), rows))
     assert not differences.regressed, render.write_text(differences)
 
@@ -36,15 +46,34 @@ def test_nothing_got_worse_since_the_accepted_state() -> None:
 @pytest.mark.parametrize("turns", [0, 800])
 def test_a_row_states_the_condition_that_its_allowance_comes_from(turns: int) -> None:
     """By which a move is distinguished from round-off: one limit position has 7 digits, the next 13."""
-    name, scene = next((name, SUITE.scene(i)) for i in range(len(SUITE)) if (name := SUITE.name(i)) == "triple_rocker")
+    name, scene = next(
+        (name, SUITE.scene(i))
+        for i in range(len(SUITE))
+        if (name := SUITE.name(i)) == "triple_rocker"
+    )
     if turns:
         motion = scene.motion.replace(angle=np.array([2.0, 3.0]) + turns * 2.0 * np.pi)
         scene = replace(scene, motion=motion)
-    apart = {"torque_error", "force_error", "undecided", "status"}  # bars against their errors, and counts
-    rows = [row for row in judge(name, scene, EXACT).rows if row.allowed > 0.0 and row.quantity not in apart]
-    assert {"closure", "moment_sum", "F12", "limit_positions", "transmission"} <= {row.quantity for row in rows}
+    apart = {
+        "torque_error",
+        "force_error",
+        "undecided",
+        "status",
+    }  # bars against their errors, and counts
+    rows = [
+        row
+        for row in judge(name, scene, EXACT).rows
+        if row.allowed > 0.0 and row.quantity not in apart
+    ]
+    assert {"closure", "moment_sum", "F12", "limit_positions", "transmission"} <= {
+        row.quantity for row in rows
+    }
     assert all(row.passed for row in rows)
     for row in rows:
-        if row.verdict == DEGRADED:  # held to what is computed for the position: no law in the condition
+        if (
+            row.verdict == DEGRADED
+        ):  # held to what is computed for the position: no law in the condition
             continue
-        assert row.condition == pytest.approx(min(1.0, K * EPS / row.allowed), rel=1e-9), row
+        assert row.condition == pytest.approx(
+            min(1.0, K * EPS / row.allowed), rel=1e-9
+        ), row

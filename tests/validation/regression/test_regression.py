@@ -49,7 +49,9 @@ from tests.support.here import judge_here
 from tests.support.runs import compare_rows, read_run
 
 WithRows = tuple[About, list[Row]]
-ROW = Row("scene", "engine", "exact", "torque", 1e-15, 1e-14, AGREES, "equivalence", 1.0, 1.0)
+ROW = Row(
+    "scene", "engine", "exact", "torque", 1e-15, 1e-14, AGREES, "equivalence", 1.0, 1.0
+)
 HERE = describe_run([Engine("engine", FreeBody, EQUIVALENCE)], "suite")
 
 
@@ -74,14 +76,19 @@ def test_each_kind_of_change(changed: dict[str, object], kind: Kind) -> None:
 def test_round_off_grows_with_the_condition() -> None:
     hard = replace(ROW, error=1e-9, condition=1e-6)
     assert kinds([hard], [replace(hard, error=5e-9)]) == [Kind.ROUND_OFF]
-    assert kinds([replace(hard, condition=1.0)], [replace(hard, error=5e-9, condition=1.0)]) == [Kind.WORSE]
+    assert kinds(
+        [replace(hard, condition=1.0)], [replace(hard, error=5e-9, condition=1.0)]
+    ) == [Kind.WORSE]
     beyond = 60 * EPS / 1e-6
     assert kinds([hard], [replace(hard, error=1e-9 + beyond)]) == [Kind.WORSE]
 
 
 def test_better_and_new_rows_are_no_regression_but_a_new_failure_is() -> None:
     simulated = replace(ROW, error=4e-6, allowed=1e-5)
-    changes = compare_rows((HERE, [simulated]), (HERE, [replace(simulated, error=1e-6), replace(ROW, quantity="F12")]))
+    changes = compare_rows(
+        (HERE, [simulated]),
+        (HERE, [replace(simulated, error=1e-6), replace(ROW, quantity="F12")]),
+    )
     assert {change.kind for change in changes.changes} == {Kind.BETTER, Kind.NEW}
     assert not changes.regressed
     failing = replace(ROW, quantity="F12", verdict=FAILS)
@@ -111,10 +118,14 @@ def save(folder: Path, rows: list[Row], times: str = "", about: About = HERE) ->
 def test_command_writes_every_form_and_leaves_with_the_status(tmp_path: Path) -> None:
     hostile = replace(ROW, scene="<script>alert(1)</script>|`x`")
     old = save(tmp_path / "old", [ROW, hostile])
-    new = save(tmp_path / "new", [replace(ROW, error=1e-9), replace(hostile, error=1e-9)])
+    new = save(
+        tmp_path / "new", [replace(ROW, error=1e-9), replace(hostile, error=1e-9)]
+    )
     forms = [f"--{form}={tmp_path / form}" for form in ("markdown", "html", "junit")]
     runner = CliRunner()
-    process = runner.invoke(compare, [str(old), str(new), *forms], standalone_mode=False)
+    process = runner.invoke(
+        compare, [str(old), str(new), *forms], standalone_mode=False
+    )
     assert process.return_value == 1
     assert "2 regressions" in process.output
     assert "<script>" not in (tmp_path / "html").read_text()
@@ -126,30 +137,48 @@ def test_command_writes_every_form_and_leaves_with_the_status(tmp_path: Path) ->
     assert "No regression" in same.output
 
 
-def test_accept_keeps_the_run_next_to_the_results_or_in_a_stated_folder(tmp_path: Path) -> None:
+def test_accept_keeps_the_run_next_to_the_results_or_in_a_stated_folder(
+    tmp_path: Path,
+) -> None:
     run = save(tmp_path / "run", [ROW], "scene,engine,-,1,1,3.0\n")
     runner = CliRunner()
-    for options, kept in (([], tmp_path / "accepted"), (["--to", str(tmp_path / "mine")], tmp_path / "mine")):
+    for options, kept in (
+        ([], tmp_path / "accepted"),
+        (["--to", str(tmp_path / "mine")], tmp_path / "mine"),
+    ):
         assert runner.invoke(accept_command, [str(run), *options]).exit_code == 0
         assert read_run(kept) == read_run(run)
         assert dict(open_run(kept).times()) == {"scene": [("engine", 3.0)]}
         assert json.loads((kept / "record.json").read_text())["machine"] == HERE.machine
-        assert runner.invoke(compare, [str(kept), str(run)], standalone_mode=False).return_value == 0
+        assert (
+            runner.invoke(
+                compare, [str(kept), str(run)], standalone_mode=False
+            ).return_value
+            == 0
+        )
     assert runner.invoke(accept_command, [str(run), "--to", str(run)]).exit_code != 0
-    assert find_baseline("accepted").parent == Path(record.__file__).parent  # of this project, where no such folder is
+    assert (
+        find_baseline("accepted").parent == Path(record.__file__).parent
+    )  # of this project, where no such folder is
 
 
 def damaged(folder: Path) -> Iterator[tuple[Path, str]]:
     """A run's folder damaged in one place after the other: the file that is to blame, and words of the message."""
     files = {path: path.read_bytes() for path in folder.iterdir()}
-    table, times, about = (folder / name for name in ("results.csv", "timings.csv", "record.json"))
+    table, times, about = (
+        folder / name for name in ("results.csv", "timings.csv", "record.json")
+    )
     lines = files[table].splitlines(keepends=True)
     rows = len(lines) - 1
     for words, damage in {
         f"{rows - 2} rows of {rows}": b"".join(lines[:-2]),
         f"{2 * rows} rows of {rows}": b"".join([*lines, *lines[1:]]),
-        f"{rows - 1} rows of {rows}": b"".join(line for line in lines if b"engine 1" not in line),
-        f"{rows} rows of {rows}, and not the SHA-256": files[table].replace(b"1e-15", b"1e-16"),
+        f"{rows - 1} rows of {rows}": b"".join(
+            line for line in lines if b"engine 1" not in line
+        ),
+        f"{rows} rows of {rows}, and not the SHA-256": files[table].replace(
+            b"1e-15", b"1e-16"
+        ),
         "no rows that can be read": b"\xff",
     }.items():
         table.write_bytes(damage)
@@ -171,9 +200,14 @@ def damaged(folder: Path) -> Iterator[tuple[Path, str]]:
     about.write_bytes(files[about])
 
 
-def test_a_damaged_run_is_named_and_nothing_is_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_damaged_run_is_named_and_nothing_is_written(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     rows = [replace(ROW, engine=f"engine {k}") for k in range(4)]
-    good, run = (save(tmp_path / name, rows, "scene,engine,-,1,1,3.0\n") for name in ("good", "run"))
+    good, run = (
+        save(tmp_path / name, rows, "scene,engine,-,1,1,3.0\n")
+        for name in ("good", "run")
+    )
     kept = tmp_path / "kept"
     assert status(["accept", str(good), "--to", str(kept)]) == 0
     before = {path: path.read_bytes() for path in kept.iterdir()}
@@ -187,14 +221,20 @@ def test_a_damaged_run_is_named_and_nothing_is_written(tmp_path: Path, capsys: p
         for key, command in commands.items():
             assert status(command) == 2
             out, message = capsys.readouterr()
-            assert not out and message.startswith(f"error: {key} = '{file}': ") and words in message
+            assert (
+                not out
+                and message.startswith(f"error: {key} = '{file}': ")
+                and words in message
+            )
             assert message.count("\n") == 1
         assert {path: path.read_bytes() for path in kept.iterdir()} == before
     assert [status(command) for command in commands.values()] == [0, 0, 0]
 
 
 @pytest.mark.slow
-def test_a_damaged_table_is_one_line_and_nothing_is_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_damaged_table_is_one_line_and_nothing_is_written(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     run, kept = save(tmp_path / "run", [ROW]), tmp_path / "kept"
     assert status(["accept", str(run), "--to", str(kept)]) == 0
     file, table = kept / HISTORY, (kept / "results.csv").read_bytes()
@@ -215,12 +255,21 @@ def test_a_damaged_table_is_one_line_and_nothing_is_written(tmp_path: Path, caps
         capsys.readouterr()
         assert status(["accept", str(run), "--to", str(kept)]) == 2, damage[:20]
         line = capsys.readouterr().err
-        assert line == f"error: --to = '{file}': is damaged, or no table written by `accept`\n"
-        assert (kept / "results.csv").read_bytes() == table and file.read_bytes() == damage
-    for place in range(4, len(contents)):  # a bit of a number, which the checksum of its page shows
+        assert (
+            line
+            == f"error: --to = '{file}': is damaged, or no table written by `accept`\n"
+        )
+        assert (
+            kept / "results.csv"
+        ).read_bytes() == table and file.read_bytes() == damage
+    for place in range(
+        4, len(contents)
+    ):  # a bit of a number, which the checksum of its page shows
         damage = contents[:place] + bytes([contents[place] ^ 1]) + contents[place + 1 :]
         with contextlib.suppress(OSError, ValueError):
-            if pq.read_table(pa.BufferReader(damage), columns=["error"])["error"].to_pylist() != [ROW.error]:
+            if pq.read_table(pa.BufferReader(damage), columns=["error"])[
+                "error"
+            ].to_pylist() != [ROW.error]:
                 break
     file.write_bytes(damage)
     assert status(["accept", str(run), "--to", str(kept)]) == 2
@@ -237,9 +286,18 @@ def test_what_has_no_record_of_its_rows_is_compared_with_a_note_and_not_accepted
 
 
 def test_what_is_empty_unfinished_or_fails_is_not_accepted(tmp_path: Path) -> None:
-    fails, refuses = replace(ROW, verdict=FAILS, error=1.0), replace(ROW, verdict=REFUSES)
-    folders = {name: save(tmp_path / name, rows) for name, rows in (("empty", []), ("good", [ROW]), ("bad", [fails]))}
-    folders |= {name: save(tmp_path / name, [row]) for name, row in (("unfinished", ROW), ("nothing", refuses))}
+    fails, refuses = (
+        replace(ROW, verdict=FAILS, error=1.0),
+        replace(ROW, verdict=REFUSES),
+    )
+    folders = {
+        name: save(tmp_path / name, rows)
+        for name, rows in (("empty", []), ("good", [ROW]), ("bad", [fails]))
+    }
+    folders |= {
+        name: save(tmp_path / name, [row])
+        for name, row in (("unfinished", ROW), ("nothing", refuses))
+    }
     (folders["unfinished"] / "run.json").write_text("{}")
     reasons = {
         "empty": "at least one comparison",
@@ -249,7 +307,12 @@ def test_what_is_empty_unfinished_or_fails_is_not_accepted(tmp_path: Path) -> No
     }
     for name, reason in reasons.items():
         with pytest.raises(InputError, match=reason):
-            CliRunner().invoke(accept_command, [str(folders[name])], standalone_mode=False, catch_exceptions=False)
+            CliRunner().invoke(
+                accept_command,
+                [str(folders[name])],
+                standalone_mode=False,
+                catch_exceptions=False,
+            )
         assert not (tmp_path / "accepted").exists()
     for name in ("empty", "unfinished"):
         with pytest.raises(InputError, match=reasons[name]):
@@ -265,7 +328,10 @@ def test_what_is_empty_unfinished_or_fails_is_not_accepted(tmp_path: Path) -> No
         (["--seed", "3"], "say --random N too"),
         (["--random", "3", "--type", "crank"], "crank-rocker, drag-link"),
         (["--engines", ","], "must be among pinocchio-inverse"),
-        (["--against", "no-such-run"], "error: --against = 'no-such-run': must be a folder with results.csv"),
+        (
+            ["--against", "no-such-run"],
+            "error: --against = 'no-such-run': must be a folder with results.csv",
+        ),
         (["--html", "changes.html"], "say --against BASELINE too"),
         (["a.toml", "--random", "3"], "leave out the scene files"),
         (["--suite", "hard", "--random", "3"], "leave out scene files and --random"),
@@ -285,20 +351,28 @@ def test_what_stood_for_a_failure_and_is_gone_is_no_regression() -> None:
     assert kinds([ROW, alarm], [ROW]) == [Kind.SAME, Kind.GONE_FAILURE]
     assert not compare_rows((HERE, [ROW, alarm]), (HERE, [ROW])).regressed
     failed = replace(ROW, verdict=FAILS)
-    assert compare_rows((HERE, [failed]), (HERE, [])).regressed  # a comparison that failed and is not made any more
+    assert compare_rows(
+        (HERE, [failed]), (HERE, [])
+    ).regressed  # a comparison that failed and is not made any more
 
 
-def test_a_run_with_too_many_rows_for_a_text_is_read_from_its_columns(tmp_path: Path) -> None:
+def test_a_run_with_too_many_rows_for_a_text_is_read_from_its_columns(
+    tmp_path: Path,
+) -> None:
     rows = [ROW, replace(ROW, quantity="watch", error=math.nan, verdict=FAILS)]
     with Columns(tmp_path) as columns:
         columns.add(rows)
     write_about(HERE, tmp_path)
     from_text = read_run(tmp_path)
-    assert pq.read_table(tmp_path / "results.parquet")["error"].null_count == 1  # no greatest error is NaN by it
+    assert (
+        pq.read_table(tmp_path / "results.parquet")["error"].null_count == 1
+    )  # no greatest error is NaN by it
     (tmp_path / "results.csv").unlink()
     write_about(HERE, tmp_path)
     from_columns = read_run(tmp_path)
-    assert from_columns[0] == from_text[0] and repr(from_columns[1]) == repr(from_text[1])
+    assert from_columns[0] == from_text[0] and repr(from_columns[1]) == repr(
+        from_text[1]
+    )
     assert not compare_rows(from_text, from_columns).regressed
     (tmp_path / "results.parquet").write_bytes(b"no columns")
     with pytest.raises(InputError, match="is damaged: no rows that can be read of 2"):
@@ -313,7 +387,10 @@ def test_two_long_runs_are_read_scene_by_scene_and_little_of_them_is_kept(
 ) -> None:
     """One row group after the other, both in step; every row is counted, of each kind the worst are listed."""
     monkeypatch.setattr("fourbar_validation.compare.columns.GROUP_ROWS", 60)
-    for module in ("fourbar_validation.compare.columns", "fourbar_validation.regression.accept"):
+    for module in (
+        "fourbar_validation.compare.columns",
+        "fourbar_validation.regression.accept",
+    ):
         monkeypatch.setattr(f"{module}.CSV_ROWS", 100)
     monkeypatch.setattr("fourbar_validation.compare.columns.BATCH_ROWS", 60)
     scenes, kept = 1000, 5
@@ -321,10 +398,18 @@ def test_two_long_runs_are_read_scene_by_scene_and_little_of_them_is_kept(
         (tmp_path / name).mkdir()
         with Columns(tmp_path / name) as columns:
             for k in range(scenes):
-                row = replace(ROW, scene=f"random-0-{k:09d}", condition=1e-3, error=1e-9 * (1.0 + k * (grown - 1.0)))
+                row = replace(
+                    ROW,
+                    scene=f"random-0-{k:09d}",
+                    condition=1e-3,
+                    error=1e-9 * (1.0 + k * (grown - 1.0)),
+                )
                 columns.add([replace(row, quantity="F12", error=1e-15), row])
         write_about(HERE, tmp_path / name)
-        assert not (tmp_path / name / "results.csv").exists() and len(columns.first_lines) < 60
+        assert (
+            not (tmp_path / name / "results.csv").exists()
+            and len(columns.first_lines) < 60
+        )
     alive = most = 0
     before, after = (open_run(tmp_path / name) for name in ("old", "new"))
 
@@ -336,17 +421,38 @@ def test_two_long_runs_are_read_scene_by_scene_and_little_of_them_is_kept(
             yield scene, rows
             alive -= 1
 
-    changes = compare_runs((HERE, watched(before)), (HERE, watched(after)), {"engine"}, kept)
-    assert most == 2 and changes.rows == 2 * scenes and changes.regressed == changes.kinds[Kind.WORSE] == scenes - 1
-    assert [change.key[0][-3:] for change in changes.of(Kind.WORSE)] == ["999", "998", "997", "996", "995"]
+    changes = compare_runs(
+        (HERE, watched(before)), (HERE, watched(after)), {"engine"}, kept
+    )
+    assert (
+        most == 2
+        and changes.rows == 2 * scenes
+        and changes.regressed == changes.kinds[Kind.WORSE] == scenes - 1
+    )
+    assert [change.key[0][-3:] for change in changes.of(Kind.WORSE)] == [
+        "999",
+        "998",
+        "997",
+        "996",
+        "995",
+    ]
     assert len(changes.changes) == 2 * kept
     cases = ET.fromstring(render.write_junit(changes))
-    assert cases.findall(".//testcase")[-1].get("name") == f"{2 * (scenes - kept)} rows more: see results.parquet"
+    assert (
+        cases.findall(".//testcase")[-1].get("name")
+        == f"{2 * (scenes - kept)} rows more: see results.parquet"
+    )
     arguments = ["compare", str(tmp_path / "old"), str(tmp_path / "new")]
-    assert [status(arguments), status([*arguments, "--only", "random-0-000000000"])] == [1, 0]
+    assert [
+        status(arguments),
+        status([*arguments, "--only", "random-0-000000000"]),
+    ] == [1, 0]
     kept_as = tmp_path / "kept"
     assert status(["accept", str(tmp_path / "new"), "--to", str(kept_as)]) == 0
-    assert {path.name for path in kept_as.iterdir()} == {"record.json", "results.parquet"}  # too long for a history
+    assert {path.name for path in kept_as.iterdir()} == {
+        "record.json",
+        "results.parquet",
+    }  # too long for a history
     assert status(["compare", str(kept_as), str(tmp_path / "new")]) == 0
 
 
@@ -354,10 +460,16 @@ def test_a_part_of_a_long_run_compares_with_its_part_and_a_table_out_of_order_wi
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     rows = [replace(ROW, scene=f"scene {k:03d}") for k in range(80)]
-    all_rows, some = save(tmp_path / "whole", rows), save(tmp_path / "some", [rows[7], rows[70]])
+    all_rows, some = (
+        save(tmp_path / "whole", rows),
+        save(tmp_path / "some", [rows[7], rows[70]]),
+    )
     assert status(["compare", str(all_rows), str(some)]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert lines[0] == "Not run: scene scene 000 (1 row)" and lines[50] == "Not run: 28 more (28 rows)"
+    assert (
+        lines[0] == "Not run: scene scene 000 (1 row)"
+        and lines[50] == "Not run: 28 more (28 rows)"
+    )
     assert lines[-1].startswith("No regression in 2 of 80 rows: 78 not run, 2 same")
     table = some / "results.csv"
     first, *others = table.read_text().splitlines(keepends=True)
@@ -369,9 +481,19 @@ def test_a_part_of_a_long_run_compares_with_its_part_and_a_table_out_of_order_wi
 
 def disagreeing(worse: set[tuple[str, str]]) -> tuple[list[Row], list[Row]]:
     """Two runs of three scenes by three exact engines, a simulation and an identity; `worse`: engine and quantity."""
-    names = [(engine, quantity) for engine in ("one", "two", "three", "sim") for quantity in ("F12", "torque")]
-    rows = [replace(ROW, engine=engine, quantity=quantity) for engine, quantity in (*names, ("formulas", "power"))]
-    rows = [replace(row, setting="RK4 628/rev") if row.engine == "sim" else row for row in rows]
+    names = [
+        (engine, quantity)
+        for engine in ("one", "two", "three", "sim")
+        for quantity in ("F12", "torque")
+    ]
+    rows = [
+        replace(ROW, engine=engine, quantity=quantity)
+        for engine, quantity in (*names, ("formulas", "power"))
+    ]
+    rows = [
+        replace(row, setting="RK4 628/rev") if row.engine == "sim" else row
+        for row in rows
+    ]
     old = [replace(row, scene=scene) for scene in "abc" for row in rows]
     fails = {"verdict": FAILS, "error": 1e-6}
     return old, [
@@ -388,17 +510,23 @@ def disagreeing(worse: set[tuple[str, str]]) -> tuple[list[Row], list[Row]]:
         ({("sim", "F12"), ("sim", "torque")}, "only sim, 3 of 3 scenes"),
         ({("one", "torque"), ("sim", "torque")}, "only one, sim, 3 of 3 scenes"),
         (
-            {(engine, "torque") for engine in ("one", "two", "three")} | {("formulas", "power")},
+            {(engine, "torque") for engine in ("one", "two", "three")}
+            | {("formulas", "power")},
             "all engines and the identity disagree: the formulas, 3 of 3 scenes",
         ),
         (
             {(engine, "F12") for engine in ("one", "two", "three")},
             "all engines disagree, and the identities hold: the formulas, or what all engines are given, 3 of 3 scenes",
         ),
-        ({("formulas", "power")}, "only the identities: the formulas, or what is stated of them, 3 of 3 scenes"),
+        (
+            {("formulas", "power")},
+            "only the identities: the formulas, or what is stated of them, 3 of 3 scenes",
+        ),
     ],
 )
-def test_the_report_says_who_is_at_fault(worse: set[tuple[str, str]], sentence: str) -> None:
+def test_the_report_says_who_is_at_fault(
+    worse: set[tuple[str, str]], sentence: str
+) -> None:
     old, new = disagreeing(worse)
     changes = compare_rows((HERE, old), (HERE, new))
     assert changes.fault.sentences == [sentence]
@@ -409,10 +537,17 @@ def test_the_report_says_who_is_at_fault(worse: set[tuple[str, str]], sentence: 
 def test_rows_that_changed_are_grouped_by_engine_and_cause_the_worst_first() -> None:
     old, new = disagreeing({("sim", "F12"), ("sim", "torque"), ("one", "torque")})
     better = [replace(row, error=1e-9) if row.engine == "two" else row for row in old]
-    new = [replace(row, error=1.0) if row.failed and row.engine == "one" and row.scene == "b" else row for row in new]
+    new = [
+        replace(row, error=1.0)
+        if row.failed and row.engine == "one" and row.scene == "b"
+        else row
+        for row in new
+    ]
     changes_from_better = compare_rows((HERE, better), (HERE, new))
     groups = [
-        line for line in render.write_text(changes_from_better).splitlines() if "scenes, " in line and "rows (" in line
+        line
+        for line in render.write_text(changes_from_better).splitlines()
+        if "scenes, " in line and "rows (" in line
     ]
     cause = "agrees -> fails: # where # was predicted"
     assert groups == [
@@ -421,44 +556,95 @@ def test_rows_that_changed_are_grouped_by_engine_and_cause_the_worst_first() -> 
         "Better: two, 3 of 3 scenes, 6 rows (F12 3, torque 3)",
     ]
     assert changes_from_better.of(Kind.VERDICT_WORSE)[0].key[:2] == ("b", "one")
-    assert groups[0].partition(": ")[2] in html.unescape(render.write_html(changes_from_better))
+    assert groups[0].partition(": ")[2] in html.unescape(
+        render.write_html(changes_from_better)
+    )
 
 
 SCENE = fourbar.load(Path(__file__).parents[3] / "models" / "crank_rocker.toml")
 
 
-def made(rows: list[Row], scenes: dict[str, fourbar.Scene], engines: tuple[str, ...] = ("engine",)) -> WithRows:
+def made(
+    rows: list[Row],
+    scenes: dict[str, fourbar.Scene],
+    engines: tuple[str, ...] = ("engine",),
+) -> WithRows:
     free_bodies = [Engine(engine, FreeBody, EQUIVALENCE) for engine in engines]
-    return describe_run(free_bodies, "suite", {name: describe_changes(s) for name, s in scenes.items()}), rows
+    return describe_run(
+        free_bodies, "suite", {name: describe_changes(s) for name, s in scenes.items()}
+    ), rows
 
 
 def test_a_scene_that_changed_comes_first_and_its_rows_are_not_compared() -> None:
     output = replace(SCENE.linkage.output, inertia=0.05)
-    heavier = replace(SCENE, linkage=replace(SCENE.linkage, output=output), title="another title")
-    before = replace(SCENE, linkage=replace(SCENE.linkage, output=replace(output, inertia=0.048)))
-    other_row, wrong = replace(ROW, scene="other"), replace(ROW, error=1e-9, allowed=1e-8)
+    heavier = replace(
+        SCENE, linkage=replace(SCENE.linkage, output=output), title="another title"
+    )
+    before = replace(
+        SCENE, linkage=replace(SCENE.linkage, output=replace(output, inertia=0.048))
+    )
+    other_row, wrong = (
+        replace(ROW, scene="other"),
+        replace(ROW, error=1e-9, allowed=1e-8),
+    )
     old = made([ROW, other_row], {"scene": before, "other": SCENE})
-    changes = compare_rows(old, made([wrong, other_row], {"scene": heavier, "other": SCENE}))
-    assert render.write_text(changes).splitlines()[0] == "scene scene: bars.output.inertia 0.048 -> 0.05 kg m^2"
-    assert changes.status == 0 and changes.not_compared == ["scene scene changed (1 row)"]
-    assert compare_rows(old, made([replace(wrong, verdict=FAILS), other_row], {"scene": heavier})).regressed
-    assert compare_rows(made([ROW], {"scene": before}), made([wrong], {"scene": heavier})).nothing
+    changes = compare_rows(
+        old, made([wrong, other_row], {"scene": heavier, "other": SCENE})
+    )
+    assert (
+        render.write_text(changes).splitlines()[0]
+        == "scene scene: bars.output.inertia 0.048 -> 0.05 kg m^2"
+    )
+    assert changes.status == 0 and changes.not_compared == [
+        "scene scene changed (1 row)"
+    ]
+    assert compare_rows(
+        old, made([replace(wrong, verdict=FAILS), other_row], {"scene": heavier})
+    ).regressed
+    assert compare_rows(
+        made([ROW], {"scene": before}), made([wrong], {"scene": heavier})
+    ).nothing
     for form in (render.write_markdown, render.write_html):
         assert "bars.output.inertia 0.048" in form(changes)
 
 
-def test_a_renamed_scene_is_found_by_what_it_states(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    heavier = replace(SCENE, linkage=replace(SCENE.linkage, output=replace(SCENE.linkage.output, inertia=0.05)))
-    names = {"g": SCENE, "h": heavier, "same": SCENE}, {"a": heavier, "gate": SCENE, "same": SCENE}
+def test_a_renamed_scene_is_found_by_what_it_states(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    heavier = replace(
+        SCENE,
+        linkage=replace(
+            SCENE.linkage, output=replace(SCENE.linkage.output, inertia=0.05)
+        ),
+    )
+    names = (
+        {"g": SCENE, "h": heavier, "same": SCENE},
+        {"a": heavier, "gate": SCENE, "same": SCENE},
+    )
     both = []
     for folder, error, scenes in zip(("old", "new"), (1e-9, 2e-9), names, strict=True):
-        stated, rows = made([replace(ROW, scene=name, error=error, allowed=1e-9) for name in scenes], scenes)
-        both.append(str(save(tmp_path / folder, rows, "".join(f"{n},engine,-,1,1,3.0\n" for n in scenes), stated)))
+        stated, rows = made(
+            [replace(ROW, scene=name, error=error, allowed=1e-9) for name in scenes],
+            scenes,
+        )
+        both.append(
+            str(
+                save(
+                    tmp_path / folder,
+                    rows,
+                    "".join(f"{n},engine,-,1,1,3.0\n" for n in scenes),
+                    stated,
+                )
+            )
+        )
     assert status(["compare", *both]) == 1
     out = capsys.readouterr().out.splitlines()
     assert out[:2] == ["renamed: g -> gate", "renamed: h -> a"]
     assert out[-1].startswith("3 regressions in 3 rows: 3 worse.")
-    for name, rows in (("gate", "1 regression in 1 rows"), ("h", "1 regression in 1 rows")):
+    for name, rows in (
+        ("gate", "1 regression in 1 rows"),
+        ("h", "1 regression in 1 rows"),
+    ):
         assert status(["compare", *both, "--only", name]) == 1
         assert rows in capsys.readouterr().out
 
@@ -467,9 +653,16 @@ def test_what_grew_within_its_allowance_is_shown_and_no_regression() -> None:
     """Another kernel of the BLAS turns 3.4e-7 into 5.2e-7 where 1 is allowed; a wider allowance excuses nothing."""
     shipped = replace(ROW, quantity="as shipped", error=3.4e-7, allowed=1.0)
     changes = compare_rows((HERE, [shipped]), (HERE, [replace(shipped, error=5.2e-7)]))
-    assert [change.kind for change in changes.changes] == [Kind.GREW] and changes.status == 0
-    assert "Grew within its allowance: scene / engine / exact / as shipped" in render.write_text(changes)
-    assert kinds([replace(shipped, allowed=4e-7)], [replace(shipped, error=6e-7)]) == [Kind.WORSE]
+    assert [change.kind for change in changes.changes] == [
+        Kind.GREW
+    ] and changes.status == 0
+    assert (
+        "Grew within its allowance: scene / engine / exact / as shipped"
+        in render.write_text(changes)
+    )
+    assert kinds([replace(shipped, allowed=4e-7)], [replace(shipped, error=6e-7)]) == [
+        Kind.WORSE
+    ]
 
 
 @pytest.mark.slow
@@ -480,96 +673,167 @@ def test_the_kernels_of_a_run_are_recorded_and_named_where_they_differ() -> None
     if not possible:
         pytest.skip("this CPU can pass for no other")
     printed = [
-        subprocess.check_output([sys.executable, "-c", code], cwd=ROOT, env=os.environ | more, text=True)
+        subprocess.check_output(
+            [sys.executable, "-c", code], cwd=ROOT, env=os.environ | more, text=True
+        )
         for more in ({}, environment(possible[0]))
     ]
     first, second = map(ast.literal_eval, printed)
     assert set(first) == {"cpu_features", "blas_kernel"} and first != second
-    old, new = (replace(HERE, versions=HERE.versions | kernels) for kernels in (first, second))
+    old, new = (
+        replace(HERE, versions=HERE.versions | kernels) for kernels in (first, second)
+    )
     text = render.write_text(compare_rows((old, [ROW]), (new, [ROW])))
     assert any(f"{name}: {first[name]} -> {second[name]}" in text for name in first)
     assert set(first) <= set(HERE.versions)
 
 
 def test_more_positions_and_other_settings_are_named_so() -> None:
-    finer = replace(SCENE, motion=SCENE.motion.replace(angle=fourbar.Sweep(0.0, 2.0 * math.pi, 720)))
+    finer = replace(
+        SCENE, motion=SCENE.motion.replace(angle=fourbar.Sweep(0.0, 2.0 * math.pi, 720))
+    )
     worse = replace(ROW, error=1e-9, allowed=1e-8)
-    changes = compare_rows(made([ROW], {"scene": SCENE}), made([worse], {"scene": finer}))
-    assert changes.not_compared == ["scene scene has other positions (1 row)"] and not changes.regressed
+    changes = compare_rows(
+        made([ROW], {"scene": SCENE}), made([worse], {"scene": finer})
+    )
+    assert (
+        changes.not_compared == ["scene scene has other positions (1 row)"]
+        and not changes.regressed
+    )
     assert "360} -> " in str(changes.scenes[0]) or "steps" in str(changes.scenes[0])
-    old, new = replace(ROW, setting="RK4 628/rev"), replace(worse, setting="RK4 1256/rev")
+    old, new = (
+        replace(ROW, setting="RK4 628/rev"),
+        replace(worse, setting="RK4 1256/rev"),
+    )
     changes = compare_rows(made([old], {"scene": SCENE}), made([new], {"scene": SCENE}))
-    assert changes.not_compared == ["scene / engine: RK4 628/rev -> RK4 1256/rev (1 row)"] and not changes.regressed
+    assert (
+        changes.not_compared == ["scene / engine: RK4 628/rev -> RK4 1256/rev (1 row)"]
+        and not changes.regressed
+    )
 
 
 def test_of_an_older_record_only_the_hash_can_say_that_scenes_changed() -> None:
-    old = About(HERE.versions, HERE.machine, {**HERE.settings, "suite": "0123456789abcdef"})
+    old = About(
+        HERE.versions, HERE.machine, {**HERE.settings, "suite": "0123456789abcdef"}
+    )
     changes = compare_rows((old, [ROW]), made([ROW], {"scene": SCENE}))
     assert not changes.scenes and not changes.regressed
     first, note = changes.notes
-    assert "0123456789ab -> suite" in note and "the older record does not say what they ask" in note
+    assert (
+        "0123456789ab -> suite" in note
+        and "the older record does not say what they ask" in note
+    )
     assert first == "1 of 1 rows are compared: the others are of one run alone"
     others = [replace(ROW, scene=f"another {k}") for k in range(3)]
-    changes = compare_rows((old, [ROW, others[0]]), made([ROW, *others[1:]], {"scene": SCENE}))
+    changes = compare_rows(
+        (old, [ROW, others[0]]), made([ROW, *others[1:]], {"scene": SCENE})
+    )
     assert render.write_text(changes).startswith(
         "1 of 4 rows are compared"
     ) and "No regression in 1 of 4 rows" in render.write_text(changes)
 
 
 def test_what_was_not_wanted_is_not_run_and_what_was_wanted_is_gone() -> None:
-    rows = [replace(ROW, scene=scene, engine=engine) for scene in ("a", "b") for engine in ("engine", "formulas")]
+    rows = [
+        replace(ROW, scene=scene, engine=engine)
+        for scene in ("a", "b")
+        for engine in ("engine", "formulas")
+    ]
     rows.append(replace(ROW, scene="a", engine="other"))
     old = made(rows, dict.fromkeys("ab", SCENE), ("engine", "other"))
     changes = compare_rows(old, made(rows[:2], {"a": SCENE}))
-    assert changes.not_run == ["scene b (2 rows)", "other (1 row)"] and changes.status == 0
+    assert (
+        changes.not_run == ["scene b (2 rows)", "other (1 row)"] and changes.status == 0
+    )
     gone = compare_rows(old, made(rows[1:2], {"a": SCENE}))
     assert [change.key[1] for change in gone.changes if change.regression] == ["engine"]
-    assert compare_rows(old, (HERE, rows[:2])).not_run[0] == "scene b (2 rows)"  # without a record its rows say so
+    assert (
+        compare_rows(old, (HERE, rows[:2])).not_run[0] == "scene b (2 rows)"
+    )  # without a record its rows say so
 
 
-def test_what_is_compared_can_be_chosen(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_is_compared_can_be_chosen(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     bad = replace(ROW, quantity="F12")
     old = save(tmp_path / "old", [ROW, bad])
     new = save(tmp_path / "new", [ROW, replace(bad, error=1e-9)])
     arguments = ["compare", str(old), str(new)]
-    assert [status([*arguments, *more]) for more in ([], ["--quantity", "torque"], ["--only", "scene"])] == [1, 0, 1]
+    assert [
+        status([*arguments, *more])
+        for more in ([], ["--quantity", "torque"], ["--only", "scene"])
+    ] == [1, 0, 1]
     capsys.readouterr()
     assert status([*arguments, "--engines", "motor"]) == 2
-    assert capsys.readouterr().err == "error: --engines = 'motor': must be among engine\n"
+    assert (
+        capsys.readouterr().err == "error: --engines = 'motor': must be among engine\n"
+    )
 
 
 @pytest.mark.slow
-def test_the_run_itself_is_written_as_junit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_run_itself_is_written_as_junit(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("fourbar_validation.report.junit.LISTED", 10)
     judge_here(monkeypatch)
-    xml, scene = tmp_path / "run.xml", Path(__file__).parents[3] / "models" / "crank_rocker.toml"
-    arguments = ["run", str(scene), "--engines", "free-body", "--no-pictures", "--out", str(tmp_path / "out")]
+    xml, scene = (
+        tmp_path / "run.xml",
+        Path(__file__).parents[3] / "models" / "crank_rocker.toml",
+    )
+    arguments = [
+        "run",
+        str(scene),
+        "--engines",
+        "free-body",
+        "--no-pictures",
+        "--out",
+        str(tmp_path / "out"),
+    ]
     assert status([*arguments, "--junit", str(xml)]) == 0
     report, rows = ET.parse(xml).getroot(), read_run(tmp_path / "out")[1]
     names = [case.get("name") for case in report.iter("testcase")]
-    assert names == [row.quantity for row in rows[:10]] + [f"{len(rows) - 10} rows more: see results.parquet"]
+    assert names == [row.quantity for row in rows[:10]] + [
+        f"{len(rows) - 10} rows more: see results.parquet"
+    ]
     assert report.get("failures") == "0" and report.get("name", "").startswith("All ")
     failing = [replace(row, verdict=FAILS, reason="not held") for row in rows[20:22]]
-    kinds = [(case.outcome, case.message.partition(": ")[2]) for case in list_cases([*rows, *failing])][10:]
+    kinds = [
+        (case.outcome, case.message.partition(": ")[2])
+        for case in list_cases([*rows, *failing])
+    ][10:]
     assert kinds == [("failure", "not held")] * 2 + [("skipped", "")]
 
 
 def test_accepted_runs_are_rows_of_one_table_that_pandas_reads(tmp_path: Path) -> None:
     import pandas as pd
 
-    kept, dates = tmp_path / "kept", [f"2026-01-0{night}T02:00:00+00:00" for night in (1, 2, 3)]
+    kept, dates = (
+        tmp_path / "kept",
+        [f"2026-01-0{night}T02:00:00+00:00" for night in (1, 2, 3)],
+    )
     for night, date in enumerate(dates):
         record, rows = made([replace(ROW, error=1e-15 * (1 + night))], {"scene": SCENE})
-        versions = {**record.versions, "mujoco": f"4.{night}.0"} | ({"newcomer": "1"} if night else {})
+        versions = {**record.versions, "mujoco": f"4.{night}.0"} | (
+            {"newcomer": "1"} if night else {}
+        )
         about = replace(record, versions=versions, date=date, commit=f"{night}abcdef")
         run = save(tmp_path / str(night), rows, "scene,engine,-,1,1,3.0\n", about)
         assert status(["accept", str(run), "--to", str(kept)]) == 0
-    assert status(["accept", str(tmp_path / "1"), "--to", str(kept)]) == 0  # it is in it
+    assert (
+        status(["accept", str(tmp_path / "1"), "--to", str(kept)]) == 0
+    )  # it is in it
     table = pd.read_parquet(kept / HISTORY)
-    assert table.groupby("date", observed=True).size().to_dict() == dict.fromkeys(dates, 2)
-    assert table[table.quantity == "torque"].error.tolist() == [1e-15 * n for n in (1, 2, 3)]
+    assert table.groupby("date", observed=True).size().to_dict() == dict.fromkeys(
+        dates, 2
+    )
+    assert table[table.quantity == "torque"].error.tolist() == [
+        1e-15 * n for n in (1, 2, 3)
+    ]
     assert table[table.quantity == "time"].times_formulas.tolist() == [3.0] * 3
-    assert set(table.version_mujoco) == {"4.0.0", "4.1.0", "4.2.0"} and table.version_newcomer.isna().sum() == 2
+    assert (
+        set(table.version_mujoco) == {"4.0.0", "4.1.0", "4.2.0"}
+        and table.version_newcomer.isna().sum() == 2
+    )
     assert table.scene_hash.nunique() == 1
 
 
@@ -580,36 +844,86 @@ def test_a_name_that_does_not_print_or_is_a_formula_is_one_name_everywhere(
     """Escapes change the order of names, and a spreadsheet calculates a cell that begins with =."""
     judge_here(monkeypatch)
     names = ["a\x1b", "aB", "b\nc", "=cmd|'calc'!A0", "+1", "'quoted"]
-    text = fourbar.dump(replace(SCENE, motion=fourbar.Motion(fourbar.Sweep(0.1, 1.0, 3), 1.0)))
+    text = fourbar.dump(
+        replace(SCENE, motion=fourbar.Motion(fourbar.Sweep(0.1, 1.0, 3), 1.0))
+    )
     for name in names:
         (tmp_path / f"{name}.toml").write_text(text)
     run, files = tmp_path / "run", [str(tmp_path / f"{name}.toml") for name in names]
-    assert status(["run", *files, "--engines", "free-body", "--no-pictures", "--out", str(run)]) == 0
+    assert (
+        status(
+            [
+                "run",
+                *files,
+                "--engines",
+                "free-body",
+                "--no-pictures",
+                "--out",
+                str(run),
+            ]
+        )
+        == 0
+    )
     assert status(["compare", str(run), str(run)]) == 0
     printed = sorted(["a\\x1b", "aB", "b\\nc", *names[3:]])
-    cells = [list(csv.reader((run / name).read_text().splitlines())) for name in ("results.csv", "timings.csv")]
-    assert not any(cell.startswith(("=", "+", "@")) for rows in cells for row in rows for cell in row)
+    cells = [
+        list(csv.reader((run / name).read_text().splitlines()))
+        for name in ("results.csv", "timings.csv")
+    ]
+    assert not any(
+        cell.startswith(("=", "+", "@"))
+        for rows in cells
+        for row in rows
+        for cell in row
+    )
     assert all(len(row) == len(rows[0]) for rows in cells for row in rows)
     kept = open_run(run)
-    assert [name for name, _ in kept.scenes()] == [name for name, _ in kept.times()] == printed == [*kept.about.scenes]
+    assert (
+        [name for name, _ in kept.scenes()]
+        == [name for name, _ in kept.times()]
+        == printed
+        == [*kept.about.scenes]
+    )
     (tmp_path / "a\\x1b.toml").write_text(text)
     with pytest.raises(InputError, match="must have a name of its own"):
         read_scene_files([tmp_path / "a\x1b.toml", tmp_path / "a\\x1b.toml"])
 
 
-@pytest.mark.parametrize("name", ["lock", "run.json", "results.csv", "timings.csv", "report.html"])
+@pytest.mark.parametrize(
+    "name", ["lock", "run.json", "results.csv", "timings.csv", "report.html"]
+)
 def test_a_folder_where_a_file_of_a_run_belongs_is_one_line_before_it(
     name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "out" / name).mkdir(parents=True)
-    assert status(["run", *MODEL, "--engines", "free-body", "--no-pictures", "--out", str(tmp_path / "out")]) == 2
+    assert (
+        status(
+            [
+                "run",
+                *MODEL,
+                "--engines",
+                "free-body",
+                "--no-pictures",
+                "--out",
+                str(tmp_path / "out"),
+            ]
+        )
+        == 2
+    )
     message = capsys.readouterr().err.strip()
-    assert message == f"error: path = '{tmp_path / 'out' / name}': must name a file, not a folder"
+    assert (
+        message
+        == f"error: path = '{tmp_path / 'out' / name}': must name a file, not a folder"
+    )
     assert [path.name for path in (tmp_path / "out").iterdir()] == [name]
 
 
-@pytest.mark.parametrize("name", ["results.csv", "results.parquet", "timings.csv", "record.json", HISTORY])
-def test_accept_onto_a_folder_of_that_name_writes_nothing(name: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    "name", ["results.csv", "results.parquet", "timings.csv", "record.json", HISTORY]
+)
+def test_accept_onto_a_folder_of_that_name_writes_nothing(
+    name: str, tmp_path: Path
+) -> None:
     run, kept = save(tmp_path / "run", [ROW]), tmp_path / "kept"
     (kept / name).mkdir(parents=True)
     assert status(["accept", str(run), "--to", str(kept)]) == 2
@@ -625,19 +939,28 @@ def test_folders_among_the_parts_of_a_run_are_swept_away(tmp_path: Path) -> None
             assert store.done() == set() and not [*store.parts.iterdir()]
     (tmp_path / "parts").write_text("a file")
     with (
-        pytest.raises(InputError, match="must be a folder, in which a run keeps its parts"),
+        pytest.raises(
+            InputError, match="must be a folder, in which a run keeps its parts"
+        ),
         Store(tmp_path, {}).held(),
     ):
         pass
 
 
-def test_a_full_disk_names_the_file_that_does_not_fit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_full_disk_names_the_file_that_does_not_fit(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     run = save(tmp_path / "run", [ROW])
 
     def full(source: Path, target: Path) -> None:
-        raise OSError(errno.ENOSPC, "No space left on device", str(source), None, str(target))  # as shutil does
+        raise OSError(
+            errno.ENOSPC, "No space left on device", str(source), None, str(target)
+        )  # as shutil does
 
     monkeypatch.setattr("fourbar_validation.regression.record.shutil.copyfile", full)
     with pytest.raises(OSError) as caught:
         record.accept(open_run(run), tmp_path / "kept")
-    assert (caught.value.filename, caught.value.filename2) == (str(tmp_path / "kept" / "results.csv"), None)
+    assert (caught.value.filename, caught.value.filename2) == (
+        str(tmp_path / "kept" / "results.csv"),
+        None,
+    )

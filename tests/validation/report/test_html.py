@@ -9,7 +9,9 @@ from fourbar_validation.compare.rows import write_rows
 from fourbar_validation.report.html import ALL_OPEN
 from tests.validation.report.test_report import copies, report
 
-pytest.importorskip("selenium", reason="pages are driven by selenium: pip install selenium")
+pytest.importorskip(
+    "selenium", reason="pages are driven by selenium: pip install selenium"
+)
 
 CONTRAST = 4.5
 """WCAG 2.1, level AA, for text."""
@@ -71,7 +73,9 @@ def test_a_number_leads_to_its_row(browse, count: int) -> None:
     driver = browse(report(copies(count))[1])
     link = driver.find_elements("css selector", "#overview ~ details td.cell a")[-1]
     target = link.get_attribute("href").rpartition("#")[2]
-    assert count <= ALL_OPEN or not driver.find_elements("id", target)  # not unpacked yet
+    assert count <= ALL_OPEN or not driver.find_elements(
+        "id", target
+    )  # not unpacked yet
     driver.execute_script("arguments[0].click()", link)
     row = wait(driver, lambda: driver.find_element("id", target))
     wait(driver, row.is_displayed)
@@ -86,13 +90,17 @@ def test_the_download_is_results_csv(browse) -> None:
     driver = browse(report(pages)[1])
     script = "return document.querySelector('a[download]').href"
     data = driver.execute_script(script).partition(";base64,")[2]
-    assert base64.b64decode(data).decode() == write_rows(row for page in pages for row in page.rows)
+    assert base64.b64decode(data).decode() == write_rows(
+        row for page in pages for row in page.rows
+    )
 
 
 @pytest.mark.slow
 def test_200_scenes_open_quickly_and_a_scene_when_opened(browse) -> None:
     driver = browse(report(copies(200))[1])
-    times = driver.execute_script("return JSON.stringify(performance.getEntriesByType('navigation')[0])")
+    times = driver.execute_script(
+        "return JSON.stringify(performance.getEntriesByType('navigation')[0])"
+    )
     assert json.loads(times)["loadEventEnd"] / 1e3 < LOADED
     scene = driver.find_element("id", "scene-7")
     assert not scene.find_elements("tag name", "svg")
@@ -104,10 +112,17 @@ def test_200_scenes_open_quickly_and_a_scene_when_opened(browse) -> None:
 @pytest.mark.slow
 def test_it_prints_on_paper(browse) -> None:
     driver = browse(report(copies(2, failing=1))[1], dark=True)
-    pdf = driver.execute_cdp_cmd("Page.printToPDF", {"printBackground": True, "paperWidth": 8.27, "paperHeight": 11.69})
+    pdf = driver.execute_cdp_cmd(
+        "Page.printToPDF",
+        {"printBackground": True, "paperWidth": 8.27, "paperHeight": 11.69},
+    )
     pages = base64.b64decode(pdf["data"]).count(b"/Type /Page\n")
     assert 2 <= pages <= 6
     driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
-    paper = driver.execute_script("return getComputedStyle(document.body).backgroundColor")
+    paper = driver.execute_script(
+        "return getComputedStyle(document.body).backgroundColor"
+    )
     driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": ""})
-    assert paper == "rgb(254, 254, 254)"  # white on paper, also where the screen is dark
+    assert (
+        paper == "rgb(254, 254, 254)"
+    )  # white on paper, also where the screen is dark

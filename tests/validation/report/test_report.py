@@ -40,7 +40,11 @@ def demo(*, draw: bool = True) -> Record:
     """A small scene as two exact engines and the free bodies judge it."""
     scene = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.0, 6.0, 36), 5.0))
     return judge_for_report(
-        "demo", scene, tuple(w for w in ENGINES if w.name != "mujoco-simulated"), draw=draw, shipped=draw
+        "demo",
+        scene,
+        tuple(w for w in ENGINES if w.name != "mujoco-simulated"),
+        draw=draw,
+        shipped=draw,
     )
 
 
@@ -79,15 +83,24 @@ def unpacked(text: str) -> str:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("count", [2, ALL_OPEN + 1])
-def test_every_link_leads_to_a_row_and_the_row_says_what_results_csv_says_there(count: int) -> None:
+def test_every_link_leads_to_a_row_and_the_row_says_what_results_csv_says_there(
+    count: int,
+) -> None:
     pages = copies(count, failing=1)
     _, text = report(pages)
     text = unpacked(text)
-    lines = list(csv.reader(io.StringIO(write_rows(row for record in pages for row in record.rows))))
+    lines = list(
+        csv.reader(
+            io.StringIO(write_rows(row for record in pages for row in record.rows))
+        )
+    )
     rows = dict(re.findall(r'<tr id="row-(\d+)"[^>]*>(.*?)</tr>', text))
     assert {int(line) for line in rows} == set(range(2, len(lines) + 1))
     for line, shown in rows.items():
-        cells = [re.sub(r"<[^>]*>", "", cell).split() for cell in re.findall(r"<td[^>]*>(.*?)</td>", shown)]
+        cells = [
+            re.sub(r"<[^>]*>", "", cell).split()
+            for cell in re.findall(r"<td[^>]*>(.*?)</td>", shown)
+        ]
         record = dict(zip(lines[0], lines[int(line) - 1], strict=True))
         assert cells[1][0] == record["engine"] and cells[2] == [record["quantity"]]
         assert cells[3] == [f"{float(record['error']):.2e}"]
@@ -99,9 +112,13 @@ def test_every_link_leads_to_a_row_and_the_row_says_what_results_csv_says_there(
 def test_the_page_carries_results_csv_to_the_byte() -> None:
     pages = copies(3)
     _, text = report(pages)
-    data = re.search(r'download="results.csv" href="data:text/csv;base64,([^"]*)"', text)
+    data = re.search(
+        r'download="results.csv" href="data:text/csv;base64,([^"]*)"', text
+    )
     assert data is not None
-    assert base64.b64decode(data.group(1)).decode() == write_rows(row for page in pages for row in page.rows)
+    assert base64.b64decode(data.group(1)).decode() == write_rows(
+        row for page in pages for row in page.rows
+    )
 
 
 @pytest.mark.slow
@@ -109,14 +126,22 @@ def test_the_verdict_stands_first_and_a_failure_is_named_before_anything_else() 
     summary, text = report(copies(3, failing=1))
     assert summary.verdict.startswith("FAILS: 1 of ")
     body = text[text.index("<body>") :]
-    assert body.index(summary.verdict) < body.index("What fails</h2>") < body.index("Independent engines</h2>")
+    assert (
+        body.index(summary.verdict)
+        < body.index("What fails</h2>")
+        < body.index("Independent engines</h2>")
+    )
     assert "What fails</h2>" not in report(copies(3))[1]
 
 
 @pytest.mark.slow
 def test_a_scene_cannot_write_into_the_demo() -> None:
-    hostile = replace(demo(), title=HOSTILE, source=HOSTILE, name=HOSTILE, left_out=[HOSTILE])
-    summary, text = report([hostile], sections=[Section("more", HOSTILE, HOSTILE, [HOSTILE], [[HOSTILE]])])
+    hostile = replace(
+        demo(), title=HOSTILE, source=HOSTILE, name=HOSTILE, left_out=[HOSTILE]
+    )
+    summary, text = report(
+        [hostile], sections=[Section("more", HOSTILE, HOSTILE, [HOSTILE], [[HOSTILE]])]
+    )
     assert "<img src=x" not in text
     assert len(re.findall("<script", text)) == 1
     assert "<img" not in write_markdown(summary)
@@ -124,7 +149,9 @@ def test_a_scene_cannot_write_into_the_demo() -> None:
 
 @pytest.mark.slow
 def test_nothing_is_fetched() -> None:
-    _, text = report(copies(2), pictures={"scene-000": "iVBORw0KGgo="}, no_pictures="none")
+    _, text = report(
+        copies(2), pictures={"scene-000": "iVBORw0KGgo="}, no_pictures="none"
+    )
     text = re.sub(r'xmlns(:xlink)?="[^"]*"', "", text)
     assert not re.search(r'(?:src|href)="(?!#|data:)', text)
     assert "url(" not in re.sub(r"url\(#", "", text) and "@import" not in text
@@ -136,8 +163,17 @@ def test_the_comment_of_a_pull_request_holds_200_scenes_that_all_fail() -> None:
 
 
 def test_a_section_of_another_module_is_shown_and_linked() -> None:
-    _, text = report(copies(2), sections=[Section("hard", "Hard cases", "As predicted.", ["family"], [["toggle"]])])
-    assert '<a href="#hard">Hard cases</a>' in text and '<h2 id="hard">' in text and ">toggle</th>" in text
+    _, text = report(
+        copies(2),
+        sections=[
+            Section("hard", "Hard cases", "As predicted.", ["family"], [["toggle"]])
+        ],
+    )
+    assert (
+        '<a href="#hard">Hard cases</a>' in text
+        and '<h2 id="hard">' in text
+        and ">toggle</th>" in text
+    )
 
 
 def test_the_errors_drawn_are_the_largest_of_their_stretches() -> None:
@@ -157,33 +193,51 @@ def test_the_times_of_engines_are_those_of_the_run() -> None:
     """The median over scenes; of an engine that refused none, and beside our own consistency that of the formulas."""
     scenes = []
     for k in (1.0, 2.0, 8.0):
-        timings = [replace(timing, seconds=k * timing.seconds) for timing in demo().timings]
+        timings = [
+            replace(timing, seconds=k * timing.seconds) for timing in demo().timings
+        ]
         scenes.append(replace(demo(draw=False), timings=timings))
     lines = {line.name: line for line in summary_of(scenes).engines}
     of_one = {timing.engine: timing for timing in demo().timings}
-    assert set(of_one) == {"formulas", "pinocchio-inverse", "mujoco-inverse", "free-body"}
+    assert set(of_one) == {
+        "formulas",
+        "pinocchio-inverse",
+        "mujoco-inverse",
+        "free-body",
+    }
     for engine, timing in of_one.items():
         line = lines[OWN if engine == "formulas" else engine]
-        assert line.microseconds == pytest.approx(2.0 * 1e6 * timing.seconds / 37, rel=1e-12)
-        assert line.times_formulas == pytest.approx(timing.seconds / of_one["formulas"].seconds, rel=1e-12)
+        assert line.microseconds == pytest.approx(
+            2.0 * 1e6 * timing.seconds / 37, rel=1e-12
+        )
+        assert line.times_formulas == pytest.approx(
+            timing.seconds / of_one["formulas"].seconds, rel=1e-12
+        )
         assert WORK[engine] in unescape(report(scenes)[1]) and line.work == WORK[engine]
     refused = replace(demo().rows[0], engine="free-body", verdict=REFUSES)
     silent = summary_of([replace(demo(draw=False), rows=[*demo().rows, refused])])
-    assert math.isnan(next(line for line in silent.engines if line.name == "free-body").microseconds)
+    assert math.isnan(
+        next(line for line in silent.engines if line.name == "free-body").microseconds
+    )
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("motion", "pictures"),
     [
-        (fourbar.Motion(fourbar.Sweep(0.0, 6.0, 24)), 3),  # positions only: angles are drawn
+        (
+            fourbar.Motion(fourbar.Sweep(0.0, 6.0, 24)),
+            3,
+        ),  # positions only: angles are drawn
         (fourbar.Motion(1.0, 5.0), 1),  # one position: the linkage alone
         (fourbar.Motion(1.0, 0.0, free=fourbar.Free(0.2, 20)), 3),
         (fourbar.Motion(fourbar.Sweep(0.0, 6.0, 24), 5.0), 3),
     ],
     ids=["positions", "one position", "released", "sweep"],
 )
-def test_every_kind_of_scene_is_drawn(motion: fourbar.Motion, pictures: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_every_kind_of_scene_is_drawn(
+    motion: fourbar.Motion, pictures: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
     judge_solve_alone(monkeypatch)
     engines = tuple(w for w in ENGINES if w.name == "free-body")
     made = judge_for_report("kind", crank_rocker(motion=motion), engines)
@@ -193,45 +247,84 @@ def test_every_kind_of_scene_is_drawn(motion: fourbar.Motion, pictures: int, mon
 
 
 def test_an_engine_that_is_missing_is_reported_as_failing() -> None:
-    absent = replace(ENGINES[0], start=lambda: import_module("fourbar_validation.engines.absent").Absent())
-    summary, text = report([judge_for_report("demo", crank_rocker(), (absent,), draw=False)])
+    absent = replace(
+        ENGINES[0],
+        start=lambda: import_module("fourbar_validation.engines.absent").Absent(),
+    )
+    summary, text = report(
+        [judge_for_report("demo", crank_rocker(), (absent,), draw=False)]
+    )
     assert summary.verdict.startswith("FAILS")
     assert "What fails</h2>" in text and "No module named" in text and "∞" in text
 
 
 @pytest.mark.slow
-def test_many_scenes_give_a_short_report_of_the_worst(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_many_scenes_give_a_short_report_of_the_worst(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setattr("fourbar_validation.report.summary.SCENES_SHOWN", 20)
     pages = copies(100)
     for number, record in enumerate(pages):
         record.rows[0] = replace(record.rows[0], error=number * 8e-3, allowed=1.0)
-        record.left_out = [f"mujoco-simulated: falls to {number * 1e-3:.1e}; below 0.05 it is not simulated"]
-        record.evidence = {"sim": {"error_at_4h": 1e-3, "error_at_2h": 1e-4, "observed_order": 3.0 + number}}
-        record.timings = [*record.timings, replace(record.timings[0], engine="sim", setting=f"RK4 {628 + number}/rev")]
+        record.left_out = [
+            f"mujoco-simulated: falls to {number * 1e-3:.1e}; below 0.05 it is not simulated"
+        ]
+        record.evidence = {
+            "sim": {
+                "error_at_4h": 1e-3,
+                "error_at_2h": 1e-4,
+                "observed_order": 3.0 + number,
+            }
+        }
+        record.timings = [
+            *record.timings,
+            replace(record.timings[0], engine="sim", setting=f"RK4 {628 + number}/rev"),
+        ]
     summary, text = report(pages)
     assert [w.row.scene for w in summary.worst[:2]] == ["scene-099", "scene-098"]
-    assert {scene.name for scene in summary.shown} == {f"scene-0{number}" for number in range(80, 100)}
-    assert summary.refusals == [("mujoco-simulated", "falls to 0.0e+00; below 0.05 it is not simulated", 100)]
+    assert {scene.name for scene in summary.shown} == {
+        f"scene-0{number}" for number in range(80, 100)
+    }
+    assert summary.refusals == [
+        ("mujoco-simulated", "falls to 0.0e+00; below 0.05 it is not simulated", 100)
+    ]
     assert summary.orders[0][0] == "scene-000"
-    assert f"the 80 of {summary.judged} scenes and engines" in write_markdown(summary) and summary.judged > 1000
+    assert (
+        f"the 80 of {summary.judged} scenes and engines" in write_markdown(summary)
+        and summary.judged > 1000
+    )
     assert write_markdown(summary).count("\n") < 160
-    assert len(text) < 1.8e6  # 20 scenes, each with a figure of 20 kB and some 55 kB of rows of eleven engines
+    assert (
+        len(text) < 1.8e6
+    )  # 20 scenes, each with a figure of 20 kB and some 55 kB of rows of eleven engines
 
 
 @pytest.mark.slow
-def test_every_engine_of_a_report_has_a_mark_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_every_engine_of_a_report_has_a_mark_of_its_own(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """Whoever is drawn first, and in whatever process: the engine says its number."""
     monkeypatch.setattr(svg, "NUMBERS", {})
     classes = "tests.support.hostile_class:"
     engines = guests.read_guests(
-        [f"{classes}Right", f"{classes}Leaves"], [engine.name for engine in (*ENGINES, *load_further())]
+        [f"{classes}Right", f"{classes}Leaves"],
+        [engine.name for engine in (*ENGINES, *load_further())],
     )
     names = [engine.name for engine in (*ENGINES, *load_further(), *engines)]
     svg.NUMBERS.update(guests.list_numbers(engines))
-    marks = {name: (svg.choose_style(name).symbol, svg.choose_style(name).marker) for name in names}
-    assert len({mark for mark, _ in marks.values()}) == len({marker for _, marker in marks.values()}) == len(names)
+    marks = {
+        name: (svg.choose_style(name).symbol, svg.choose_style(name).marker)
+        for name in names
+    }
+    assert (
+        len({mark for mark, _ in marks.values()})
+        == len({marker for _, marker in marks.values()})
+        == len(names)
+    )
     svg.NUMBERS.clear()
-    svg.NUMBERS.update(guests.list_numbers(engines[1:]))  # a scene in which the first broke down
+    svg.NUMBERS.update(
+        guests.list_numbers(engines[1:])
+    )  # a scene in which the first broke down
     assert svg.choose_style(names[-1]).symbol == marks[names[-1]][0]
     assert all(svg.choose_style(name).variable in svg.LIGHT for name in names)
 
@@ -240,15 +333,36 @@ def test_a_run_prints_one_row_an_engine_and_the_rest_on_demand(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Beside the error what is allowed to it; a share of undecided numbers is no error; our own rows are one."""
-    row = Row("first", "mujoco-simulated", "RK4", "F12", 2.5e-7, 1e-5, AGREES, "", math.radians(40.0), 1.0)
+    row = Row(
+        "first",
+        "mujoco-simulated",
+        "RK4",
+        "F12",
+        2.5e-7,
+        1e-5,
+        AGREES,
+        "",
+        math.radians(40.0),
+        1.0,
+    )
     share = replace(row, quantity="undecided", error=0.4, allowed=0.5, theta_2=math.nan)
     colours = [
         replace(row, engine=engine, quantity="torque", error=error)
         for engine, error in (("study", 1e-6), ("formulas", 0.0))
     ]
-    pages = [replace(demo(draw=False), name="first", rows=[row, share, *colours], left_out=["extremes: too near"])]
+    pages = [
+        replace(
+            demo(draw=False),
+            name="first",
+            rows=[row, share, *colours],
+            left_out=["extremes: too near"],
+        )
+    ]
     summary = summary_of(pages)
-    assert [line.name for line in summary.engines] == ["mujoco-simulated", "our own consistency"]
+    assert [line.name for line in summary.engines] == [
+        "mujoco-simulated",
+        "our own consistency",
+    ]
     assert summary.engines[0].worst == row and summary.engines[0].undecided == 0.4
     print_table(summary, tmp_path)
     printed = capsys.readouterr().out
@@ -257,22 +371,65 @@ def test_a_run_prints_one_row_an_engine_and_the_rest_on_demand(
         "2.5e-07 1.0e-05 F12 of first, 40.0 deg" in words
         and "our own consistency 1.0e-06 1.0e-05 study torque" in words
     )
-    assert "1 comparisons were left out, for 1 reasons; --verbose lists them." in words and "too near" not in words
-    assert words.endswith(f"{summary.verdict}. Report: {tmp_path / 'report.html'}") and len(printed.splitlines()) < 14
+    assert (
+        "1 comparisons were left out, for 1 reasons; --verbose lists them." in words
+        and "too near" not in words
+    )
+    assert (
+        words.endswith(f"{summary.verdict}. Report: {tmp_path / 'report.html'}")
+        and len(printed.splitlines()) < 14
+    )
     print_table(summary, tmp_path, verbose=True)
-    assert "extremes left out in 1 scene: too near" in " ".join(capsys.readouterr().out.split())
+    assert "extremes left out in 1 scene: too near" in " ".join(
+        capsys.readouterr().out.split()
+    )
     assert write_markdown(summary).splitlines()[6].startswith("| mujoco-simulated")
 
 
 @pytest.mark.parametrize("columns", ["80", "40"])
 def test_a_value_far_beyond_what_is_allowed_leaves_the_numbers_of_the_table_whole(
-    columns: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    columns: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.setenv("COLUMNS", columns)
-    row = Row("thesis_printed_inertias", "mujoco-simulated", "RK4", "limit_positions", 3.14, 1e-9, FAILS, "", 0.5, 0.3)
-    print_table(summary_of([replace(demo(draw=False), name=row.scene, rows=[row])]), tmp_path, verbose=True)
-    line = next(line for line in capsys.readouterr().out.splitlines() if "mujoco-simulated" in line)
-    assert line.split() == ["mujoco-simulated", "limit_positions", "3.1e+00", "1.0e-09", "3.1e+09", "28.6"]
+    row = Row(
+        "thesis_printed_inertias",
+        "mujoco-simulated",
+        "RK4",
+        "limit_positions",
+        3.14,
+        1e-9,
+        FAILS,
+        "",
+        0.5,
+        0.3,
+    )
+    print_table(
+        summary_of([replace(demo(draw=False), name=row.scene, rows=[row])]),
+        tmp_path,
+        verbose=True,
+    )
+    line = next(
+        line
+        for line in capsys.readouterr().out.splitlines()
+        if "mujoco-simulated" in line
+    )
+    assert line.split() == [
+        "mujoco-simulated",
+        "limit_positions",
+        "3.1e+00",
+        "1.0e-09",
+        "3.1e+09",
+        "28.6",
+    ]
     nowhere = replace(row, theta_2=float("nan"))
-    print_table(summary_of([replace(demo(draw=False), name=row.scene, rows=[nowhere])]), tmp_path, verbose=True)
-    assert "3.1e+09 -" in " ".join(capsys.readouterr().out.split())  # what holds at no one position
+    print_table(
+        summary_of([replace(demo(draw=False), name=row.scene, rows=[nowhere])]),
+        tmp_path,
+        verbose=True,
+    )
+    assert "3.1e+09 -" in " ".join(
+        capsys.readouterr().out.split()
+    )  # what holds at no one position

@@ -6,11 +6,22 @@ from pathlib import Path
 import pytest
 from markupsafe import escape
 
-from fourbar_validation.compare.rows import AGREES, FAILS, REFUSES, UNDECIDED, Row, write_results
+from fourbar_validation.compare.rows import (
+    AGREES,
+    FAILS,
+    REFUSES,
+    UNDECIDED,
+    Row,
+    write_results,
+)
 from fourbar_validation.engines.limits import LIMITS
 from fourbar_validation.engines.registry import HARD_ENGINES, WORK, load_further
 from fourbar_validation.report.html import write_html
-from fourbar_validation.report.sections import LARGEST, collect_hard_cases, collect_sections
+from fourbar_validation.report.sections import (
+    LARGEST,
+    collect_hard_cases,
+    collect_sections,
+)
 from fourbar_validation.report.templating import count_or_size
 from fourbar_validation.scenes.hard_families import FAMILIES, Hard
 from tests.support.here import summary_of
@@ -27,21 +38,41 @@ def test_every_scene_is_counted_in_its_family_alone() -> None:
     table = {row[0]: row for row in collect_hard_cases(rows).rows}
     for family in FAMILIES:
         count = str(sum(1 for _ in family.scenes()))
-        assert table[family.name][1:3] == (count, count) and table[family.name][7:] == ("holds", family.statement)
+        assert table[family.name][1:3] == (count, count) and table[family.name][7:] == (
+            "holds",
+            family.statement,
+        )
     assert set(table) == {family.name for family in FAMILIES}
 
 
 def test_a_failing_row_fails_its_family_in_the_report(tmp_path: Path) -> None:
-    rows = [judged("toggle-near-a", AGREES), judged("toggle-near-a", REFUSES), judged("toggle-b", FAILS)]
+    rows = [
+        judged("toggle-near-a", AGREES),
+        judged("toggle-near-a", REFUSES),
+        judged("toggle-b", FAILS),
+    ]
     toggle, near = collect_hard_cases(rows).rows
     assert toggle[:8] == ("toggle", "1", "0", "0", "0", "0", "1", "1 fail")
     assert near[:8] == ("toggle-near", "1", "1", "0", "0", "1", "0", "holds")
-    (refused,) = collect_hard_cases([judged("toggle-near-a", REFUSES), judged("toggle-near-a", UNDECIDED)]).rows
-    assert refused[:8] == ("toggle-near", "1", "0", "0", "1", "1", "0", "nothing compared")
+    (refused,) = collect_hard_cases(
+        [judged("toggle-near-a", REFUSES), judged("toggle-near-a", UNDECIDED)]
+    ).rows
+    assert refused[:8] == (
+        "toggle-near",
+        "1",
+        "0",
+        "0",
+        "1",
+        "1",
+        "0",
+        "nothing compared",
+    )
     assert collect_sections(None, tmp_path) == []
     (tmp_path / "hard").mkdir()
     write_results(rows, tmp_path / "hard" / "results.csv")
-    assert collect_sections(None, tmp_path) == []  # unfinished: its page is not written yet
+    assert (
+        collect_sections(None, tmp_path) == []
+    )  # unfinished: its page is not written yet
     (tmp_path / "hard" / "report.html").touch()
     (section,) = collect_sections(None, tmp_path)
     assert section.rows == collect_hard_cases(rows).rows
@@ -52,18 +83,31 @@ def test_the_report_of_the_hard_suite_has_its_picture_every_statement_and_every_
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     picture = "<svg><text>the picture</text></svg>"
-    monkeypatch.setattr("fourbar_validation.report.hard_picture.draw_picture", lambda: picture)
+    monkeypatch.setattr(
+        "fourbar_validation.report.hard_picture.draw_picture", lambda: picture
+    )
     hard = Hard()
-    parts = collect_sections([judged(hard.name(index), AGREES) for index in range(len(hard))], tmp_path)
+    parts = collect_sections(
+        [judged(hard.name(index), AGREES) for index in range(len(hard))], tmp_path
+    )
     text = write_html(summary_of([]), {}, sections=parts)
-    assert [part.key for part in parts] == ["hard", "engine-limits"] and not list(tmp_path.iterdir())
-    assert 'href="#hard"' in text and 'href="#engine-limits"' in text and "<text>the picture</text>" in text
+    assert [part.key for part in parts] == ["hard", "engine-limits"] and not list(
+        tmp_path.iterdir()
+    )
+    assert (
+        'href="#hard"' in text
+        and 'href="#engine-limits"' in text
+        and "<text>the picture</text>" in text
+    )
     assert all(escape(family.statement) in text for family in FAMILIES)
     assert all(escape(limit.name) in text for limit in LIMITS)
 
 
 def test_every_engine_says_what_its_time_goes_into() -> None:
-    assert set(WORK) == {"formulas", *(engine.name for engine in (*HARD_ENGINES, *load_further()))}
+    assert set(WORK) == {
+        "formulas",
+        *(engine.name for engine in (*HARD_ENGINES, *load_further())),
+    }
 
 
 @pytest.mark.slow
@@ -78,11 +122,21 @@ def test_a_study_of_cost_next_to_the_report_is_part_of_it(tmp_path: Path) -> Non
     assert "The study of demo" in text and 'href="cost/demo/cost.md"' in text
     data = base64.b64encode(b"<svg onload='alert(1)'/>").decode()
     # an image runs no script; what is too large stays outside
-    assert text.count('<figure class="part">') == 1 and f'src="data:image/svg+xml;base64,{data}"' in text
+    assert (
+        text.count('<figure class="part">') == 1
+        and f'src="data:image/svg+xml;base64,{data}"' in text
+    )
 
 
 @pytest.mark.parametrize(
-    ("value", "text"), [(628.0, "628"), (0.0, "0"), (0.125, "0.125"), (3.1e-9, "3.10e-09"), (1.5e7, "1.50e+07")]
+    ("value", "text"),
+    [
+        (628.0, "628"),
+        (0.0, "0"),
+        (0.125, "0.125"),
+        (3.1e-9, "3.10e-09"),
+        (1.5e7, "1.50e+07"),
+    ],
 )
 def test_what_is_counted_is_written_for_people(value: float, text: str) -> None:
     assert count_or_size(value) == text

@@ -13,7 +13,15 @@ from fourbar_lab.fault_scenes import FAULT_SCENES
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.columns import read_columns
 from fourbar_validation.compare.compare import COMPARED
-from fourbar_validation.compare.rows import AGREES, FAILS, REFUSES, UNDECIDED, Row, write_results, write_rows
+from fourbar_validation.compare.rows import (
+    AGREES,
+    FAILS,
+    REFUSES,
+    UNDECIDED,
+    Row,
+    write_results,
+    write_rows,
+)
 from fourbar_validation.compare.tolerance import EPS, EQUIVALENCE, FULL_ACCURACY, K
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.registry import ENGINES, Engine, make_prediction
@@ -32,7 +40,9 @@ class Echo:
     def answer(self, scene: Scene, command: Command) -> Answer:
         s = fourbar.solve(scene, at=command)
         numbers = {name: np.array(getattr(s, name)) for name in COMPARED}
-        return self.spoil(Answer("echo", "exact", command, np.array(s.assembled), numbers))
+        return self.spoil(
+            Answer("echo", "exact", command, np.array(s.assembled), numbers)
+        )
 
 
 class Silent(Echo):
@@ -85,11 +95,17 @@ def rows_of(adapter: type, scene: Scene | None = None) -> dict[str, Row]:
 def test_an_equal_answer_agrees_in_every_quantity() -> None:
     rows = rows_of(Echo)
     stated = {"range", "limit_positions", "transmission"}
-    assert set(rows) == {*COMPARED, "assembled", "undecided", "closure", "torque_inertia"} | stated
+    assert (
+        set(rows)
+        == {*COMPARED, "assembled", "undecided", "closure", "torque_inertia"} | stated
+    )
     assert all(row.verdict == AGREES for row in rows.values())
 
 
-@pytest.mark.parametrize(("engine", "quantity"), [(Silent, "F12"), (NotANumber, "torque"), (Elsewhere, "assembled")])
+@pytest.mark.parametrize(
+    ("engine", "quantity"),
+    [(Silent, "F12"), (NotANumber, "torque"), (Elsewhere, "assembled")],
+)
 def test_silence_nan_and_a_missing_position_fail(engine: type, quantity: str) -> None:
     row = rows_of(engine)[quantity]
     assert row.verdict == FAILS
@@ -110,7 +126,9 @@ def test_an_engine_that_breaks_down_costs_its_own_row_in_one_line() -> None:
     assert "\n" not in rows["all"].reason
 
 
-def test_a_basis_that_breaks_down_is_no_agreement(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_basis_that_breaks_down_is_no_agreement(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """By the free bodies all are judged, also where they are no engine."""
     others = [engine for engine in ENGINES if engine.name == "mujoco-inverse"]
 
@@ -162,7 +180,9 @@ def test_where_dry_friction_reverses_forces_are_not_judged_and_the_motion_is() -
     for quantity in COMPARED:
         row = rows[quantity]
         noted = "1 positions at which dry friction reverses not judged" in row.reason
-        assert (row.verdict, noted) == ((AGREES, True) if quantity in FORCES else (FAILS, False)), quantity
+        assert (row.verdict, noted) == (
+            (AGREES, True) if quantity in FORCES else (FAILS, False)
+        ), quantity
         if quantity not in FORCES:
             assert row.theta_2 == with_friction().motion.theta_2[AT_REST], quantity  # type: ignore[index]
 
@@ -185,20 +205,35 @@ def test_a_scene_of_which_most_numbers_are_undecided_does_not_hold() -> None:
     needles = fourbar.uniform(
         0.3, 1e-14, 0.3, 2e-14
     )  # bar 4 turns by 0.3 eps/2e-14 where the loop closes to the last digit
-    row = rows_of(Echo, Scene(needles, fourbar.Motion(np.array([1.0, 1.5]), 1.0)))["undecided"]
+    row = rows_of(Echo, Scene(needles, fourbar.Motion(np.array([1.0, 1.5]), 1.0)))[
+        "undecided"
+    ]
     assert row.verdict == FAILS and row.error > row.allowed == 0.5
 
 
 def test_a_loop_said_to_be_open_a_thousand_roundings_from_its_limit_fails() -> None:
     rocker = fourbar.uniform(0.3, 0.25, 0.1, 0.22)
     first = limit_positions(rocker)[0].theta_2
-    thetas = np.array([first + 0.2, first + 0.3, first + 0.4, first + 0.5, first + 0.6, first + 1e-12])
-    assert rows_of(Elsewhere, Scene(rocker, fourbar.Motion(thetas, 1.0)))["assembled"].verdict == FAILS
+    thetas = np.array(
+        [first + 0.2, first + 0.3, first + 0.4, first + 0.5, first + 0.6, first + 1e-12]
+    )
+    assert (
+        rows_of(Elsewhere, Scene(rocker, fourbar.Motion(thetas, 1.0)))[
+            "assembled"
+        ].verdict
+        == FAILS
+    )
 
 
-def test_an_engine_that_may_answer_within_the_rounding_of_theta_2_is_held_to_that_answer() -> None:
+def test_an_engine_that_may_answer_within_the_rounding_of_theta_2_is_held_to_that_answer() -> (
+    None
+):
     engine = Engine("echo", SlightlyOff, FULL_ACCURACY, nearby=True)
-    rows = {row.quantity: row for row in judge("", crank_rocker(), [engine]).rows if row.engine == "echo"}
+    rows = {
+        row.quantity: row
+        for row in judge("", crank_rocker(), [engine]).rows
+        if row.engine == "echo"
+    }
     assert rows["torque"].verdict == FAILS and rows["F12"].verdict == AGREES
 
 
@@ -218,13 +253,23 @@ def test_results_survive_the_file(tmp_path) -> None:  # type: ignore[no-untyped-
     )
 
 
-def test_an_engine_that_raised_an_alarm_is_excused_by_no_prediction_of_its_own() -> None:
+def test_an_engine_that_raised_an_alarm_is_excused_by_no_prediction_of_its_own() -> (
+    None
+):
     scene = crank_rocker()
     commanded = command(scene)
     engine = next(engine for engine in ENGINES if engine.residuals)
-    answer = Answer(engine.name, "RK4", commanded, predicted={"torque": np.ones(len(commanded.theta_2))})
+    answer = Answer(
+        engine.name,
+        "RK4",
+        commanded,
+        predicted={"torque": np.ones(len(commanded.theta_2))},
+    )
     predicted = make_prediction(engine, scene, commanded, answer)
-    assert predicted is not None and predicted("torque", np.ones(len(commanded.theta_2), bool))[0] == 1.0
+    assert (
+        predicted is not None
+        and predicted("torque", np.ones(len(commanded.theta_2), bool))[0] == 1.0
+    )
     answer.alarms.append("the loop is open")
     assert make_prediction(engine, scene, commanded, answer) is None
 
@@ -233,7 +278,10 @@ class AnswersAnyway(Echo):
     """Numbers of its own where the formulas state none."""
 
     def spoil(self, answer: Answer) -> Answer:
-        answer.quantities = {name: np.nan_to_num(values, nan=7.0) for name, values in answer.quantities.items()}
+        answer.quantities = {
+            name: np.nan_to_num(values, nan=7.0)
+            for name, values in answer.quantities.items()
+        }
         return answer
 
 
@@ -245,10 +293,14 @@ def test_an_answer_that_the_formulas_withhold_is_not_compared() -> None:
         for quantity in COMPARED:
             row = rows[quantity]
             expected = (REFUSES, "the formulas state no value: 5 no_torque")
-            assert (row.verdict, row.reason) == (expected if quantity in FORCES else (AGREES, EQUIVALENCE.name))
+            assert (row.verdict, row.reason) == (
+                expected if quantity in FORCES else (AGREES, EQUIVALENCE.name)
+            )
 
 
-def test_positions_without_a_value_are_counted_next_to_those_that_were_compared() -> None:
+def test_positions_without_a_value_are_counted_next_to_those_that_were_compared() -> (
+    None
+):
     """A parallelogram from the crossed branch through its change point into bars that stay parallel."""
     motion = fourbar.Motion(np.array([-0.5, -0.3, 0.0, 0.3]), 1.0)
     scene = Scene(fourbar.uniform(1.0, 0.5, 1.0, 0.5), motion, 3)
@@ -261,10 +313,16 @@ def test_positions_without_a_value_are_counted_next_to_those_that_were_compared(
 
 
 def test_beyond_the_range_of_doubles_what_was_before_is_judged() -> None:
-    heavy = fourbar.FourBar(3.0, fourbar.Bar(1.0, 1.0), fourbar.Bar(2.5, 1e308, 1.0), fourbar.Bar(2.2, 1.0))
-    rows = rows_of(AnswersAnyway, Scene(heavy, fourbar.Motion(np.linspace(0.3, 2.0, 5), 10.0)))
+    heavy = fourbar.FourBar(
+        3.0, fourbar.Bar(1.0, 1.0), fourbar.Bar(2.5, 1e308, 1.0), fourbar.Bar(2.2, 1.0)
+    )
+    rows = rows_of(
+        AnswersAnyway, Scene(heavy, fourbar.Motion(np.linspace(0.3, 2.0, 5), 10.0))
+    )
     for quantity in COMPARED:
-        assert rows[quantity].verdict == (REFUSES if quantity in FORCES else AGREES), quantity
+        assert rows[quantity].verdict == (REFUSES if quantity in FORCES else AGREES), (
+            quantity
+        )
 
 
 class Counting(FreeBody):
@@ -276,7 +334,9 @@ class Counting(FreeBody):
         Counting.started += 1
 
 
-def test_an_engine_is_started_once_a_scene_and_no_question_is_put_twice(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_engine_is_started_once_a_scene_and_no_question_is_put_twice(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     put: list[tuple[Scene, Command]] = []
     true = FreeBody.answer
 
@@ -294,7 +354,9 @@ def test_an_engine_is_started_once_a_scene_and_no_question_is_put_twice(monkeypa
     assert Counting.started == 1
 
 
-def test_an_engine_that_is_commanded_by_a_stroke_is_given_no_angle(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_engine_that_is_commanded_by_a_stroke_is_given_no_angle(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """The angle, its rates and the lever are what the formulas computed from the stroke: it finds its own."""
     commands: list[Command] = []
     answering = FreeBody.answer
@@ -304,10 +366,20 @@ def test_an_engine_that_is_commanded_by_a_stroke_is_given_no_angle(monkeypatch: 
         return answering(engine, scene, command)
 
     monkeypatch.setattr(FreeBody, "answer", seen)
-    rows = judge("", FAULT_SCENES["stroke"], [engine for engine in ENGINES if engine.name == "free-body"]).rows
+    rows = judge(
+        "",
+        FAULT_SCENES["stroke"],
+        [engine for engine in ENGINES if engine.name == "free-body"],
+    ).rows
     assert not [row for row in rows if row.failed]
     assert sum(row.engine == "free-body" and row.compared for row in rows) > 20
     assert commands
     for at in commands:
-        assert at.stroke is not None and np.isfinite(at.stroke).all() and at.condition is None
-        assert all(np.isnan(values).all() for values in (at.angle, at.speed, at.acceleration))
+        assert (
+            at.stroke is not None
+            and np.isfinite(at.stroke).all()
+            and at.condition is None
+        )
+        assert all(
+            np.isnan(values).all() for values in (at.angle, at.speed, at.acceleration)
+        )

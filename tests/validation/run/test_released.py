@@ -19,7 +19,9 @@ from fourbar_validation.run.judge import judge, judge_for_report
 
 def falling(coupler: float = 0.15, **motion: Any) -> Scene:
     """It falls from rest until bars 3 and 4 lie in one line; with a coupler of 0.12 m that is a change point."""
-    linkage = fourbar.FourBar(0.3, fourbar.Bar(0.2, 0.2), fourbar.Bar(coupler, 0.5), fourbar.Bar(0.22, 0.4))
+    linkage = fourbar.FourBar(
+        0.3, fourbar.Bar(0.2, 0.2), fourbar.Bar(coupler, 0.5), fourbar.Bar(0.22, 0.4)
+    )
     released = fourbar.Motion(1.0, 0.0, free=fourbar.Free(1.0, 100), **motion)
     return Scene(linkage, released, effects=(fourbar.Gravity(),))
 
@@ -31,7 +33,9 @@ def row(rows: list[Row], engine: str, quantity: str) -> Row:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("coupler", [0.12, 0.15])
-def test_every_engine_is_judged_up_to_the_limit_and_by_its_instant(coupler: float) -> None:
+def test_every_engine_is_judged_up_to_the_limit_and_by_its_instant(
+    coupler: float,
+) -> None:
     scene = falling(coupler)
     solution = solve(scene)
     assert solution.stopped_at is not None and solution.time is not None
@@ -40,7 +44,9 @@ def test_every_engine_is_judged_up_to_the_limit_and_by_its_instant(coupler: floa
     assert {row.engine for row in page.rows} > set(free.FORWARD)
     assert all(row.passed for row in page.rows)
     for engine in free.FORWARD:
-        assert row(page.rows, engine, "stopped_at").error < 2e-5  # of the second, as measured
+        assert (
+            row(page.rows, engine, "stopped_at").error < 2e-5
+        )  # of the second, as measured
         assert row(page.rows, engine, "theta_2").error < 2e-6
     assert page.figure is not None
 
@@ -57,13 +63,24 @@ def answering(monkeypatch: pytest.MonkeyPatch, change: Any) -> list[Row]:
     from fourbar_validation.engines.pinocchio import PinocchioReleased
 
     true = PinocchioReleased.release
-    monkeypatch.setattr(PinocchioReleased, "release", lambda *arguments: change(true(*arguments)))
-    return [row for row in judge("falling", falling()).rows if row.engine == "pinocchio-forward"]
+    monkeypatch.setattr(
+        PinocchioReleased, "release", lambda *arguments: change(true(*arguments))
+    )
+    return [
+        row
+        for row in judge("falling", falling()).rows
+        if row.engine == "pinocchio-forward"
+    ]
 
 
 def test_an_engine_that_stops_before_fails(monkeypatch: pytest.MonkeyPatch) -> None:
     def cut(answer: Any) -> Any:
-        return replace(answer, theta_2=answer.theta_2[:20], omega_2=answer.omega_2[:20], energy=answer.energy[:20])
+        return replace(
+            answer,
+            theta_2=answer.theta_2[:20],
+            omega_2=answer.omega_2[:20],
+            energy=answer.energy[:20],
+        )
 
     (only,) = answering(monkeypatch, cut)
     assert only.verdict == FAILS and "20 of 44 instants" in only.reason
@@ -81,7 +98,10 @@ def test_an_engine_that_is_nan_before_it_fails_and_one_that_is_nan_behind_the_li
         return strike
 
     with monkeypatch.context() as patch:
-        assert row(answering(patch, struck(20)), "pinocchio-forward", "theta_2").verdict == FAILS
+        assert (
+            row(answering(patch, struck(20)), "pinocchio-forward", "theta_2").verdict
+            == FAILS
+        )
     with monkeypatch.context() as patch:
         assert all(row.passed for row in answering(patch, struck(60)))
 
@@ -96,27 +116,43 @@ def test_an_engine_is_run_at_twice_its_step_however_close_the_instants_are() -> 
     scene = replace(falling(), effects=(), loads=(fourbar.Load(4, moment=0.1),))
     for steps in (20, 200):  # 10 and 1 ms apart
         released = fourbar.Free(0.2, steps)
-        rows = judge("pushed", replace(scene, motion=scene.motion.replace(free=released))).rows
+        rows = judge(
+            "pushed", replace(scene, motion=scene.motion.replace(free=released))
+        ).rows
         assert not any(row.failed for row in rows)
         energy = row(rows, "mujoco-forward", "energy")
         assert energy.verdict == DEGRADED and energy.error < 1e-3, energy
 
 
-def test_an_engine_that_predicts_nothing_of_itself_is_undecided(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_engine_that_predicts_nothing_of_itself_is_undecided(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """One that is wrong by 3 rad at its step and by 5 rad at twice it has no digit by which it could agree."""
     off = iter([3.0, 5.0])
-    rows = answering(monkeypatch, lambda released: replace(released, theta_2=released.theta_2 + next(off)))
+    rows = answering(
+        monkeypatch,
+        lambda released: replace(released, theta_2=released.theta_2 + next(off)),
+    )
     assert row(rows, "pinocchio-forward", "theta_2").verdict == UNDECIDED
 
 
-def test_formulas_that_stop_too_early_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_formulas_that_stop_too_early_are_found(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """Cut after three instants all that is left would agree."""
 
     def short(scene: Scene) -> Any:
         solution = solve(scene)
         assert solution.omega_2 is not None
-        solution.theta_2, solution.omega_2, solution.stopped_at = solution.theta_2[:3], solution.omega_2[:3], 0.025
-        solution.branch, solution.status_code = solution.branch[:3], solution.status_code[:3]
+        solution.theta_2, solution.omega_2, solution.stopped_at = (
+            solution.theta_2[:3],
+            solution.omega_2[:3],
+            0.025,
+        )
+        solution.branch, solution.status_code = (
+            solution.branch[:3],
+            solution.status_code[:3],
+        )
         return solution
 
     monkeypatch.setattr("fourbar_validation.run.question.solve", short)
@@ -145,11 +181,15 @@ def test_the_summary_says_that_the_motion_ended() -> None:
 
 
 @pytest.mark.slow
-def test_a_released_scene_is_reported_without_a_torque_that_is_rounding(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_released_scene_is_reported_without_a_torque_that_is_rounding(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     from fourbar_validation.report import figures
 
     scene = falling()
     shown: list[str] = []
-    monkeypatch.setattr(figures, "_draw_picture", lambda quantity, *_: shown.append(quantity) or "")
+    monkeypatch.setattr(
+        figures, "_draw_picture", lambda quantity, *_: shown.append(quantity) or ""
+    )
     figures.draw_scene_figure(Record("falling", scene, solution=solve(scene)))
     assert shown == ["theta_4", "F32"]

@@ -20,8 +20,16 @@ from fourbar_validation.engines.limits import LIMITS
 from fourbar_validation.engines.mujoco import simulate
 from fourbar_validation.engines.mujoco.closed_loop import ClosedLoop
 from fourbar_validation.engines.mujoco.shipped import compare_shipped
-from fourbar_validation.engines.prediction import predict_from_data, predict_in_world_axes
-from fourbar_validation.engines.registry import HARD_ENGINES, Engine, Predictor, make_nearby
+from fourbar_validation.engines.prediction import (
+    predict_from_data,
+    predict_in_world_axes,
+)
+from fourbar_validation.engines.registry import (
+    HARD_ENGINES,
+    Engine,
+    Predictor,
+    make_nearby,
+)
 from fourbar_validation.run.judge import judge
 from fourbar_validation.run.released import make_pendulum
 from fourbar_validation.scenes import hard_families as families
@@ -41,7 +49,9 @@ from tests.support.engine_limits import MEASURED, Measured
 from tests.support.scenes import crank_rocker
 
 EXACT = tuple(w for w in HARD_ENGINES if not w.through_time)
-SWEEP = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.1, 0.1 + 2 * math.pi, 30), 10.0))
+SWEEP = crank_rocker(
+    motion=fourbar.Motion(fourbar.Sweep(0.1, 0.1 + 2 * math.pi, 30), 10.0)
+)
 
 
 def test_the_suite_is_made_from_its_parameters_alone() -> None:
@@ -50,14 +60,22 @@ def test_the_suite_is_made_from_its_parameters_alone() -> None:
     assert names == sorted(set(names)) == [second.name(i) for i in range(len(second))]
     for i in (0, len(first) // 2, len(first) - 1):
         assert fourbar.dump(first.scene(i)) == fourbar.dump(second.scene(i))
-    assert {first.scene(i).source for i in range(len(first))} == {family.statement for family in FAMILIES}
+    assert {first.scene(i).source for i in range(len(first))} == {
+        family.statement for family in FAMILIES
+    }
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("family", [f for f in FAMILIES if f.name != "released"], ids=lambda family: family.name)
+@pytest.mark.parametrize(
+    "family",
+    [f for f in FAMILIES if f.name != "released"],
+    ids=lambda family: family.name,
+)
 def test_a_scene_of_each_family_holds(family: Family) -> None:
     name, scene = list(family.scenes())[-1]
-    few = scene if not isinstance(scene.motion.theta_2, fourbar.Sweep) else _fewer(scene)
+    few = (
+        scene if not isinstance(scene.motion.theta_2, fourbar.Sweep) else _fewer(scene)
+    )
     rows = judge(name, few, EXACT).rows
     assert {row.verdict for row in rows} <= set(VERDICTS)
     assert [row for row in rows if row.verdict == FAILS] == []
@@ -66,18 +84,32 @@ def test_a_scene_of_each_family_holds(family: Family) -> None:
 def _fewer(scene: Scene, steps: int = 12) -> Scene:
     sweep = scene.motion.theta_2
     assert isinstance(sweep, fourbar.Sweep)
-    return replace(scene, motion=scene.motion.replace(angle=replace(sweep, steps=steps)))
+    return replace(
+        scene, motion=scene.motion.replace(angle=replace(sweep, steps=steps))
+    )
 
 
 def test_beyond_a_toggle_no_engine_finds_a_position() -> None:
     lengths = draw_linkage(DrawnType.TRIPLE_ROCKER, 0)
     (psi, stretched), *_ = find_collinear_3_4(lengths)
-    beyond = set_angles(dress(lengths), psi + (1.0 if stretched else -1.0) * np.array(TOGGLE))
+    beyond = set_angles(
+        dress(lengths), psi + (1.0 if stretched else -1.0) * np.array(TOGGLE)
+    )
     assert not fourbar.solve(beyond).assembled.any()
     for engine in EXACT:
         answer = engine.start().answer(beyond, fourbar.command(beyond))
         assert answer.assembled is not None and not answer.assembled.any(), engine.name
-        of_input = ("theta_2", "omega_2", "alpha_2", "A", "G2", "v_A", "v_G2", "a_A", "a_G2")  # where it is commanded
+        of_input = (
+            "theta_2",
+            "omega_2",
+            "alpha_2",
+            "A",
+            "G2",
+            "v_A",
+            "v_G2",
+            "a_A",
+            "a_G2",
+        )  # where it is commanded
         for name, values in answer.quantities.items():
             assert name in of_input or np.isnan(values).all(), (engine.name, name)
 
@@ -86,17 +118,31 @@ def test_near_a_toggle_all_but_the_sine_has_its_digits_though_it_has_few_itself(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """A millionth of the torque stood within what the last digits of theta_2 excuse there, for every engine."""
-    lengths, true = draw_linkage(DrawnType.TRIPLE_ROCKER, 0), fourbar_validation.run.question.solve
+    lengths, true = (
+        draw_linkage(DrawnType.TRIPLE_ROCKER, 0),
+        fourbar_validation.run.question.solve,
+    )
     (psi, stretched), *_ = find_collinear_3_4(lengths)
-    near = set_angles(dress(lengths), psi + (-1.0 if stretched else 1.0) * np.array([*families.REGULAR, 1e-9]))
+    near = set_angles(
+        dress(lengths),
+        psi + (-1.0 if stretched else 1.0) * np.array([*families.REGULAR, 1e-9]),
+    )
     balls = [engine for engine in HARD_ENGINES if engine.nearby]
 
     def verdicts() -> dict[str, str]:
-        return {row.quantity: row.verdict for row in judge("", near, balls).rows if row.engine == balls[0].name}
+        return {
+            row.quantity: row.verdict
+            for row in judge("", near, balls).rows
+            if row.engine == balls[0].name
+        }
 
     assert set(verdicts().values()) == {AGREES}
     without = [replace(balls[0], nearby=False)]
-    rows = {row.quantity: row for row in judge("", near, without).rows if row.engine == balls[0].name}
+    rows = {
+        row.quantity: row
+        for row in judge("", near, without).rows
+        if row.engine == balls[0].name
+    }
     assert rows["torque"].verdict == DEGRADED and rows["torque"].allowed > 1e-6
 
     def spoiled(*arguments: Any, **keywords: Any) -> Any:
@@ -110,21 +156,29 @@ def test_near_a_toggle_all_but_the_sine_has_its_digits_though_it_has_few_itself(
 
 def test_an_answer_nearby_is_one_within_the_rounding_of_theta_2() -> None:
     scene = dress(families.PLAIN)
-    command = fourbar.command(set_angles(scene, [0.7, 0.7 + 4.0 * 2.0**-52, 0.7 + 1e-13]))
+    command = fourbar.command(
+        set_angles(scene, [0.7, 0.7 + 4.0 * 2.0**-52, 0.7 + 1e-13])
+    )
     formulas, balls = fourbar.solve(set_angles(scene, [0.7] * 3)), HARD_ENGINES[0]
     nearby = make_nearby(balls, scene, command, formulas)
-    assert nearby is not None and np.isfinite(nearby(np.ones(3, dtype=bool))["torque"]).tolist() == [True, True, False]
+    assert nearby is not None and np.isfinite(
+        nearby(np.ones(3, dtype=bool))["torque"]
+    ).tolist() == [True, True, False]
 
 
 def test_an_answer_nearby_has_the_sine_of_the_formulas() -> None:
     """Of a shift in many digits: 1e-9 rad from a limit position a sine of the formulas is met to its last digit."""
     lengths = draw_linkage(DrawnType.TRIPLE_ROCKER, 0)
     (psi, stretched), *_ = find_collinear_3_4(lengths)
-    near = set_angles(dress(lengths), psi + (-1.0 if stretched else 1.0) * np.array([0.3, 1e-3, 1e-9]))
+    near = set_angles(
+        dress(lengths), psi + (-1.0 if stretched else 1.0) * np.array([0.3, 1e-3, 1e-9])
+    )
     command, formulas = fourbar.command(near), fourbar.solve(near)
     nearby = make_nearby(HARD_ENGINES[0], near, command, formulas)
     assert nearby is not None
-    np.testing.assert_allclose(nearby(np.ones(3, dtype=bool))["sin_mu"], formulas.sin_mu, rtol=1e-15)
+    np.testing.assert_allclose(
+        nearby(np.ones(3, dtype=bool))["sin_mu"], formulas.sin_mu, rtol=1e-15
+    )
 
 
 class Spoiled:
@@ -147,10 +201,16 @@ class AlmostRight(Spoiled):
     part = 1e-10
 
 
-def verdict_of(adapter: type, scene: Scene, predictor: Predictor | None) -> tuple[str, float]:
+def verdict_of(
+    adapter: type, scene: Scene, predictor: Predictor | None
+) -> tuple[str, float]:
     tolerance = FULL_ACCURACY if predictor else _equivalence()
     engine = Engine("spoiled", adapter, tolerance, predictor=predictor)
-    row = next(r for r in judge("scene", scene, [engine]).rows if r.engine == "spoiled" and r.quantity == "F32")
+    row = next(
+        r
+        for r in judge("scene", scene, [engine]).rows
+        if r.engine == "spoiled" and r.quantity == "F32"
+    )
     return row.verdict, row.allowed
 
 
@@ -178,7 +238,12 @@ def test_predictions_know_what_no_law_in_sines_knows() -> None:
         for quantity in ("torque", "F32"):
             error = predict_from_data(scene, at_, quantity)
             judged = np.isfinite(error)
-            assert judged.any() and (error[judged] <= predict_in_world_axes(scene, at_, quantity)[judged]).all(), name
+            assert (
+                judged.any()
+                and (
+                    error[judged] <= predict_in_world_axes(scene, at_, quantity)[judged]
+                ).all()
+            ), name
 
 
 def test_every_declared_limit_is_measured() -> None:
@@ -186,7 +251,9 @@ def test_every_declared_limit_is_measured() -> None:
 
 
 @pytest.mark.parametrize("limit", MEASURED, ids=lambda limit: limit.of.name)
-def test_a_limit_is_where_it_was(limit: Measured, tmp_path: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_limit_is_where_it_was(
+    limit: Measured, tmp_path: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Should this fail after an engine upgrade, the engine has lifted or worsened the limit: measure it again."""
     monkeypatch.chdir(tmp_path)  # MuJoCo writes its warnings into the working folder
     assert limit.holds(limit.inside)
@@ -200,14 +267,19 @@ def simulated(settings: Settings = RECIPE, scene: Scene = SWEEP) -> Answer:
 def test_a_healthy_run_raises_no_alarm() -> None:
     answer = simulated()
     assert answer.refusal is None and answer.alarms == []
-    assert answer.evidence["power_gap"] < 1e-6 and answer.evidence["acceleration_gap"] < 1e-5
+    assert (
+        answer.evidence["power_gap"] < 1e-6
+        and answer.evidence["acceleration_gap"] < 1e-5
+    )
 
 
 def alarm(answer: Answer, name: str) -> bool:
     return any(line.startswith(name) for line in answer.alarms)
 
 
-def test_power_and_acceleration_see_what_the_gap_does_not(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_power_and_acceleration_see_what_the_gap_does_not(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """A closure stiffer than RK4 can follow: torque 98 % wrong and worse with a gap of 6e-6 m."""
 
     class Stiff(ClosedLoop):
@@ -218,18 +290,28 @@ def test_power_and_acceleration_see_what_the_gap_does_not(monkeypatch: pytest.Mo
     monkeypatch.setattr(simulate, "ClosedLoop", Stiff)
     answer = simulated(replace(RECIPE, time_constant_steps=0.5))
     ours = fourbar.solve(SWEEP, at=answer.at)
-    assert np.abs(answer.quantities["torque"] - ours.torque).max() > 0.9 * np.abs(ours.torque).max()  # type: ignore[operator]
+    assert (
+        np.abs(answer.quantities["torque"] - ours.torque).max()
+        > 0.9 * np.abs(ours.torque).max()
+    )  # type: ignore[operator]
     assert answer.evidence["closure_gap_m"] < 1e-5 and not alarm(answer, "closure_gap")
     assert alarm(answer, "acceleration_gap") and alarm(answer, "power_gap")
 
 
 def test_a_solver_that_did_not_converge_is_seen() -> None:
     answer = simulated(replace(RECIPE, solver="CG", tolerance=1e-8))
-    assert alarm(answer, "force_gap") and alarm(answer, "power_gap") and not alarm(answer, "acceleration_gap")
+    assert (
+        alarm(answer, "force_gap")
+        and alarm(answer, "power_gap")
+        and not alarm(answer, "acceleration_gap")
+    )
 
 
 def test_a_gap_is_seen() -> None:
-    assert alarm(simulated(replace(RECIPE, impedance=0.1, pad=None, time_constant_steps=300.0)), "closure_gap")
+    assert alarm(
+        simulated(replace(RECIPE, impedance=0.1, pad=None, time_constant_steps=300.0)),
+        "closure_gap",
+    )
 
 
 def test_a_crank_that_does_not_turn_as_commanded_is_seen() -> None:
@@ -237,7 +319,9 @@ def test_a_crank_that_does_not_turn_as_commanded_is_seen() -> None:
 
 
 @pytest.mark.parametrize("what", ["qvel", "qacc"])
-def test_a_reset_and_what_caused_it_are_seen(what: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Any) -> None:
+def test_a_reset_and_what_caused_it_are_seen(
+    what: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Any
+) -> None:
     """A state or an acceleration that MuJoCo takes for bad, once, in the middle of the run."""
     monkeypatch.chdir(tmp_path)
     true, calls = ClosedLoop.forward, []
@@ -258,7 +342,10 @@ def test_a_reset_and_what_caused_it_are_seen(what: str, monkeypatch: pytest.Monk
 
 def test_an_alarm_fails_its_row(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(simulate, "list_alarms", lambda *_: ["the sky falls"])
-    rows = [r for r in judge("scene", SWEEP, [w for w in HARD_ENGINES if w.through_time]).rows]
+    rows = [
+        r
+        for r in judge("scene", SWEEP, [w for w in HARD_ENGINES if w.through_time]).rows
+    ]
     assert any(row.verdict == FAILS and row.reason == "the sky falls" for row in rows)
 
 
@@ -274,11 +361,19 @@ def test_a_free_motion_through_change_points_in_every_engine() -> None:
     rows = {(row.engine, row.quantity): row for row in judge(name, scene).rows}
     assert all(row.passed for row in rows.values())
     assert rows["formulas", "theta_2"].error < 1e-11
-    assert rows["pinocchio-forward", "theta_2"].error < 1e-8 and rows["pinocchio-forward", "energy"].error < 1e-9
-    assert rows["mujoco-forward", "theta_2"].error < 1e-3 and rows["mujoco-forward", "energy"].error < 1e-5
+    assert (
+        rows["pinocchio-forward", "theta_2"].error < 1e-8
+        and rows["pinocchio-forward", "energy"].error < 1e-9
+    )
+    assert (
+        rows["mujoco-forward", "theta_2"].error < 1e-3
+        and rows["mujoco-forward", "energy"].error < 1e-5
+    )
 
 
-def test_an_engine_that_drifts_unpredicted_fails(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_engine_that_drifts_unpredicted_fails(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """Wrong by the same amount with either step: its own step says nothing of it, the exact solution does."""
     from fourbar_validation.engines import pinocchio
 
@@ -292,7 +387,11 @@ def test_an_engine_that_drifts_unpredicted_fails(monkeypatch: pytest.MonkeyPatch
 
     monkeypatch.setattr(pinocchio.PinocchioReleased, "release", off)
     rows = judge(name, scene).rows
-    assert [r.verdict for r in rows if (r.engine, r.quantity) == ("pinocchio-forward", "theta_2")] == [FAILS]
+    assert [
+        r.verdict
+        for r in rows
+        if (r.engine, r.quantity) == ("pinocchio-forward", "theta_2")
+    ] == [FAILS]
 
 
 def test_a_golden_file_of_others_swept_through_its_change_point() -> None:
@@ -301,23 +400,43 @@ def test_a_golden_file_of_others_swept_through_its_change_point() -> None:
     scene = Scene(linkage, fourbar.Motion(np.radians([170.0, 180.0, 190.0]), 10.0))
     s = fourbar.solve(scene)
     assert s.status == ["ok", "singular", "ok"]
-    assert s.torque is not None and np.isnan(s.torque[1]) and np.isfinite(s.torque[[0, 2]]).all()
+    assert (
+        s.torque is not None
+        and np.isnan(s.torque[1])
+        and np.isfinite(s.torque[[0, 2]]).all()
+    )
     assert (np.sign(s.sin_mu[[0, 2]]) == 1.0).all()
 
 
 @pytest.mark.parametrize(
     ("name", "why"),
-    [("speeds-+1e+6", "mjMAXVAL"), ("toggle-double-rocker-0-folded-open", "below 0.05"), ("speeds-+1e+3", None)],
+    [
+        ("speeds-+1e+6", "mjMAXVAL"),
+        ("toggle-double-rocker-0-folded-open", "below 0.05"),
+        ("speeds-+1e+3", None),
+    ],
 )
-def test_the_file_as_shipped_is_driven_within_the_declared_limits_of_mujoco(name: str, why: str | None) -> None:
+def test_the_file_as_shipped_is_driven_within_the_declared_limits_of_mujoco(
+    name: str, why: str | None
+) -> None:
     suite = Hard()
-    scene = next(suite.scene(index) for index in range(len(suite)) if suite.name(index) == name)
+    scene = next(
+        suite.scene(index) for index in range(len(suite)) if suite.name(index) == name
+    )
     row = compare_shipped(name, scene, fourbar.command(scene))
     assert row is not None
-    assert (row.verdict, why is None or why in row.reason) == (AGREES if why is None else UNDECIDED, True)
+    assert (row.verdict, why is None or why in row.reason) == (
+        AGREES if why is None else UNDECIDED,
+        True,
+    )
 
 
-def test_the_file_of_an_input_that_starts_almost_at_rest_is_judged_by_the_speed_that_it_reaches() -> None:
-    scene = Scene(fourbar.uniform(0.3, 0.1, 0.25, 0.22), fourbar.Motion(fourbar.Sweep(0.1, 6.0, 4), 1e-9, 100.0))
+def test_the_file_of_an_input_that_starts_almost_at_rest_is_judged_by_the_speed_that_it_reaches() -> (
+    None
+):
+    scene = Scene(
+        fourbar.uniform(0.3, 0.1, 0.25, 0.22),
+        fourbar.Motion(fourbar.Sweep(0.1, 6.0, 4), 1e-9, 100.0),
+    )
     row = compare_shipped("quickening", scene, fourbar.command(scene))
     assert row is not None and row.verdict == AGREES, row

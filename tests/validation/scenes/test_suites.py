@@ -36,7 +36,9 @@ def uses(scene: Scene) -> Iterator[Any]:
         yield f"law with ends {motion.law.ends}"
         if motion.law.ends == "periodic" and motion.law.time[0] != 0.0:
             yield "periodic law that begins late"
-    if motion.free is not None and any(effect.key == "flywheel" for effect in scene.effects):
+    if motion.free is not None and any(
+        effect.key == "flywheel" for effect in scene.effects
+    ):
         yield "released with a flywheel"
     for effect in scene.effects:
         if effect.key == "torsion":
@@ -50,30 +52,53 @@ def uses(scene: Scene) -> Iterator[Any]:
 def test_the_default_suite_uses_every_capability() -> None:
     used = {use for scene in scenes() for use in uses(scene)}
     wanted: set[Any] = TERM_OF.keys() - {"load"}
-    wanted |= {f"command of {name}" for name in ("theta_2", "theta_3", "theta_4", "stroke")}
+    wanted |= {
+        f"command of {name}" for name in ("theta_2", "theta_3", "theta_4", "stroke")
+    }
     wanted |= {("drive", pair) for pair in itertools.combinations((1, 2, 3, 4), 2)}
-    wanted |= {("drive", bar) for bar in (2, 3, 4)} | {("torsion", pin) for pin in ("O2", "A", "B", "O4")}
-    wanted |= {"load in world axes", "load in bar axes", "load over a table", "tolerances", "points"}
-    wanted |= {"law with ends rest", "periodic law that begins late", "released with a flywheel"}
+    wanted |= {("drive", bar) for bar in (2, 3, 4)} | {
+        ("torsion", pin) for pin in ("O2", "A", "B", "O4")
+    }
+    wanted |= {
+        "load in world axes",
+        "load in bar axes",
+        "load over a table",
+        "tolerances",
+        "points",
+    }
+    wanted |= {
+        "law with ends rest",
+        "periodic law that begins late",
+        "released with a flywheel",
+    }
     assert wanted <= used
 
 
 SUITE = read_default_suite()
 
 
-@pytest.mark.parametrize("index", range(len(SUITE)), ids=[SUITE.name(i) for i in range(len(SUITE))])
+@pytest.mark.parametrize(
+    "index", range(len(SUITE)), ids=[SUITE.name(i) for i in range(len(SUITE))]
+)
 def test_every_scene_of_it_holds(index: int) -> None:
     rows = judge(SUITE.name(index), SUITE.scene(index), [FREE_BODY], order=False).rows
     assert not [row for row in rows if row.failed]
     assert any(row.compared and row.engine == FREE_BODY.name for row in rows)
 
 
-@pytest.mark.parametrize(("count", "sample", "shipped"), [(6, 30, 6), (60, 30, 30), (1000, 30, 30), (6, 0, 0)])
-def test_of_a_sample_what_else_is_shipped_is_judged(count: int, sample: int, shipped: int) -> None:
+@pytest.mark.parametrize(
+    ("count", "sample", "shipped"),
+    [(6, 30, 6), (60, 30, 30), (1000, 30, 30), (6, 0, 0)],
+)
+def test_of_a_sample_what_else_is_shipped_is_judged(
+    count: int, sample: int, shipped: int
+) -> None:
     suite = Random(count, 0, tuple(DrawnType))
     jobs = pool.make_jobs(suite, range(count), (), True, sample)
     assert sum(job.shipped for job in jobs) == shipped
-    assert [job.shipped for job in pool.make_jobs(suite, range(count), (), False, sample)] == [j.shipped for j in jobs]
+    assert [
+        job.shipped for job in pool.make_jobs(suite, range(count), (), False, sample)
+    ] == [j.shipped for j in jobs]
 
 
 @pytest.mark.slow

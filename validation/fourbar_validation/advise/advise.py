@@ -16,7 +16,12 @@ from fourbar.mjcf import Settings, write_mjcf
 from fourbar.scene import Command, Scene
 from fourbar.scene import command as command_of
 from fourbar.writing import require_file, write_text
-from fourbar_validation.advise.matters import MATTERS, judge_trial, measure_influences, write_sentence
+from fourbar_validation.advise.matters import (
+    MATTERS,
+    judge_trial,
+    measure_influences,
+    write_sentence,
+)
 from fourbar_validation.advise.worst_errors import WorstErrors
 from fourbar_validation.engines.mujoco.trial import (
     FEWEST_STEPS,
@@ -64,8 +69,14 @@ class Advice:
 
     def cells(self) -> tuple[str, str, str]:
         """Format error, steps per revolution and time constant for a table of several scenes."""
-        error = f"{self.best.errors.worst:.1e}" + ("" if self.reached else " (not reached)")
-        return error, f"{self.best.steps_per_revolution:.0f}", f"{self.best.settings.time_constant_steps:.3g}"
+        error = f"{self.best.errors.worst:.1e}" + (
+            "" if self.reached else " (not reached)"
+        )
+        return (
+            error,
+            f"{self.best.steps_per_revolution:.0f}",
+            f"{self.best.settings.time_constant_steps:.3g}",
+        )
 
     @property
     def reason(self) -> str:
@@ -91,8 +102,12 @@ def advise(scene: Scene, error: float, setup: TrialSetup | None = None) -> Advic
     Raises LimitError for a scene that cannot be run through in time.
     """
     if not 0.0 < error < 1.0:
-        raise InputError("--error", error, "must be a relative error, above 0 and below 1")
-    return _CheapestSearch(scene, error, setup or TrialSetup(scene, choose_positions(scene))).advice()
+        raise InputError(
+            "--error", error, "must be a relative error, above 0 and below 1"
+        )
+    return _CheapestSearch(
+        scene, error, setup or TrialSetup(scene, choose_positions(scene))
+    ).advice()
 
 
 def choose_positions(scene: Scene) -> Command:
@@ -102,7 +117,9 @@ def choose_positions(scene: Scene) -> Command:
         return command
     between = np.linspace(command.theta_2.min(), command.theta_2.max(), BETWEEN + 1)
     theta_2 = np.union1d(command.theta_2, between)
-    return command._replace(angle=theta_2, branch=np.full(theta_2.shape, command.branch[0], dtype=np.int8))
+    return command._replace(
+        angle=theta_2, branch=np.full(theta_2.shape, command.branch[0], dtype=np.int8)
+    )
 
 
 class _CheapestSearch:
@@ -121,7 +138,11 @@ class _CheapestSearch:
             if constant != tc:
                 self._polish(constant)
         served = self._is_served()
-        best = min(served, key=lambda a: a.steps) if served else _find_nearest(self.attempts)
+        best = (
+            min(served, key=lambda a: a.steps)
+            if served
+            else _find_nearest(self.attempts)
+        )
         return Advice(self.error, best, tuple(self.attempts), bool(served))
 
     def _polish(self, tc: float) -> None:
@@ -147,7 +168,11 @@ class _CheapestSearch:
                 serves = n
                 ahead = n * min(max(step, 0.4), 1.0 / CLOSE_ENOUGH)
             else:
-                if last is not None and n > (fails or 0.0) and self._is_floored(last, attempt):
+                if (
+                    last is not None
+                    and n > (fails or 0.0)
+                    and self._is_floored(last, attempt)
+                ):
                     return
                 fails, last = n, attempt
                 ahead = n * min(max(step, CLOSE_ENOUGH), 3.0)
@@ -164,7 +189,11 @@ class _CheapestSearch:
     def _is_floored(self, before: Attempt, after: Attempt) -> bool:
         """Tell whether more steps bought nothing."""
         worst = after.errors.worst
-        return worst < 1e-2 and worst > LEAST_GAIN * before.errors.worst and after.steps > 1.3 * before.steps
+        return (
+            worst < 1e-2
+            and worst > LEAST_GAIN * before.errors.worst
+            and after.steps > 1.3 * before.steps
+        )
 
     def _serves(self, attempt: Attempt) -> bool:
         return attempt.errors.worst <= MARGIN * self.error
@@ -178,7 +207,12 @@ class _CheapestSearch:
         if steps > MOST_STEPS:
             settings = make_settings(n * MOST_STEPS / steps, tc)
         trial = self.setup.try_out(settings)
-        attempt = Attempt(settings, max(trial.steps, 1), judge_trial(self.scene, trial), trial.steps_per_revolution)
+        attempt = Attempt(
+            settings,
+            max(trial.steps, 1),
+            judge_trial(self.scene, trial),
+            trial.steps_per_revolution,
+        )
         self.attempts.append(attempt)
         return attempt
 
@@ -188,8 +222,16 @@ def _find_nearest(attempts: Sequence[Attempt]) -> Attempt:
 
 
 @click.command(name="advise")
-@click.argument("scenes", nargs=-1, required=True, type=click.Path(path_type=Path, dir_okay=False))
-@click.option("--error", "wanted", type=float, required=True, help="Relative error of torque and pin forces.")
+@click.argument(
+    "scenes", nargs=-1, required=True, type=click.Path(path_type=Path, dir_okay=False)
+)
+@click.option(
+    "--error",
+    "wanted",
+    type=float,
+    required=True,
+    help="Relative error of torque and pin forces.",
+)
 @click.option(
     *("-o", "--out", "--output", "output"),
     type=click.Path(path_type=Path, dir_okay=False),
@@ -203,7 +245,9 @@ def command(scenes: tuple[Path, ...], wanted: float, output: Path | None) -> int
     from fourbar.files import load
 
     if output is not None and len(scenes) > 1:
-        raise InputError("-o", str(output), f"is the MJCF of one scene, not of {len(scenes)}")
+        raise InputError(
+            "-o", str(output), f"is the MJCF of one scene, not of {len(scenes)}"
+        )
     loaded = [(scene, load(scene)) for scene in scenes]
     if output is not None:
         require_file(output, *scenes)
@@ -222,10 +266,18 @@ def command(scenes: tuple[Path, ...], wanted: float, output: Path | None) -> int
         click.echo(f"{file.name}: {advice.reason}")
         click.echo(f"{write_sentence(influences)}")
         steps = sum(attempt.steps for attempt in advice.attempts)
-        click.echo(f"The search ran the scene {len(advice.attempts)} times, {steps} steps in all.")
+        click.echo(
+            f"The search ran the scene {len(advice.attempts)} times, {steps} steps in all."
+        )
         reached &= advice.reached
         rows.append(
-            (file.name, *advice.cells(), influences[0].setting if influences[0].times >= MATTERS else "none by itself")
+            (
+                file.name,
+                *advice.cells(),
+                influences[0].setting
+                if influences[0].times >= MATTERS
+                else "none by itself",
+            )
         )
         if output is not None and advice.reached:
             write_text(output, write_mjcf(scene, advice.best.settings))

@@ -10,7 +10,11 @@ from fourbar.mjcf import Settings
 from fourbar.mjcf.document import LIGHT, compute_load_ratio, compute_mass_ratio
 from fourbar.scene import Command, Scene
 from fourbar.solve import solve
-from fourbar_validation.advise.worst_errors import NO_ANSWER, WorstErrors, compute_errors
+from fourbar_validation.advise.worst_errors import (
+    NO_ANSWER,
+    WorstErrors,
+    compute_errors,
+)
 from fourbar_validation.engines.mujoco.trial import LONGEST, SHORTEST, Trial, TrialSetup
 
 MATTERS = 2.0
@@ -47,36 +51,57 @@ def judge_trial(scene: Scene, trial: Trial) -> WorstErrors:
     if trial.broken:
         return NO_ANSWER
     errors = [compute_errors(scene, trial.at, trial.quantities)]
-    if scene.drive_bar == 2:  # the torque of another bar has poles, through which no curve can be drawn
-        errors += [between for segment in trial.segments for between in compute_errors_between(scene, trial, *segment)]
+    if (
+        scene.drive_bar == 2
+    ):  # the torque of another bar has poles, through which no curve can be drawn
+        errors += [
+            between
+            for segment in trial.segments
+            for between in compute_errors_between(scene, trial, *segment)
+        ]
     return WorstErrors(*map(max, *errors)) if len(errors) > 1 else errors[0]
 
 
-def compute_errors_between(scene: Scene, trial: Trial, samples: slice, steps: int) -> Iterator[WorstErrors]:
+def compute_errors_between(
+    scene: Scene, trial: Trial, samples: slice, steps: int
+) -> Iterator[WorstErrors]:
     """Compute errors amid the steps of a segment, where they are fewer than its positions: by a spline.
 
     A largest force that lies between two steps is not seen at either of them.
     """
     theta_2, first = np.unique(trial.at.theta_2[samples], return_index=True)
     n = samples.stop - samples.start
-    if len(theta_2) <= steps or not np.isfinite(theta_2).all():  # each gap has a position of its own
+    if (
+        len(theta_2) <= steps or not np.isfinite(theta_2).all()
+    ):  # each gap has a position of its own
         return
     from scipy.interpolate import make_interp_spline
 
-    made = {"omega_2": trial.at.omega_2, "alpha_2": trial.at.alpha_2, **trial.quantities}
+    made = {
+        "omega_2": trial.at.omega_2,
+        "alpha_2": trial.at.alpha_2,
+        **trial.quantities,
+    }
     read = {name: np.asarray(values)[samples][first] for name, values in made.items()}
-    if len(theta_2) < 2 or not all(np.isfinite(values).all() for values in read.values()):
+    if len(theta_2) < 2 or not all(
+        np.isfinite(values).all() for values in read.values()
+    ):
         yield NO_ANSWER
         return
     places = np.linspace(theta_2[0], theta_2[-1], 2 * n)
     degree = min(SPLINE, len(theta_2) - 1)
-    curves = {name: make_interp_spline(theta_2, values, degree)(places) for name, values in read.items()}
+    curves = {
+        name: make_interp_spline(theta_2, values, degree)(places)
+        for name, values in read.items()
+    }
     branch = np.full(places.shape, trial.at.branch[samples][0], dtype=np.int8)
     command = Command(places, branch, curves.pop("omega_2"), curves.pop("alpha_2"))
     yield compute_errors(scene, command, curves)
 
 
-def measure_influences(scene: Scene, setup: TrialSetup, settings: Settings) -> list[SettingInfluence]:
+def measure_influences(
+    scene: Scene, setup: TrialSetup, settings: Settings
+) -> list[SettingInfluence]:
     """List every setting changed alone, the one that matters most first."""
     before = judge_trial(scene, setup.try_out(settings)).worst
     influences = []
@@ -84,7 +109,9 @@ def measure_influences(scene: Scene, setup: TrialSetup, settings: Settings) -> l
         worst = judge_trial(scene, setup.try_out(varied)).worst
         times = worst / before if before > 0.0 and math.isfinite(before) else math.nan
         influences.append(SettingInfluence(name, changed, worst, times, why(setup)))
-    return sorted(influences, key=lambda one: -one.times if one.times == one.times else math.inf)
+    return sorted(
+        influences, key=lambda one: -one.times if one.times == one.times else math.inf
+    )
 
 
 def write_sentence(influences: list[SettingInfluence]) -> str:
@@ -100,7 +127,9 @@ def _describe_changes(
     """Say what is changed to what, and what a growth of the error would come from."""
     steps, tc = settings.steps_per_revolution, settings.time_constant_steps
     window = max(settings.steps_per_window // 2, 1)
-    coarse = replace(settings, steps_per_revolution=steps / 2.0, steps_per_window=window)
+    coarse = replace(
+        settings, steps_per_revolution=steps / 2.0, steps_per_window=window
+    )
     yield "the timestep", "twice as long", coarse, _explain_timestep
     if tc / 2.0 >= SHORTEST / 2.0:
         stiff = replace(settings, time_constant_steps=tc / 2.0)
@@ -108,11 +137,18 @@ def _describe_changes(
             "the closure's time constant",
             "half as long",
             stiff,
-            lambda _: "a closure of few steps is a spring that RK4 follows badly, in proportion to (h/tc)^4",
+            lambda _: (
+                "a closure of few steps is a spring that RK4 follows badly, in proportion to (h/tc)^4"
+            ),
         )
     if 2.0 * tc <= LONGEST:
         slow = replace(settings, time_constant_steps=2.0 * tc)
-        yield "the closure's time constant", "twice as long", slow, lambda _: _find_yielding(scene, "a slow closure")
+        yield (
+            "the closure's time constant",
+            "twice as long",
+            slow,
+            lambda _: _find_yielding(scene, "a slow closure"),
+        )
     if settings.pad is not None:
         yield (
             "the stiffness by pads",
@@ -126,7 +162,9 @@ def _describe_changes(
             "the solver's tolerance",
             f"at MuJoCo's own {MUJOCO_TOLERANCE:g}",
             loose,
-            lambda _: "MuJoCo divides it by the inertia of the flywheel, next to which the linkage is small",
+            lambda _: (
+                "MuJoCo divides it by the inertia of the flywheel, next to which the linkage is small"
+            ),
         )
 
 
@@ -135,7 +173,10 @@ def _explain_timestep(setup: TrialSetup) -> str:
     sines = np.abs(motion.sin_mu)
     nearest = int(np.nanargmin(sines))
     if sines[nearest] < IN_LINE:
-        near, angle = (math.degrees(x) for x in (math.asin(sines[nearest]), float(setup.command.theta_2[nearest])))
+        near, angle = (
+            math.degrees(x)
+            for x in (math.asin(sines[nearest]), float(setup.command.theta_2[nearest]))
+        )
         return f"bars 3 and 4 come within {near:.2g} deg of one line at theta_2 = {angle:.4g} deg and speed up there"
     return "the error of RK4 goes as the fourth power of it"
 

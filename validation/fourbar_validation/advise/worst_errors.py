@@ -39,7 +39,9 @@ QUANTITIES = WorstErrors._fields
 NO_ANSWER = WorstErrors(*[math.inf] * len(QUANTITIES))
 
 
-def compute_errors(scene: Scene, command: Command, quantities: dict[str, Array]) -> WorstErrors:
+def compute_errors(
+    scene: Scene, command: Command, quantities: dict[str, Array]
+) -> WorstErrors:
     """Compute the errors of an answer at the motion that its engine really made.
 
     The torque on bar 3 or 4 has poles where that bar stands still: it is judged where the bar turns
@@ -55,8 +57,12 @@ def compute_errors(scene: Scene, command: Command, quantities: dict[str, Array])
     for name in QUANTITIES:
         ours, counted = getattr(formulas, name), judged
         if name == "torque" and scene.drive_bar != 2:
-            counted = judged & mark_turning(getattr(formulas, f"omega_{scene.drive_bar}"))
-        error = find_error(name, ours, quantities[name], scale_of(name, scene, formulas, ours))
+            counted = judged & mark_turning(
+                getattr(formulas, f"omega_{scene.drive_bar}")
+            )
+        error = find_error(
+            name, ours, quantities[name], scale_of(name, scene, formulas, ours)
+        )
         worst[name] = find_greatest(error[counted])
     return WorstErrors(**worst)
 

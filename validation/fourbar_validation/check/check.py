@@ -35,7 +35,11 @@ class Judgement:
     @property
     def differing(self) -> list[Discrepancy]:
         """Return the findings that do not agree, though there are digits to judge by."""
-        return [finding for finding in self.findings if finding.judged and not finding.agrees]
+        return [
+            finding
+            for finding in self.findings
+            if finding.judged and not finding.agrees
+        ]
 
     @property
     def agreeing(self) -> int:
@@ -60,7 +64,11 @@ class Judgement:
     @property
     def status(self) -> int:
         """Exit status; nothing compared is no success."""
-        return FAILED if self.differing or self.not_assembled or not self.compared else HOLDS
+        return (
+            FAILED
+            if self.differing or self.not_assembled or not self.compared
+            else HOLDS
+        )
 
     def sentence(self) -> str:
         """Write how many numbers agree, exactly and within the stated tolerance."""
@@ -71,23 +79,39 @@ class Judgement:
         else:
             within = f"rtol {self.tolerance.rtol:g}, atol {self.tolerance.atol:g}"
             agreed = f"{self.agreeing} of {self.compared} numbers agree within {within}; {self.exact} to round-off"
-        return agreed + (f"; no digit left to judge {self.not_judged} more by" if self.not_judged else "")
+        return agreed + (
+            f"; no digit left to judge {self.not_judged} more by"
+            if self.not_judged
+            else ""
+        )
 
     def together(self) -> bool:
         """Return whether the explanations together account for every quantity that differs."""
-        explained = {quantity for explanation in self.explanations for quantity in explanation.quantities}
+        explained = {
+            quantity
+            for explanation in self.explanations
+            for quantity in explanation.quantities
+        }
         return explained >= {finding.quantity for finding in self.differing}
 
 
-def judge_table(scene: Scene, table: TheirTable, tolerance: Allowance | None = None) -> Judgement:
+def judge_table(
+    scene: Scene, table: TheirTable, tolerance: Allowance | None = None
+) -> Judgement:
     """Judge every number by K eps/condition plus half a unit of its last printed digit, and of theta_2's.
 
     With a tolerance that decides, and what explains the rest is held to it too.
     """
     judge = Judge(scene, table, tolerance)
     findings = judge.findings()
-    differing_quantities = {finding.quantity for finding in findings if finding.judged and not finding.agrees}
-    differing = sorted(key for key in table.values if table.label(key) in differing_quantities)
+    differing_quantities = {
+        finding.quantity
+        for finding in findings
+        if finding.judged and not finding.agrees
+    }
+    differing = sorted(
+        key for key in table.values if table.label(key) in differing_quantities
+    )
     explanations = explain(judge, differing) if differing else []
     return Judgement(findings, judge.without_answer(), explanations, tolerance)
 
@@ -107,7 +131,10 @@ def write_json(judgement: Judgement, table: TheirTable) -> str:
         "left_out": table.left_out,
         "lines_without_motion": judgement.not_assembled,
         "differing": [
-            {name: None if isinstance(x, float) and not math.isfinite(x) else x for name, x in asdict(finding).items()}
+            {
+                name: None if isinstance(x, float) and not math.isfinite(x) else x
+                for name, x in asdict(finding).items()
+            }
             for finding in judgement.differing
         ],
         "explanations": [asdict(explanation) for explanation in judgement.explanations],
@@ -133,11 +160,30 @@ def _list_cases(judgement: Judgement, name: str) -> Iterator[JunitCase]:
             yield JunitCase(name, name, quantity, "failure", "differs", text)
         else:
             skipped = "no digit is left to judge by"
-            yield JunitCase(name, name, quantity, *(("passed",) if judged else ("skipped", "not judged", skipped)))
+            yield JunitCase(
+                name,
+                name,
+                quantity,
+                *(("passed",) if judged else ("skipped", "not judged", skipped)),
+            )
     for line in judgement.not_assembled:
-        yield JunitCase(name, name, f"line {line}", "failure", "no motion", "the linkage has no motion there")
+        yield JunitCase(
+            name,
+            name,
+            f"line {line}",
+            "failure",
+            "no motion",
+            "the linkage has no motion there",
+        )
     if not judgement.compared:
-        yield JunitCase(name, name, "anything is compared", "failure", "nothing compared", judgement.sentence())
+        yield JunitCase(
+            name,
+            name,
+            "anything is compared",
+            "failure",
+            "nothing compared",
+            judgement.sentence(),
+        )
 
 
 SHOWN = 3
@@ -151,19 +197,41 @@ def write_extent(explanation: Explanation) -> str:
     if explanation.quantities:
         parts.append("explains " + ", ".join(explanation.quantities))
     if explanation.nearer:
-        parts.append(", ".join(explanation.nearer) + f" then at least {NEARER:g} times nearer")
+        parts.append(
+            ", ".join(explanation.nearer) + f" then at least {NEARER:g} times nearer"
+        )
     return "; ".join(parts)
 
 
 @click.command()
 @click.argument("scene", type=click.Path(path_type=Path))
 @click.argument("theirs", type=click.Path(path_type=Path))
-@click.option("--rtol", type=float, metavar="R", help="Allow this part of each number too.")
-@click.option("--atol", type=float, metavar="A", help="Allow this too, in the SI unit of each quantity.")
-@click.option("--json", type=click.Path(path_type=Path, dir_okay=False), help="Write it as JSON too.")
-@click.option("--junit", type=click.Path(path_type=Path, dir_okay=False), help="Write it as JUnit too.")
+@click.option(
+    "--rtol", type=float, metavar="R", help="Allow this part of each number too."
+)
+@click.option(
+    "--atol",
+    type=float,
+    metavar="A",
+    help="Allow this too, in the SI unit of each quantity.",
+)
+@click.option(
+    "--json",
+    type=click.Path(path_type=Path, dir_okay=False),
+    help="Write it as JSON too.",
+)
+@click.option(
+    "--junit",
+    type=click.Path(path_type=Path, dir_okay=False),
+    help="Write it as JUnit too.",
+)
 def check(
-    scene: Path, theirs: Path, rtol: float | None, atol: float | None, json: Path | None, junit: Path | None
+    scene: Path,
+    theirs: Path,
+    rtol: float | None,
+    atol: float | None,
+    json: Path | None,
+    junit: Path | None,
 ) -> int:
     """Judge a table of torques and forces (THEIRS.csv) against the formulas, row by row.
 
@@ -176,9 +244,16 @@ def check(
     omega_2 each row is judged at its own omega_2 and alpha_2.
     """
     if scene.suffix == ".json":
-        for option, value in (("--rtol", rtol), ("--atol", atol), ("--json", json), ("--junit", junit)):
+        for option, value in (
+            ("--rtol", rtol),
+            ("--atol", atol),
+            ("--json", json),
+            ("--junit", junit),
+        ):
             if value is not None:
-                raise InputError(option, str(value), "is of a table: a problem has its own levels")
+                raise InputError(
+                    option, str(value), "is of a table: a problem has its own levels"
+                )
         return check_problem(scene, theirs)
     table = read_table(theirs)
     for path in (json, junit):
@@ -187,7 +262,9 @@ def check(
     for option, value in (("--rtol", rtol), ("--atol", atol)):
         if value is not None and not 0.0 <= value < math.inf:
             raise InputError(option, value, "must be a finite number >= 0")
-    tolerance = None if rtol is None and atol is None else Allowance(rtol or 0.0, atol or 0.0)
+    tolerance = (
+        None if rtol is None and atol is None else Allowance(rtol or 0.0, atol or 0.0)
+    )
     judgement = judge_table(load(scene), table, tolerance)
     if json is not None:
         write_text(json, write_json(judgement, table))
@@ -204,23 +281,48 @@ def show(judgement: Judgement, table: TheirTable, name: str) -> None:
 
     console = Console(soft_wrap=True)
     for why in dict.fromkeys(table.left_out.values()):
-        headings = ", ".join(heading for heading, reason in table.left_out.items() if reason == why)
+        headings = ", ".join(
+            heading for heading, reason in table.left_out.items() if reason == why
+        )
         console.print(f"left out ({why}): {escape(make_plain(headings))}")
     differing = judgement.differing
     if differing:
         title = f"{escape(make_plain(name))}: what differs, the {SHOWN} worst of each quantity"
-        head = ("line", "theta_2\ndeg", "quantity", "theirs", "ours", "error", "allowed")
+        head = (
+            "line",
+            "theta_2\ndeg",
+            "quantity",
+            "theirs",
+            "ours",
+            "error",
+            "allowed",
+        )
         rows = [(str(each.line), f"{math.degrees(each.theta_2):.7g}", *write_in_their_unit(each, table),
                  f"{each.error:.1e}", f"{each.allowed:.1e}") for each in choose_worst(differing)]  # fmt: skip
-        console.print(make_table(head, rows, title=title, show_edge=False, padding=(0, 1, 0, 0)))
+        console.print(
+            make_table(head, rows, title=title, show_edge=False, padding=(0, 1, 0, 0))
+        )
         counted = Counter(finding.quantity for finding in differing)
-        console.print("in all: " + ", ".join(f"{count} of {quantity}" for quantity, count in counted.items()))
+        console.print(
+            "in all: "
+            + ", ".join(f"{count} of {quantity}" for quantity, count in counted.items())
+        )
     for line in judgement.not_assembled:
-        console.print(f"line {line}: the linkage has no motion there (it does not assemble, or is singular)")
+        console.print(
+            f"line {line}: the linkage has no motion there (it does not assemble, or is singular)"
+        )
     for explanation in judgement.explanations:
-        console.print(f"looks like: {escape(explanation.text)} ({write_extent(explanation)})")
-    if differing and not any(explanation.complete for explanation in judgement.explanations):
-        together = "these together explain all of it" if judgement.together() else "no single known mistake explains it"
+        console.print(
+            f"looks like: {escape(explanation.text)} ({write_extent(explanation)})"
+        )
+    if differing and not any(
+        explanation.complete for explanation in judgement.explanations
+    ):
+        together = (
+            "these together explain all of it"
+            if judgement.together()
+            else "no single known mistake explains it"
+        )
         console.print(together)
     console.print(f"[bold]{judgement.sentence()}[/]")
 
@@ -230,13 +332,28 @@ def choose_worst(differing: list[Discrepancy]) -> list[Discrepancy]:
     by_quantity: dict[str, list[Discrepancy]] = {}
     for finding in sorted(differing, key=lambda f: -f.error):
         by_quantity.setdefault(finding.quantity, []).append(finding)
-    return [finding for findings in by_quantity.values() for finding in findings[:SHOWN]]
+    return [
+        finding for findings in by_quantity.values() for finding in findings[:SHOWN]
+    ]
 
 
 def write_in_their_unit(finding: Discrepancy, table: TheirTable) -> tuple[str, ...]:
     """Write the quantity with the unit of their column, and both numbers in it with the digits that set them apart."""
-    unit = table.units[next(key for key in table.values if table.label(key) == finding.quantity)]
-    theirs, ours = ([x / unit.factor for x in numbers] for numbers in (finding.theirs, finding.ours))
-    digits = next((d for d in (4, 6, 9, 12) if any(f"{a:.{d}g}" != f"{b:.{d}g}" for a, b in zip(theirs, ours))), 15)  # noqa: B905
-    written = (", ".join(f"{x:.{digits}g}" for x in numbers) for numbers in (theirs, ours))
+    unit = table.units[
+        next(key for key in table.values if table.label(key) == finding.quantity)
+    ]
+    theirs, ours = (
+        [x / unit.factor for x in numbers] for numbers in (finding.theirs, finding.ours)
+    )
+    digits = next(
+        (
+            d
+            for d in (4, 6, 9, 12)
+            if any(f"{a:.{d}g}" != f"{b:.{d}g}" for a, b in zip(theirs, ours))  # noqa: B905
+        ),
+        15,
+    )
+    written = (
+        ", ".join(f"{x:.{digits}g}" for x in numbers) for numbers in (theirs, ours)
+    )
     return f"{finding.quantity} [{make_plain(unit.text)}]", *written

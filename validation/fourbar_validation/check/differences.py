@@ -22,7 +22,9 @@ ONE_SIDED = ("loads.", "tendons.", "actuators.")
 """Entries that a file may lack: what is missing on one side is a difference."""
 NOTHING: dict[str, Value] = {".force": (0.0, 0.0), ".couple": 0.0}
 """What a load exerts that is not there."""
-REMARKS = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))["remarks"]
+REMARKS = tomllib.loads(
+    Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
+)["remarks"]
 """Part of a key, and what a difference there does; the first that fits."""
 
 
@@ -55,33 +57,62 @@ class Difference:
     def cells(self) -> tuple[str, ...]:
         """Return the cells of a row of the page."""
         key = f"{self.key} ({self.written})" if self.written else self.key
-        return self.price, key, write_value(self.generated), write_value(self.theirs), self.remark
+        return (
+            self.price,
+            key,
+            write_value(self.generated),
+            write_value(self.theirs),
+            self.remark,
+        )
 
 
-def find_differences(generated: Mapping[str, ModelEntry], theirs: Mapping[str, ModelEntry]) -> list[Difference]:
+def find_differences(
+    generated: Mapping[str, ModelEntry], theirs: Mapping[str, ModelEntry]
+) -> list[Difference]:
     """Find what differs, in the order of their description."""
-    length = max(float(entry.value) for key, entry in generated.items() if _is_length(key))  # type: ignore[arg-type]
+    length = max(
+        float(entry.value)
+        for key, entry in generated.items()
+        if _is_length(key)  # type: ignore[arg-type]
+    )
     differences = []
     for key in [*theirs, *(key for key in generated if key not in theirs)]:
         ours, yours_entry = generated.get(key), theirs.get(key)
-        if (ours is None or yours_entry is None) and not (key.startswith(ONE_SIDED) or key.endswith(".motor")):
+        if (ours is None or yours_entry is None) and not (
+            key.startswith(ONE_SIDED) or key.endswith(".motor")
+        ):
             continue  # what one of the files has no use for, such as the solver parameters of no friction
-        nothing = next((value for end, value in NOTHING.items() if key.endswith(end)), None)
-        mine, yours = (nothing if entry is None else entry.value for entry in (ours, yours_entry))
+        nothing = next(
+            (value for end, value in NOTHING.items() if key.endswith(end)), None
+        )
+        mine, yours = (
+            nothing if entry is None else entry.value for entry in (ours, yours_entry)
+        )
         if _is_same(key, mine, yours, length):
             continue
-        written = f"{yours_entry.element} {yours_entry.attribute}".strip() if yours_entry is not None else ""
-        differences.append(Difference(key, mine, yours, _remark(key, mine, yours), written))
+        written = (
+            f"{yours_entry.element} {yours_entry.attribute}".strip()
+            if yours_entry is not None
+            else ""
+        )
+        differences.append(
+            Difference(key, mine, yours, _remark(key, mine, yours), written)
+        )
     return differences
 
 
-def price(difference: Difference, rows: Sequence[Row], unchanged: Sequence[Row]) -> Difference:
+def price(
+    difference: Difference, rows: Sequence[Row], unchanged: Sequence[Row]
+) -> Difference:
     """Put the cost on a difference: what it adds to the worst error of a force.
 
     `rows`: of the generated file that has it, none where it cannot be set alone; `unchanged`: of the file without it.
     """
     before = _collect_errors(unchanged)
-    gains = [(error - before.get(key, 0.0), key[1]) for key, error in _collect_errors(rows).items()]
+    gains = [
+        (error - before.get(key, 0.0), key[1])
+        for key, error in _collect_errors(rows).items()
+    ]
     if not gains:
         return difference
     cost, quantity = max(gains)
@@ -91,7 +122,9 @@ def price(difference: Difference, rows: Sequence[Row], unchanged: Sequence[Row])
 def _collect_errors(rows: Sequence[Row]) -> dict[tuple[str, str], float]:
     """Collect the error of the torque and of each pin force, by method."""
     return {
-        (row.engine, row.quantity): row.error for row in rows if row.quantity in FORCES and math.isfinite(row.error)
+        (row.engine, row.quantity): row.error
+        for row in rows
+        if row.quantity in FORCES and math.isfinite(row.error)
     }
 
 
@@ -105,23 +138,47 @@ def _is_length(key: str) -> bool:
 
 
 def _is_same(key: str, ours: Value | None, theirs: Value | None, length: float) -> bool:
-    if isinstance(ours, str) or isinstance(theirs, str) or ours is None or theirs is None or ours == theirs:
+    if (
+        isinstance(ours, str)
+        or isinstance(theirs, str)
+        or ours is None
+        or theirs is None
+        or ours == theirs
+    ):
         return ours == theirs
     first, second = np.atleast_1d(ours), np.atleast_1d(theirs)
     if first.shape != second.shape:
         return False
     if key.endswith("angle"):
-        return bool(np.all(np.abs(np.remainder(first - second + np.pi, math.tau) - np.pi) <= SAME))
+        return bool(
+            np.all(
+                np.abs(np.remainder(first - second + np.pi, math.tau) - np.pi) <= SAME
+            )
+        )
     placed = any(part in key for part in ("centre", "plane", ".point", ".path"))
     floor = length if placed else 1.0 if key.startswith(("gravity", "loads")) else 0.0
-    return bool(np.all(np.abs(first - second) <= SAME * max(np.abs(first).max(), np.abs(second).max(), floor)))
+    return bool(
+        np.all(
+            np.abs(first - second)
+            <= SAME * max(np.abs(first).max(), np.abs(second).max(), floor)
+        )
+    )
 
 
 def _remark(key: str, ours: Value | None, theirs: Value | None) -> str:
     remark = next((text for part, text in REMARKS.items() if part in key), "")
-    if key != OF_THE_DRIVE and isinstance(ours, float) and isinstance(theirs, float) and ours * theirs > 0.0:
+    if (
+        key != OF_THE_DRIVE
+        and isinstance(ours, float)
+        and isinstance(theirs, float)
+        and ours * theirs > 0.0
+    ):
         power = math.log10(abs(theirs)) - math.log10(abs(ours))
-        if not key.startswith("option") and round(power) and abs(power - round(power)) <= TENFOLD:
+        if (
+            not key.startswith("option")
+            and round(power)
+            and abs(power - round(power)) <= TENFOLD
+        ):
             return f"10^{round(power)} times: units? {remark}"
     return str(remark)
 
@@ -130,4 +187,6 @@ def write_value(value: Value | None) -> str:
     """Write numbers with the digits that set them apart, or the word itself."""
     if value is None or isinstance(value, str):
         return value or "none"
-    return " ".join(f"{number:.12g}" for number in (value if isinstance(value, tuple) else (value,)))
+    return " ".join(
+        f"{number:.12g}" for number in (value if isinstance(value, tuple) else (value,))
+    )

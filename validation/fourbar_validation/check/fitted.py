@@ -30,14 +30,30 @@ OTHER_UNITS = {
     "m": ("m", "mm", "cm", "in", "ft"),
     "m/s^2": ("m/s^2", "mm/s^2", "cm/s^2", "in/s^2", "ft/s^2", "g0"),
     "N": ("N", "kN", "mN", "lbf", "kgf"),
-    "N m": ("N m", "N mm", "N cm", "kN m", "mN m", "lbf ft", "lbf in", "kgf m", "kgf cm", "kgf mm"),
+    "N m": (
+        "N m",
+        "N mm",
+        "N cm",
+        "kN m",
+        "mN m",
+        "lbf ft",
+        "lbf in",
+        "kgf m",
+        "kgf cm",
+        "kgf mm",
+    ),
 }
 """Units that may be taken for each SI unit; the SI unit itself if the file announced another unit."""
 ENOUGH = 3
 """Numbers that a fitted one must explain: fewer are explained by chance."""
 CARRIED = 2.0
 """Times what is allowed: the fitted number carries the rounding of the numbers it was fitted to."""
-FACTORS = {0.5: "halved", 2.0: "doubled", 1e4: "in kg cm^2 taken for kg m^2", 1e-4: "10^4 too small"}
+FACTORS = {
+    0.5: "halved",
+    2.0: "doubled",
+    1e4: "in kg cm^2 taken for kg m^2",
+    1e-4: "10^4 too small",
+}
 """Factors of a moment of inertia, and the mistake behind each."""
 PLAIN = 1e-2
 """Relative; a fitted number this near a plain one is tried as that."""
@@ -75,7 +91,9 @@ def _find_ratios(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
             continue
         announced, unit = judge.table.units[key], UNITS[name_quantity(key)]
         near = float(ours @ theirs) / squares
-        ratio_found = _name_ratio(judge, key, announced.text, announced.factor, unit, near)
+        ratio_found = _name_ratio(
+            judge, key, announced.text, announced.factor, unit, near
+        )
         if ratio_found is None and np.count_nonzero(ours) >= ENOUGH and near:
             ratio_found = _round_ratio(judge, key, near)
         if ratio_found is not None:
@@ -97,7 +115,11 @@ def _name_ratio(
 ) -> tuple[str, float] | None:
     for unit_tried in OTHER_UNITS.get(unit, ()):
         ratio = math.copysign(factor / find_factor(unit, unit_tried), near)
-        if abs(near / ratio - 1.0) < PLAIN and abs(ratio) != 1.0 and judge.explained(key, ratio * judge.ours(key)):
+        if (
+            abs(near / ratio - 1.0) < PLAIN
+            and abs(ratio) != 1.0
+            and judge.explained(key, ratio * judge.ours(key))
+        ):
             reversed_too = ", and reversed" if near < 0.0 else ""
             return (
                 f"units: numbers in {unit_tried} where {announced} was announced ({ratio:.6g} times){reversed_too}",
@@ -125,7 +147,9 @@ def _try_exchanged(differing: list[str]) -> Iterator[Mistake]:
             taken = {one: second, second: one}
             yield Mistake(
                 f"the columns {one} and {second} are exchanged",
-                lambda quantity, right, taken=taken: getattr(right, taken.get(quantity, ""), None),  # type: ignore[misc]
+                lambda quantity, right, taken=taken: getattr(
+                    right, taken.get(quantity, ""), None
+                ),  # type: ignore[misc]
                 whole=False,
             )
 
@@ -133,7 +157,9 @@ def _try_exchanged(differing: list[str]) -> Iterator[Mistake]:
 def _compute_residual(judge: Judge, key: str, one: Array, base: Array) -> Array:
     scale = judge.size(key)
     mask = judge.where(key) & (scale > 0.0)
-    scaled = (one[mask] - base[mask]) / (scale[mask][:, None] if one.ndim == 2 else scale[mask])
+    scaled = (one[mask] - base[mask]) / (
+        scale[mask][:, None] if one.ndim == 2 else scale[mask]
+    )
     stated = np.isfinite(judge.table.values[key][mask])
     return np.asarray(np.where(stated, scaled, 0.0)).ravel()
 
@@ -142,15 +168,29 @@ def _try_factors(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
     """Try a moment of inertia, a mass, gravity or a load times a factor: forces and torque are linear in each."""
     scene = judge.scene
     keys = [key for key in differing if name_quantity(key) in FORCES]
-    keys = [key for key in keys if not key.startswith("|")] or keys  # a magnitude is linear in none of them
-    theirs = np.concatenate([_compute_residual(judge, key, judge.table.values[key], judge.ours(key)) for key in keys])
+    keys = [
+        key for key in keys if not key.startswith("|")
+    ] or keys  # a magnitude is linear in none of them
+    theirs = np.concatenate(
+        [
+            _compute_residual(judge, key, judge.table.values[key], judge.ours(key))
+            for key in keys
+        ]
+    )
     if np.count_nonzero(theirs) < ENOUGH:
         return
     bars = ("input", "coupler", "output")
-    inertia = ("moment of inertia", lambda bar, f: replace(bar, inertia=f * bar.moment_of_inertia))
+    inertia = (
+        "moment of inertia",
+        lambda bar, f: replace(bar, inertia=f * bar.moment_of_inertia),
+    )
     mass = ("mass", lambda bar, f: replace(bar, mass=f * bar.mass))
     of_bars = [
-        (f"{which[0] if len(which) == 1 else 'every bar'}: {word}", word, partial(_scale_bars, scene, which, change))
+        (
+            f"{which[0] if len(which) == 1 else 'every bar'}: {word}",
+            word,
+            partial(_scale_bars, scene, which, change),
+        )
         for which, (word, change) in (
             *(((bar,), property_) for bar in bars for property_ in (inertia, mass)),
             (bars, inertia),
@@ -160,15 +200,28 @@ def _try_factors(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
         (f"load {number} (bar {load.bar})", "load", partial(_scale_load, scene, load))
         for number, load in enumerate(scene.loads, 1)
     ]
-    for name, word, scaled in (*of_bars, ("gravity", "gravity", partial(_scale_gravity, scene)), *of_loads):
+    for name, word, scaled in (
+        *of_bars,
+        ("gravity", "gravity", partial(_scale_gravity, scene)),
+        *of_loads,
+    ):
         try:
             twice = solve(scaled(2.0), "force", at=judge.at)
-            moves = np.concatenate([_compute_residual(judge, k, judge.ours(k, twice), judge.ours(k)) for k in keys])
+            moves = np.concatenate(
+                [
+                    _compute_residual(judge, k, judge.ours(k, twice), judge.ours(k))
+                    for k in keys
+                ]
+            )
             slope = float(moves @ moves)
             factor = 1.0 + float(moves @ theirs) / slope if slope else math.nan
             if not 0.0 < factor < math.inf or factor == 1.0:
                 continue
-            plain = next((f for f in FACTORS if abs(factor / f - 1.0) < PLAIN), None) if word == inertia[0] else None
+            plain = (
+                next((f for f in FACTORS if abs(factor / f - 1.0) < PLAIN), None)
+                if word == inertia[0]
+                else None
+            )
             for f in (factor,) if plain is None else (plain, factor):
                 wrong = solve(scaled(f), "force", at=judge.at)
                 what = f"{FACTORS[f]}" if f == plain else f"{f:.6g} times ours (fitted)"
@@ -177,19 +230,27 @@ def _try_factors(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
                     lambda quantity, right, wrong=wrong: getattr(wrong, quantity, None),  # type: ignore[misc]
                     times=1.0 if f == plain else CARRIED,
                 )
-                if f == plain and all(judge.explained(key, judge.ours(key, wrong)) for key in keys):
+                if f == plain and all(
+                    judge.explained(key, judge.ours(key, wrong)) for key in keys
+                ):
                     break
         except FourBarError:  # the factor leaves no valid scene
             continue
 
 
-def _scale_bars(scene: Scene, which: Sequence[str], change: Callable[[Bar, float], Bar], f: float) -> Scene:
-    return replace_bars(scene, **{bar: change(getattr(scene.linkage, bar), f) for bar in which})
+def _scale_bars(
+    scene: Scene, which: Sequence[str], change: Callable[[Bar, float], Bar], f: float
+) -> Scene:
+    return replace_bars(
+        scene, **{bar: change(getattr(scene.linkage, bar), f) for bar in which}
+    )
 
 
 def _scale_gravity(scene: Scene, f: float) -> Scene:
     scaled = (
-        replace(effect, magnitude=f * effect.magnitude) if isinstance(effect, Gravity) else effect
+        replace(effect, magnitude=f * effect.magnitude)
+        if isinstance(effect, Gravity)
+        else effect
         for effect in scene.effects
     )
     return replace(scene, effects=tuple(scaled))
@@ -198,13 +259,20 @@ def _scale_gravity(scene: Scene, f: float) -> Scene:
 def _scale_load(scene: Scene, load: Load, f: float) -> Scene:
     force = None if load.force is None else (f * load.force[0], load.force[1])
     scaled = replace(load, force=force, moment=f * load.moment)
-    return replace(scene, loads=tuple(scaled if candidate is load else candidate for candidate in scene.loads))
+    return replace(
+        scene,
+        loads=tuple(
+            scaled if candidate is load else candidate for candidate in scene.loads
+        ),
+    )
 
 
 def _try_offset(judge: Judge) -> Iterator[Mistake]:
     """Try the crank angle from another zero: the offset at which theirs fit best, refined by Gauss and Newton."""
     keys = [key for key in judge.table.values if judge.size(key).any()]
-    rows = np.unique(np.linspace(0, len(judge.at.theta_2) - 1, TRIED).round().astype(int))
+    rows = np.unique(
+        np.linspace(0, len(judge.at.theta_2) - 1, TRIED).round().astype(int)
+    )
 
     def residuals(offsets: Array, rows: NDArray[np.int_]) -> Array:
         """Write one line for each offset."""
@@ -215,7 +283,11 @@ def _try_offset(judge: Judge) -> Iterator[Mistake]:
             if np.ndim(values := getattr(command, name)) == 1
         }
         many["angle"] += np.repeat(offsets, len(rows))
-        moved = solve(judge.scene, judge.stage, at=command._replace(**many, remainder=None, time=None))
+        moved = solve(
+            judge.scene,
+            judge.stage,
+            at=command._replace(**many, remainder=None, time=None),
+        )
         parts = []
         for key in keys:
             theirs = judge.table.values[key][rows].reshape(len(rows), -1)
@@ -229,7 +301,9 @@ def _try_offset(judge: Judge) -> Iterator[Mistake]:
     if sum(np.count_nonzero(judge.where(key)) for key in keys) < ENOUGH:
         return
     tried = 2.0 * np.pi * np.arange(1, GRID) / GRID
-    sizes = np.mean(np.minimum(np.abs(np.nan_to_num(residuals(tried, rows), nan=1.0)), 1.0), axis=1)
+    sizes = np.mean(
+        np.minimum(np.abs(np.nan_to_num(residuals(tried, rows), nan=1.0)), 1.0), axis=1
+    )
     offset = float(tried[np.argmin(sizes)])
     everything = np.arange(len(judge.at.theta_2))
     for _ in range(NEWTON):
@@ -243,10 +317,16 @@ def _try_offset(judge: Judge) -> Iterator[Mistake]:
         if abs(step) < STEP**2:
             break
     offset = math.remainder(offset, 2.0 * np.pi)
-    wrong = solve(judge.scene, judge.stage, at=judge.at._replace(angle=judge.at.theta_2 + offset, remainder=None))
+    wrong = solve(
+        judge.scene,
+        judge.stage,
+        at=judge.at._replace(angle=judge.at.theta_2 + offset, remainder=None),
+    )
     yield Mistake(
         f"the crank angle is measured from another zero: theta_2 {math.degrees(offset):+.6g} deg is what they solved",
-        lambda quantity, right: None if quantity == "theta_2" else getattr(wrong, quantity, None),
+        lambda quantity, right: (
+            None if quantity == "theta_2" else getattr(wrong, quantity, None)
+        ),
         times=CARRIED,
     )
 
@@ -254,23 +334,33 @@ def _try_offset(judge: Judge) -> Iterator[Mistake]:
 def _try_order(judge: Judge) -> Iterator[Mistake]:
     """Try the right numbers in other rows: each row of theirs goes to the nearest of ours."""
     table, n = judge.table, len(judge.at.theta_2)
-    keys = [key for key in table.values if judge.where(key).all() and judge.size(key).all()]
+    keys = [
+        key for key in table.values if judge.where(key).all() and judge.size(key).all()
+    ]
     if not ENOUGH <= n <= MOST_ROWS or not keys:
         return
     apart = np.zeros((n, n))
     for key in keys:
         ours, theirs, scale = judge.ours(key), table.values[key], judge.size(key).max()
         for i in range(n):
-            filled = np.where(np.isnan(theirs[i]), ours, theirs[i]) if ours.ndim == 2 else np.full(n, theirs[i])
+            filled = (
+                np.where(np.isnan(theirs[i]), ours, theirs[i])
+                if ours.ndim == 2
+                else np.full(n, theirs[i])
+            )
             apart[i] += compute_difference(name_quantity(key), ours, filled) / scale
     nearest = np.argmin(apart, axis=1)
-    if len(np.unique(nearest)) < n - 1 or np.array_equal(nearest, np.arange(n)):  # a revolution ends where it began
+    if len(np.unique(nearest)) < n - 1 or np.array_equal(
+        nearest, np.arange(n)
+    ):  # a revolution ends where it began
         return
     steps = np.diff(nearest)
     if np.all(steps[1:-1] == -1):
         text = "the rows are in reverse order: theta_2 runs the other direction"
     elif np.count_nonzero(steps == 1) >= n - 2:
-        rows = round(float(np.median(np.remainder(nearest - np.arange(n) + n / 2, n) - n / 2)))
+        rows = round(
+            float(np.median(np.remainder(nearest - np.arange(n) + n / 2, n) - n / 2))
+        )
         text = f"the rows are shifted by {rows:+d}: each has the numbers of another theta_2"
     else:
         text = "the rows are in another order than their theta_2"

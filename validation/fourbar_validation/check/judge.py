@@ -82,12 +82,19 @@ class Discrepancy:
 class Judge:
     """Numbers of a table against the formulas at its positions."""
 
-    def __init__(self, scene: Scene, table: TheirTable, tolerance: Allowance | None) -> None:
+    def __init__(
+        self, scene: Scene, table: TheirTable, tolerance: Allowance | None
+    ) -> None:
         self.scene, self.tolerance = scene, tolerance
         self.at = make_command(scene, table)
         command_names = OWN_MOTION if _moves_itself(scene, table) else ()
         self.table = replace(
-            table, values={key: value for key, value in table.values.items() if key not in command_names}
+            table,
+            values={
+                key: value
+                for key, value in table.values.items()
+                if key not in command_names
+            },
         )
         self.stage = "position" if self.at.omega_2 is None else "force"
         self.right = solve(scene, self.stage, at=self.at)
@@ -96,12 +103,22 @@ class Judge:
         for key in table.values:
             if getattr(self.right, name_quantity(key)) is None:
                 if self.at.omega_2 is None:
-                    raise InputError("motion.omega_2", None, f"is needed in the scene or the table to judge {key}")
-                raise InputError("header", key, "does not exist in this scene: it has no dry friction")
+                    raise InputError(
+                        "motion.omega_2",
+                        None,
+                        f"is needed in the scene or the table to judge {key}",
+                    )
+                raise InputError(
+                    "header",
+                    key,
+                    "does not exist in this scene: it has no dry friction",
+                )
 
     def ours(self, key: str, solution: Solution | None = None) -> Array:
         """Give the formulas' values of a key of the table."""
-        values: Array = getattr(self.right if solution is None else solution, name_quantity(key))
+        values: Array = getattr(
+            self.right if solution is None else solution, name_quantity(key)
+        )
         return magnitude(values) if key.startswith("|") else values
 
     def where(self, key: str) -> Mask:
@@ -112,7 +129,9 @@ class Judge:
         """Compute what the error of a key is divided by at each position, (n,)."""
         if key not in self._sizes:
             quantity = name_quantity(key)
-            self._sizes[key] = scale_of(quantity, self.scene, self.right, getattr(self.right, quantity))
+            self._sizes[key] = scale_of(
+                quantity, self.scene, self.right, getattr(self.right, quantity)
+            )
         return self._sizes[key]
 
     @cached_property
@@ -122,32 +141,50 @@ class Judge:
         if not rounding.any():
             return []
         moved = (self.at.theta_2 + shift for shift in (-rounding, rounding))
-        return [solve(self.scene, self.stage, at=self.at._replace(angle=x, remainder=None)) for x in moved]
+        return [
+            solve(self.scene, self.stage, at=self.at._replace(angle=x, remainder=None))
+            for x in moved
+        ]
 
     def judged(self, key: str, ours: Array) -> tuple[Array, Array, Array]:
         """Return (error, allowed, apart) of the table if `ours` is taken for the right numbers, each (n,)."""
         quantity, size = name_quantity(key), self.size(key)
         scale = replace_zero_size(size)  # quantities whose terms are all 0
         theirs = self.table.values[key]
-        theirs = np.where(np.isnan(theirs), ours, theirs)  # a component that their table does not have
+        theirs = np.where(
+            np.isnan(theirs), ours, theirs
+        )  # a component that their table does not have
         apart = compute_difference(quantity, ours, theirs)
         condition = find_condition(quantity, self.scene.linkage, self.right)
         # the number a mistake would have printed is rounded at its own size, however much larger
         unchanged = self.ours(key)
         larger: Array | float = 1.0
         if ours is not unchanged and not quantity.startswith("theta"):
-            larger = np.maximum(np.nanmax(magnitude(ours)[self.ok], initial=0.0) / scale, 1.0)
-        moves = [compute_difference(quantity, unchanged, self.ours(key, other)) for other in self.near]
+            larger = np.maximum(
+                np.nanmax(magnitude(ours)[self.ok], initial=0.0) / scale, 1.0
+            )
+        moves = [
+            compute_difference(quantity, unchanged, self.ours(key, other))
+            for other in self.near
+        ]
         spread = divide(np.fmax.reduce(moves), scale) if moves else 0.0
         exact = np.where(size == 0.0, 0.0, EQUIVALENCE.allowed(condition))
         allowed = (exact + spread) * larger + divide(self.table.rounding[key], scale)
-        return divide(apart, scale), np.where(condition * NOTHING_TO_TELL > EPS, allowed, np.inf), apart
+        return (
+            divide(apart, scale),
+            np.where(condition * NOTHING_TO_TELL > EPS, allowed, np.inf),
+            apart,
+        )
 
     def permitted(self, key: str, ours: Array) -> Array | None:
         """Compute the difference that the given tolerance allows, (n,), in the quantity's unit."""
         if self.tolerance is None:
             return None
-        return np.asarray(self.tolerance.atol + self.tolerance.rtol * magnitude(ours) + self.table.rounding[key])
+        return np.asarray(
+            self.tolerance.atol
+            + self.tolerance.rtol * magnitude(ours)
+            + self.table.rounding[key]
+        )
 
     def explained(self, key: str, predicted: Array, times: float = 1.0) -> bool:
         """Return whether all numbers of a key are as `predicted`, within `times` the allowed error."""
@@ -168,17 +205,30 @@ class Judge:
             permitted = self.permitted(key, ours)
             for i in np.flatnonzero(self.where(key)).tolist():
                 stated = np.isfinite(np.atleast_1d(theirs[i]))
-                yours, mine = (tuple(np.atleast_1d(values[i])[stated].tolist()) for values in (theirs, ours))
+                yours, mine = (
+                    tuple(np.atleast_1d(values[i])[stated].tolist())
+                    for values in (theirs, ours)
+                )
                 numbers = (float(error[i]), float(allowed[i]), float(apart[i]))
                 most = None if permitted is None else float(permitted[i])
                 findings.append(
-                    Discrepancy(self.table.lines[i], label, yours, mine, *numbers, most, float(self.at.theta_2[i]))
+                    Discrepancy(
+                        self.table.lines[i],
+                        label,
+                        yours,
+                        mine,
+                        *numbers,
+                        most,
+                        float(self.at.theta_2[i]),
+                    )
                 )
         return findings
 
     def without_answer(self) -> list[int]:
         """List lines that state a number where this linkage does not assemble or is singular: none is right there."""
-        missing = [self.table.stated(key) & ~self._answer(key) for key in self.table.values]
+        missing = [
+            self.table.stated(key) & ~self._answer(key) for key in self.table.values
+        ]
         return [self.table.lines[i] for i in np.flatnonzero(np.any(missing, axis=0))]
 
     def _answer(self, key: str) -> Mask:
@@ -197,9 +247,14 @@ def make_command(scene: Scene, table: TheirTable) -> Command:
         allowed = "not judged while released; without free and omega_2 each row is judged at its own omega_2"
         raise InputError("motion.free", scene.title, allowed)
     if _moves_itself(scene, table):
-        base = base._replace(speed=table.values["omega_2"], acceleration=table.values.get("alpha_2", base.acceleration))
+        base = base._replace(
+            speed=table.values["omega_2"],
+            acceleration=table.values.get("alpha_2", base.acceleration),
+        )
     theta_2 = table.theta_2
-    if base.theta_2.shape == theta_2.shape and np.allclose(base.theta_2, theta_2, rtol=AS_PRINTED, atol=0.0):
+    if base.theta_2.shape == theta_2.shape and np.allclose(
+        base.theta_2, theta_2, rtol=AS_PRINTED, atol=0.0
+    ):
         return base
     if scene.motion.law is not None:
         allowed = "a table is judged along a law at the scene's own positions, all of them in its order"
@@ -212,7 +267,11 @@ def make_command(scene: Scene, table: TheirTable) -> Command:
 
 def _moves_itself(scene: Scene, table: TheirTable) -> bool:
     """Return whether the table, and not the scene, states the motion that its rows are judged at."""
-    return scene.motion.law is None and scene.motion.speed is None and "omega_2" in table.values
+    return (
+        scene.motion.law is None
+        and scene.motion.speed is None
+        and "omega_2" in table.values
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -230,4 +289,8 @@ class Mistake:
     def prediction(self, key: str, right: Solution) -> Array | None:
         """Return the numbers that this mistake predicts for a key of the table; None if it predicts none."""
         predicted = self.predict(name_quantity(key), right)
-        return magnitude(predicted) if predicted is not None and key.startswith("|") else predicted
+        return (
+            magnitude(predicted)
+            if predicted is not None and key.startswith("|")
+            else predicted
+        )

@@ -33,18 +33,29 @@ def list_hypotheses(scene: Scene, command: Command) -> Iterator[Mistake]:
     for text, change, applies in COLUMN_MISTAKES:
         yield Mistake(text, partial(_change_column, change, applies), whole=False)
     for bar in (2, 3):
-        yield Mistake(f"relative to bar {bar} instead of the ground", partial(_subtract_angle_of, bar), whole=False)
+        yield Mistake(
+            f"relative to bar {bar} instead of the ground",
+            partial(_subtract_angle_of, bar),
+            whole=False,
+        )
     yield from _scale_inertial(scene, command)
     for text, changed, other_command in _list_other_problems(scene, command):
         try:
-            wrong = solve(changed, "position" if other_command.omega_2 is None else "force", at=other_command)
+            wrong = solve(
+                changed,
+                "position" if other_command.omega_2 is None else "force",
+                at=other_command,
+            )
         except FourBarError:  # the mistake leaves no valid scene
             continue
         yield Mistake(text, partial(_take_from, wrong))
 
 
 def _change_column(
-    change: Callable[[Array], Array], applies: Callable[[str], bool], quantity: str, right: Solution
+    change: Callable[[Array], Array],
+    applies: Callable[[str], bool],
+    quantity: str,
+    right: Solution,
 ) -> Array | None:
     values = getattr(right, quantity, None)
     return change(values) if applies(quantity) and values is not None else None
@@ -54,7 +65,9 @@ def _subtract_angle_of(bar: int, quantity: str, right: Solution) -> Array | None
     """Take an angle, or its rate, from the line of another bar."""
     if not _is_angular(quantity) or quantity.endswith(str(bar)):
         return None
-    values, base = (getattr(right, name, None) for name in (quantity, f"{quantity[:-1]}{bar}"))
+    values, base = (
+        getattr(right, name, None) for name in (quantity, f"{quantity[:-1]}{bar}")
+    )
     return None if values is None or base is None else np.asarray(values - base)
 
 
@@ -67,35 +80,58 @@ def _scale_inertial(scene: Scene, command: Command) -> Iterator[Mistake]:
     if command.omega_2 is None:
         return
     bare = replace(scene, loads=(), effects=())
-    massless = {name: replace(bar, mass=0.0, inertia=bar.moment_of_inertia) for name, bar in list_moving(bare)}
+    massless = {
+        name: replace(bar, mass=0.0, inertia=bar.moment_of_inertia)
+        for name, bar in list_moving(bare)
+    }
     pointlike = {name: replace(bar, inertia=0.0) for name, bar in list_moving(bare)}
-    of_mass, of_inertia = (solve(replace_bars(bare, **bars), "force", at=command) for bars in (pointlike, massless))
+    of_mass, of_inertia = (
+        solve(replace_bars(bare, **bars), "force", at=command)
+        for bars in (pointlike, massless)
+    )
 
-    def scaled(by_mass: float, by_inertia: float) -> Callable[[str, Solution], Array | None]:
+    def scaled(
+        by_mass: float, by_inertia: float
+    ) -> Callable[[str, Solution], Array | None]:
         def predict(quantity: str, right: Solution) -> Array | None:
             if quantity not in FORCES:
                 return None
-            extra = (by_mass - 1.0) * getattr(of_mass, quantity) + (by_inertia - 1.0) * getattr(of_inertia, quantity)
+            extra = (by_mass - 1.0) * getattr(of_mass, quantity) + (
+                by_inertia - 1.0
+            ) * getattr(of_inertia, quantity)
             return np.asarray(getattr(right, quantity) + extra)
 
         return predict
 
-    yield Mistake("m a and I alpha in kg cm/s^2 and kg cm^2/s^2, added to N and N cm: 100 times", scaled(1e2, 1e2))
+    yield Mistake(
+        "m a and I alpha in kg cm/s^2 and kg cm^2/s^2, added to N and N cm: 100 times",
+        scaled(1e2, 1e2),
+    )
     yield Mistake("m a in kg cm/s^2 added to N: 100 times too large", scaled(1e2, 1.0))
-    yield Mistake("I alpha in kg cm^2/s^2 added to N cm: 100 times too large", scaled(1.0, 1e2))
-    yield Mistake("m a and I alpha in kg mm/s^2 and kg mm^2/s^2, added to N and N mm: 1000 times", scaled(1e3, 1e3))
+    yield Mistake(
+        "I alpha in kg cm^2/s^2 added to N cm: 100 times too large", scaled(1.0, 1e2)
+    )
+    yield Mistake(
+        "m a and I alpha in kg mm/s^2 and kg mm^2/s^2, added to N and N mm: 1000 times",
+        scaled(1e3, 1e3),
+    )
     yield Mistake("m a in kg mm/s^2 added to N: 1000 times too large", scaled(1e3, 1.0))
     yield Mistake(
-        "inertial forces with the wrong sign (d'Alembert's forces put on the side of m a)", scaled(-1.0, -1.0)
+        "inertial forces with the wrong sign (d'Alembert's forces put on the side of m a)",
+        scaled(-1.0, -1.0),
     )
     yield Mistake("I alpha with the wrong sign", scaled(1.0, -1.0))
 
 
-def _list_other_problems(scene: Scene, command: Command) -> Iterator[tuple[str, Scene, Command]]:
+def _list_other_problems(
+    scene: Scene, command: Command
+) -> Iterator[tuple[str, Scene, Command]]:
     """List scenes and commands that mistakes amount to: the same formulas answer them."""
     for text, other_command in _list_other_commands(command):
         yield text, scene, other_command
-    for text, changed in chain(_change_gravity(scene), _change_loads(scene), _change_bars(scene)):
+    for text, changed in chain(
+        _change_gravity(scene), _change_loads(scene), _change_bars(scene)
+    ):
         yield text, changed, command
     for drive in {2, 3, 4} - {scene.drive_bar} if scene.drive is None else ():
         yield (
@@ -108,21 +144,40 @@ def _list_other_problems(scene: Scene, command: Command) -> Iterator[tuple[str, 
 def _list_other_commands(command: Command) -> Iterator[tuple[str, Command]]:
     yield "the other branch", command._replace(branch=-command.branch)
     yield "theta_2 read as degrees", command._replace(angle=np.radians(command.theta_2))
-    in_degrees = np.degrees(np.fmod(command.theta_2, TURN))  # a whole turn is 6.28 of these degrees
-    yield "theta_2 in radians where degrees were announced", command._replace(angle=in_degrees)
+    in_degrees = np.degrees(
+        np.fmod(command.theta_2, TURN)
+    )  # a whole turn is 6.28 of these degrees
+    yield (
+        "theta_2 in radians where degrees were announced",
+        command._replace(angle=in_degrees),
+    )
     if command.omega_2 is not None:
-        yield "no inertial forces (statics)", command._replace(speed=0.0, acceleration=0.0)
+        yield (
+            "no inertial forces (statics)",
+            command._replace(speed=0.0, acceleration=0.0),
+        )
         if np.any(command.alpha_2):
             yield "alpha_2 is left out", command._replace(acceleration=0.0)
-        yield "omega_2 in rev/min taken for rad/s", command._replace(speed=command.omega_2 / RPM)
-        yield "omega_2 in rad/s taken for rev/min", command._replace(speed=command.omega_2 * RPM)
+        yield (
+            "omega_2 in rev/min taken for rad/s",
+            command._replace(speed=command.omega_2 / RPM),
+        )
+        yield (
+            "omega_2 in rad/s taken for rev/min",
+            command._replace(speed=command.omega_2 * RPM),
+        )
 
 
 def _change_gravity(scene: Scene) -> Iterator[tuple[str, Scene]]:
     gravity = [effect for effect in scene.effects if isinstance(effect, Gravity)]
-    others = tuple(effect for effect in scene.effects if not isinstance(effect, Gravity))
+    others = tuple(
+        effect for effect in scene.effects if not isinstance(effect, Gravity)
+    )
     if not gravity:
-        yield "gravity along -y is included though the scene has none", replace(scene, effects=(*others, Gravity()))
+        yield (
+            "gravity along -y is included though the scene has none",
+            replace(scene, effects=(*others, Gravity())),
+        )
         return
     yield "gravity is missing", replace(scene, effects=others)
     flipped = (replace(effect, magnitude=-effect.magnitude) for effect in gravity)
@@ -134,14 +189,22 @@ def _change_loads(scene: Scene) -> Iterator[tuple[str, Scene]]:
         return replace(scene, loads=scene.loads[:i] + scene.loads[i + 1 :])
 
     def reversing(i: int) -> Scene:
-        return replace(scene, loads=(*scene.loads[:i], _reverse(scene.loads[i]), *scene.loads[i + 1 :]))
+        return replace(
+            scene,
+            loads=(*scene.loads[:i], _reverse(scene.loads[i]), *scene.loads[i + 1 :]),
+        )
 
-    names = [f"load {number} (bar {load.bar})" for number, load in enumerate(scene.loads, 1)]
+    names = [
+        f"load {number} (bar {load.bar})" for number, load in enumerate(scene.loads, 1)
+    ]
     if names:
         yield "the loads are missing", replace(scene, loads=())
         yield from ((f"{name} is missing", without(i)) for i, name in enumerate(names))
     if len(names) > 1:
-        yield "the loads are reversed", replace(scene, loads=tuple(map(_reverse, scene.loads)))
+        yield (
+            "the loads are reversed",
+            replace(scene, loads=tuple(map(_reverse, scene.loads))),
+        )
     yield from ((f"{name} is reversed", reversing(i)) for i, name in enumerate(names))
 
 
@@ -160,7 +223,11 @@ def _reverse(load: Load) -> Load:
 def _measure_from_other_pin(bar: Bar) -> Bar | None:
     r, phi = bar.mass_centre
     x, y = bar.length - r * np.cos(phi), r * np.sin(phi)
-    return replace(bar, centre=(float(np.hypot(x, y)), float(np.arctan2(y, x)))) if bar.mass else None
+    return (
+        replace(bar, centre=(float(np.hypot(x, y)), float(np.arctan2(y, x))))
+        if bar.mass
+        else None
+    )
 
 
 def _rotate(bar: Bar) -> Bar | None:
@@ -175,16 +242,26 @@ def _mirror(bar: Bar) -> Bar | None:
 
 BAR_MISTAKES: tuple[tuple[str, Callable[[Bar], Bar | None]], ...] = (
     ("mass centre measured from the wrong pin", _measure_from_other_pin),
-    ("mass centre taken at mid-bar", lambda bar: replace(bar, centre=(bar.length / 2.0, 0.0)) if bar.mass else None),
+    (
+        "mass centre taken at mid-bar",
+        lambda bar: replace(bar, centre=(bar.length / 2.0, 0.0)) if bar.mass else None,
+    ),
     ("mass centre turned by 180 deg about the bar's first pin", _rotate),
     ("mass centre on the other side of the bar's line", _mirror),
     (
         "inertia about the pin used as the inertia about G",
         lambda bar: (
-            replace(bar, inertia=bar.moment_of_inertia + bar.mass * bar.mass_centre[0] ** 2) if bar.mass else None
+            replace(
+                bar, inertia=bar.moment_of_inertia + bar.mass * bar.mass_centre[0] ** 2
+            )
+            if bar.mass
+            else None
         ),
     ),
-    ("moment of inertia left out", lambda bar: replace(bar, inertia=0.0) if bar.moment_of_inertia else None),
+    (
+        "moment of inertia left out",
+        lambda bar: replace(bar, inertia=0.0) if bar.moment_of_inertia else None,
+    ),
 )
 
 
@@ -192,7 +269,9 @@ def _is_angular(quantity: str) -> bool:
     return quantity.startswith(("theta", "omega", "alpha"))
 
 
-COLUMN_MISTAKES: tuple[tuple[str, Callable[[Array], Array], Callable[[str], bool]], ...] = (
+COLUMN_MISTAKES: tuple[
+    tuple[str, Callable[[Array], Array], Callable[[str], bool]], ...
+] = (
     ("sign reversed, or F_ij given for F_ji", np.negative, lambda quantity: True),
     ("degrees where radians were announced", np.degrees, _is_angular),
     ("x and y exchanged", lambda values: values[:, ::-1], VECTORS.__contains__),
@@ -225,11 +304,15 @@ def explain(judge: Judge, differing: list[str]) -> list[Explanation]:
     """
     explanations: list[Explanation] = []
     table = judge.table
-    for mistake in chain(list_hypotheses(judge.scene, judge.at), find_fitted(judge, differing)):
+    for mistake in chain(
+        list_hypotheses(judge.scene, judge.at), find_fitted(judge, differing)
+    ):
         explained, nearer, broken = [], [], False
         for key in table.values:
             predicted = mistake.prediction(key, judge.right)
-            if predicted is None or np.array_equal(predicted, judge.ours(key), equal_nan=True):
+            if predicted is None or np.array_equal(
+                predicted, judge.ours(key), equal_nan=True
+            ):
                 continue
             if judge.explained(key, predicted, mistake.times):
                 if key in differing:
@@ -240,10 +323,18 @@ def explain(judge: Judge, differing: list[str]) -> list[Explanation]:
                 before, allowed, _ = judge.judged(key, judge.ours(key))
                 after = judge.judged(key, predicted)[0]
                 mask = judge.where(key)
-                enough = int((before > allowed)[mask].sum()) >= min(ENOUGH, int(mask.sum()))
-                if enough and np.all((after <= np.maximum(before / NEARER, allowed))[mask]):
+                enough = int((before > allowed)[mask].sum()) >= min(
+                    ENOUGH, int(mask.sum())
+                )
+                if enough and np.all(
+                    (after <= np.maximum(before / NEARER, allowed))[mask]
+                ):
                     nearer.append(table.label(key))
         if (explained or nearer) and not broken:
             complete = len(explained) == len(differing)
-            explanations.append(Explanation(mistake.text, tuple(explained), complete, tuple(nearer)))
-    return sorted(explanations, key=lambda e: (-len(e.quantities), -len(e.nearer)))[:SHOWN]
+            explanations.append(
+                Explanation(mistake.text, tuple(explained), complete, tuple(nearer))
+            )
+    return sorted(explanations, key=lambda e: (-len(e.quantities), -len(e.nearer)))[
+        :SHOWN
+    ]

@@ -21,7 +21,12 @@ from fourbar.scene import Scene
 from fourbar.show.tables import show_running
 from fourbar.solve import solve
 from fourbar.writing import write_text
-from fourbar_validation.check.differences import Difference, find_differences, order, price
+from fourbar_validation.check.differences import (
+    Difference,
+    find_differences,
+    order,
+    price,
+)
 from fourbar_validation.check.screen import list_unread, read_mjcf
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.compare import Comparison, Held
@@ -58,8 +63,16 @@ class CostOfModel:
     def cells(self) -> tuple[str, ...]:
         """Return the rows under HEADINGS; a row without an error says why."""
         row = self.row
-        verdict = row.verdict if not math.isnan(row.error) else f"{row.verdict}: {row.reason}"
-        return row.quantity, write_number(row.error), write_number(self.generated), write_number(row.allowed), verdict
+        verdict = (
+            row.verdict if not math.isnan(row.error) else f"{row.verdict}: {row.reason}"
+        )
+        return (
+            row.quantity,
+            write_number(row.error),
+            write_number(self.generated),
+            write_number(row.allowed),
+            verdict,
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,35 +101,66 @@ def read_names(pairs: tuple[str, ...]) -> dict[str, str]:
     for pair in pairs:
         role, equals, name = pair.partition("=")
         if not equals or role not in allowed or not name:
-            raise InputError("--name", pair, f"must be ROLE=NAME, ROLE one of {', '.join(allowed)}")
+            raise InputError(
+                "--name", pair, f"must be ROLE=NAME, ROLE one of {', '.join(allowed)}"
+            )
         names[role] = name
     return names
 
 
 def examine_model(
-    name: str, scene: Scene, mjcf: Path, names: Mapping[str, str], tolerance: ErrorBound = SIMULATED
+    name: str,
+    scene: Scene,
+    mjcf: Path,
+    names: Mapping[str, str],
+    tolerance: ErrorBound = SIMULATED,
 ) -> ModelReport:
     """Examine a file in a guarded process, and the generated one before; theirs is held to the tolerance."""
     text = read_mjcf(mjcf)
     with examine_guarded(mjcf) as examined:
-        generated, theirs = examined(EXAMINE, scene, None, {}), examined(EXAMINE, scene, text, dict(names))
-        ours = {(row.engine, row.quantity): row.error for row in _list_rows(name, scene, generated.answers, SIMULATED)}
+        generated, theirs = (
+            examined(EXAMINE, scene, None, {}),
+            examined(EXAMINE, scene, text, dict(names)),
+        )
+        ours = {
+            (row.engine, row.quantity): row.error
+            for row in _list_rows(name, scene, generated.answers, SIMULATED)
+        }
         rows = _list_rows(name, scene, theirs.answers, tolerance)
-        costs = [CostOfModel(row, ours.get((row.engine, row.quantity), math.nan)) for row in rows]
+        costs = [
+            CostOfModel(row, ours.get((row.engine, row.quantity), math.nan))
+            for row in rows
+        ]
         differences = find_differences(generated.described, theirs.described)
         if any(row.failed for row in rows):
-            answered = examined(CHANGED, scene, [(difference.key, difference.theirs) for difference in differences])
-            unchanged, *changed = (_list_rows(name, scene, answers or [], tolerance) for answers in answered)
-            differences = [price(*pair, unchanged) for pair in zip(differences, changed, strict=True)]
-    unread = [f"not looked at: {', '.join(parts)}"] if (parts := list_unread(text)) else []
+            answered = examined(
+                CHANGED,
+                scene,
+                [(difference.key, difference.theirs) for difference in differences],
+            )
+            unchanged, *changed = (
+                _list_rows(name, scene, answers or [], tolerance)
+                for answers in answered
+            )
+            differences = [
+                price(*pair, unchanged)
+                for pair in zip(differences, changed, strict=True)
+            ]
+    unread = (
+        [f"not looked at: {', '.join(parts)}"] if (parts := list_unread(text)) else []
+    )
     return ModelReport(order(differences), costs, [*theirs.notes, *unread])
 
 
-def _list_rows(name: str, scene: Scene, answers: list[Answer], tolerance: ErrorBound) -> list[Row]:
+def _list_rows(
+    name: str, scene: Scene, answers: list[Answer], tolerance: ErrorBound
+) -> list[Row]:
     rows = []
     for answer in answers:
         formulas = solve(scene, "force", at=answer.at)
-        rows += Comparison(name, scene, answer, formulas, Held(tolerance, UNKNOWNS)).rows()
+        rows += Comparison(
+            name, scene, answer, formulas, Held(tolerance, UNKNOWNS)
+        ).rows()
     return rows
 
 
@@ -128,7 +172,12 @@ def examine_guarded(mjcf: Path) -> Iterator[Callable[..., Any]]:
     from pebble import ProcessExpired, ProcessPool
 
     waiting = show_running(f"MuJoCo examines the file, in {SECONDS:g} s at most")
-    with waiting, ProcessPool(max_workers=1, context=get_context("spawn"), initializer=_confine) as pool:
+    with (
+        waiting,
+        ProcessPool(
+            max_workers=1, context=get_context("spawn"), initializer=_confine
+        ) as pool,
+    ):
 
         def examined(*arguments: object) -> Any:
             try:
@@ -136,7 +185,9 @@ def examine_guarded(mjcf: Path) -> Iterator[Callable[..., Any]]:
             except FourBarError as error:
                 if not isinstance(error, InputError) or error.key != "MJCF":
                     raise
-                raise InputError(error.key, error.value or mjcf.name, error.allowed, str(mjcf)) from None
+                raise InputError(
+                    error.key, error.value or mjcf.name, error.allowed, str(mjcf)
+                ) from None
             except TimeoutError:
                 reason = f"MuJoCo did not come back in {SECONDS:g} s"
             except MemoryError:
@@ -171,31 +222,49 @@ def show(report: ModelReport, mjcf: Path, out: Path) -> None:
     if not report.differences:
         console.print("It differs in nothing from the generated MJCF.")
     else:
-        console.print(f"{escape(make_plain(mjcf.name))} against the generated MJCF, the dearest difference first")
+        console.print(
+            f"{escape(make_plain(mjcf.name))} against the generated MJCF, the dearest difference first"
+        )
         console.print(f"[dim]{ABOUT_COSTS}[/]\n")
     for difference in report.differences:
-        console.print(f"{difference.price:>16}  {escape(make_plain(difference.line()))}")
-        for text in (f"in the file: {difference.written}" if difference.written else "", difference.remark):
+        console.print(
+            f"{difference.price:>16}  {escape(make_plain(difference.line()))}"
+        )
+        for text in (
+            f"in the file: {difference.written}" if difference.written else "",
+            difference.remark,
+        ):
             if text:
                 console.print(Padding(escape(make_plain(text)), (0, 0, 0, 18)))
     for note in report.notes:
         console.print(f"note: {escape(make_plain(note))}")
     for method in report.methods():
         costs = [cost for cost in report.costs if cost.method == method]
-        table = make_table(HEADINGS, (cost.cells() for cost in costs), title=f"what it costs, {escape(method)}: error")
+        table = make_table(
+            HEADINGS,
+            (cost.cells() for cost in costs),
+            title=f"what it costs, {escape(method)}: error",
+        )
         for shown, cost in zip(table.rows, costs, strict=True):
             shown.style = "bold red" if cost.row.failed else ""
         console.print(table)
     out.mkdir(parents=True, exist_ok=True)
     write_text(out / "theirs.md", write_markdown(report, mjcf))
     write_results([cost.row for cost in report.costs], out / "results.csv")
-    sentence = f"{report.counts.sentence()}. It differs in {len(report.differences)} entries"
+    sentence = (
+        f"{report.counts.sentence()}. It differs in {len(report.differences)} entries"
+    )
     console.print(f"[bold]{sentence}[/]; written to {escape(make_plain(str(out)))}")
 
 
 def write_markdown(report: ModelReport, mjcf: Path) -> str:
     """Write the same as text for a page."""
-    what = {"report": report, "mjcf": mjcf.name, "about": ABOUT_COSTS, "headings": ("method", *HEADINGS)}
+    what = {
+        "report": report,
+        "mjcf": mjcf.name,
+        "about": ABOUT_COSTS,
+        "headings": ("method", *HEADINGS),
+    }
     what |= {"differences": [difference.cells() for difference in report.differences]}
     what |= {"costs": [(cost.method, *cost.cells()) for cost in report.costs]}
     return render("fourbar_validation.check", "theirs.md.j2", **what)
@@ -212,14 +281,32 @@ def write_markdown(report: ModelReport, mjcf: Path) -> str:
     help="The body that is the input, coupler or output; B3, B4: the sites of pin B on the coupler and the output, "
     "where no connect or weld closes the loop. Left out: guessed from structure and lengths, and printed.",
 )
-@click.option("--error", "wanted", type=float, metavar="E", help="The relative error that THEIRS.xml may have.")
 @click.option(
-    "-o", "--out", type=click.Path(path_type=Path, file_okay=False), default=Path("results"), show_default=True
+    "--error",
+    "wanted",
+    type=float,
+    metavar="E",
+    help="The relative error that THEIRS.xml may have.",
 )
-def command(scene: Path, theirs: Path, names: tuple[str, ...], wanted: float | None, out: Path) -> int:
+@click.option(
+    "-o",
+    "--out",
+    type=click.Path(path_type=Path, file_okay=False),
+    default=Path("results"),
+    show_default=True,
+)
+def command(
+    scene: Path, theirs: Path, names: tuple[str, ...], wanted: float | None, out: Path
+) -> int:
     """Compare your own MJCF of SCENE with the generated one: how wrong it is, and what each difference costs."""
     suite = read_scene_files((scene,))
-    tolerance = SIMULATED if wanted is None else hold_simulated(wanted, "what this file may be wrong by")
-    report = examine_model(suite.name(0), suite.scene(0), theirs, read_names(names), tolerance)
+    tolerance = (
+        SIMULATED
+        if wanted is None
+        else hold_simulated(wanted, "what this file may be wrong by")
+    )
+    report = examine_model(
+        suite.name(0), suite.scene(0), theirs, read_names(names), tolerance
+    )
     show(report, theirs, out)
     return report.counts.status

@@ -24,7 +24,11 @@ SCHEMA, RESULT = "fourbar-problem/2", "fourbar-result/1"
 LEVELS = {"A": 1e-9, "B": 1e-6, "C": 1e-3}
 """Largest error of each level, of the largest value; D is worse. Error bars of the problem are allowed."""
 WORSE, MISSING = "D", "-"
-GROUPS = {"reactions": (*PIN_FORCES, "guide_force"), "torque": ("torque", "drive_force"), "frequency": ("frequency",)}
+GROUPS = {
+    "reactions": (*PIN_FORCES, "guide_force"),
+    "torque": ("torque", "drive_force"),
+    "frequency": ("frequency",),
+}
 """Quantities of each group; every quantity that is not listed belongs to the motion."""
 SAFE = 8.0
 """Times the error bars of the formulas, which are estimates: against many digits an answer is up to 6.6 of them off."""
@@ -56,9 +60,19 @@ def read_result(path: str | Path, problem: dict[str, Any]) -> dict[str, Any]:
     """Read somebody's answers to a problem; InputError names what is wrong."""
     answered = _read(path, RESULT)
     if not isinstance(answered.get("answers"), dict):
-        raise InputError("answers", answered.get("answers"), "must be an object: a list for each quantity", str(path))
+        raise InputError(
+            "answers",
+            answered.get("answers"),
+            "must be an object: a list for each quantity",
+            str(path),
+        )
     if answered.get("problem") != problem["problem"]:
-        raise InputError("problem", answered.get("problem"), f"must be {problem['problem']!r}", str(path))
+        raise InputError(
+            "problem",
+            answered.get("problem"),
+            f"must be {problem['problem']!r}",
+            str(path),
+        )
     return answered
 
 
@@ -67,10 +81,15 @@ def _read(path: str | Path, schema: str) -> dict[str, Any]:
     try:
         data = json.loads(text)
     except (ValueError, RecursionError) as error:
-        raise InputError("JSON", None, f"cannot be read: {write_one_line(str(error))}", str(path)) from None
+        raise InputError(
+            "JSON", None, f"cannot be read: {write_one_line(str(error))}", str(path)
+        ) from None
     if not isinstance(data, dict) or data.get("schema") != schema:
         raise InputError(
-            "schema", data.get("schema") if isinstance(data, dict) else None, f"must be {schema!r}", str(path)
+            "schema",
+            data.get("schema") if isinstance(data, dict) else None,
+            f"must be {schema!r}",
+            str(path),
         )
     return data
 
@@ -80,18 +99,31 @@ def judge(problem: dict[str, Any], answered: dict[str, Any]) -> list[Judged]:
     answers, errors = problem["answers"], problem["errors"]
     if answered.get("at") is not None:
         answers, errors = _answer_at(problem, answered["at"])
-    return [_judge_quantity(name, answers[name], errors[name], answered["answers"].get(name)) for name in answers]
+    return [
+        _judge_quantity(
+            name, answers[name], errors[name], answered["answers"].get(name)
+        )
+        for name in answers
+    ]
 
 
-def _answer_at(problem: dict[str, Any], motion: Any) -> tuple[dict[str, Any], dict[str, Any]]:
+def _answer_at(
+    problem: dict[str, Any], motion: Any
+) -> tuple[dict[str, Any], dict[str, Any]]:
     """Evaluate the reference at the motion that an engine really made."""
     if problem["mechanism"] != "four-bar" or problem["ask"] != "answer":
-        raise InputError("at", None, "is judged of a four-bar's positions alone: answer at the command")
+        raise InputError(
+            "at",
+            None,
+            "is judged of a four-bar's positions alone: answer at the command",
+        )
     scene = protocol.scene_from_json(problem["scene"])
     scene, command = protocol.command_from_json(scene, problem["command"])
     made = protocol.read_motion(motion, command)
     answers, errors = collect_answers(solve(scene, "error", at=made))
-    return {name: values.tolist() for name, values in answers.items()}, {k: v.tolist() for k, v in errors.items()}
+    return {name: values.tolist() for name, values in answers.items()}, {
+        k: v.tolist() for k, v in errors.items()
+    }
 
 
 def collect_answers(solution: Solution) -> tuple[dict[str, Array], dict[str, Array]]:
@@ -99,7 +131,11 @@ def collect_answers(solution: Solution) -> tuple[dict[str, Array], dict[str, Arr
     drive = "torque" if solution.drive_force is None else "drive_force"
     angle = K * EPS / solution.condition
     assert solution.force_error is not None
-    bars = {"theta_3": angle, "theta_4": angle, drive: SAFE * getattr(solution, f"{drive}_error")}
+    bars = {
+        "theta_3": angle,
+        "theta_4": angle,
+        drive: SAFE * getattr(solution, f"{drive}_error"),
+    }
     bars |= dict.fromkeys(PIN_FORCES, SAFE * solution.force_error)
     return {name: getattr(solution, name) for name in bars}, bars
 
@@ -111,7 +147,11 @@ def _judge_quantity(name: str, values: Any, errors: Any, theirs: Any) -> Judged:
         answered = np.array(theirs, dtype=float)
     except (TypeError, ValueError, OverflowError):
         answered = np.array(np.nan)
-    if answered.shape != ours.shape or not np.isfinite(answered).all() or theirs is None:
+    if (
+        answered.shape != ours.shape
+        or not np.isfinite(answered).all()
+        or theirs is None
+    ):
         return Judged(name, group, MISSING, math.nan, 0)
     difference = np.atleast_1d(answered - ours)
     size = 1.0
@@ -119,8 +159,18 @@ def _judge_quantity(name: str, values: Any, errors: Any, theirs: Any) -> Judged:
         difference = np.remainder(difference + np.pi, 2.0 * np.pi) - np.pi
     else:
         size = float(magnitude(np.atleast_1d(ours)).max()) or 1.0
-    off, bars = magnitude(difference) / size, np.atleast_1d(np.array(errors, dtype=float)) / size
-    level = next((level for level, most in LEVELS.items() if (off <= np.maximum(most, bars)).all()), WORSE)
+    off, bars = (
+        magnitude(difference) / size,
+        np.atleast_1d(np.array(errors, dtype=float)) / size,
+    )
+    level = next(
+        (
+            level
+            for level, most in LEVELS.items()
+            if (off <= np.maximum(most, bars)).all()
+        ),
+        WORSE,
+    )
     worst = int(np.argmax(off))
     return Judged(name, group, level, float(off[worst]), worst)
 
@@ -129,7 +179,10 @@ def find_levels(rows: list[Judged]) -> dict[str, str]:
     """Return the worst level of each group of quantities that a problem asks for."""
     order = (*LEVELS, WORSE, MISSING)
     groups = dict.fromkeys(row.group for row in rows)
-    return {group: max((row.level for row in rows if row.group == group), key=order.index) for group in groups}
+    return {
+        group: max((row.level for row in rows if row.group == group), key=order.index)
+        for group in groups
+    }
 
 
 def check_problem(problem_file: Path, result_file: Path) -> int:
@@ -144,13 +197,29 @@ def check_problem(problem_file: Path, result_file: Path) -> int:
     rows, console = judge(problem, answered), Console(soft_wrap=True)
     engine = escape(make_plain(str(answered.get("engine", "")))) or "a result"
     cells = [
-        (row.quantity, "no answer" if row.level == MISSING else f"{row.error:.1e}", str(row.position), row.level)
+        (
+            row.quantity,
+            "no answer" if row.level == MISSING else f"{row.error:.1e}",
+            str(row.position),
+            row.level,
+        )
         for row in rows
     ]
     title = f"{engine}: {problem['problem']}"
-    console.print(make_table(("quantity", "error", "position", "level"), cells, title=title, show_edge=False))
+    console.print(
+        make_table(
+            ("quantity", "error", "position", "level"),
+            cells,
+            title=title,
+            show_edge=False,
+        )
+    )
     levels = find_levels(rows)
-    console.print("levels: " + ", ".join(f"{group} {level}" for group, level in levels.items()))
+    console.print(
+        "levels: " + ", ".join(f"{group} {level}" for group, level in levels.items())
+    )
     limits = ", ".join(f"{level} {most:g}" for level, most in LEVELS.items())
-    console.print(f"of the largest value, angles in rad: {limits}, D worse; - no answer")
+    console.print(
+        f"of the largest value, angles in rad: {limits}, D worse; - no answer"
+    )
     return HOLDS if levels and not set(levels.values()) & {WORSE, MISSING} else FAILED

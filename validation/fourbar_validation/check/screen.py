@@ -17,12 +17,27 @@ LARGEST_MJCF = 2**20
 """Bytes; a four-bar takes four thousand."""
 DEEPEST = 100
 """Nested elements; the readers of XML recurse."""
-REACHING_OUT = ("include", "extension", "plugin", "attach", "composite", "flexcomp", "replicate")
+REACHING_OUT = (
+    "include",
+    "extension",
+    "plugin",
+    "attach",
+    "composite",
+    "flexcomp",
+    "replicate",
+)
 """Elements that read files, load plugins, or make a thousand bodies of one: no linkage of four bars needs them."""
 OUTSIDE = ("file", "meshdir", "texturedir", "assetdir", "directory")
 """Attributes that name files; those of a cube texture are file and a side."""
 
-COUNTS = ("iterations", "ls_iterations", "noslip_iterations", "ccd_iterations", "sdf_iterations", "sdf_initpoints")
+COUNTS = (
+    "iterations",
+    "ls_iterations",
+    "noslip_iterations",
+    "ccd_iterations",
+    "sdf_iterations",
+    "sdf_initpoints",
+)
 MOST_ITERATIONS = 1000
 """Upper limit of each count in <option>, ten times the greatest of MuJoCo's defaults: MuJoCo already steps while it
 compiles, and with a tolerance of 0 nothing else may stop a solver."""
@@ -30,15 +45,44 @@ compiles, and with a tolerance of 0 nothing else may stop a solver."""
 ANY = "*"
 HINGE = "name class type pos axis ref damping frictionloss stiffness springref springdamper armature range limited"
 LOOKED_AT = {
-    **dict.fromkeys(("mujoco", "compiler", "inertial", "geom", "site", "worldbody", "default", "frame"), ANY),
-    **dict.fromkeys(("equality", "connect", "weld", "tendon", "actuator", "motor", "contact", "pair", "exclude"), ANY),
-    **dict.fromkeys(("visual", "asset", "camera", "light", "sensor", "keyframe", "custom", "size"), ANY),
+    **dict.fromkeys(
+        (
+            "mujoco",
+            "compiler",
+            "inertial",
+            "geom",
+            "site",
+            "worldbody",
+            "default",
+            "frame",
+        ),
+        ANY,
+    ),
+    **dict.fromkeys(
+        (
+            "equality",
+            "connect",
+            "weld",
+            "tendon",
+            "actuator",
+            "motor",
+            "contact",
+            "pair",
+            "exclude",
+        ),
+        ANY,
+    ),
+    **dict.fromkeys(
+        ("visual", "asset", "camera", "light", "sensor", "keyframe", "custom", "size"),
+        ANY,
+    ),
     "option": "timestep integrator solver tolerance iterations ls_iterations noslip_iterations gravity density "
     "viscosity wind jacobian",
     "flag": "contact gravity limit spring damper passive frictionloss island sensor energy fwdinv",
     "statistic": "extent center meansize meanmass",
     "body": "name childclass pos quat axisangle euler xyaxes zaxis",
-    "joint": HINGE + " solreffriction solimpfriction group user joint coef joint1 joint2 polycoef",
+    "joint": HINGE
+    + " solreffriction solimpfriction group user joint coef joint1 joint2 polycoef",
     **dict.fromkeys(
         ("fixed", "spatial"),
         "name class stiffness damping frictionloss springlength solreffriction solimpfriction group width rgba "
@@ -64,7 +108,11 @@ def list_unread(text: str) -> list[str]:
         if looked_at is None:
             yield element.tag
         elif looked_at != ANY:
-            yield from (f"{element.tag} {name}" for name in element.attrib if name not in looked_at.split())
+            yield from (
+                f"{element.tag} {name}"
+                for name in element.attrib
+                if name not in looked_at.split()
+            )
         if element.tag not in SKIPPED:
             for part in element:
                 yield from walk(part)
@@ -95,13 +143,22 @@ def read_mjcf(path: Path) -> str:
         raise refuse(root.tag, "must be an MJCF, whose outermost element is <mujoco>")
     for element in root.iter():
         if element.tag in REACHING_OUT:
-            raise refuse(f"<{element.tag}>", "is not allowed: a linkage is described by the file itself")
+            raise refuse(
+                f"<{element.tag}>",
+                "is not allowed: a linkage is described by the file itself",
+            )
         for name in element.attrib:
             if element.tag == "option" and name in COUNTS:
                 count = element.attrib[name].strip()
-                if not re.fullmatch("[0-9]{1,9}", count) or int(count) > MOST_ITERATIONS:
+                if (
+                    not re.fullmatch("[0-9]{1,9}", count)
+                    or int(count) > MOST_ITERATIONS
+                ):
                     allowed = f"must be a whole number up to {MOST_ITERATIONS}: MuJoCo might never come back"
                     raise refuse(f'<option {name}="{count}">', allowed)
             if name.startswith(OUTSIDE):
-                raise refuse(f"<{element.tag} {name}=...>", "is not allowed: no other file is read")
+                raise refuse(
+                    f"<{element.tag} {name}=...>",
+                    "is not allowed: no other file is read",
+                )
     return ET.tostring(root, encoding="unicode")

@@ -33,7 +33,8 @@ DECIMALS = 4
 NOT_JUDGED = {
     "time": "a row is found by its theta_2",
     **dict.fromkeys(
-        (COUPLE.error, LINE.error, "force_error", "friction_residual"), "an error of the formulas themselves"
+        (COUPLE.error, LINE.error, "force_error", "friction_residual"),
+        "an error of the formulas themselves",
     ),
     **dict.fromkeys(("status", "branch", "drive_bar"), "stated by the scene"),
 }
@@ -41,7 +42,9 @@ NOT_JUDGED = {
 BLANK = "blank"
 LARGEST_FILE = 64 * 2**20
 """Bytes; a table larger than this is not a hand-made comparison."""
-HEADING = re.compile(r"\|?(?P<name>\w+)\|?\s*(?:\[(?P<square>[^\]]*)\]|\((?P<round>.*)\))?(?P<letter>_[xy])?")
+HEADING = re.compile(
+    r"\|?(?P<name>\w+)\|?\s*(?:\[(?P<square>[^\]]*)\]|\((?P<round>.*)\))?(?P<letter>_[xy])?"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +78,11 @@ class TheirTable:
     def label(self, key: str) -> str:
         """Name the quantity, or the one component of it that the table has."""
         values = self.values[key]
-        letters = [letter for letter, gone in zip("xy", np.isnan(values).T, strict=False) if not gone.all()]
+        letters = [
+            letter
+            for letter, gone in zip("xy", np.isnan(values).T, strict=False)
+            if not gone.all()
+        ]
         return f"{key}_{letters[0]}" if values.ndim == 2 and len(letters) == 1 else key
 
     def stated(self, key: str) -> NDArray[np.bool_]:
@@ -96,27 +103,54 @@ def read_table(path: Path) -> TheirTable:
     if rows and _is_unit_line(rows[0][1]):
         unit_line = rows.pop(0)[1]
     if not rows:
-        raise InputError("table", path.name, "needs a header and at least one row", str(path))
+        raise InputError(
+            "table", path.name, "needs a header and at least one row", str(path)
+        )
     columns, left_out = _read_columns(path, headings, unit_line)
     names = [name for name, _ in columns.values()]
     if len(set(names)) != len(names):
         raise InputError("header", headings, "names a column twice", str(path))
     if "theta_2" not in names:
-        raise InputError("header", headings, "needs a column theta_2 (say theta_2 [deg] for degrees)", str(path))
+        raise InputError(
+            "header",
+            headings,
+            "needs a column theta_2 (say theta_2 [deg] for degrees)",
+            str(path),
+        )
     numbers = {name: np.empty(len(rows)) for name in names}
     halves = {name: np.empty(len(rows)) for name in names}
     for row, (line, cells) in enumerate(rows):
-        if len(cells) < len(headings) or any(cell.strip() for cell in cells[len(headings) :]):
-            beside = "; with decimal commas, semicolons between them" if len(cells) > len(headings) else ""
-            raise InputError(f"line {line}", cells, f"needs {len(headings)} cells{beside}", str(path))
+        if len(cells) < len(headings) or any(
+            cell.strip() for cell in cells[len(headings) :]
+        ):
+            beside = (
+                "; with decimal commas, semicolons between them"
+                if len(cells) > len(headings)
+                else ""
+            )
+            raise InputError(
+                f"line {line}", cells, f"needs {len(headings)} cells{beside}", str(path)
+            )
         for index, (name, unit) in columns.items():
-            value, half = _read_number(path, f"line {line}, {headings[index].strip()}", cells[index])
-            numbers[name][row], halves[name][row] = value * unit.factor, half * unit.factor
+            value, half = _read_number(
+                path, f"line {line}, {headings[index].strip()}", cells[index]
+            )
+            numbers[name][row], halves[name][row] = (
+                value * unit.factor,
+                half * unit.factor,
+            )
         if math.isnan(numbers["theta_2"][row]):
             raise InputError(f"line {line}", cells, "needs a theta_2", str(path))
     units = {name: unit for name, unit in columns.values()}
-    left_out |= {headings[index]: BLANK for index, (name, _) in columns.items() if np.isnan(numbers[name]).all()}
-    lines, rounded = [line for line, _ in rows], _find_rounding(halves["theta_2"], units["theta_2"])
+    left_out |= {
+        headings[index]: BLANK
+        for index, (name, _) in columns.items()
+        if np.isnan(numbers[name]).all()
+    }
+    lines, rounded = (
+        [line for line, _ in rows],
+        _find_rounding(halves["theta_2"], units["theta_2"]),
+    )
     table = TheirTable(numbers["theta_2"], {}, {}, {}, lines, rounded, left_out)
     for name in names:
         if name != "theta_2" and not np.isnan(numbers[name]).all():
@@ -124,16 +158,25 @@ def read_table(path: Path) -> TheirTable:
     if not table.values:
         examples = "torque, F12_x and F12_y, or F12 (its magnitude)"
         raise InputError(
-            "header", headings, f"needs a result, such as {examples}; known are {_find_known()}", str(path)
+            "header",
+            headings,
+            f"needs a result, such as {examples}; known are {_find_known()}",
+            str(path),
         )
     return table
 
 
-def _put(table: TheirTable, name: str, unit: Unit, numbers: Array, halves: Array) -> None:
+def _put(
+    table: TheirTable, name: str, unit: Unit, numbers: Array, halves: Array
+) -> None:
     """Enter a column into the table, a component into its vector."""
     halves = np.where(np.isnan(numbers), 0.0, halves)
     if name[-2:] not in ("_x", "_y"):
-        table.values[name], table.rounding[name], table.units[name] = numbers, halves, unit
+        table.values[name], table.rounding[name], table.units[name] = (
+            numbers,
+            halves,
+            unit,
+        )
         return
     vector, axis = name[:-2], "xy".index(name[-1])
     values = table.values.setdefault(vector, np.full((len(numbers), 2), np.nan))
@@ -147,7 +190,11 @@ def _find_rounding(halves: Array, unit: Unit) -> Array:
     least = halves.min()
     if least > 0.5 * unit.factor * 10.0**-DECIMALS * (1.0 + EPS):
         return np.zeros_like(halves)
-    return np.where(halves <= 0.5 * unit.factor * 10.0 ** (1 - DECIMALS) * (1.0 + EPS), halves, least)
+    return np.where(
+        halves <= 0.5 * unit.factor * 10.0 ** (1 - DECIMALS) * (1.0 + EPS),
+        halves,
+        least,
+    )
 
 
 def _read_lines(path: Path) -> list[tuple[int, list[str]]]:
@@ -157,19 +204,30 @@ def _read_lines(path: Path) -> list[tuple[int, list[str]]]:
     delimiter = next((mark for mark in ";\t" if mark in header), ",")
     try:
         reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter)
-        numbered = [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]
+        numbered = [
+            (reader.line_num, row)
+            for row in reader
+            if any(cell.strip() for cell in row)
+        ]
     except csv.Error:
         raise InputError("table", path.name, "must be a CSV file", str(path)) from None
     if len(numbered) < 2:
-        raise InputError("table", path.name, "needs a header and at least one row", str(path))
+        raise InputError(
+            "table", path.name, "needs a header and at least one row", str(path)
+        )
     if delimiter != ",":  # there a comma is a decimal comma
-        numbered[1:] = [(line, [cell.replace(",", ".") for cell in cells]) for line, cells in numbered[1:]]
+        numbered[1:] = [
+            (line, [cell.replace(",", ".") for cell in cells])
+            for line, cells in numbered[1:]
+        ]
     return numbered
 
 
 def _is_unit_line(cells: list[str]) -> bool:
     """Return whether a line under the header states units: no cell contains a number."""
-    return not any(re.search("[0-9]", re.sub(r"[\^*][0-9]|[²³]", "", cell)) for cell in cells)
+    return not any(
+        re.search("[0-9]", re.sub(r"[\^*][0-9]|[²³]", "", cell)) for cell in cells
+    )
 
 
 def _read_columns(
@@ -181,15 +239,22 @@ def _read_columns(
     for index, heading in enumerate(headings):
         match = HEADING.fullmatch(heading.strip())
         name = match["name"] + (match["letter"] or "") if match else heading.strip()
-        quantity = name[:-2] if name[-2:] in ("_x", "_y") and name[:-2] in VECTORS else name
+        quantity = (
+            name[:-2] if name[-2:] in ("_x", "_y") and name[:-2] in VECTORS else name
+        )
         if not name and index >= len(headings) - 1:
             continue  # an empty cell that a spreadsheet leaves at the end of a line
         if match is None or quantity in NOT_JUDGED or quantity not in UNITS:
-            left_out[heading.strip() or f"column {index + 1}"] = NOT_JUDGED.get(quantity, "not a known column")
+            left_out[heading.strip() or f"column {index + 1}"] = NOT_JUDGED.get(
+                quantity, "not a known column"
+            )
             continue
         below = unit_line[index].strip(" []()") if index < len(unit_line) else ""
         text = (match["square"] or match["round"] or below).strip()
-        columns[index] = f"|{name}|" if name in VECTORS else name, _read_unit(path, heading, quantity, text)
+        columns[index] = (
+            f"|{name}|" if name in VECTORS else name,
+            _read_unit(path, heading, quantity, text),
+        )
     return columns, left_out
 
 
@@ -201,11 +266,15 @@ def _read_unit(path: Path, heading: str, quantity: str, text: str) -> Unit:
     try:
         return Unit(text, find_factor(UNITS[quantity], text))
     except InputError as error:
-        raise InputError("header", heading, f"{text}: {error.allowed}", str(path)) from None
+        raise InputError(
+            "header", heading, f"{text}: {error.allowed}", str(path)
+        ) from None
 
 
 def _find_known() -> str:
-    return ", ".join(f"{q}_x, {q}_y" if q in VECTORS else q for q in UNITS if q not in NOT_JUDGED)
+    return ", ".join(
+        f"{q}_x, {q}_y" if q in VECTORS else q for q in UNITS if q not in NOT_JUDGED
+    )
 
 
 def _read_number(path: Path, place: str, cell: str) -> tuple[float, float]:

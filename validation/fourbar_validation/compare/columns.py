@@ -14,7 +14,14 @@ from pathlib import Path
 from typing import Any
 
 from fourbar.writing import name_file
-from fourbar_validation.compare.rows import COLUMNS, MADE_OF, Row, make_plain, read_cell_text, write_rows
+from fourbar_validation.compare.rows import (
+    COLUMNS,
+    MADE_OF,
+    Row,
+    make_plain,
+    read_cell_text,
+    write_rows,
+)
 
 GROUP_ROWS = 100_000
 """Rows of a row group of the Parquet file: each costs some kilobytes of footer, whatever it holds."""
@@ -40,13 +47,23 @@ class Columns:
         import pyarrow.parquet as pq
 
         kinds = {str: pa.string(), float: pa.float64(), bool: pa.bool_()}
-        self._schema = pa.schema([(field.name, kinds[field.type]) for field in fields(Row)])  # type: ignore[index]
-        self._text, self._columns = (self.out / f".results.{kind}.part" for kind in ("csv", "parquet"))
+        self._schema = pa.schema(
+            [(field.name, kinds[field.type]) for field in fields(Row)]  # type: ignore[index]
+        )
+        self._text, self._columns = (
+            self.out / f".results.{kind}.part" for kind in ("csv", "parquet")
+        )
         with self._files:
-            self._files.enter_context(name_file(self.out / "results.csv"))  # a failure on closing is named too
-            self._csv = self._files.enter_context(self._text.open("w", encoding="utf-8", newline=""))
+            self._files.enter_context(
+                name_file(self.out / "results.csv")
+            )  # a failure on closing is named too
+            self._csv = self._files.enter_context(
+                self._text.open("w", encoding="utf-8", newline="")
+            )
             self._files.enter_context(name_file(self.out / "results.parquet"))
-            self._parquet = self._files.enter_context(pq.ParquetWriter(self._columns, self._schema))
+            self._parquet = self._files.enter_context(
+                pq.ParquetWriter(self._columns, self._schema)
+            )
             self._csv.write(write_rows([]))
             self._files = self._files.pop_all()
         return self
@@ -67,7 +84,10 @@ class Columns:
     def _write_group(self) -> None:
         import pyarrow as pa
 
-        by_column = {name: [null_nan(getattr(row, name)) for row in self._waiting] for name in COLUMNS}
+        by_column = {
+            name: [null_nan(getattr(row, name)) for row in self._waiting]
+            for name in COLUMNS
+        }
         with name_file(self.out / "results.parquet"):
             self._parquet.write_table(pa.table(by_column, schema=self._schema))
         self._waiting.clear()
@@ -97,7 +117,9 @@ def read_columns(path: Path) -> Iterator[Row]:
     for cells in _read_batches(path, list(MADE_OF)):
         words: dict[str, str] = {}
         columns = [
-            [math.nan if cell is None else cell for cell in column] if kind is float else _read_words(column, words)
+            [math.nan if cell is None else cell for cell in column]
+            if kind is float
+            else _read_words(column, words)
             for column, kind in zip(cells, MADE_OF.values(), strict=True)
         ]
         yield from map(Row, *columns)
@@ -124,17 +146,26 @@ def _read_batches(path: Path, columns: list[str]) -> Iterator[list[list[Any]]]:
 def _read_parquet(path: Path, columns: list[str], files: ExitStack) -> Any:
     import pyarrow.parquet as pq
 
-    return files.enter_context(pq.ParquetFile(path)).iter_batches(BATCH_ROWS, columns=columns)
+    return files.enter_context(pq.ParquetFile(path)).iter_batches(
+        BATCH_ROWS, columns=columns
+    )
 
 
 def _read_text(path: Path, columns: list[str], files: ExitStack) -> Any:
     import pyarrow as pa
     from pyarrow import csv
 
-    kinds = {name: pa.float64() if MADE_OF[name] is float else pa.string() for name in columns}
+    kinds = {
+        name: pa.float64() if MADE_OF[name] is float else pa.string()
+        for name in columns
+    }
     wanted = csv.ConvertOptions(column_types=kinds, include_columns=columns)
     return files.enter_context(
-        csv.open_csv(path, parse_options=csv.ParseOptions(newlines_in_values=True), convert_options=wanted)
+        csv.open_csv(
+            path,
+            parse_options=csv.ParseOptions(newlines_in_values=True),
+            convert_options=wanted,
+        )
     )
 
 

@@ -27,8 +27,20 @@ from fourbar.scene import Scene
 from fourbar.solution import Solution
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.reversals import mark_reversing
-from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES, UNDECIDED, Row, make_plain
-from fourbar_validation.compare.scales import make_reference, take_smallest_scale, take_strictest_condition
+from fourbar_validation.compare.rows import (
+    AGREES,
+    DEGRADED,
+    FAILS,
+    REFUSES,
+    UNDECIDED,
+    Row,
+    make_plain,
+)
+from fourbar_validation.compare.scales import (
+    make_reference,
+    take_smallest_scale,
+    take_strictest_condition,
+)
 from fourbar_validation.compare.tolerance import DEGRADED as TIMES_PREDICTED
 from fourbar_validation.compare.tolerance import (
     EPS,
@@ -54,11 +66,25 @@ Nearby = Callable[[Mask], dict[str, Array]]
 Scales = dict[str, tuple[Array, Array]]
 """Size and condition of each quantity at each position."""
 
-OF_THE_FORMULAS = (*DRY_FRICTION_QUANTITIES, *PIN_LOAD_QUANTITIES, COUPLE.error, LINE.error, "force_error", "power")
+OF_THE_FORMULAS = (
+    *DRY_FRICTION_QUANTITIES,
+    *PIN_LOAD_QUANTITIES,
+    COUPLE.error,
+    LINE.error,
+    "force_error",
+    "power",
+)
 """Quantities with checks of their own: the range in which dry friction holds, its residual, error bars, a product."""
-COMPARED = tuple(name for name in STAGE_OF if name not in (*OF_THE_FORMULAS, *LINE_QUANTITIES))
+COMPARED = tuple(
+    name for name in STAGE_OF if name not in (*OF_THE_FORMULAS, *LINE_QUANTITIES)
+)
 """Quantities that are compared with an exact engine: all that is printed of a position."""
-OF_THE_LINE = {"stroke": "sin_mu", "drive_line": "sin_mu", "stroke_speed": "v_B", LINE.value: COUPLE.value}
+OF_THE_LINE = {
+    "stroke": "sin_mu",
+    "drive_line": "sin_mu",
+    "stroke_speed": "v_B",
+    LINE.value: COUPLE.value,
+}
 """Quantities of a linear drive; each is compared if the quantity it maps to is compared or the engine answers it."""
 OF_FORCES = (*FORCES, *DRY_FRICTION_QUANTITIES)
 MOST_UNDECIDED = 0.5
@@ -116,33 +142,80 @@ class Comparison:
         """Compare where the loop closes, each quantity, and what the engine says of itself."""
         answer = self.answer
         if answer.refusal is not None:
-            return [Row.unmeasured(self.name, answer.engine, answer.setting, "all", REFUSES, answer.refusal)]
+            return [
+                Row.unmeasured(
+                    self.name,
+                    answer.engine,
+                    answer.setting,
+                    "all",
+                    REFUSES,
+                    answer.refusal,
+                )
+            ]
         if answer.assembled is None or len(answer.assembled) != len(self.formulas):
             what = "the engine did not say where the loop closes"
-            return [Row.unmeasured(self.name, answer.engine, answer.setting, "assembled", FAILS, what)]
+            return [
+                Row.unmeasured(
+                    self.name, answer.engine, answer.setting, "assembled", FAILS, what
+                )
+            ]
         names = set(self.held.quantities)
         if self.scene.drive is not None:
-            names |= {line for line, quantity in OF_THE_LINE.items() if quantity in names or line in answer.quantities}
-        judged = [one for name in STAGE_OF if name in names and (one := self._compare(name)) is not None]
+            names |= {
+                line
+                for line, quantity in OF_THE_LINE.items()
+                if quantity in names or line in answer.quantities
+            }
+        judged = [
+            one
+            for name in STAGE_OF
+            if name in names and (one := self._compare(name)) is not None
+        ]
         alarms = [self._row("watch", FAILS, alarm) for alarm in answer.alarms]
-        numbers, decided = sum(one.numbers for one in judged), sum(one.decided for one in judged)
+        numbers, decided = (
+            sum(one.numbers for one in judged),
+            sum(one.decided for one in judged),
+        )
         rows = [self._compare_assembled(), *(one.row for one in judged), *alarms]
         if numbers:  # a scene of which most numbers are undecided does not hold
             reason = f"{numbers - decided} of {numbers} numbers are undecided"
-            rows.append(Row.judged(self._who, "undecided", (numbers - decided) / numbers, MOST_UNDECIDED, reason))
+            rows.append(
+                Row.judged(
+                    self._who,
+                    "undecided",
+                    (numbers - decided) / numbers,
+                    MOST_UNDECIDED,
+                    reason,
+                )
+            )
         return rows
 
     def closure(self) -> Row:
         """Check that the engine's angles close the loop."""
         answer, linkage = self.answer, self.scene.linkage
         assert answer.at is not None and answer.assembled is not None
-        theta_2 = answer.at.angle if answer.at.commanded == "theta_2" else answer.quantities["theta_2"]
+        theta_2 = (
+            answer.at.angle
+            if answer.at.commanded == "theta_2"
+            else answer.quantities["theta_2"]
+        )
         theta_3, theta_4 = answer.quantities["theta_3"], answer.quantities["theta_4"]
         condition = 1.0 / count_half_turns(linkage.ground_angle, theta_2)
-        allowed = (IDENTITY if answer.setting == "exact" else self.held.tolerance).factor / condition
+        allowed = (
+            IDENTITY if answer.setting == "exact" else self.held.tolerance
+        ).factor / condition
         reason = f"identity: {CLOSURE}" if answer.assembled.any() else NOWHERE
         gap = find_gap(linkage, theta_2, theta_3, theta_4)
-        return Row.judged(self._who, "closure", gap, allowed, reason, theta_2, condition, answer.assembled)
+        return Row.judged(
+            self._who,
+            "closure",
+            gap,
+            allowed,
+            reason,
+            theta_2,
+            condition,
+            answer.assembled,
+        )
 
     @property
     def _who(self) -> tuple[str, str, str]:
@@ -161,24 +234,48 @@ class Comparison:
         return self.held.nearby(self.formulas.assembled)
 
     def _row(self, quantity: str, verdict: str, reason: str, **numbers: float) -> Row:
-        error, allowed, theta_2, condition = (float(numbers.get(key, math.nan)) for key in NUMBERS)
-        return Row(*self._who, quantity, error, allowed, verdict, make_plain(reason), theta_2, condition)
+        error, allowed, theta_2, condition = (
+            float(numbers.get(key, math.nan)) for key in NUMBERS
+        )
+        return Row(
+            *self._who,
+            quantity,
+            error,
+            allowed,
+            verdict,
+            make_plain(reason),
+            theta_2,
+            condition,
+        )
 
     def _compare_assembled(self) -> Row:
         """Compare where both close the loop."""
         theirs, ours, command = self.answer.assembled, self.formulas, self.answer.at
         assert theirs is not None and command is not None
-        differ = (theirs != ours.assembled) & ~mark_touching(self.scene.linkage, command.angle, command.bar)
+        differ = (theirs != ours.assembled) & ~mark_touching(
+            self.scene.linkage, command.angle, command.bar
+        )
         count = np.count_nonzero(differ)
-        reason = f"{count} of {len(differ)} positions differ" if count else "the same positions"
-        return Row.judged(self._who, "assembled", float(count) * differ, 0.0, reason, ours.theta_2)
+        reason = (
+            f"{count} of {len(differ)} positions differ"
+            if count
+            else "the same positions"
+        )
+        return Row.judged(
+            self._who, "assembled", float(count) * differ, 0.0, reason, ours.theta_2
+        )
 
     def _compare(self, quantity: str) -> _Judged | None:
         """Compare a quantity where both close the loop and the formulas state a value; None if neither side has it."""
         formulas, scene, tolerance = self.formulas, self.scene, self.held.tolerance
-        ours, theirs = getattr(formulas, quantity, None), self.answer.quantities.get(quantity)
+        ours, theirs = (
+            getattr(formulas, quantity, None),
+            self.answer.quantities.get(quantity),
+        )
         if theirs is None and self._solution is not None:
-            if quantity == "drive_condition" and any(effect.loaded_pins for effect in scene.effects):
+            if quantity == "drive_condition" and any(
+                effect.loaded_pins for effect in scene.effects
+            ):
                 return None  # an engine that passes over loads and friction does not know how near they are to jamming
             theirs = getattr(self._solution, quantity)
         if ours is None and theirs is None:  # the scene states positions only
@@ -189,14 +286,28 @@ class Comparison:
         assert self.answer.assembled is not None
         both = formulas.assembled & self.answer.assembled
         stated = both & _mark_stated(quantity, formulas, ours)
-        closed, unstated = int(np.count_nonzero(both)), _count(formulas.status_code[both & ~stated])
+        closed, unstated = (
+            int(np.count_nonzero(both)),
+            _count(formulas.status_code[both & ~stated]),
+        )
         if unstated and not stated.any():
-            return _Judged(self._row(quantity, REFUSES, f"the formulas state no value: {unstated}"), closed)
+            return _Judged(
+                self._row(
+                    quantity, REFUSES, f"the formulas state no value: {unstated}"
+                ),
+                closed,
+            )
         answerable = stated & _mark_answerable(quantity, scene, formulas, tolerance)
         reversing = answerable & _mark_reversing(quantity, scene, formulas, tolerance)
-        reversals = int(np.count_nonzero(reversing))  # at a reversal the forces of either side are right
+        reversals = int(
+            np.count_nonzero(reversing)
+        )  # at a reversal the forces of either side are right
         note = f"; not judged: {unstated}" if unstated else ""
-        note += f"; {reversals} positions at which dry friction reverses not judged" if reversals else ""
+        note += (
+            f"; {reversals} positions at which dry friction reverses not judged"
+            if reversals
+            else ""
+        )
         mask = answerable & ~reversing
         if not mask.any():
             nowhere = "no position at which this quantity can be compared" + note
@@ -204,7 +315,9 @@ class Comparison:
         row, decided = self._judge(quantity, ours, theirs, mask, note)
         return _Judged(row, closed, reversals + decided)
 
-    def _judge(self, quantity: str, ours: Array, theirs: Array, mask: Mask, note: str) -> tuple[Row, int]:
+    def _judge(
+        self, quantity: str, ours: Array, theirs: Array, mask: Mask, note: str
+    ) -> tuple[Row, int]:
         """Judge the errors at the positions of `mask`; return the row, and the number of positions with a verdict."""
         size, condition = self._scale(quantity)
         allowed = self.held.tolerance.allowed(condition)
@@ -224,12 +337,19 @@ class Comparison:
                 share = divide(predicted(quantity, positions), size)
                 return np.where(np.isfinite(retried), np.fmin(share, allowed), share)
 
-        worst = _judge_errors(error, condition, mask, allowed, self.held.tolerance, predict)
+        worst = _judge_errors(
+            error, condition, mask, allowed, self.held.tolerance, predict
+        )
         reason, i = worst.reason, worst.position
         if settled.any():
             reason += f"; {np.count_nonzero(settled)} positions within the rounding of theta_2"
         numbers = (error[i], worst.allowed, self.formulas.theta_2[i], condition[i])
-        row = self._row(quantity, worst.verdict, reason + note, **dict(zip(NUMBERS, numbers, strict=True)))
+        row = self._row(
+            quantity,
+            worst.verdict,
+            reason + note,
+            **dict(zip(NUMBERS, numbers, strict=True)),
+        )
         return row, worst.decided
 
     def _scale(self, quantity: str) -> tuple[Array, Array]:
@@ -238,7 +358,9 @@ class Comparison:
             reference = self._solution if self.reference is None else self.reference
             self.scales[quantity] = (
                 take_smallest_scale(quantity, self.scene, self.formulas, reference),
-                take_strictest_condition(quantity, self.scene.linkage, self.formulas, reference),
+                take_strictest_condition(
+                    quantity, self.scene.linkage, self.formulas, reference
+                ),
             )
         return self.scales[quantity]
 
@@ -266,36 +388,73 @@ def _judge_errors(
 
     NaN at any of them fails. `allowed` is 0 where the quantity vanishes; the error is in the quantity's unit there.
     """
-    decidable = mask & (condition * NOTHING_TO_TELL > EPS) if tolerance.conditioned else mask
+    decidable = (
+        mask & (condition * NOTHING_TO_TELL > EPS) if tolerance.conditioned else mask
+    )
     undecided = int(np.count_nonzero(mask & ~decidable))
-    note = f"; {undecided} positions with eps/condition > {NOTHING_TO_TELL:g} not judged" if undecided else ""
+    note = (
+        f"; {undecided} positions with eps/condition > {NOTHING_TO_TELL:g} not judged"
+        if undecided
+        else ""
+    )
     beyond = (decidable & ~(error <= allowed)) | (mask & ~np.isfinite(error))
     if not (decidable | beyond).any():
         index = int(np.flatnonzero(mask)[0])
-        return _Worst(index, UNDECIDED, f"eps/condition = {EPS / condition[index]:.1e}", allowed[index], 0)
+        return _Worst(
+            index,
+            UNDECIDED,
+            f"eps/condition = {EPS / condition[index]:.1e}",
+            allowed[index],
+            0,
+        )
     if not beyond.any():
         index = int(np.argmax(np.where(decidable, find_used(error, allowed), -1.0)))
-        return _Worst(index, AGREES, tolerance.name + note, allowed[index], int(np.count_nonzero(decidable)))
+        return _Worst(
+            index,
+            AGREES,
+            tolerance.name + note,
+            allowed[index],
+            int(np.count_nonzero(decidable)),
+        )
     predicted = np.zeros_like(error)
     if predict is not None:
         predicted = np.nan_to_num(predict(beyond), nan=0.0, posinf=np.inf)
     bound = np.maximum(allowed, TIMES_PREDICTED * predicted)
     ratio = find_used(error, bound)
     # where a first-order prediction reaches the value itself, no digit is left to judge
-    lost = beyond & np.isfinite(error) & np.where(allowed > 0.0, predicted >= 1.0, predicted == np.inf)
+    lost = (
+        beyond
+        & np.isfinite(error)
+        & np.where(allowed > 0.0, predicted >= 1.0, predicted == np.inf)
+    )
     ratio[lost] = np.minimum(ratio[lost], 1.0)
     index = int(np.argmax(np.where(beyond, ratio, -1.0)))
     if math.isnan(error[index]):
         verdict, reason = FAILS, "NaN"
     elif lost[index]:
-        verdict, reason = UNDECIDED, f"an error of {predicted[index]:.1e} of the value is predicted"
+        verdict, reason = (
+            UNDECIDED,
+            f"an error of {predicted[index]:.1e} of the value is predicted",
+        )
     elif predict is None:
         verdict, reason = FAILS, tolerance.name
     elif ratio[index] <= 1.0:
-        verdict, reason = DEGRADED, f"{error[index]:.1e} of {predicted[index]:.1e} predicted for this position"
+        verdict, reason = (
+            DEGRADED,
+            f"{error[index]:.1e} of {predicted[index]:.1e} predicted for this position",
+        )
     else:
-        verdict, reason = FAILS, f"{error[index]:.1e} where {predicted[index]:.1e} was predicted"
-    return _Worst(index, verdict, reason + note, bound[index], int(np.count_nonzero(decidable & ~lost)))
+        verdict, reason = (
+            FAILS,
+            f"{error[index]:.1e} where {predicted[index]:.1e} was predicted",
+        )
+    return _Worst(
+        index,
+        verdict,
+        reason + note,
+        bound[index],
+        int(np.count_nonzero(decidable & ~lost)),
+    )
 
 
 def _mark_stated(quantity: str, formulas: Solution, ours: Array) -> Mask:
@@ -306,28 +465,42 @@ def _mark_stated(quantity: str, formulas: Solution, ours: Array) -> Mask:
         stated = (formulas.status_code == JAMMED) & np.isfinite(magnitude(ours))
         return np.asarray(stated | (formulas.status_code == OK))
     beyond = (formulas.status_code == OVERFLOW) & np.isnan(magnitude(ours))
-    jammed = (formulas.status_code == JAMMED) & (quantity == "drive_condition")  # drive_condition says how near that is
+    jammed = (formulas.status_code == JAMMED) & (
+        quantity == "drive_condition"
+    )  # drive_condition says how near that is
     return np.asarray((formulas.status_code != SINGULAR) & ~beyond & ~jammed)
 
 
 def _count(codes: NDArray[np.uint8]) -> str:
     """Count positions by status: "3 singular, 5 no_torque"."""
     counts = np.bincount(codes, minlength=len(STATUS_NAMES)).tolist()
-    return ", ".join(f"{count} {name}" for name, count in zip(STATUS_NAMES, counts, strict=True) if count)
+    return ", ".join(
+        f"{count} {name}"
+        for name, count in zip(STATUS_NAMES, counts, strict=True)
+        if count
+    )
 
 
-def _mark_reversing(quantity: str, scene: Scene, formulas: Solution, tolerance: ErrorBound) -> Mask:
+def _mark_reversing(
+    quantity: str, scene: Scene, formulas: Solution, tolerance: ErrorBound
+) -> Mask:
     """Mark where dry friction reverses, so that a force may have either of two values."""
-    near_jamming = quantity == "drive_condition" and any(effect.loaded_pins for effect in scene.effects)
+    near_jamming = quantity == "drive_condition" and any(
+        effect.loaded_pins for effect in scene.effects
+    )
     if quantity not in OF_FORCES and not near_jamming:
         return np.zeros(len(formulas), dtype=bool)
     return mark_reversing(scene, formulas, tolerance.factor, in_time=tolerance.in_time)
 
 
-def _mark_answerable(quantity: str, scene: Scene, formulas: Solution, tolerance: ErrorBound) -> Mask:
+def _mark_answerable(
+    quantity: str, scene: Scene, formulas: Solution, tolerance: ErrorBound
+) -> Mask:
     """Mark where an engine of this class can be expected to have the quantity."""
     if quantity in FORCES and scene.drive_bar != 2 and tolerance.in_time:
-        speed = {3: formulas.omega_3, 4: formulas.omega_4}.get(scene.drive_bar, formulas.stroke_speed)
+        speed = {3: formulas.omega_3, 4: formulas.omega_4}.get(
+            scene.drive_bar, formulas.stroke_speed
+        )
         assert speed is not None
         return mark_turning(speed)
     return np.ones(len(formulas), dtype=bool)

@@ -25,7 +25,11 @@ def _find_shortest(linkage: FourBar) -> float:
 
 def _multiply_levers(linkage: FourBar, places: Iterable[tuple[int, float]]) -> float:
     """Return the size of forces at distances along bars with their couples, as a multiple of the force."""
-    return sum(1.0 + abs(distance) / linkage.bar(bar).length for bar, distance in places if bar != 1)
+    return sum(
+        1.0 + abs(distance) / linkage.bar(bar).length
+        for bar, distance in places
+        if bar != 1
+    )
 
 
 def _pin_force(formulas: Solution, pin: str) -> Array:
@@ -34,24 +38,36 @@ def _pin_force(formulas: Solution, pin: str) -> Array:
 
 SIZE_OF: dict[str, Callable[[Any, FourBar, Solution], Array | float]] = {
     "gravity": lambda gravity, linkage, _: sum(
-        bar.mass * abs(gravity.magnitude) * _multiply_levers(linkage, [(number, bar.mass_centre[0])])
+        bar.mass
+        * abs(gravity.magnitude)
+        * _multiply_levers(linkage, [(number, bar.mass_centre[0])])
         for number, bar in ((number, linkage.bar(number)) for number in MOVING_BARS)
     ),
     "viscous": lambda viscous, linkage, formulas: sum(
-        k * np.abs(compute_slip(formulas, pin)) / _find_shortest(linkage) for pin, k in viscous.coefficients
+        k * np.abs(compute_slip(formulas, pin)) / _find_shortest(linkage)
+        for pin, k in viscous.coefficients
     ),
-    "friction": lambda friction, linkage, _: sum(torque for _, torque in friction.torques) / _find_shortest(linkage),
+    "friction": lambda friction, linkage, _: (
+        sum(torque for _, torque in friction.torques) / _find_shortest(linkage)
+    ),
     "pin_friction": lambda friction, linkage, formulas: sum(
-        mu * r * _pin_force(formulas, pin) / _find_shortest(linkage) for pin, mu, r in friction.pins
+        mu * r * _pin_force(formulas, pin) / _find_shortest(linkage)
+        for pin, mu, r in friction.pins
     ),
-    "torsion": lambda torsion, linkage, _: torsion.greatest_couple / _find_shortest(linkage),
+    "torsion": lambda torsion, linkage, _: (
+        torsion.greatest_couple / _find_shortest(linkage)
+    ),
     "springs": lambda springs, linkage, _: sum(
         spring.greatest_tension(linkage)
-        * _multiply_levers(linkage, [(p.bar, p.distance) for p in (spring.start, spring.end)])
+        * _multiply_levers(
+            linkage, [(p.bar, p.distance) for p in (spring.start, spring.end)]
+        )
         for spring in springs.springs
     ),
     "flywheel": lambda flywheel, linkage, formulas: (
-        flywheel.inertia * abs(getattr(formulas, f"alpha_{flywheel.bar}")) / linkage.bar(flywheel.bar).length
+        flywheel.inertia
+        * abs(getattr(formulas, f"alpha_{flywheel.bar}"))
+        / linkage.bar(flywheel.bar).length
     ),
     "load": lambda load, linkage, _: load.greatest_force(linkage),
 }

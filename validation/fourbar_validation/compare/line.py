@@ -40,10 +40,15 @@ class DriveLine(NamedTuple):
     def speed(self, omega: dict[int, Array]) -> Array:
         """Compute the rate of the stroke at angular velocities of bars 1 to 4, m/s: each arm swings across itself."""
         swung = []
-        for point, arm in zip((self.drive.start, self.drive.end), self.arms, strict=True):
+        for point, arm in zip(
+            (self.drive.start, self.drive.end), self.arms, strict=True
+        ):
             velocity = 1j * omega[point.bar] * arm
             if point.bar == 3:
-                velocity = velocity + 1j * omega[2] * self.linkage.input.length * self.directions[2]
+                velocity = (
+                    velocity
+                    + 1j * omega[2] * self.linkage.input.length * self.directions[2]
+                )
             swung.append(velocity)
         return np.asarray((np.conj(self.unit) * (swung[1] - swung[0])).real)
 
@@ -52,16 +57,23 @@ class DriveLine(NamedTuple):
         """Distance of a cylinder's line from the ground pin of its bar 2 or 4, over the longer of both arms."""
         on_bar, on_ground = (0, 1) if self.drive.start.bar != 1 else (1, 0)
         point = (self.drive.start, self.drive.end)[on_bar]
-        to_ground = self.arms[on_ground] - (0.0 if point.bar == 2 else self.linkage.ground * self.directions[1])
+        to_ground = self.arms[on_ground] - (
+            0.0 if point.bar == 2 else self.linkage.ground * self.directions[1]
+        )
         longer = np.maximum(np.abs(self.arms[on_bar]), np.abs(to_ground))
-        return np.asarray(np.abs((np.conj(self.unit) * self.arms[on_bar]).imag) / longer)
+        return np.asarray(
+            np.abs((np.conj(self.unit) * self.arms[on_bar]).imag) / longer
+        )
 
     @property
     def most(self) -> float:
         """Return the greatest possible movement of its ends, as `condition` counts it, m."""
         _, a, b, c = self.linkage.lengths
         reach = {1: (0.0, 0.0), 2: (0.0, 1.0), 3: (a, a / b), 4: (0.0, a / c)}
-        return sum(reach[p.bar][0] + reach[p.bar][1] * abs(p.distance) for p in (self.drive.start, self.drive.end))
+        return sum(
+            reach[p.bar][0] + reach[p.bar][1] * abs(p.distance)
+            for p in (self.drive.start, self.drive.end)
+        )
 
     @property
     def condition(self) -> Array:
@@ -69,17 +81,31 @@ class DriveLine(NamedTuple):
         _, a, b, c = self.linkage.lengths
         u2, u3, u4 = (self.directions[bar] for bar in (2, 3, 4))
         zero = np.zeros(len(u2))
-        omega = {1: zero, 2: (np.conj(u3) * u4).imag, 3: a / b * (np.conj(u4) * u2).imag}
+        omega = {
+            1: zero,
+            2: (np.conj(u3) * u4).imag,
+            3: a / b * (np.conj(u4) * u2).imag,
+        }
         omega[4] = a / c * (np.conj(u3) * u2).imag
         return np.abs(self.speed(omega)) / self.most
 
 
-def place_line(linkage: FourBar, drive: "LinearDrive", theta: dict[int, Array]) -> DriveLine:
+def place_line(
+    linkage: FourBar, drive: "LinearDrive", theta: dict[int, Array]
+) -> DriveLine:
     """Place the ends at angles of bars 2, 3, 4, each (n,)."""
     directions = {bar: np.exp(1j * angle) for bar, angle in theta.items()}
     directions[1] = np.full(len(theta[2]), np.exp(1j * linkage.ground_angle))
-    feet = {1: 0.0, 2: 0.0, 3: linkage.input.length * directions[2], 4: linkage.ground * directions[1]}
+    feet = {
+        1: 0.0,
+        2: 0.0,
+        3: linkage.input.length * directions[2],
+        4: linkage.ground * directions[1],
+    }
     ends = (drive.start, drive.end)
-    arms = [point.distance * np.exp(1j * point.angle) * directions[point.bar] for point in ends]
+    arms = [
+        point.distance * np.exp(1j * point.angle) * directions[point.bar]
+        for point in ends
+    ]
     across = feet[drive.end.bar] + arms[1] - feet[drive.start.bar] - arms[0]
     return DriveLine(linkage, drive, directions, (arms[0], arms[1]), across)

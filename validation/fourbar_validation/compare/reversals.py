@@ -35,16 +35,25 @@ class Reversal:
 
     def jump(self, quantity: str) -> float:
         """Return by how much a force or the torque changes, N or N m."""
-        return float(np.linalg.norm(getattr(self.after, quantity) - getattr(self.before, quantity)))
+        return float(
+            np.linalg.norm(
+                getattr(self.after, quantity) - getattr(self.before, quantity)
+            )
+        )
 
     def __str__(self) -> str:
         most = max(PIN_FORCE.values(), key=self.jump)
-        ends = [" ".join(f"{x:.6g}" for x in getattr(side, most)[0]) for side in (self.before, self.after)]
+        ends = [
+            " ".join(f"{x:.6g}" for x in getattr(side, most)[0])
+            for side in (self.before, self.after)
+        ]
         place = f"pin {self.pin}, theta_2 = {np.degrees(self.theta_2):.6g} deg"
         return f"dry friction reverses at {place}: {most} jumps from ({ends[0]}) to ({ends[1]}) N"
 
 
-def find_reversals(scene: Scene, command: Command, solution: Solution) -> list[Reversal]:
+def find_reversals(
+    scene: Scene, command: Command, solution: Solution
+) -> list[Reversal]:
     """Find every reversal between two positions of a sweep, in their order.
 
     A position at which the pin is at rest lies within its reversal and ends no stretch.
@@ -63,13 +72,21 @@ def find_reversals(scene: Scene, command: Command, solution: Solution) -> list[R
             if solution.status_code[i] != OK:
                 last = None
             elif not at_rest[i]:
-                if last is not None and slip[last] * slip[i] < 0.0 and command.branch[last] == command.branch[i]:
-                    reversals.append(_bisect(scene, command, pin, last, i, float(slip[last])))
+                if (
+                    last is not None
+                    and slip[last] * slip[i] < 0.0
+                    and command.branch[last] == command.branch[i]
+                ):
+                    reversals.append(
+                        _bisect(scene, command, pin, last, i, float(slip[last]))
+                    )
                 last = i
     return sorted(reversals, key=lambda reversal: reversal.position)
 
 
-def mark_reversing(scene: Scene, solution: Solution, slip: float, *, in_time: bool = False) -> NDArray[np.bool_]:
+def mark_reversing(
+    scene: Scene, solution: Solution, slip: float, *, in_time: bool = False
+) -> NDArray[np.bool_]:
     """Mark where a dry pin of a moving linkage slips by at most this part of the two speeds over sin^2 mu, (n,).
 
     There the sense of friction is undecided, and the forces on both sides of the jump are right. An engine
@@ -80,7 +97,9 @@ def mark_reversing(scene: Scene, solution: Solution, slip: float, *, in_time: bo
     for pin in {pin for effect in scene.effects for pin in effect.dry_pins}:
         mask |= _mark_resting(solution, pin, slip)
         if in_time:
-            speeds = np.max([np.abs(_compute_speeds(solution)[bar]) for bar in MOVING_BARS], axis=0)
+            speeds = np.max(
+                [np.abs(_compute_speeds(solution)[bar]) for bar in MOVING_BARS], axis=0
+            )
             speeds = np.nan_to_num(speeds)
             mask |= speeds <= slip * speeds.max()
     return mask
@@ -89,11 +108,16 @@ def mark_reversing(scene: Scene, solution: Solution, slip: float, *, in_time: bo
 def _mark_resting(solution: Solution, pin: str, slip: float) -> NDArray[np.bool_]:
     one, second = (_compute_speeds(solution)[bar] for bar in PINS[pin])
     speeds = np.abs(one) + np.abs(second) + np.abs(_compute_speeds(solution)[2])
-    return np.asarray((np.abs(second - one) * solution.condition**2 <= slip * speeds) & (speeds > 0.0))
+    return np.asarray(
+        (np.abs(second - one) * solution.condition**2 <= slip * speeds) & (speeds > 0.0)
+    )
 
 
 def break_curve(
-    theta_2: Array, values: Array, jumps: list[Reversal], value: Callable[[Solution], Array]
+    theta_2: Array,
+    values: Array,
+    jumps: list[Reversal],
+    value: Callable[[Solution], Array],
 ) -> tuple[Array, Array]:
     """Give a curve, (n,), both ends of each jump and NaN between them: no line is drawn across.
 
@@ -118,11 +142,18 @@ def _compute_speeds(solution: Solution) -> dict[int, Any]:
     return {1: 0.0, 2: solution.omega_2, 3: solution.omega_3, 4: solution.omega_4}
 
 
-def _bisect(scene: Scene, command: Command, pin: str, i: int, j: int, slip: float) -> Reversal:
+def _bisect(
+    scene: Scene, command: Command, pin: str, i: int, j: int, slip: float
+) -> Reversal:
     """Locate the reversal between positions i and j by bisection, with friction in the sense of either side."""
 
     def look(theta_2: float, side: int, stage: str) -> Solution:
-        moved = command._replace(angle=np.array([theta_2]), branch=command.branch[i : i + 1], remainder=None, time=None)
+        moved = command._replace(
+            angle=np.array([theta_2]),
+            branch=command.branch[i : i + 1],
+            remainder=None,
+            time=None,
+        )
         return solve(scene, stage, at=moved, side=side)
 
     low, high = float(command.theta_2[i]), float(command.theta_2[j])

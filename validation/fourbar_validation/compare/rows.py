@@ -27,12 +27,31 @@ COMPARED = (*HELD, FAILS)
 
 FORMULAS = "formulas"
 IDENTITIES = (
-    *("closure", "force_sum", "moment_sum", "power", "status", "blocks", "points", "law", "sweep"),
+    *(
+        "closure",
+        "force_sum",
+        "moment_sum",
+        "power",
+        "status",
+        "blocks",
+        "points",
+        "law",
+        "sweep",
+    ),
     *("torque", "torque_error", "force_error", "friction_residual"),
 )
 """Rows of the formulas that no engine answers: they do not count as compared."""
 
-SHIPPED = ("study", "sensitivity", "internal_forces", "extremes", "tolerances", "equilibria", "sdf", "usd")
+SHIPPED = (
+    "study",
+    "sensitivity",
+    "internal_forces",
+    "extremes",
+    "tolerances",
+    "equilibria",
+    "sdf",
+    "usd",
+)
 """Engines of the rows that check functions other than `solve`: with `formulas` they are fourbar's own."""
 LONGEST = 500
 """Characters of what somebody else's code gives as a reason."""
@@ -58,15 +77,38 @@ class Row:
 
     def __post_init__(self) -> None:
         """Raise ValueError for a verdict that nobody knows, and for one that holds without a number."""
-        if self.verdict not in VERDICTS or (self.verdict in HELD and math.isnan(self.error)):
-            raise ValueError(f"{self.verdict!r} is no verdict on an error of {self.error!r}")
+        if self.verdict not in VERDICTS or (
+            self.verdict in HELD and math.isnan(self.error)
+        ):
+            raise ValueError(
+                f"{self.verdict!r} is no verdict on an error of {self.error!r}"
+            )
         object.__setattr__(self, "passed", self.verdict in HELD)
 
     @classmethod
-    def unmeasured(cls, scene: str, engine: str, setting: str, quantity: str, verdict: str, reason: str) -> "Row":
+    def unmeasured(
+        cls,
+        scene: str,
+        engine: str,
+        setting: str,
+        quantity: str,
+        verdict: str,
+        reason: str,
+    ) -> "Row":
         """Make a verdict without numbers: a refusal, a breakdown, an answer that is missing."""
         nan = math.nan
-        return cls(scene, engine, setting or "-", quantity, nan, nan, verdict, make_plain(reason), nan, nan)
+        return cls(
+            scene,
+            engine,
+            setting or "-",
+            quantity,
+            nan,
+            nan,
+            verdict,
+            make_plain(reason),
+            nan,
+            nan,
+        )
 
     @classmethod
     def judged(
@@ -93,12 +135,23 @@ class Row:
         errors = errors if where is None else np.where(where, errors, 0.0)
         index = int(np.argmax(find_used(errors, allowed)))
         numbers = (np.ravel(x) for x in (allowed, theta_2, condition))
-        bound, place, worst_condition = (float(x[index] if len(x) > 1 else x[0]) for x in numbers)
+        bound, place, worst_condition = (
+            float(x[index] if len(x) > 1 else x[0]) for x in numbers
+        )
         worst = float(errors[index])
         verdict = AGREES if math.isfinite(worst) and worst <= bound else FAILS
         if where is not None and not where.any():
             verdict = UNDECIDED
-        return cls(*who, quantity, worst, bound, verdict, make_plain(reason), place, worst_condition)
+        return cls(
+            *who,
+            quantity,
+            worst,
+            bound,
+            verdict,
+            make_plain(reason),
+            place,
+            worst_condition,
+        )
 
     @property
     def compared(self) -> bool:
@@ -111,7 +164,9 @@ class Row:
         return self.verdict == FAILS
 
 
-def make_breakdown(scene: str, engine: str, error: BaseException, part: str = "") -> Row:
+def make_breakdown(
+    scene: str, engine: str, error: BaseException, part: str = ""
+) -> Row:
     """Make the row of an engine that raised, took its process with it, or never came back; `part`: in what."""
     if isinstance(error, TimeoutError):
         reason = "the engine hung and was stopped"
@@ -134,7 +189,11 @@ def say_error(error: BaseException) -> str:
 def write_one_line(text: str) -> str:
     """Write somebody's text in one line that prints, its middle left out where it is long."""
     line = make_plain(" ".join(text.split()))
-    return line if len(line) <= LONGEST else f"{line[: LONGEST // 2]} ... {line[-LONGEST // 2 :]}"
+    return (
+        line
+        if len(line) <= LONGEST
+        else f"{line[: LONGEST // 2]} ... {line[-LONGEST // 2 :]}"
+    )
 
 
 def make_plain(text: str) -> str:
@@ -142,7 +201,10 @@ def make_plain(text: str) -> str:
 
     Characters that would steer a terminal or a reader are shown, not sent.
     """
-    return "".join(c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode() for c in text)
+    return "".join(
+        c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode()
+        for c in text
+    )
 
 
 FORMULA = ("=", "+", "-", "@")
@@ -156,7 +218,9 @@ def write_cell_text(cell: str) -> str:
 
 def read_cell_text(cell: str) -> str:
     """Give back what `write_cell_text` was given."""
-    return cell[1:] if cell.startswith(tuple("'" + first for first in FORMULA)) else cell
+    return (
+        cell[1:] if cell.startswith(tuple("'" + first for first in FORMULA)) else cell
+    )
 
 
 COLUMNS = tuple(column.name for column in fields(Row))
@@ -164,12 +228,20 @@ COLUMNS = tuple(column.name for column in fields(Row))
 
 def sort_rows(rows: Iterable[Row]) -> list[Row]:
     """Sort rows by scene, engine, setting and quantity."""
-    return sorted(rows, key=lambda row: (row.scene, row.engine, row.setting, row.quantity))
+    return sorted(
+        rows, key=lambda row: (row.scene, row.engine, row.setting, row.quantity)
+    )
 
 
 def write_rows(rows: Iterable[Row]) -> str:
     """Write the table as text, sorted, floats as repr, a missing number left empty."""
-    return write_csv(COLUMNS, ([_write_cell(getattr(row, name)) for name in COLUMNS] for row in sort_rows(rows)))
+    return write_csv(
+        COLUMNS,
+        (
+            [_write_cell(getattr(row, name)) for name in COLUMNS]
+            for row in sort_rows(rows)
+        ),
+    )
 
 
 def write_csv(columns: Sequence[str], rows: Iterable[Iterable[object]]) -> str:
@@ -177,7 +249,10 @@ def write_csv(columns: Sequence[str], rows: Iterable[Iterable[object]]) -> str:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerows([columns] if columns else [])
-    writer.writerows([write_cell_text(cell) if isinstance(cell, str) else cell for cell in row] for row in rows)
+    writer.writerows(
+        [write_cell_text(cell) if isinstance(cell, str) else cell for cell in row]
+        for row in rows
+    )
     return text.getvalue()
 
 
@@ -221,7 +296,9 @@ class Counts:
         """Take in rows."""
         for row in rows:
             self._of[row.verdict] += 1
-            self._answered += row.compared and not (row.engine == FORMULAS and row.quantity in IDENTITIES)
+            self._answered += row.compared and not (
+                row.engine == FORMULAS and row.quantity in IDENTITIES
+            )
 
     def add_scene(self, rows: Iterable[Row]) -> None:
         """Take in all rows of one scene."""
@@ -253,7 +330,13 @@ class Counts:
     @property
     def word(self) -> str:
         """Return the verdict for a cell of a table."""
-        return f"{self[FAILS]} fail" if self[FAILS] else "nothing compared" if self.nothing else "holds"
+        return (
+            f"{self[FAILS]} fail"
+            if self[FAILS]
+            else "nothing compared"
+            if self.nothing
+            else "holds"
+        )
 
     def sentence(self) -> str:
         """Give the verdict in one sentence: "all hold" is stated only of what was compared."""
@@ -277,8 +360,16 @@ class Counts:
     def _write_where(self) -> str:
         if not self.scenes:
             return ""
-        share = "" if self.nothing or self.scenes_compared == self.scenes else f"{self.scenes_compared} of "
+        share = (
+            ""
+            if self.nothing or self.scenes_compared == self.scenes
+            else f"{self.scenes_compared} of "
+        )
         return f" on {share}{self.scenes} scene{'s' if self.scenes != 1 else ''}"
 
     def _write_worded(self, verdicts: Iterable[str]) -> list[str]:
-        return [f"{self[verdict]} {WORDING[verdict][self[verdict] != 1]}" for verdict in verdicts if self[verdict]]
+        return [
+            f"{self[verdict]} {WORDING[verdict][self[verdict] != 1]}"
+            for verdict in verdicts
+            if self[verdict]
+        ]

@@ -21,7 +21,14 @@ from fourbar.solution import Solution
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.effects import find_size as size_of
 from fourbar_validation.compare.line import place_line
-from fourbar_validation.compare.tolerance import WELL_CONDITIONED, Array, K, find_condition, magnitude, sum_lengths
+from fourbar_validation.compare.tolerance import (
+    WELL_CONDITIONED,
+    Array,
+    K,
+    find_condition,
+    magnitude,
+    sum_lengths,
+)
 
 VANISHING = 1.0 / K
 """A quantity below this part of the sum of its terms has lost more to cancellation than K covers."""
@@ -34,7 +41,9 @@ def scale_of(quantity: str, scene: Scene, formulas: Solution, values: Array) -> 
     size = magnitude(values)
     terms = sum_terms(quantity, scene, formulas)
     well = (formulas.condition >= WELL_CONDITIONED) & np.isfinite(size)
-    if UNITS[quantity] in ("N m", "W") or quantity == LINE.value:  # its poles are not where sin_mu vanishes
+    if (
+        UNITS[quantity] in ("N m", "W") or quantity == LINE.value
+    ):  # its poles are not where sin_mu vanishes
         assert formulas.drive_condition is not None
         well &= formulas.drive_condition >= WELL_CONDITIONED
     nonzero = np.where(size < VANISHING * terms, terms, size)
@@ -51,7 +60,9 @@ def sum_terms(quantity: str, scene: Scene, formulas: Solution) -> Array:
     Raises KeyError for a quantity of a unit that has no such sum here: nothing is judged by another's scale.
     """
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(TERMS[UNITS[quantity]](quantity, scene, formulas), dtype=float)
+        return np.asarray(
+            TERMS[UNITS[quantity]](quantity, scene, formulas), dtype=float
+        )
 
 
 def _return_one(quantity: str, scene: Scene, formulas: Solution) -> Array:
@@ -59,7 +70,9 @@ def _return_one(quantity: str, scene: Scene, formulas: Solution) -> Array:
 
 
 def _sum_lengths(quantity: str, scene: Scene, formulas: Solution) -> Array:
-    arms = sum(_compute_arm(scene, number) for number in MOVING_BARS) + sum(_compute_drive_arms(scene).values())
+    arms = sum(_compute_arm(scene, number) for number in MOVING_BARS) + sum(
+        _compute_drive_arms(scene).values()
+    )
     return np.full(len(formulas), sum_lengths(scene.linkage) + arms)
 
 
@@ -68,24 +81,39 @@ def _sum_speeds(quantity: str, scene: Scene, formulas: Solution) -> Array:
     assert formulas.omega_2 is not None
     omega_2 = np.abs(formulas.omega_2)
     return (
-        omega_2 if quantity == "omega_2" else a * omega_2 / ((b if quantity == "omega_3" else c) * formulas.condition)
+        omega_2
+        if quantity == "omega_2"
+        else a * omega_2 / ((b if quantity == "omega_3" else c) * formulas.condition)
     )
 
 
-def _sum_angular_accelerations(quantity: str, scene: Scene, formulas: Solution) -> Array:
+def _sum_angular_accelerations(
+    quantity: str, scene: Scene, formulas: Solution
+) -> Array:
     _, a, b, c = scene.linkage.lengths
-    w2, w3, w4, a2 = formulas.omega_2, formulas.omega_3, formulas.omega_4, formulas.alpha_2
+    w2, w3, w4, a2 = (
+        formulas.omega_2,
+        formulas.omega_3,
+        formulas.omega_4,
+        formulas.alpha_2,
+    )
     assert w2 is not None and w3 is not None and w4 is not None and a2 is not None
     if quantity == "alpha_2":
         return np.abs(a2)
     terms = a * w2 * w2 + a * np.abs(a2) + b * w3 * w3 + c * w4 * w4
-    return np.asarray(terms / ((b if quantity == "alpha_3" else c) * formulas.condition))
+    return np.asarray(
+        terms / ((b if quantity == "alpha_3" else c) * formulas.condition)
+    )
 
 
 def _sum_velocities(quantity: str, scene: Scene, formulas: Solution) -> Array:
     total, drive = np.zeros(len(formulas)), _compute_drive_arms(scene)
     for number in MOVING_BARS:
-        arm = scene.linkage.bar(number).length + _compute_arm(scene, number) + drive.get(number, 0.0)
+        arm = (
+            scene.linkage.bar(number).length
+            + _compute_arm(scene, number)
+            + drive.get(number, 0.0)
+        )
         total += arm * np.abs(getattr(formulas, f"omega_{number}"))
     return total
 
@@ -93,8 +121,13 @@ def _sum_velocities(quantity: str, scene: Scene, formulas: Solution) -> Array:
 def _sum_accelerations(quantity: str, scene: Scene, formulas: Solution) -> Array:
     total = np.zeros(len(formulas))
     for number in MOVING_BARS:
-        omega, alpha = getattr(formulas, f"omega_{number}"), getattr(formulas, f"alpha_{number}")
-        total += (scene.linkage.bar(number).length + _compute_arm(scene, number)) * (omega * omega + np.abs(alpha))
+        omega, alpha = (
+            getattr(formulas, f"omega_{number}"),
+            getattr(formulas, f"alpha_{number}"),
+        )
+        total += (scene.linkage.bar(number).length + _compute_arm(scene, number)) * (
+            omega * omega + np.abs(alpha)
+        )
     return total
 
 
@@ -102,19 +135,31 @@ def _sum_forces(quantity: str, scene: Scene, formulas: Solution) -> Array:
     assert formulas.drive_condition is not None
     gain = 1.0
     if scene.drive is not None:  # a short lever makes the force as many times larger
-        short = place_line(scene.linkage, scene.drive, {bar: np.zeros(1) for bar in MOVING_BARS}).most
+        short = place_line(
+            scene.linkage, scene.drive, {bar: np.zeros(1) for bar in MOVING_BARS}
+        ).most
         gain = max(1.0, max(scene.linkage.lengths) / short)
-    return np.asarray(gain * _sum_force_terms(scene, formulas) / formulas.drive_condition)
+    return np.asarray(
+        gain * _sum_force_terms(scene, formulas) / formulas.drive_condition
+    )
 
 
 def _sum_torques(quantity: str, scene: Scene, formulas: Solution) -> Array:
-    return np.asarray(max(scene.linkage.lengths[1:]) * _sum_forces(quantity, scene, formulas))
+    return np.asarray(
+        max(scene.linkage.lengths[1:]) * _sum_forces(quantity, scene, formulas)
+    )
 
 
 def _sum_powers(quantity: str, scene: Scene, formulas: Solution) -> Array:
     if scene.drive is not None:
-        return np.asarray(_sum_forces(quantity, scene, formulas) * _sum_velocities(quantity, scene, formulas))
-    return np.asarray(_sum_torques(quantity, scene, formulas) * np.abs(getattr(formulas, f"omega_{scene.drive_bar}")))
+        return np.asarray(
+            _sum_forces(quantity, scene, formulas)
+            * _sum_velocities(quantity, scene, formulas)
+        )
+    return np.asarray(
+        _sum_torques(quantity, scene, formulas)
+        * np.abs(getattr(formulas, f"omega_{scene.drive_bar}"))
+    )
 
 
 TERMS: dict[str, Callable[[str, Scene, Solution], Array]] = {
@@ -148,9 +193,15 @@ def _sum_force_terms(scene: Scene, formulas: Solution) -> Array:
     total = np.zeros(len(formulas))
     for number in MOVING_BARS:
         bar = scene.linkage.bar(number)
-        acceleration, alpha = getattr(formulas, f"a_G{number}"), getattr(formulas, f"alpha_{number}")
+        acceleration, alpha = (
+            getattr(formulas, f"a_G{number}"),
+            getattr(formulas, f"alpha_{number}"),
+        )
         lever = 1.0 + abs(bar.mass_centre[0]) / bar.length
-        total += lever * bar.mass * magnitude(acceleration) + bar.moment_of_inertia * np.abs(alpha) / bar.length
+        total += (
+            lever * bar.mass * magnitude(acceleration)
+            + bar.moment_of_inertia * np.abs(alpha) / bar.length
+        )
     for term in (*scene.loads, *scene.effects):
         total += size_of(term, scene.linkage, formulas)
     return total
@@ -162,8 +213,13 @@ SIZED_BY = ("omega_3", "alpha_3", "a_G2", "a_G3", "a_G4")
 
 def has_angles(answer: Answer) -> bool:
     """Return whether an answer has the angles of all moving bars that are not given."""
-    theta_2 = () if answer.at is None or answer.at.commanded == "theta_2" else ("theta_2",)
-    return answer.at is not None and {"theta_3", "theta_4", *theta_2} <= answer.quantities.keys()
+    theta_2 = (
+        () if answer.at is None or answer.at.commanded == "theta_2" else ("theta_2",)
+    )
+    return (
+        answer.at is not None
+        and {"theta_3", "theta_4", *theta_2} <= answer.quantities.keys()
+    )
 
 
 def make_reference(scene: Scene, answer: Answer) -> Solution | None:
@@ -171,18 +227,28 @@ def make_reference(scene: Scene, answer: Answer) -> Solution | None:
     if answer.at is None or not has_angles(answer):
         return None
     answered = answer.quantities
-    theta_2 = answer.at.angle if answer.at.commanded == "theta_2" else answered["theta_2"]
+    theta_2 = (
+        answer.at.angle if answer.at.commanded == "theta_2" else answered["theta_2"]
+    )
     theta = {2: theta_2, 3: answered["theta_3"], 4: answered["theta_4"]}
     code = np.full(len(theta_2), OK, dtype=np.uint8)
-    reference = Solution(scene.title, scene.drive_bar, code, answer.at.branch, theta_2=theta_2)
+    reference = Solution(
+        scene.title, scene.drive_bar, code, answer.at.branch, theta_2=theta_2
+    )
     for name in UNITS:
         if name in answered:
             setattr(reference, name, answered[name])
     reference.at = answer.at
     if answer.at.speed is not None:
         rates = (("omega", answer.at.speed), ("alpha", answer.at.acceleration))
-        for name, x in rates if answer.at.stroke is None else ():  # the engine finds them if a stroke is commanded
-            setattr(reference, f"{name}_{answer.at.bar}", np.broadcast_to(np.asarray(x, float), theta_2.shape))
+        for name, x in (
+            rates if answer.at.stroke is None else ()
+        ):  # the engine finds them if a stroke is commanded
+            setattr(
+                reference,
+                f"{name}_{answer.at.bar}",
+                np.broadcast_to(np.asarray(x, float), theta_2.shape),
+            )
         if reference.omega_3 is not None and reference.omega_4 is not None:
             _add_velocities(scene.linkage, theta, reference)
     reference.drive = scene.drive
@@ -193,50 +259,90 @@ def make_reference(scene: Scene, answer: Answer) -> Solution | None:
     reference.condition = np.abs(np.sin(second - one))
     if answer.at.stroke is not None and scene.drive is not None:
         lever = place_line(scene.linkage, scene.drive, theta).lever
-        reference.at, reference.condition = answer.at._replace(condition=lever), reference.condition * lever
-    if reference.drive_condition is None:  # one that knows how near friction is to jamming answers it
+        reference.at, reference.condition = (
+            answer.at._replace(condition=lever),
+            reference.condition * lever,
+        )
+    if (
+        reference.drive_condition is None
+    ):  # one that knows how near friction is to jamming answers it
         one, second = (theta[bar] for bar in theta if bar != scene.drive_bar)
         # not of their difference: of an angle many turns away that has fewer digits than its sine
-        reference.drive_condition = np.abs(np.sin(second) * np.cos(one) - np.cos(second) * np.sin(one))
+        reference.drive_condition = np.abs(
+            np.sin(second) * np.cos(one) - np.cos(second) * np.sin(one)
+        )
     return reference
 
 
-def _add_line(linkage: FourBar, drive: LinearDrive, theta: dict[int, Array], reference: Solution) -> None:
+def _add_line(
+    linkage: FourBar, drive: LinearDrive, theta: dict[int, Array], reference: Solution
+) -> None:
     """Add stroke, direction, speed and leverage of a linear drive, from the answer's own angles and speeds."""
     line = place_line(linkage, drive, theta)
-    reference.stroke, reference.drive_line = line.stroke, np.stack((line.unit.real, line.unit.imag), axis=1)
-    if reference.omega_2 is not None and reference.omega_3 is not None and reference.omega_4 is not None:
-        omega = {1: np.zeros(len(reference)), 2: reference.omega_2, 3: reference.omega_3, 4: reference.omega_4}
+    reference.stroke, reference.drive_line = (
+        line.stroke,
+        np.stack((line.unit.real, line.unit.imag), axis=1),
+    )
+    if (
+        reference.omega_2 is not None
+        and reference.omega_3 is not None
+        and reference.omega_4 is not None
+    ):
+        omega = {
+            1: np.zeros(len(reference)),
+            2: reference.omega_2,
+            3: reference.omega_3,
+            4: reference.omega_4,
+        }
         reference.stroke_speed = line.speed(omega)
     if reference.drive_condition is None:
         reference.drive_condition = line.condition
 
 
-def _add_velocities(linkage: FourBar, theta: dict[int, Array], reference: Solution) -> None:
+def _add_velocities(
+    linkage: FourBar, theta: dict[int, Array], reference: Solution
+) -> None:
     """Add the speeds of A, B and the mass centres, from the answer's own angles and speeds, m/s."""
 
     def swung(bar: int, distance: float, angle: float) -> Array:
-        speed, direction = distance * getattr(reference, f"omega_{bar}"), theta[bar] + angle
+        speed, direction = (
+            distance * getattr(reference, f"omega_{bar}"),
+            theta[bar] + angle,
+        )
         return np.stack((-speed * np.sin(direction), speed * np.cos(direction)), axis=1)
 
-    reference.v_A, reference.v_B = swung(2, linkage.input.length, 0.0), swung(4, linkage.output.length, 0.0)
+    reference.v_A, reference.v_B = (
+        swung(2, linkage.input.length, 0.0),
+        swung(4, linkage.output.length, 0.0),
+    )
     for bar in MOVING_BARS:
         centre = swung(bar, *linkage.bar(bar).mass_centre)
         setattr(reference, f"v_G{bar}", centre + reference.v_A if bar == 3 else centre)
 
 
-def take_strictest_condition(quantity: str, linkage: FourBar, formulas: Solution, reference: Solution | None) -> Array:
+def take_strictest_condition(
+    quantity: str, linkage: FourBar, formulas: Solution, reference: Solution | None
+) -> Array:
     """Take the better of two conditions of a quantity at each position, (n,)."""
     ours = find_condition(quantity, linkage, formulas)
-    return ours if reference is None else np.fmin(np.fmax(ours, find_condition(quantity, linkage, reference)), 1.0)
+    return (
+        ours
+        if reference is None
+        else np.fmin(np.fmax(ours, find_condition(quantity, linkage, reference)), 1.0)
+    )
 
 
-def take_smallest_scale(quantity: str, scene: Scene, formulas: Solution, reference: Solution | None) -> Array:
+def take_smallest_scale(
+    quantity: str, scene: Scene, formulas: Solution, reference: Solution | None
+) -> Array:
     """Take the smaller of two sizes of a quantity at each position, (n,)."""
     ours = scale_of(quantity, scene, formulas, getattr(formulas, quantity))
     of_motion = reference is not None and (
-        reference.omega_2 is None or all(getattr(reference, q) is not None for q in SIZED_BY)
+        reference.omega_2 is None
+        or all(getattr(reference, q) is not None for q in SIZED_BY)
     )
     if reference is None or not of_motion or getattr(reference, quantity) is None:
         return ours
-    return np.fmin(ours, scale_of(quantity, scene, reference, getattr(reference, quantity)))
+    return np.fmin(
+        ours, scale_of(quantity, scene, reference, getattr(reference, quantity))
+    )

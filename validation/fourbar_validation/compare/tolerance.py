@@ -92,7 +92,9 @@ POWER = {
     **dict.fromkeys(("rad/s", "m/s", "rad/s^2", "m/s^2", "N", "N m", "W"), 2),
 }
 """Power of 1/s by unit: angles and positions lose digits as 1/s, everything that follows from them as 1/s^2."""
-OF_THE_INPUT = frozenset(("theta_2", "omega_2", "alpha_2", "A", "G2", "v_A", "v_G2", "a_A", "a_G2"))
+OF_THE_INPUT = frozenset(
+    ("theta_2", "omega_2", "alpha_2", "A", "G2", "v_A", "v_G2", "a_A", "a_G2")
+)
 """Quantities that the input alone decides: they lose none."""
 TOUCHING_MARGIN = 32.0 * EPS
 """A loop that closes, or misses, by less than this part of the sum of its lengths does so by the
@@ -102,8 +104,12 @@ rounding of the data, and the engines may differ on whether it closes."""
 def hold_simulated(error: float, why: str) -> ErrorBound:
     """Hold what runs through time to a wanted error."""
     if not 0.0 < error < 1.0:
-        raise InputError("--error", error, "must be a relative error, above 0 and below 1")
-    return replace(SIMULATED, factor=error, reason=f"{error:g} of the scale, as wanted: {why}")
+        raise InputError(
+            "--error", error, "must be a relative error, above 0 and below 1"
+        )
+    return replace(
+        SIMULATED, factor=error, reason=f"{error:g} of the scale, as wanted: {why}"
+    )
 
 
 OF_DIRECTION = frozenset(("drive_line", "stroke_speed", "drive_condition"))
@@ -118,17 +124,32 @@ def find_lever(linkage: FourBar, bar: int = 2) -> float:
 
     Without it 28 of 10 008 comparisons on 300 random linkages exceed K = 50 (at most 83); with it none exceeds 17.
     """
-    return min(linkage.bar(number).length for number in MOVING_BARS if number != bar) / max(linkage.lengths)
+    return min(
+        linkage.bar(number).length for number in MOVING_BARS if number != bar
+    ) / max(linkage.lengths)
 
 
 def find_condition(quantity: str, linkage: FourBar, formulas: Solution) -> Array:
     """Compute a quantity's condition at each position: s for positions, s^2 for what follows, times lever and drive."""
-    s, unit, bar, commanded = formulas.condition, UNITS[quantity], formulas.at.bar, formulas.at.condition
-    if quantity in (OF_THE_INPUT if bar == 2 else (f"theta_{bar}", f"omega_{bar}", f"alpha_{bar}")):
+    s, unit, bar, commanded = (
+        formulas.condition,
+        UNITS[quantity],
+        formulas.at.bar,
+        formulas.at.condition,
+    )
+    if quantity in (
+        OF_THE_INPUT if bar == 2 else (f"theta_{bar}", f"omega_{bar}", f"alpha_{bar}")
+    ):
         # a stroke commands the bar as far as its cylinder has a lever
-        return np.ones_like(s) if commanded is None else np.asarray(commanded ** POWER[unit], dtype=float)
+        return (
+            np.ones_like(s)
+            if commanded is None
+            else np.asarray(commanded ** POWER[unit], dtype=float)
+        )
     condition = find_lever(linkage, bar) * s ** POWER[unit]
-    if formulas.stroke is not None and (quantity in OF_DIRECTION or unit in ("N", "N m", "W")):
+    if formulas.stroke is not None and (
+        quantity in OF_DIRECTION or unit in ("N", "N m", "W")
+    ):
         condition = condition * np.minimum(formulas.stroke / max(linkage.lengths), 1.0)
     if unit in ("N", "N m", "W"):
         assert formulas.drive_condition is not None
@@ -143,7 +164,9 @@ def wrap_angle(angle: Angle) -> Angle:
 
 def count_half_turns(ground_angle: float, theta_2: Array | float = 0.0) -> float:
     """Give the largest angle in half turns, at least 1: many turns away it has fewer digits of its direction."""
-    return max(1.0, abs(ground_angle) / np.pi, float(np.abs(theta_2).max(initial=0.0)) / np.pi)
+    return max(
+        1.0, abs(ground_angle) / np.pi, float(np.abs(theta_2).max(initial=0.0)) / np.pi
+    )
 
 
 def find_roundoff(linkage: FourBar) -> float:
@@ -160,7 +183,9 @@ def find_margin(linkage: FourBar, theta: Array, bar: int = 2) -> Array:
     """Compute by what part of the sum of the lengths the loop closes (> 0) or misses (< 0) at a bar's angle."""
     held = linkage.bar(bar).length * (-1.0 if bar == 4 else 1.0)
     b, c = (linkage.bar(number).length for number in MOVING_BARS if number != bar)
-    e = np.abs(linkage.ground * np.exp(1j * linkage.ground_angle) - held * np.exp(1j * theta))
+    e = np.abs(
+        linkage.ground * np.exp(1j * linkage.ground_angle) - held * np.exp(1j * theta)
+    )
     return np.asarray(np.minimum(b + c - e, e - abs(b - c)) / sum_lengths(linkage))
 
 
@@ -168,7 +193,12 @@ def find_gap(linkage: FourBar, theta_2: Array, theta_3: Array, theta_4: Array) -
     """Compute by what part of the sum of the lengths three angles miss the closure of the loop, (n,)."""
     d, a, b, c = linkage.lengths
     ground = d * np.exp(1j * linkage.ground_angle)
-    gap = a * np.exp(1j * theta_2) + b * np.exp(1j * theta_3) - ground - c * np.exp(1j * theta_4)
+    gap = (
+        a * np.exp(1j * theta_2)
+        + b * np.exp(1j * theta_3)
+        - ground
+        - c * np.exp(1j * theta_4)
+    )
     return divide(np.abs(gap), sum_lengths(linkage))
 
 
@@ -179,7 +209,9 @@ def mark_touching(linkage: FourBar, theta: Array, bar: int = 2) -> Mask:
 
 def magnitude(values: Array) -> Array:
     """Return the absolute value of a scalar, the Euclidean norm of a vector, (n,)."""
-    return np.asarray(np.hypot(values[:, 0], values[:, 1]) if values.ndim == 2 else np.abs(values))
+    return np.asarray(
+        np.hypot(values[:, 0], values[:, 1]) if values.ndim == 2 else np.abs(values)
+    )
 
 
 def compute_difference(quantity: str, ours: Array, theirs: Array) -> Array:

@@ -31,7 +31,11 @@ Quantities = dict[str, Any]
 
 def choose_few(command: Command) -> Command:
     """Choose at most AT_MOST positions, evenly over the sweep."""
-    rows = np.unique(np.linspace(0, len(command.theta_2) - 1, min(AT_MOST, len(command.theta_2))).round().astype(int))
+    rows = np.unique(
+        np.linspace(0, len(command.theta_2) - 1, min(AT_MOST, len(command.theta_2)))
+        .round()
+        .astype(int)
+    )
     return command._replace(angle=command.theta_2[rows], branch=command.branch[rows])
 
 
@@ -48,21 +52,34 @@ def evaluate_single(scene: Scene, command: Command) -> Quantities:
     case = case._replace(path=path)
     with np.errstate(all="ignore"):
         theta_2 = command.theta_2.astype(np.float32)
-        speed, growth = (np.float32(value) for value in (command.omega_2 or 0.0, command.alpha_2))
+        speed, growth = (
+            np.float32(value) for value in (command.omega_2 or 0.0, command.alpha_2)
+        )
         position = path.position(theta_2, path.half_angle(theta_2), command.branch)
-        state = case.state(theta_2, change_numbers(position, _round_single), command.branch, speed, growth)
+        state = case.state(
+            theta_2,
+            change_numbers(position, _round_single),
+            command.branch,
+            speed,
+            growth,
+        )
         state = change_numbers(state, _round_single)
         dynamics = case.dynamics(state, growth)
     assert dynamics.drive.dtype == np.float32
     return {
         "torque": dynamics.drive,
-        **{name: _stack(getattr(dynamics.pins, name), len(theta_2)) for name in PIN_FORCES},
+        **{
+            name: _stack(getattr(dynamics.pins, name), len(theta_2))
+            for name in PIN_FORCES
+        },
     }
 
 
 def _round_single(value: Any) -> Any:
     """Round to single precision, both parts of a vector too."""
-    return np.asarray(value).astype(np.complex64 if np.iscomplexobj(value) else np.float32)[()]
+    return np.asarray(value).astype(
+        np.complex64 if np.iscomplexobj(value) else np.float32
+    )[()]
 
 
 def _stack(vector: Any, n: int) -> Array:
@@ -74,15 +91,23 @@ def _stack(vector: Any, n: int) -> Array:
 def solve_thirteen_equations(scene: Scene, command: Command) -> Quantities:
     """Solve thirteen equations per position, with kinematics by the formulas."""
     if any(effect.loaded_pins for effect in scene.effects):
-        raise NotImplementedError("friction that depends on the pin forces is not linear in them")
+        raise NotImplementedError(
+            "friction that depends on the pin forces is not linear in them"
+        )
     x = thirteen.solve_thirteen(make_bodies(scene, command), scene.drive_bar)
     columns = {name: getattr(thirteen, name) for name in PIN_FORCES}
-    return {"torque": x[:, thirteen.TORQUE], **{name: x[:, k : k + 2] for name, k in columns.items()}}
+    return {
+        "torque": x[:, thirteen.TORQUE],
+        **{name: x[:, k : k + 2] for name, k in columns.items()},
+    }
 
 
 def make_bodies(scene: Scene, command: Command) -> thirteen.FreeBodies:
     """Set up the free bodies with what acts on them, moments about the mass centres, by our kinematics."""
-    state, parts = compute_state(scene, command), list_bodies(scene.linkage, scene.effects)
+    state, parts = (
+        compute_state(scene, command),
+        list_bodies(scene.linkage, scene.effects),
+    )
     n = len(state.theta_2)
     actions = Actions(state, parts).add((*scene.loads, *scene.effects))
     acting = actions.wrenches(Wrenches())
@@ -99,7 +124,9 @@ def make_bodies(scene: Scene, command: Command) -> thirteen.FreeBodies:
     return thirteen.FreeBodies(first, second, force, moment)
 
 
-def evaluate_balls(scene: Scene, command: Command, bits: int = FIFTY_DIGITS) -> Quantities:
+def evaluate_balls(
+    scene: Scene, command: Command, bits: int = FIFTY_DIGITS
+) -> Quantities:
     """Evaluate balls of the independent reference, (n,) objects."""
     from flint import arb, ctx
 
@@ -108,13 +135,21 @@ def evaluate_balls(scene: Scene, command: Command, bits: int = FIFTY_DIGITS) -> 
     before, ctx.prec = ctx.prec, bits
     try:
         outputs = []
-        for theta_2, branch in zip(command.theta_2.tolist(), command.branch.tolist(), strict=True):
-            x = {name: arb(value) for name, value in collect_inputs(scene, theta_2).items()}
+        for theta_2, branch in zip(
+            command.theta_2.tolist(), command.branch.tolist(), strict=True
+        ):
+            x = {
+                name: arb(value)
+                for name, value in collect_inputs(scene, theta_2).items()
+            }
             outputs.append(compute_outputs(scene, branch, x) or {})
     finally:
         ctx.prec = before
     out: Quantities = {"torque": [y.get("torque") for y in outputs]}
-    return out | {name: [(y.get(f"{name}_x"), y.get(f"{name}_y")) for y in outputs] for name in PIN_FORCES}
+    return out | {
+        name: [(y.get(f"{name}_x"), y.get(f"{name}_y")) for y in outputs]
+        for name in PIN_FORCES
+    }
 
 
 def compare_with_reference(
@@ -126,10 +161,23 @@ def compare_with_reference(
     for name in ("torque", *PIN_FORCES):
         sizes = scale_of(name, scene, formulas, getattr(formulas, name))
         errors = []
-        for ours, exact, size in zip(quantities[name], reference[name], sizes.tolist(), strict=True):
-            pairs = ((ours, exact),) if name == "torque" else tuple(zip(ours, exact, strict=True))
+        for ours, exact, size in zip(
+            quantities[name], reference[name], sizes.tolist(), strict=True
+        ):
+            pairs = (
+                ((ours, exact),)
+                if name == "torque"
+                else tuple(zip(ours, exact, strict=True))
+            )
             if all(y is not None for _, y in pairs):
-                errors.append(float(divide(math.hypot(*(_compute_difference(x, y) for x, y in pairs)), size)))
+                errors.append(
+                    float(
+                        divide(
+                            math.hypot(*(_compute_difference(x, y) for x, y in pairs)),
+                            size,
+                        )
+                    )
+                )
         worst[name] = find_greatest(errors)
     return WorstErrors(**worst)
 

@@ -24,7 +24,9 @@ JUMP = 10.0
 """An error so many times larger than at either of the two coarser settings is no part of a law, where it has met no
 floor: between neighbours of a ladder the laws here change it by 10 or less, and downwards."""
 FIRST_ORDER, FOURTH_ORDER = 1.0, 4.0
-EXPECTED_ORDER = dict.fromkeys(("Euler", "implicit", "implicitfast", "discrete"), FIRST_ORDER) | {"RK4": FOURTH_ORDER}
+EXPECTED_ORDER = dict.fromkeys(
+    ("Euler", "implicit", "implicitfast", "discrete"), FIRST_ORDER
+) | {"RK4": FOURTH_ORDER}
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,13 +51,19 @@ class ErrorLaw:
     @property
     def holds(self) -> bool:
         """Return whether the exponent is the expected one throughout; False if it is not decided."""
-        return self.decided and not self.jumps and abs(self.exponent - self.expected) <= max(2.0 * self.sigma, WITHIN)
+        return (
+            self.decided
+            and not self.jumps
+            and abs(self.exponent - self.expected) <= max(2.0 * self.sigma, WITHIN)
+        )
 
     def __str__(self) -> str:
         if self.jumps:
             return f"FAILS, {'; '.join(self.jumps)}"
         if not self.decided:
-            return f"no fit, {self.points} points above the floor and below {TOO_LARGE:g}"
+            return (
+                f"no fit, {self.points} points above the floor and below {TOO_LARGE:g}"
+            )
         return f"{'holds' if self.holds else 'FAILS'}, {self.exponent:.2f} +- {self.sigma:.2f}"
 
 
@@ -72,7 +80,10 @@ def write_laws(all_laws: Sequence[ErrorLaw]) -> list[str]:
 def _group(pairs: Sequence[tuple[str, str]]) -> list[str]:
     """Group quantities with the same text."""
     texts = dict.fromkeys(text for _, text in pairs)
-    return [f"{', '.join(quantity for quantity, text_of in pairs if text_of == text)}: {text}" for text in texts]
+    return [
+        f"{', '.join(quantity for quantity, text_of in pairs if text_of == text)}: {text}"
+        for text in texts
+    ]
 
 
 def fit(x: Sequence[float], y: Sequence[float]) -> tuple[float, float]:
@@ -86,7 +97,11 @@ def fit(x: Sequence[float], y: Sequence[float]) -> tuple[float, float]:
 def find_floor(points: Sequence[CostPoint], quantity: str) -> float | None:
     """Find the error that more steps no longer lessen; None where it still falls at the end of the ladder."""
     errors = [getattr(point, quantity) for point in _list_by_steps(points)]
-    if len(errors) < 2 or not math.isfinite(errors[-1]) or errors[-1] < FLOORED * errors[-2]:
+    if (
+        len(errors) < 2
+        or not math.isfinite(errors[-1])
+        or errors[-1] < FLOORED * errors[-2]
+    ):
         return None
     return float(errors[-1])  # before it two sources may cancel: a dip is not a floor
 
@@ -96,7 +111,11 @@ def find_steps_at_floor(points: Sequence[CostPoint], quantity: str) -> CostPoint
     least = find_floor(points, quantity)
     if least is None:
         return None
-    return next(point for point in _list_by_steps(points) if getattr(point, quantity) <= least / FLOORED)
+    return next(
+        point
+        for point in _list_by_steps(points)
+        if getattr(point, quantity) <= least / FLOORED
+    )
 
 
 def _list_by_steps(points: Sequence[CostPoint]) -> list[CostPoint]:
@@ -109,10 +128,15 @@ def find_jumps(points: Sequence[CostPoint], quantity: str) -> list[CostPoint]:
     for i, point in enumerate(points[1:], 1):
         value, before = (
             getattr(point, quantity),
-            [getattr(point_before, quantity) for point_before in points[max(i - 2, 0) : i]],
+            [
+                getattr(point_before, quantity)
+                for point_before in points[max(i - 2, 0) : i]
+            ],
         )
         # two sources that cancel make a dip, and its far side is no jump; a motion that is lost again is one
-        if before[-1] < TOO_LARGE and not value <= JUMP * (max(before) if value < TOO_LARGE else before[-1]):
+        if before[-1] < TOO_LARGE and not value <= JUMP * (
+            max(before) if value < TOO_LARGE else before[-1]
+        ):
             jumps.append(point)
     return jumps
 
@@ -120,7 +144,9 @@ def find_jumps(points: Sequence[CostPoint], quantity: str) -> list[CostPoint]:
 def fit_laws(curves: Mapping[str, Sequence[CostPoint]]) -> list[ErrorLaw]:
     """Fit every law that the study was laid out for, of each quantity, as far as its curves exist."""
     laws = []
-    one_state = [point for point in curves.get("one state", ()) if point.setting_value > 0.0]
+    one_state = [
+        point for point in curves.get("one state", ()) if point.setting_value > 0.0
+    ]
     ladders = [
         ("softness in (1-d)", curves.get("softness d", ()), 1.0),
         ("sag at 0.1 rad/s in (1-d)", curves.get("sag d, slow", ()), 1.0),
@@ -128,21 +154,47 @@ def fit_laws(curves: Mapping[str, Sequence[CostPoint]]) -> list[ErrorLaw]:
         ("MuJoCo at one state in (1-d)/d", one_state, 1.0),
     ]
     for integrator, order in EXPECTED_ORDER.items():
-        points, name = curves.get(f"{integrator}, tc held", ()), f"order of {integrator} in the timestep"
-        laws += [_fit_law(name, quantity, points, order, by_steps=True) for quantity in QUANTITIES if points]
-    laws += [_fit_law(name, quantity, points, n) for name, points, n in ladders for quantity in QUANTITIES if points]
-    return laws + [law for quantity in QUANTITIES if (law := _fit_stiff(curves, quantity)).points > 0]
+        points, name = (
+            curves.get(f"{integrator}, tc held", ()),
+            f"order of {integrator} in the timestep",
+        )
+        laws += [
+            _fit_law(name, quantity, points, order, by_steps=True)
+            for quantity in QUANTITIES
+            if points
+        ]
+    laws += [
+        _fit_law(name, quantity, points, n)
+        for name, points, n in ladders
+        for quantity in QUANTITIES
+        if points
+    ]
+    return laws + [
+        law
+        for quantity in QUANTITIES
+        if (law := _fit_stiff(curves, quantity)).points > 0
+    ]
 
 
 def _fit_law(
-    name: str, quantity: str, points: Sequence[CostPoint], expected: float, *, by_steps: bool = False
+    name: str,
+    quantity: str,
+    points: Sequence[CostPoint],
+    expected: float,
+    *,
+    by_steps: bool = False,
 ) -> ErrorLaw:
     least = (find_floor(points, quantity) or 0.0) if by_steps else 0.0
     ordered = sorted(
-        (p for p in points if p.setting_value > 0.0), key=lambda p: p.setting_value if by_steps else -p.setting_value
+        (p for p in points if p.setting_value > 0.0),
+        key=lambda p: p.setting_value if by_steps else -p.setting_value,
     )
-    leaps = tuple(_measure_leap(p, ordered, quantity) for p in find_jumps(ordered, quantity))
-    used = [p for p in ordered if ABOVE_FLOOR * least < getattr(p, quantity) < TOO_LARGE]
+    leaps = tuple(
+        _measure_leap(p, ordered, quantity) for p in find_jumps(ordered, quantity)
+    )
+    used = [
+        p for p in ordered if ABOVE_FLOOR * least < getattr(p, quantity) < TOO_LARGE
+    ]
     if len(used) < FEWEST:
         return ErrorLaw(name, quantity, math.nan, math.inf, expected, len(used), leaps)
     x = [1.0 / p.setting_value if by_steps else p.setting_value for p in used]
@@ -158,8 +210,15 @@ def _measure_leap(point: CostPoint, ladder: Sequence[CostPoint], quantity: str) 
 
 def _fit_stiff(curves: Mapping[str, Sequence[CostPoint]], quantity: str) -> ErrorLaw:
     """Fit RK4's floor: at a time constant of k steps it goes as k^-4, whatever the timestep."""
-    ladders = ((tc, curves.get(f"RK4, pads, tc = {tc:g} h", ())) for tc in (3.0, 10.0, 30.0, 100.0))
-    floors = {tc: least for tc, points in ladders if (least := find_floor(points, quantity)) is not None}
+    ladders = (
+        (tc, curves.get(f"RK4, pads, tc = {tc:g} h", ()))
+        for tc in (3.0, 10.0, 30.0, 100.0)
+    )
+    floors = {
+        tc: least
+        for tc, points in ladders
+        if (least := find_floor(points, quantity)) is not None
+    }
     name = "floor of RK4 in tc/h"
     if len(floors) < FEWEST:
         return ErrorLaw(name, quantity, math.nan, math.inf, -FOURTH_ORDER, len(floors))
@@ -172,28 +231,57 @@ def list_warnings(curves: Mapping[str, Sequence[CostPoint]]) -> list[str]:
     warnings = []
     for name, points in curves.items():
         ladder = _list_by_steps(
-            [p for p in points if p.kind == STEPPED and p.setting_value == p.setting_value and p.setting_value >= 2.0]
+            [
+                p
+                for p in points
+                if p.kind == STEPPED
+                and p.setting_value == p.setting_value
+                and p.setting_value >= 2.0
+            ]
         )
-        if name == "recommended" or len(ladder) < 4 or ladder[0].setting_value == ladder[-1].setting_value:
+        if (
+            name == "recommended"
+            or len(ladder) < 4
+            or ladder[0].setting_value == ladder[-1].setting_value
+        ):
             continue
         if len({round(p.steps_per_revolution) for p in ladder}) < 4:
             continue
-        leaps = [(q, _measure_leap(p, ladder, q)) for q in QUANTITIES for p in find_jumps(ladder, q)]
+        leaps = [
+            (q, _measure_leap(p, ladder, q))
+            for q in QUANTITIES
+            for p in find_jumps(ladder, q)
+        ]
         warnings += [f"{name}: {line}" for line in _group(leaps)]
-        floored = [(q, p) for q in QUANTITIES if (p := find_steps_at_floor(ladder, q)) is not None]
+        floored = [
+            (q, p)
+            for q in QUANTITIES
+            if (p := find_steps_at_floor(ladder, q)) is not None
+        ]
         if floored:
-            beyond = (f"{q} beyond {p.steps_per_revolution:.0f} ({find_floor(ladder, q):.1e})" for q, p in floored)
-            warnings.append(f"{name}: more steps per revolution buy nothing: {', '.join(beyond)}")
-        never = [q for q in QUANTITIES if not any(getattr(p, q) < TOO_LARGE for p in ladder)]
+            beyond = (
+                f"{q} beyond {p.steps_per_revolution:.0f} ({find_floor(ladder, q):.1e})"
+                for q, p in floored
+            )
+            warnings.append(
+                f"{name}: more steps per revolution buy nothing: {', '.join(beyond)}"
+            )
+        never = [
+            q for q in QUANTITIES if not any(getattr(p, q) < TOO_LARGE for p in ladder)
+        ]
         if never:
-            warnings.append(f"{name}: no timestep of the ladder brings {', '.join(never)} below {TOO_LARGE:g}")
+            warnings.append(
+                f"{name}: no timestep of the ladder brings {', '.join(never)} below {TOO_LARGE:g}"
+            )
     return warnings
 
 
 def find_pareto(points: Sequence[CostPoint], quantity: str) -> list[CostPoint]:
     """Find the points that no other beats in both error and cost, from cheap to accurate."""
     front: list[CostPoint] = []
-    for point in sorted(points, key=lambda p: (p.seconds_per_revolution, getattr(p, quantity))):
+    for point in sorted(
+        points, key=lambda p: (p.seconds_per_revolution, getattr(p, quantity))
+    ):
         if math.isfinite(getattr(point, quantity)) and (
             not front or getattr(point, quantity) < getattr(front[-1], quantity)
         ):

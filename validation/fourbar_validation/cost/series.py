@@ -55,7 +55,12 @@ class Curve:
     worst error would be that of the start (three to four times as large) at every setting."""
 
 
-BEST = Settings(steps_per_window=1, flywheel=FLYWHEEL, time_constant_steps=20.0, steps_per_revolution=MIDDLE)
+BEST = Settings(
+    steps_per_window=1,
+    flywheel=FLYWHEEL,
+    time_constant_steps=20.0,
+    steps_per_revolution=MIDDLE,
+)
 
 
 def trace(
@@ -66,11 +71,17 @@ def trace(
     build: Callable[[float], Build | None] = lambda _: None,
 ) -> Curve:
     """Make a curve over the values of a setting, each with its label, settings and build."""
-    return Curve(name, tuple(Spot(label.format(x), settings(x), build(x), x) for x in values))
+    return Curve(
+        name, tuple(Spot(label.format(x), settings(x), build(x), x) for x in values)
+    )
 
 
 def trace_steps(
-    name: str, settings: Settings, build: Build | None = None, steps: Iterable[int] = STEPS, held: float | None = None
+    name: str,
+    settings: Settings,
+    build: Build | None = None,
+    steps: Iterable[int] = STEPS,
+    held: float | None = None,
 ) -> Curve:
     """Make a curve over the timestep.
 
@@ -87,13 +98,27 @@ def trace_steps(
 
 def design_curves(scene: Scene) -> list[Curve]:
     """Design the curves of one scene."""
-    curves = [_vary_default_closure(name, abs(scene.motion.omega_2 or 1.0)) for name in INTEGRATORS]
-    for suffix, tc, held in (("pads, tc = 10 h", 10.0, None), ("tc held", 20.0, PART_OF_TURN)):
+    curves = [
+        _vary_default_closure(name, abs(scene.motion.omega_2 or 1.0))
+        for name in INTEGRATORS
+    ]
+    for suffix, tc, held in (
+        ("pads, tc = 10 h", 10.0, None),
+        ("tc held", 20.0, PART_OF_TURN),
+    ):
         for name in INTEGRATORS:
             settings = replace(BEST, integrator=name, time_constant_steps=tc)
-            curves.append(trace_steps(f"{name}, {suffix}", settings, None, _choose_ladder(name), held))
+            curves.append(
+                trace_steps(
+                    f"{name}, {suffix}", settings, None, _choose_ladder(name), held
+                )
+            )
     for tc in (3.0, 30.0, 100.0):
-        curves.append(trace_steps(f"RK4, pads, tc = {tc:g} h", replace(BEST, time_constant_steps=tc)))
+        curves.append(
+            trace_steps(
+                f"RK4, pads, tc = {tc:g} h", replace(BEST, time_constant_steps=tc)
+            )
+        )
     curves.append(trace_steps("RK4, no pads, tc = 10 h", PLAIN))
     curves += [*_vary_softness(), *_vary_tolerance()]
     return curves + (_vary_drives() if scene.motion.alpha_2 == 0.0 else [])
@@ -110,24 +135,50 @@ def _vary_default_closure(integrator: str, speed: float) -> Curve:
     """Vary MuJoCo's solref, solimp and solver around Euler at 2 ms, which a new user gets."""
     settings = replace(BEST, integrator=integrator, pad=None)
     curve = trace_steps(
-        f"{integrator}, MuJoCo's defaults", settings, drives.restore_defaults, _choose_ladder(integrator)
+        f"{integrator}, MuJoCo's defaults",
+        settings,
+        drives.restore_defaults,
+        _choose_ladder(integrator),
     )
     spots = list(curve.spots)
     if integrator == "Euler":
         n = 2.0 * math.pi / speed / DEFAULT_TIMESTEP
-        spots.append(Spot("MuJoCo's defaults", replace(settings, steps_per_revolution=n), drives.restore_defaults, n))
-    return replace(curve, spots=tuple(sorted(spots, key=lambda spot: spot.x)), settled=True)
+        spots.append(
+            Spot(
+                "MuJoCo's defaults",
+                replace(settings, steps_per_revolution=n),
+                drives.restore_defaults,
+                n,
+            )
+        )
+    return replace(
+        curve, spots=tuple(sorted(spots, key=lambda spot: spot.x)), settled=True
+    )
 
 
 def _vary_softness() -> list[Curve]:
-    by_d = tuple(Spot(f"d = {d:g}", replace(PLAIN, impedance=d), None, 1.0 - d) for d in IMPEDANCES)
+    by_d = tuple(
+        Spot(f"d = {d:g}", replace(PLAIN, impedance=d), None, 1.0 - d)
+        for d in IMPEDANCES
+    )
 
     def by_tc(name: str, impedance: float) -> Curve:
         return trace(
-            name, "tc = {:g} h", TIME_CONSTANTS, lambda tc: replace(PLAIN, impedance=impedance, time_constant_steps=tc)
+            name,
+            "tc = {:g} h",
+            TIME_CONSTANTS,
+            lambda tc: replace(PLAIN, impedance=impedance, time_constant_steps=tc),
         )
 
-    pads = (Spot("no pads" if f is None else f"pads {f:g}", replace(BEST, pad=f), None, f or 1.0) for f in PADS)
+    pads = (
+        Spot(
+            "no pads" if f is None else f"pads {f:g}",
+            replace(BEST, pad=f),
+            None,
+            f or 1.0,
+        )
+        for f in PADS
+    )
     return [
         Curve("softness d", by_d),
         by_tc("softness tc", PLAIN.impedance),
@@ -150,7 +201,14 @@ def _vary_tolerance() -> list[Curve]:
     for solver, iterations in (("Newton", 10), ("CG", 100), ("PGS", 100)):
         settings = replace(BEST, solver=solver, iterations=iterations)
         label = solver + ", tolerance {:g}"
-        curves.append(trace(f"tolerance, {solver}", label, TOLERANCES, lambda x, s=settings: replace(s, tolerance=x)))  # type: ignore[misc]
+        curves.append(
+            trace(
+                f"tolerance, {solver}",
+                label,
+                TOLERANCES,
+                lambda x, s=settings: replace(s, tolerance=x),  # type: ignore[misc]
+            )
+        )
     return curves
 
 
@@ -158,7 +216,10 @@ def _vary_drives() -> list[Curve]:
     """List each drive with the integrator that carries it."""
     light = replace(BEST, flywheel=1.0)
     fast = replace(light, integrator="implicitfast", time_constant_steps=3.0)
-    curves = [trace_steps(f"flywheel {f:g}, RK4", replace(BEST, flywheel=f)) for f in (1e2, 1e4, 1e6, 1e8)]
+    curves = [
+        trace_steps(f"flywheel {f:g}, RK4", replace(BEST, flywheel=f))
+        for f in (1e2, 1e4, 1e6, 1e8)
+    ]
     tried: list[tuple[str, Build]] = [
         ("joint equality, RK4", drives.WheelEquality),
         ("joint equality, softness edited, RK4", drives.StiffWheelEquality),

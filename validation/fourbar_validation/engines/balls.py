@@ -11,7 +11,16 @@ from typing import Any, NamedTuple, TypeAlias
 
 from flint import acb, arb, arb_mat, ctx
 
-from fourbar.effects import Flywheel, Friction, Gravity, LinearDrive, Springs, Table, Torsion, Viscous
+from fourbar.effects import (
+    Flywheel,
+    Friction,
+    Gravity,
+    LinearDrive,
+    Springs,
+    Table,
+    Torsion,
+    Viscous,
+)
 from fourbar.linkage import MOVING_BARS
 from fourbar.scene import Scene
 from fourbar_validation.engines.description import PINS, find_centre, find_inertia
@@ -53,7 +62,11 @@ def collect_inputs(scene: Scene, angle: float) -> dict[str, float]:
     link, motion = scene.linkage, scene.motion
     d, a, b, c = link.lengths
     values = {"d": d, "a": a, "b": b, "c": c, "theta_1": link.ground_angle}
-    values |= dict(zip(motion.names, (angle, motion.speed or 0.0, motion.acceleration), strict=True))
+    values |= dict(
+        zip(
+            motion.names, (angle, motion.speed or 0.0, motion.acceleration), strict=True
+        )
+    )
     if scene.drive is not None:
         for name, point in zip(ENDS, (scene.drive.start, scene.drive.end), strict=True):
             values |= {name: point.distance, f"{name}_angle": point.angle}
@@ -76,22 +89,37 @@ def collect_inputs(scene: Scene, angle: float) -> dict[str, float]:
             values["J"] = effect.inertia
         elif isinstance(effect, Torsion):
             for pin, stiffness, rest, preload in effect.springs:
-                values |= {f"torsion_{pin}": stiffness, f"rest_{pin}": rest, f"wound_{pin}": preload}
+                values |= {
+                    f"torsion_{pin}": stiffness,
+                    f"rest_{pin}": rest,
+                    f"wound_{pin}": preload,
+                }
         elif isinstance(effect, Springs):
             for k, spring in enumerate(effect.springs):
-                values |= {f"stiffness_{k}": spring.stiffness, f"length_{k}": spring.length}
+                values |= {
+                    f"stiffness_{k}": spring.stiffness,
+                    f"length_{k}": spring.length,
+                }
                 values[f"pull_{k}"] = spring.preload
                 for end, point in (("start", spring.start), ("end", spring.end)):
-                    values |= {f"{end}_{k}": point.distance, f"{end}_angle_{k}": point.angle}
+                    values |= {
+                        f"{end}_{k}": point.distance,
+                        f"{end}_angle_{k}": point.angle,
+                    }
         else:
-            raise NotImplementedError(f"the reference knows no effect {type(effect).__name__}")
+            raise NotImplementedError(
+                f"the reference knows no effect {type(effect).__name__}"
+            )
     return values
 
 
 def make_balls(scene: Scene, angle: float, **motion: float) -> Values:
     """Give the inputs as balls of no radius, with another omega_2 or alpha_2 where given; set the working precision."""
     ctx.prec = BITS
-    return {name: arb(value) for name, value in (collect_inputs(scene, angle) | motion).items()}
+    return {
+        name: arb(value)
+        for name, value in (collect_inputs(scene, angle) | motion).items()
+    }
 
 
 def closure(x: Values, branch: int) -> tuple[Complex, Complex, Complex] | None:
@@ -107,14 +135,22 @@ def closure(x: Values, branch: int) -> tuple[Complex, Complex, Complex] | None:
     w = polar(arb(1), x[f"theta_{bar}"])
     D = polar(d, x["theta_1"]) + side * held * w
     # |D|^2 by the angle between ground and input: where they are in line it is exact, and so is a loop that just closes
-    squared = d**2 + held**2 + side * 2 * d * held * (x[f"theta_{bar}"] - x["theta_1"]).cos()
+    squared = (
+        d**2 + held**2 + side * 2 * d * held * (x[f"theta_{bar}"] - x["theta_1"]).cos()
+    )
     K = squared + b * b - c * c
     discriminant = 4 * b * b * squared - K * K
     if discriminant < 0:  # an undecided one has no root, and what follows is NaN
         return None
     first = acb(K, branch * discriminant.sqrt()) * D / (2 * b * squared)
     second = (b * first - D) / c
-    return (w, first, second) if bar == 2 else (first, w, second) if bar == 3 else (-second, first, w)
+    return (
+        (w, first, second)
+        if bar == 2
+        else (first, w, second)
+        if bar == 3
+        else (-second, first, w)
+    )
 
 
 def find_commanded(x: Values) -> int:
@@ -137,19 +173,36 @@ def compute_outputs(scene: Scene, branch: int, inputs: Values) -> Values | None:
     w = dict(zip(MOVING_BARS, directions, strict=True))
     commanded = find_commanded(x)
     sines = {2: wedge(w[3], w[4]), 3: wedge(w[2], w[4]), 4: wedge(w[2], w[3])}
-    y: Values = {f"theta_{bar}": w[bar].arg() for bar in MOVING_BARS if f"theta_{bar}" not in inputs}
+    y: Values = {
+        f"theta_{bar}": w[bar].arg()
+        for bar in MOVING_BARS
+        if f"theta_{bar}" not in inputs
+    }
     y |= {"sin_mu": sines[2], "condition": abs(sines[commanded]) * x.get("lever", 1)}
-    if not y["condition"] > 0:  # singular; NaN where A lies on O4, about which bars 3 and 4 then turn freely
+    if (
+        not y["condition"] > 0
+    ):  # singular; NaN where A lies on O4, about which bars 3 and 4 then turn freely
         return y
     bars = _move(x, w, commanded)
     y |= {f"omega_{bar}": bars.omega[bar] for bar in MOVING_BARS}
     y |= {f"alpha_{bar}": bars.alpha[bar] for bar in MOVING_BARS}
     _put(y, bars.points())
-    line = find_line(scene.drive, x, bars.directions(x), bars.first_pin) if scene.drive else None
+    line = (
+        find_line(scene.drive, x, bars.directions(x), bars.first_pin)
+        if scene.drive
+        else None
+    )
     if line is None:
-        drive, y["drive_condition"], speed = "torque", abs(sines[scene.drive_bar]), bars.omega[scene.drive_bar]
+        drive, y["drive_condition"], speed = (
+            "torque",
+            abs(sines[scene.drive_bar]),
+            bars.omega[scene.drive_bar],
+        )
     else:
-        drive, y["drive_condition"] = "drive_force", compute_condition(line, x, bars.tip[2], sines)
+        drive, y["drive_condition"] = (
+            "drive_force",
+            compute_condition(line, x, bars.tip[2], sines),
+        )
         speed = line.speed({1: acb(0), **bars.v_pin}, {1: arb(0), **bars.omega})
         y |= {"stroke": line.stroke, "stroke_speed": speed}
         _put(y, {"drive_line": line.line})
@@ -218,8 +271,14 @@ def _move(x: Values, w: dict[int, Complex], commanded: int) -> BallBars:
 
     def rates(stated: Ball, total: Complex) -> dict[int, Ball]:
         """Solve for the rates of the other bars, where the sum of i side rate is `total`."""
-        u, v, rest = acb(0, 1) * side[first], acb(0, 1) * side[second], total - acb(0, stated) * side[commanded]
-        solved = solve_linear([[u.real, v.real], [u.imag, v.imag]], [rest.real, rest.imag])
+        u, v, rest = (
+            acb(0, 1) * side[first],
+            acb(0, 1) * side[second],
+            total - acb(0, stated) * side[commanded],
+        )
+        solved = solve_linear(
+            [[u.real, v.real], [u.imag, v.imag]], [rest.real, rest.imag]
+        )
         return {commanded: stated, **dict(zip((first, second), solved, strict=True))}
 
     # a probe opens the loop by slip, m/s, and jerk, m/s^2
@@ -231,19 +290,33 @@ def _move(x: Values, w: dict[int, Complex], commanded: int) -> BallBars:
     centre = {bar: w[bar] * polar(x[f"r{bar}"], x[f"phi{bar}"]) for bar in MOVING_BARS}
     v_A, a_A = acb(0, omega[2]) * tip[2], acb(-omega[2] * omega[2], alpha[2]) * tip[2]
     at_rest = {2: zero, 4: zero}
-    return BallBars(w, omega, alpha, tip, first_pin, centre, at_rest | {3: v_A}, at_rest | {3: a_A})
+    return BallBars(
+        w, omega, alpha, tip, first_pin, centre, at_rest | {3: v_A}, at_rest | {3: a_A}
+    )
 
 
-def _sum_acting(scene: Scene, x: Values, bars: BallBars) -> tuple[dict[int, Complex], dict[int, Ball]]:
+def _sum_acting(
+    scene: Scene, x: Values, bars: BallBars
+) -> tuple[dict[int, Complex], dict[int, Ball]]:
     """Sum what acts on each bar: a force, and a moment about the mass centre."""
     w, first_pin, centre = bars.directions(x), bars.first_pin, bars.centre
-    force = {bar: x[f"m{bar}"] * polar(x["g"], x["g_angle"]) if "g" in x else acb(0) for bar in MOVING_BARS}
-    moment = {bar: x.get(f"couple_{bar}", arb(0)) for bar in MOVING_BARS}  # a probe may add one
+    force = {
+        bar: x[f"m{bar}"] * polar(x["g"], x["g_angle"]) if "g" in x else acb(0)
+        for bar in MOVING_BARS
+    }
+    moment = {
+        bar: x.get(f"couple_{bar}", arb(0)) for bar in MOVING_BARS
+    }  # a probe may add one
     for k, load in enumerate(scene.loads):
         theta_2 = x.get("theta_2", w[2].arg())
-        factor = _interpolate_factor(load.table, theta_2, x, k) if load.table else arb(1)
+        factor = (
+            _interpolate_factor(load.table, theta_2, x, k) if load.table else arb(1)
+        )
         axes = w[load.bar] if load.frame == "bar" else acb(1)
-        f, arm = (axes * polar(x[f"{name}_{k}"], x[f"{name}_angle_{k}"]) for name in ("F", "at"))
+        f, arm = (
+            axes * polar(x[f"{name}_{k}"], x[f"{name}_angle_{k}"])
+            for name in ("F", "at")
+        )
         force[load.bar] += factor * f
         moment[load.bar] += factor * (wedge(arm, f) + x[f"M_{k}"])
     for effect in scene.effects:
@@ -252,8 +325,12 @@ def _sum_acting(scene: Scene, x: Values, bars: BallBars) -> tuple[dict[int, Comp
         elif isinstance(effect, Torsion):
             for pin, *_ in effect.springs:
                 i, j = PINS[pin]
-                turned = (w[j] * w[i].conjugate() * polar(arb(1), -x[f"rest_{pin}"])).arg()
-                _add_twist(moment, pin, -x[f"wound_{pin}"] - x[f"torsion_{pin}"] * turned)
+                turned = (
+                    w[j] * w[i].conjugate() * polar(arb(1), -x[f"rest_{pin}"])
+                ).arg()
+                _add_twist(
+                    moment, pin, -x[f"wound_{pin}"] - x[f"torsion_{pin}"] * turned
+                )
         elif isinstance(effect, Springs):
             for k, spring in enumerate(effect.springs):
                 start, end = spring.start.bar, spring.end.bar
@@ -262,11 +339,15 @@ def _sum_acting(scene: Scene, x: Values, bars: BallBars) -> tuple[dict[int, Comp
                     for bar, name in ((start, "start"), (end, "end"))
                 ]
                 across = first_pin[end] + arms[1] - first_pin[start] - arms[0]
-                if spring.preload == spring.stiffness * spring.length:  # k times the distance, wherever that ends
+                if (
+                    spring.preload == spring.stiffness * spring.length
+                ):  # k times the distance, wherever that ends
                     pull = x[f"stiffness_{k}"] * across
                 else:
                     distance = abs(across)
-                    tension = x[f"pull_{k}"] + x[f"stiffness_{k}"] * (distance - x[f"length_{k}"])
+                    tension = x[f"pull_{k}"] + x[f"stiffness_{k}"] * (
+                        distance - x[f"length_{k}"]
+                    )
                     pull = tension / distance * across
                 for bar, arm, f in ((start, arms[0], pull), (end, arms[1], -pull)):
                     if bar in force:
@@ -274,8 +355,19 @@ def _sum_acting(scene: Scene, x: Values, bars: BallBars) -> tuple[dict[int, Comp
                         moment[bar] += wedge(arm - centre[bar], f)
     for pin, (i, j) in PINS.items():
         slip = bars.omega.get(j, 0) - bars.omega.get(i, 0)
-        sign = arb(1) if slip > 0 else arb(-1) if slip < 0 else arb(0) if slip == 0 else arb(0, 1)
-        couple = -x.get(f"viscous_{pin}", arb(0)) * slip - x.get(f"friction_{pin}", arb(0)) * sign
+        sign = (
+            arb(1)
+            if slip > 0
+            else arb(-1)
+            if slip < 0
+            else arb(0)
+            if slip == 0
+            else arb(0, 1)
+        )
+        couple = (
+            -x.get(f"viscous_{pin}", arb(0)) * slip
+            - x.get(f"friction_{pin}", arb(0)) * sign
+        )
         _add_twist(moment, pin, couple)
     return force, moment
 
@@ -294,24 +386,37 @@ def _solve_thirteen(
     """
     at_pin = {bar: -bars.centre[bar] for bar in MOVING_BARS}
     at_tip = {bar: bars.tip[bar] - bars.centre[bar] for bar in MOVING_BARS}
-    joints = {2: ((0, at_pin), (1, at_tip)), 3: ((2, at_pin), (3, at_tip)), 4: ((4, at_tip), (5, at_pin))}
+    joints = {
+        2: ((0, at_pin), (1, at_tip)),
+        3: ((2, at_pin), (3, at_tip)),
+        4: ((4, at_tip), (5, at_pin)),
+    }
     matrix = [[arb(0)] * 13 for _ in range(13)]
     constants = []
     for n, bar in enumerate(MOVING_BARS):
         for column, arms in joints[bar]:
             arm = arms[bar]
             matrix[3 * n][2 * column] = matrix[3 * n + 1][2 * column + 1] = arb(1)
-            matrix[3 * n + 2][2 * column], matrix[3 * n + 2][2 * column + 1] = -arm.imag, arm.real
+            matrix[3 * n + 2][2 * column], matrix[3 * n + 2][2 * column + 1] = (
+                -arm.imag,
+                arm.real,
+            )
         for row, value in enumerate(drives[bar], start=3 * n):
             matrix[row][12] = value
         needed = x[f"m{bar}"] * bars.acceleration(bar) - force[bar]
-        constants += [needed.real, needed.imag, x[f"I{bar}"] * bars.alpha[bar] - moment[bar]]
+        constants += [
+            needed.real,
+            needed.imag,
+            x[f"I{bar}"] * bars.alpha[bar] - moment[bar],
+        ]
     for row, (i, j) in enumerate(((2, 4), (3, 5), (6, 8), (7, 9)), start=9):
         matrix[row][i] = matrix[row][j] = arb(1)
         constants.append(arb(0))
     solved = solve_linear(matrix, constants)
     columns = {"F12": 0, "F32": 1, "F43": 3, "F14": 5}
-    return {name: acb(solved[2 * k], solved[2 * k + 1]) for name, k in columns.items()}, solved[12]
+    return {
+        name: acb(solved[2 * k], solved[2 * k + 1]) for name, k in columns.items()
+    }, solved[12]
 
 
 def _put(y: Values, vectors: dict[str, Complex]) -> None:
@@ -335,10 +440,16 @@ def _interpolate_factor(table: Table, theta_2: Ball, x: Values, k: int) -> Ball:
     """
     turns = math.floor((float(theta_2.mid()) - table.theta_2[0]) / math.tau + 1e-12)
     angle = theta_2 - 2 * turns * arb.pi()
-    after = min(max(bisect(table.theta_2, float(angle.mid())), 1), len(table.theta_2) - 1)
-    piece = (*table.theta_2[after - 1 : after + 1], *table.factor[after - 1 : after + 1])
+    after = min(
+        max(bisect(table.theta_2, float(angle.mid())), 1), len(table.theta_2) - 1
+    )
+    piece = (
+        *table.theta_2[after - 1 : after + 1],
+        *table.factor[after - 1 : after + 1],
+    )
     start, stop, first, last = (
-        arb(value) * x.get(f"{name}_{k}", 1) for name, value in zip(OF_PIECE, piece, strict=True)
+        arb(value) * x.get(f"{name}_{k}", 1)
+        for name, value in zip(OF_PIECE, piece, strict=True)
     )
     return first + (last - first) * (angle - start) / (stop - start)
 
@@ -350,7 +461,9 @@ def turn_by_stroke(scene: Scene, x: Values) -> Values | None:
     """
     drive, motion = scene.drive, scene.motion
     assert drive is not None and motion.side is not None
-    (_, on_ground), (bar, on_bar) = sorted(zip((drive.start.bar, drive.end.bar), ENDS, strict=True))
+    (_, on_ground), (bar, on_bar) = sorted(
+        zip((drive.start.bar, drive.end.bar), ENDS, strict=True)
+    )
     held = polar(x[on_bar], x[f"{on_bar}_angle"])
     fixed = polar(x[on_ground], x[f"{on_ground}_angle"] + x["theta_1"])
     if bar == 4:
@@ -359,12 +472,18 @@ def turn_by_stroke(scene: Scene, x: Values) -> Values | None:
     cosine = (length**2 + reach**2 - s**2) / (2 * length * reach)
     if abs(cosine) > 1:
         return None
-    beta, side = cosine.acos(), 1 if motion.side == "left" else -1  # to the left the stroke grows with the angle
+    beta, side = (
+        cosine.acos(),
+        1 if motion.side == "left" else -1,
+    )  # to the left the stroke grows with the angle
     across, along = length * reach * beta.sin(), length * reach * cosine
     rate = s * speed / across
     growth = (speed**2 + s * x["stroke_acceleration"] - along * rate**2) / across
     lever = across / s / (length if length > reach else reach)
-    turned = {f"theta_{bar}": fixed.arg() - held.arg() + side * beta, f"omega_{bar}": side * rate}
+    turned = {
+        f"theta_{bar}": fixed.arg() - held.arg() + side * beta,
+        f"omega_{bar}": side * rate,
+    }
     return x | turned | {f"alpha_{bar}": side * growth, "lever": lever}
 
 
@@ -381,7 +500,10 @@ class BallLine(NamedTuple):
 
     def speed(self, foot: dict[int, Complex], omega: dict[int, Ball]) -> Ball:
         """Return ds/dt from the speeds of the bars' first pins and the bars' angular speeds."""
-        ends = (sense * (foot[k] + acb(0, omega[k]) * self.arms[k]) for k, sense in self.sense.items())
+        ends = (
+            sense * (foot[k] + acb(0, omega[k]) * self.arms[k])
+            for k, sense in self.sense.items()
+        )
         return dot(self.line, sum(ends, acb(0)))
 
     def push(self, bar: int, centre: Complex) -> tuple[Ball, Ball, Ball]:
@@ -392,16 +514,25 @@ class BallLine(NamedTuple):
         return force.real, force.imag, wedge(self.arms[bar] - centre, force)
 
 
-def find_line(drive: LinearDrive, x: Values, w: dict[int, Complex], first_pin: dict[int, Complex]) -> BallLine:
+def find_line(
+    drive: LinearDrive, x: Values, w: dict[int, Complex], first_pin: dict[int, Complex]
+) -> BallLine:
     """Find the line of a drive from the directions and first pins of all bars, the ground's too."""
     bars = drive.start.bar, drive.end.bar
-    arms = {k: w[k] * polar(x[name], x[f"{name}_angle"]) for k, name in zip(bars, ENDS, strict=True)}
+    arms = {
+        k: w[k] * polar(x[name], x[f"{name}_angle"])
+        for k, name in zip(bars, ENDS, strict=True)
+    }
     start, end = (first_pin[k] + arms[k] for k in bars)
     stroke = abs(end - start)
-    return BallLine(stroke, (end - start) / stroke, arms, dict(zip(bars, (-1, 1), strict=True)))
+    return BallLine(
+        stroke, (end - start) / stroke, arms, dict(zip(bars, (-1, 1), strict=True))
+    )
 
 
-def compute_condition(line: BallLine, x: Values, tip: Complex, sines: dict[int, Ball]) -> Ball:
+def compute_condition(
+    line: BallLine, x: Values, tip: Complex, sines: dict[int, Ball]
+) -> Ball:
     """Compute |P|/L, P the stroke's speed with (sin mu, (a/b) sin(theta_2 - theta_4), (a/c) sin(theta_2 - theta_3)).
 
     L is the sum of what each end could move: r on bar 2, a + r a/b on bar 3, r a/c on bar 4, `tip` is A.
@@ -410,5 +541,7 @@ def compute_condition(line: BallLine, x: Values, tip: Complex, sines: dict[int, 
     turning = {1: arb(0), 2: sines[2], 3: -a / b * sines[3], 4: -a / c * sines[4]}
     foot = {1: acb(0), 2: acb(0), 3: acb(0, turning[2]) * tip, 4: acb(0)}
     most = {1: (0, 0), 2: (0, 1), 3: (a, a / b), 4: (0, a / c)}
-    reach = sum((most[k][0] + most[k][1] * abs(arm) for k, arm in line.arms.items()), arb(0))
+    reach = sum(
+        (most[k][0] + most[k][1] * abs(arm) for k, arm in line.arms.items()), arb(0)
+    )
     return abs(line.speed(foot, turning)) / reach

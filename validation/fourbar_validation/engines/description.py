@@ -70,7 +70,9 @@ def resolve(size: float, angle: float) -> tuple[float, float]:
 
 def reduce_angle(angle: float) -> float:
     """Reduce an angle to its direction, rad: sums with others then lose none of its digits."""
-    return angle if abs(angle) <= math.pi else math.atan2(math.sin(angle), math.cos(angle))
+    return (
+        angle if abs(angle) <= math.pi else math.atan2(math.sin(angle), math.cos(angle))
+    )
 
 
 def rotate(angle: float, x: float, y: float) -> tuple[float, float]:
@@ -79,7 +81,9 @@ def rotate(angle: float, x: float, y: float) -> tuple[float, float]:
     return rotate_by(((cos, -sin), (sin, cos)), x, y)
 
 
-def rotate_by(rotation: Sequence[Sequence[float]], x: float, y: float) -> tuple[float, float]:
+def rotate_by(
+    rotation: Sequence[Sequence[float]], x: float, y: float
+) -> tuple[float, float]:
     """Rotate a vector by a matrix of two rows."""
     (a, b), (c, d) = rotation
     return a * x + b * y, c * x + d * y
@@ -88,7 +92,9 @@ def rotate_by(rotation: Sequence[Sequence[float]], x: float, y: float) -> tuple[
 def find_field(gravity: Gravity) -> tuple[float, float]:
     """Return (g_x, g_y), m/s^2; the angle counts from +x, counter-clockwise."""
     x, y = math.cos(gravity.angle), math.sin(gravity.angle)
-    return gravity.magnitude * (x if abs(x) > TELLS else 0.0), gravity.magnitude * (y if abs(y) > TELLS else 0.0)
+    return gravity.magnitude * (x if abs(x) > TELLS else 0.0), gravity.magnitude * (
+        y if abs(y) > TELLS else 0.0
+    )
 
 
 class Part(NamedTuple):
@@ -115,13 +121,30 @@ class Part(NamedTuple):
 def list_parts(linkage: FourBar) -> list[Part]:
     """Describe bars 2, 3 on 2, and 4."""
     theta_1, d = linkage.ground_angle, linkage.ground
-    first_pins = {2: (1, (0.0, 0.0)), 3: (2, (linkage.input.length, 0.0)), 4: (1, resolve(d, theta_1))}
+    first_pins = {
+        2: (1, (0.0, 0.0)),
+        3: (2, (linkage.input.length, 0.0)),
+        4: (1, resolve(d, theta_1)),
+    }
     parts_of_bars = []
     for number in MOVING_BARS:
         bar = linkage.bar(number)
-        ends = {"first_pin": (0.0, 0.0), "G": resolve(*find_centre(bar)), "end": (bar.length, 0.0)}
+        ends = {
+            "first_pin": (0.0, 0.0),
+            "G": resolve(*find_centre(bar)),
+            "end": (bar.length, 0.0),
+        }
         points = {f"{name}{number}": place_of for name, place_of in ends.items()}
-        parts_of_bars.append(Part(number, *first_pins[number], bar.mass, find_inertia(bar), bar.length, points))
+        parts_of_bars.append(
+            Part(
+                number,
+                *first_pins[number],
+                bar.mass,
+                find_inertia(bar),
+                bar.length,
+                points,
+            )
+        )
     return parts_of_bars
 
 
@@ -133,8 +156,12 @@ def place(point: Any, ground_angle: float) -> tuple[float, float]:
 
 def list_speeds(command: Command) -> tuple[Array, Array]:
     """Return speed and acceleration of the commanded bar at each position, (n,); a speed that is not stated is 0."""
-    rates = (0.0 if rate is None else rate for rate in (command.speed, command.acceleration))
-    omega, alpha = (np.broadcast_to(np.asarray(rate, float), command.angle.shape) for rate in rates)
+    rates = (
+        0.0 if rate is None else rate for rate in (command.speed, command.acceleration)
+    )
+    omega, alpha = (
+        np.broadcast_to(np.asarray(rate, float), command.angle.shape) for rate in rates
+    )
     return omega, alpha
 
 
@@ -156,5 +183,10 @@ def find_unknown(scene: Scene, table: Container[str], *, linear: bool = False) -
     if scene.drive is not None and scene.motion.free is None and not linear:
         return "the linear drive (drive.from, drive.to) has no model here"
     return next(
-        (f"the effect {effect.key!r} has no model here" for effect in scene.effects if effect.key not in table), ""
+        (
+            f"the effect {effect.key!r} has no model here"
+            for effect in scene.effects
+            if effect.key not in table
+        ),
+        "",
     )

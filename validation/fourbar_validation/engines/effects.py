@@ -16,7 +16,17 @@ from fourbar_validation.engines.description import PINS, find_field, resolve
 from fourbar_validation.engines.loaded import Act, Loaded
 
 if TYPE_CHECKING:
-    from fourbar.effects import Flywheel, Friction, Gravity, Load, PinFriction, Springs, Table, Torsion, Viscous
+    from fourbar.effects import (
+        Flywheel,
+        Friction,
+        Gravity,
+        Load,
+        PinFriction,
+        Springs,
+        Table,
+        Torsion,
+        Viscous,
+    )
 
 
 def _set_gravity(effect: "Gravity", bars: Loaded) -> None:
@@ -52,7 +62,14 @@ def _apply_friction(effect: "Friction", bars: Loaded) -> None:
 def _pin_friction(effect: "PinFriction", bars: Loaded) -> None:
     """Apply couples of mu r times the load that the engine computed at the pin in its last pass."""
     for pin, mu, r in effect.pins:
-        _apply_twist(bars, pin, mu * r * bars.pin_loads.get(pin, 0.0) * float(np.sign(_compute_slip(bars, pin))))
+        _apply_twist(
+            bars,
+            pin,
+            mu
+            * r
+            * bars.pin_loads.get(pin, 0.0)
+            * float(np.sign(_compute_slip(bars, pin))),
+        )
 
 
 def _apply_torsion(effect: "Torsion", bars: Loaded) -> None:
@@ -85,7 +102,10 @@ def _apply_flywheel(effect: "Flywheel", bars: Loaded) -> None:
 
 def _load(load: "Load", bars: Loaded) -> None:
     """Apply a force at its point and a couple; in the bar's frame both vectors rotate with the engine's bar."""
-    force, arm = np.array(resolve(*(load.force or (0.0, 0.0)))), np.array(resolve(*load.at))
+    force, arm = (
+        np.array(resolve(*(load.force or (0.0, 0.0)))),
+        np.array(resolve(*load.at)),
+    )
     factor = 1.0 if load.table is None else look_up(load.table, bars.angle(2))
     if load.frame == "bar":
         f, point = bars.rotate(load.bar, *force), bars.rotate(load.bar, *arm)
@@ -97,7 +117,9 @@ def _load(load: "Load", bars: Loaded) -> None:
 
 def look_up(table: "Table", theta_2: float) -> float:
     """Interpolate a table at one angle, by the two neighbours' chord, apart from the formulas' `at`."""
-    angle = table.theta_2[0] + math.fmod(math.fmod(theta_2 - table.theta_2[0], math.tau) + math.tau, math.tau)
+    angle = table.theta_2[0] + math.fmod(
+        math.fmod(theta_2 - table.theta_2[0], math.tau) + math.tau, math.tau
+    )
     k = min(max(bisect.bisect_right(table.theta_2, angle), 1), len(table.theta_2) - 1)
     (a, b), (f, g) = table.theta_2[k - 1 : k + 1], table.factor[k - 1 : k + 1]
     return (f * (b - angle) + g * (angle - a)) / (b - a)

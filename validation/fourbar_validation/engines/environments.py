@@ -24,8 +24,19 @@ from fourbar_validation.engines.registry import FOLDERS, Engine
 FILE = "engines.toml"
 LARGEST_FILE = 10**6
 """Bytes."""
-CACHE = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "fourbar-engines"
-HELD = ("tolerance", "answers", "positions", "through_time", "predictor", "residuals", "nearby", "stated")
+CACHE = (
+    Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "fourbar-engines"
+)
+HELD = (
+    "tolerance",
+    "answers",
+    "positions",
+    "through_time",
+    "predictor",
+    "residuals",
+    "nearby",
+    "stated",
+)
 """Fields of an engine that an adapter of ours keeps in every environment."""
 DONE = "installed"
 """File in the folder of an environment that is complete."""
@@ -53,9 +64,15 @@ class Entry:
 def read_engines(folders: Iterable[Path]) -> dict[str, Entry]:
     """Read engines.toml of these folders, of the package and of the lab, by name; InputError for what is no entry."""
     entries: dict[str, Entry] = {}
-    for file in dict.fromkeys(folder / FILE for folder in (*folders, Path(__file__).parent, *FOLDERS)):
+    for file in dict.fromkeys(
+        folder / FILE for folder in (*folders, Path(__file__).parent, *FOLDERS)
+    ):
         if file.is_file():
-            entries = entries | {name: entry for name, entry in read_engines_of(file).items() if name not in entries}
+            entries = entries | {
+                name: entry
+                for name, entry in read_engines_of(file).items()
+                if name not in entries
+            }
     return entries
 
 
@@ -76,7 +93,9 @@ def read_engines_of(file: Path) -> dict[str, Entry]:
 def _read_entry(file: Path, table: object) -> Entry:
     texts, lists = ("name", "adapter", "python", "setting"), ("command", "requires")
     if not isinstance(table, dict) or not table.get("name"):
-        raise InputError("engine", table, "must be a table [[engine]] with a name", str(file))
+        raise InputError(
+            "engine", table, "must be a table [[engine]] with a name", str(file)
+        )
     for key, value in table.items():
         if key == "steps" or key in lists:
             kind = int if key == "steps" else str
@@ -87,8 +106,13 @@ def _read_entry(file: Path, table: object) -> Entry:
             allowed = f"allowed: {', '.join(texts)} (texts), {', '.join(lists)} (lists of texts), steps (whole numbers)"
             raise InputError(f"engine.{key}", value, allowed, str(file))
     if bool(table.get("adapter")) == bool(table.get("command")):
-        raise InputError("engine", table["name"], "must have an adapter or a command", str(file))
-    stated: dict[str, Any] = {key: tuple(value) if isinstance(value, list) else value for key, value in table.items()}
+        raise InputError(
+            "engine", table["name"], "must have an adapter or a command", str(file)
+        )
+    stated: dict[str, Any] = {
+        key: tuple(value) if isinstance(value, list) else value
+        for key, value in table.items()
+    }
     return Entry(**stated)
 
 
@@ -103,23 +127,50 @@ def make_environment(entry: Entry, cache: Path = CACHE) -> str:
     python = shutil.which(entry.python) if entry.python else sys.executable
     if python is None:
         raise DependencyError(f"{entry.name}: no {entry.python} is found")
-    needed = [text for text in requires("fourbar") or [] if "extra ==" not in text] if entry.python else []
+    needed = (
+        [text for text in requires("fourbar") or [] if "extra ==" not in text]
+        if entry.python
+        else []
+    )
     wanted = [*entry.requires, *needed]
-    key = hashlib.sha256(repr((python, sys.version_info[:2], sys.prefix, wanted)).encode()).hexdigest()[:12]
-    folder = cache / f"{re.sub(r'[^a-zA-Z0-9.]+', '-', ' '.join(entry.requires) or entry.python)[:40]}-{key}"
+    key = hashlib.sha256(
+        repr((python, sys.version_info[:2], sys.prefix, wanted)).encode()
+    ).hexdigest()[:12]
+    folder = (
+        cache
+        / f"{re.sub(r'[^a-zA-Z0-9.]+', '-', ' '.join(entry.requires) or entry.python)[:40]}-{key}"
+    )
     inside = folder / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
     cache.mkdir(parents=True, exist_ok=True)
     with FileLock(f"{folder}.lock"):
         if not (folder / DONE).is_file():
-            pip = [sys.executable, "-m", "pip", "--python", inside, "--disable-pip-version-check", "install", *wanted]
-            for line in ([python, "-m", "venv", "--clear", "--without-pip", folder], pip):
+            pip = [
+                sys.executable,
+                "-m",
+                "pip",
+                "--python",
+                inside,
+                "--disable-pip-version-check",
+                "install",
+                *wanted,
+            ]
+            for line in (
+                [python, "-m", "venv", "--clear", "--without-pip", folder],
+                pip,
+            ):
                 if why := run_to_end(line).why:
-                    raise DependencyError(f"{entry.name}: its environment cannot be made: {why}")
+                    raise DependencyError(
+                        f"{entry.name}: its environment cannot be made: {why}"
+                    )
             if not entry.python:
                 (site,) = folder.rglob("site-packages")
-                ours = dict.fromkeys(sysconfig.get_path(name) for name in ("purelib", "platlib"))
+                ours = dict.fromkeys(
+                    sysconfig.get_path(name) for name in ("purelib", "platlib")
+                )
                 lines = [f"import site; site.addsitedir({path!r})\n" for path in ours]
-                write_text(site / "zz_of_the_harness.pth", "".join(lines))  # read after all others
+                write_text(
+                    site / "zz_of_the_harness.pth", "".join(lines)
+                )  # read after all others
             (folder / DONE).touch()
     return str(inside)
 
@@ -129,7 +180,10 @@ def prepare_program(entry: Entry, seconds: float | None = None) -> Program:
     python = make_environment(entry)
     if entry.adapter:
         return serve(entry.adapter, seconds, python)
-    program = shutil.which(entry.command[0], path=f"{Path(python).parent}{os.pathsep}{os.environ.get('PATH')}")
+    program = shutil.which(
+        entry.command[0],
+        path=f"{Path(python).parent}{os.pathsep}{os.environ.get('PATH')}",
+    )
     if program is None:
         raise InputError("engine.command", entry.command[0], "no such program", FILE)
     return Program((program, *entry.command[1:]), seconds)
@@ -139,12 +193,21 @@ def start_engines(
     entries: Sequence[Entry], engines: Sequence[Engine], seconds: float | None = None
 ) -> tuple[Guest, ...]:
     """Make the environments of engines and read each hello; an adapter of ours is held to what it is held to here."""
-    programs = [(entry.adapter or entry.name, entry.name, prepare_program(entry, seconds)) for entry in entries]
+    programs = [
+        (entry.adapter or entry.name, entry.name, prepare_program(entry, seconds))
+        for entry in entries
+    ]
     held = {engine.name: engine for engine in engines}
     guests = []
     for entry, guest in zip(entries, name_guests(programs, held), strict=True):
         kept = HELD if entry.adapter in held else ()
-        same = replace(guest, **{name: getattr(held[entry.adapter], name) for name in kept})
+        same = replace(
+            guest, **{name: getattr(held[entry.adapter], name) for name in kept}
+        )
         steps = {"steps_per_turn": entry.steps[-1]} if entry.steps else {}
-        guests.append(same.at_setting(name=entry.setting, **steps) if entry.setting or steps else same)
+        guests.append(
+            same.at_setting(name=entry.setting, **steps)
+            if entry.setting or steps
+            else same
+        )
     return tuple(guests)

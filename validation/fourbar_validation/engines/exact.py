@@ -17,7 +17,9 @@ from fourbar_validation.engines.description import SHARED, find_unknown, list_sp
 from fourbar_validation.engines.loop import make_blank
 
 NAME = "ball-arithmetic"
-KNOWN = tuple(kind.key for kind in (Gravity, Viscous, Friction, Springs, Torsion, Flywheel))
+KNOWN = tuple(
+    kind.key for kind in (Gravity, Viscous, Friction, Springs, Torsion, Flywheel)
+)
 
 
 def find_refusal(scene: Scene) -> str:
@@ -39,19 +41,29 @@ class BallArithmetic:
         if reason := find_refusal(scene):
             return Answer(NAME, "exact", refusal=reason)
         n = len(command.theta_2)
-        names = [q for q in COMPARED if command.omega_2 is not None or q.startswith("theta")]
-        out, assembled, (omega, alpha) = make_blank(n, names), np.zeros(n, dtype=bool), list_speeds(command)
+        names = [
+            q for q in COMPARED if command.omega_2 is not None or q.startswith("theta")
+        ]
+        out, assembled, (omega, alpha) = (
+            make_blank(n, names),
+            np.zeros(n, dtype=bool),
+            list_speeds(command),
+        )
         for i in range(n):
             motion = {"omega_2": float(omega[i]), "alpha_2": float(alpha[i])}
             exact = make_balls(scene, float(command.theta_2[i]), **motion)
-            exact["theta_2"] += arb(0 if command.remainder is None else command.remainder)
+            exact["theta_2"] += arb(
+                0 if command.remainder is None else command.remainder
+            )
             values = compute_outputs(scene, int(command.branch[i]), exact)
             if values is None:
                 continue
             assembled[i] = True
             for name, array in out.items():
                 axes = ("_x", "_y") if name in VECTORS else ("",)
-                array[i] = np.squeeze([_to_double(values.get(name + axis)) for axis in axes])
+                array[i] = np.squeeze(
+                    [_to_double(values.get(name + axis)) for axis in axes]
+                )
         return Answer(
             NAME,
             "exact",
@@ -70,13 +82,21 @@ def compute_sines(linkage: FourBar, command: Command) -> Array:
     from fourbar_validation.engines.balls import BITS, closure, wedge
 
     ctx.prec = BITS
-    x = {name: arb(length) for name, length in zip("dabc", linkage.lengths, strict=True)}
+    x = {
+        name: arb(length) for name, length in zip("dabc", linkage.lengths, strict=True)
+    }
     x["theta_1"] = arb(linkage.ground_angle)
     sines = np.full(len(command.theta_2), np.nan)
-    for i, (theta_2, branch) in enumerate(zip(command.theta_2.tolist(), command.branch.tolist(), strict=True)):
+    for i, (theta_2, branch) in enumerate(
+        zip(command.theta_2.tolist(), command.branch.tolist(), strict=True)
+    ):
         closed = closure(x | {"theta_2": arb(theta_2)}, branch)
         # bars 3 and 4 have no direction if A is on O4
-        sines[i] = math.nan if closed is None else np.nan_to_num(_to_double(wedge(*closed[1:])))
+        sines[i] = (
+            math.nan
+            if closed is None
+            else np.nan_to_num(_to_double(wedge(*closed[1:])))
+        )
     return sines
 
 
@@ -94,10 +114,17 @@ def shift_to(linkage: FourBar, theta_2: float, sin_mu: float) -> Any:
         for side in (2 * b * c * cos_mu, -2 * b * c * cos_mu):
             cosine = (d * d + a * a - b * b - c * c + side) / (2 * a * d)
             if abs(cosine) <= 1:
-                shifts += [theta_1 + sign * mp.acos(cosine) - theta_2 for sign in (1, -1)]
+                shifts += [
+                    theta_1 + sign * mp.acos(cosine) - theta_2 for sign in (1, -1)
+                ]
         shifts = [shift - 2 * mp.pi * mp.nint(shift / (2 * mp.pi)) for shift in shifts]
         nearest = min(shifts, key=abs, default=mp.inf)
-        return nearest if abs(nearest) <= ROUNDINGS * EPS * max(1.0, abs(theta_2), abs(linkage.ground_angle)) else None
+        return (
+            nearest
+            if abs(nearest)
+            <= ROUNDINGS * EPS * max(1.0, abs(theta_2), abs(linkage.ground_angle))
+            else None
+        )
 
 
 def _to_double(ball: Any) -> float:

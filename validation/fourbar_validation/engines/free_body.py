@@ -25,7 +25,13 @@ from fourbar_validation.engines.description import (
     find_unknown,
     list_speeds,
 )
-from fourbar_validation.engines.free_body_closure import Complex, close, cross, find_angle, measure_cylinder
+from fourbar_validation.engines.free_body_closure import (
+    Complex,
+    close,
+    cross,
+    find_angle,
+    measure_cylinder,
+)
 from fourbar_validation.engines.free_body_effects import (
     WRENCH_OF,
     BodyMotion,
@@ -68,12 +74,17 @@ class FreeBody:
             return Answer(NAME, "exact", refusal=reason)
         if command.bar != 2 and scene.counts_turns:
             return Answer(
-                NAME, "exact", refusal=f"it counts the turns of springs along theta_2, not {command.commanded}"
+                NAME,
+                "exact",
+                refusal=f"it counts the turns of springs along theta_2, not {command.commanded}",
             )
         asked = command
         if command.stroke is not None:
             command = find_angle(command, scene.motion, *measure_cylinder(scene))
-        bar, closed = command.bar, close(scene.linkage, command.angle, command.branch, command.bar)
+        bar, closed = (
+            command.bar,
+            close(scene.linkage, command.angle, command.branch, command.bar),
+        )
         theta = np.insert(closed.theta, bar - 2, command.angle, axis=0)
         answer = Answer(
             NAME,
@@ -81,28 +92,52 @@ class FreeBody:
             at=asked,
             assembled=closed.assembled,
             quantities=_compute_places(scene.linkage, *theta),
-            evidence={"closure_gap": float(np.max(closed.gap, initial=0.0, where=closed.assembled))},
+            evidence={
+                "closure_gap": float(
+                    np.max(closed.gap, initial=0.0, where=closed.assembled)
+                )
+            },
             shared=SHARED,
             own="assembly (Newton on the two closure equations), speeds and accelerations (own 2x2 Jacobian), every "
             "effect from its definition, the thirteen equations of the free bodies as one system",
         )
         if command.speed is not None:
             commanded = (theta[0], *list_speeds(command), *theta[1:])
-            blocks = [slice(start, start + BLOCK) for start in range(0, len(command.angle), BLOCK)]
-            parts = [_answer_positions(scene, bar, *(array[block] for array in commanded)) for block in blocks]
-            answer.evidence["residual"] = max((residual for _, residual in parts), default=0.0)
+            blocks = [
+                slice(start, start + BLOCK)
+                for start in range(0, len(command.angle), BLOCK)
+            ]
+            parts = [
+                _answer_positions(scene, bar, *(array[block] for array in commanded))
+                for block in blocks
+            ]
+            answer.evidence["residual"] = max(
+                (residual for _, residual in parts), default=0.0
+            )
             for name in parts[0][0] if parts else ():
-                answer.quantities[name] = np.concatenate([part[name] for part, _ in parts])
+                answer.quantities[name] = np.concatenate(
+                    [part[name] for part, _ in parts]
+                )
         return answer
 
 
-def _compute_places(linkage: FourBar, theta_2: Array, theta_3: Array, theta_4: Array) -> dict[str, Array]:
+def _compute_places(
+    linkage: FourBar, theta_2: Array, theta_3: Array, theta_4: Array
+) -> dict[str, Array]:
     """Compute the angles of bars 3 and 4, their sine, pins A, B and the mass centres."""
     unit = {2: np.exp(1j * theta_2), 3: np.exp(1j * theta_3), 4: np.exp(1j * theta_4)}
     O4 = linkage.ground * np.exp(1j * linkage.ground_angle)
     first_pin = {2: 0.0, 3: linkage.input.length * unit[2], 4: O4}
-    quantities = {"theta_2": theta_2, "theta_3": theta_3, "theta_4": theta_4, "sin_mu": np.sin(theta_4 - theta_3)}
-    quantities |= {"A": _split_components(first_pin[3]), "B": _split_components(O4 + linkage.output.length * unit[4])}
+    quantities = {
+        "theta_2": theta_2,
+        "theta_3": theta_3,
+        "theta_4": theta_4,
+        "sin_mu": np.sin(theta_4 - theta_3),
+    }
+    quantities |= {
+        "A": _split_components(first_pin[3]),
+        "B": _split_components(O4 + linkage.output.length * unit[4]),
+    }
     for bar in MOVING_BARS:
         quantities[f"G{bar}"] = _split_components(
             first_pin[bar] + make_vector(find_centre(linkage.bar(bar))) * unit[bar]
@@ -111,70 +146,134 @@ def _compute_places(linkage: FourBar, theta_2: Array, theta_3: Array, theta_4: A
 
 
 def _answer_positions(
-    scene: Scene, commanded: int, theta_2: Array, speed: Array, acceleration: Array, theta_3: Array, theta_4: Array
+    scene: Scene,
+    commanded: int,
+    theta_2: Array,
+    speed: Array,
+    acceleration: Array,
+    theta_3: Array,
+    theta_4: Array,
 ) -> tuple[dict[str, Array], float]:
     """Compute motion, pin forces and torque at some positions, and the residual of their thirteen equations."""
-    motion = move(scene.linkage, theta_2, speed, acceleration, theta_3, theta_4, commanded)
+    motion = move(
+        scene.linkage, theta_2, speed, acceleration, theta_3, theta_4, commanded
+    )
     unknowns, residual, from_jamming = balance(scene, motion)
     drive = COUPLE if scene.drive is None else LINE
     if (gone := find_wound(scene, motion)) is not None:
         unknowns[gone] = np.nan
-    forces = {name: unknowns[:, COLUMN[name] : COLUMN[name] + 2] for name in FORCE_AT.values()}
+    forces = {
+        name: unknowns[:, COLUMN[name] : COLUMN[name] + 2] for name in FORCE_AT.values()
+    }
     for bar in MOVING_BARS:
         forces |= {f"omega_{bar}": motion.omega[bar], f"alpha_{bar}": motion.alpha[bar]}
     a_A = motion.swing(2, motion.first_pin[3])
-    if (line := _place_line(scene, motion)) is None:  # the sine between the bars that are not driven
-        condition = np.abs(cross(*(motion.unit[number] for number in MOVING_BARS if number != scene.drive_bar)))
+    if (
+        line := _place_line(scene, motion)
+    ) is None:  # the sine between the bars that are not driven
+        condition = np.abs(
+            cross(
+                *(
+                    motion.unit[number]
+                    for number in MOVING_BARS
+                    if number != scene.drive_bar
+                )
+            )
+        )
     else:
         condition = line.condition
     forces["drive_condition"] = condition * from_jamming
     forces |= {
         "a_A": _split_components(a_A),
-        "a_B": _split_components(motion.swing(4, scene.linkage.output.length * motion.unit[4])),
+        "a_B": _split_components(
+            motion.swing(4, scene.linkage.output.length * motion.unit[4])
+        ),
     }
     for bar in MOVING_BARS:
-        forces[f"a_G{bar}"] = _split_components(motion.swing(bar, motion.to_centre(bar)) + (a_A if bar == 3 else 0.0))
+        forces[f"a_G{bar}"] = _split_components(
+            motion.swing(bar, motion.to_centre(bar)) + (a_A if bar == 3 else 0.0)
+        )
     if any(effect.dry for effect in scene.effects):
         ends = []
         for side in (1.0, -1.0):
             begins = move(
-                scene.linkage, theta_2, np.full_like(theta_2, side), 0.0 * theta_2, theta_3, theta_4, commanded
+                scene.linkage,
+                theta_2,
+                np.full_like(theta_2, side),
+                0.0 * theta_2,
+                theta_3,
+                theta_4,
+                commanded,
             )
-            ends.append(balance(scene, motion._replace(beginning=begins.omega))[0][:, DRIVE])
+            ends.append(
+                balance(scene, motion._replace(beginning=begins.omega))[0][:, DRIVE]
+            )
         forces |= {drive.low: np.minimum(*ends), drive.high: np.maximum(*ends)}
     if scene.loads or scene.effects:
-        forces[f"{drive.value}_inertia"] = balance(replace(scene, loads=(), effects=()), motion)[0][:, DRIVE]
+        forces[f"{drive.value}_inertia"] = balance(
+            replace(scene, loads=(), effects=()), motion
+        )[0][:, DRIVE]
     return forces | {drive.value: unknowns[:, DRIVE]}, residual
 
 
 def _place_line(scene: Scene, motion: BodyMotion) -> DriveLine | None:
     theta = {bar: np.angle(motion.unit[bar]) for bar in MOVING_BARS}
-    return None if scene.drive is None else place_line(scene.linkage, scene.drive, theta)
+    return (
+        None if scene.drive is None else place_line(scene.linkage, scene.drive, theta)
+    )
 
 
 def move(
-    linkage: FourBar, theta_2: Array, speed: Array, acceleration: Array, theta_3: Array, theta_4: Array, bar: int = 2
+    linkage: FourBar,
+    theta_2: Array,
+    speed: Array,
+    acceleration: Array,
+    theta_3: Array,
+    theta_4: Array,
+    bar: int = 2,
 ) -> BodyMotion:
     """Compute speeds and accelerations where those of a bar are stated; NaN where the Jacobian is singular."""
     d, a, b, c = linkage.lengths
     n = len(theta_2)
     u_1, u_2 = np.exp(1j * linkage.ground_angle), np.exp(1j * theta_2)
     u_3, u_4 = np.exp(1j * theta_3), np.exp(1j * theta_4)
-    length, round_ = {2: a, 3: b, 4: c}, {2: u_2, 3: u_3, 4: -u_4}  # bar 4 is gone along from B to O4
+    length, round_ = (
+        {2: a, 3: b, 4: c},
+        {2: u_2, 3: u_3, 4: -u_4},
+    )  # bar 4 is gone along from B to O4
     others = [number for number in MOVING_BARS if number != bar]
-    jacobian = np.stack([_split_components(round_[number]) for number in others], axis=-1)
+    jacobian = np.stack(
+        [_split_components(round_[number]) for number in others], axis=-1
+    )
 
     def rates(stated: Array, centripetal: Complex) -> dict[int, Array]:
-        right = _split_components(-length[bar] * stated * round_[bar] - 1j * centripetal)
+        right = _split_components(
+            -length[bar] * stated * round_[bar] - 1j * centripetal
+        )
         solved = solve_system(jacobian, right[..., None])[0][..., 0].T
-        return {bar: stated} | {number: v / length[number] for number, v in zip(others, solved, strict=True)}
+        return {bar: stated} | {
+            number: v / length[number] for number, v in zip(others, solved, strict=True)
+        }
 
     zero = np.zeros(n, dtype=complex)
     omega = {1: np.zeros(n), **rates(speed, zero)}
-    pull = sum((length[number] * omega[number] ** 2 * round_[number] for number in MOVING_BARS), zero)
+    pull = sum(
+        (
+            length[number] * omega[number] ** 2 * round_[number]
+            for number in MOVING_BARS
+        ),
+        zero,
+    )
     alpha = {1: np.zeros(n), **rates(acceleration, pull)}
     first_pin = {1: zero, 2: zero, 3: a * u_2, 4: zero + d * u_1}
-    return BodyMotion(linkage, theta_2, {1: zero + u_1, 2: u_2, 3: u_3, 4: u_4}, first_pin, omega, alpha)
+    return BodyMotion(
+        linkage,
+        theta_2,
+        {1: zero + u_1, 2: u_2, 3: u_3, 4: u_4},
+        first_pin,
+        omega,
+        alpha,
+    )
 
 
 def balance(scene: Scene, motion: BodyMotion) -> tuple[Array, float, Array | float]:
@@ -184,12 +283,16 @@ def balance(scene: Scene, motion: BodyMotion) -> tuple[Array, float, Array | flo
     from_jamming: Array | float = 1.0
     if len(arms):
         couples = continue_couples(loads[..., 0], loads[..., 1:], arms)
-        from_jamming = compute_distance_from_jamming(loads[..., 0], loads[..., 1:], arms, couples)
+        from_jamming = compute_distance_from_jamming(
+            loads[..., 0], loads[..., 1:], arms, couples
+        )
         total = total + (unknowns[..., 1:] * couples[:, None, :]).sum(axis=-1)
     return total, residual, from_jamming
 
 
-def _solve_unit_couples(scene: Scene, motion: BodyMotion) -> tuple[Array, Complex, Array, float]:
+def _solve_unit_couples(
+    scene: Scene, motion: BodyMotion
+) -> tuple[Array, Complex, Array, float]:
     """Solve without sliding friction and per N m of it at each pin, (n, 13, 1 + p).
 
     Returns also the loads of these pins as complex numbers (n, p, 1 + p), mu r of each (m), and the residual.
@@ -201,7 +304,9 @@ def _solve_unit_couples(scene: Scene, motion: BodyMotion) -> tuple[Array, Comple
         unit = BodyWrenches(len(motion.theta_2))
         unit.twist_at(pin, -motion.sense(pin))
         columns.append(_make_right_sides(motion.linkage, unit))
-    unknowns, residual = solve_system(_make_matrix(scene, motion), np.stack(columns, axis=-1))
+    unknowns, residual = solve_system(
+        _make_matrix(scene, motion), np.stack(columns, axis=-1)
+    )
     if scene.drive is None:
         unknowns[:, DRIVE] *= motion.linkage.bar(scene.drive_bar).length
     first = [COLUMN[FORCE_AT[pin]] for pin in pins]
@@ -213,10 +318,16 @@ def count_solutions(scene: Scene, command: Command) -> Array:
     """Count the pin forces and friction couples that balance the linkage at each position, where it moves, (n,)."""
     closed = close(scene.linkage, command.angle, command.branch, command.bar)
     theta = np.insert(closed.theta, command.bar - 2, command.angle, axis=0)
-    motion = move(scene.linkage, theta[0], *list_speeds(command), theta[1], theta[2], command.bar)
+    motion = move(
+        scene.linkage, theta[0], *list_speeds(command), theta[1], theta[2], command.bar
+    )
     _, loads, arms, _ = _solve_unit_couples(scene, motion)
     return np.array(
-        [_count_at_position(F, C, arms) for F, C in zip(loads[..., 0], loads[..., 1:], strict=True)], dtype=float
+        [
+            _count_at_position(F, C, arms)
+            for F, C in zip(loads[..., 0], loads[..., 1:], strict=True)
+        ],
+        dtype=float,
     )
 
 
@@ -228,12 +339,19 @@ def _count_at_position(F: Complex, C: Complex, k: Array) -> int:
         return 1
     rng, n = np.random.default_rng(0), FRICTION_STARTS
     size = float((k * np.abs(F)).max()) or 1.0
-    x = size * 10.0 ** rng.uniform(-3.0, 3.0, (n, 1)) * rng.uniform(0.0, 1.0, (n, len(k)))
+    x = (
+        size
+        * 10.0 ** rng.uniform(-3.0, 3.0, (n, 1))
+        * rng.uniform(0.0, 1.0, (n, len(k)))
+    )
     many = (np.broadcast_to(F, (n, *F.shape)), np.broadcast_to(C, (n, *C.shape)))
     x, settled, _ = _solve_couples(*many, k, x)
     solutions: list[Array] = []
     for loads in x[settled & (x >= 0.0).all(axis=1)]:
-        if all(np.abs(loads - other).max() > APART * max(loads.max(), other.max()) for other in solutions):
+        if all(
+            np.abs(loads - other).max() > APART * max(loads.max(), other.max())
+            for other in solutions
+        ):
             solutions.append(loads)
     return len(solutions)
 
@@ -245,7 +363,11 @@ def _add_inertia(motion: BodyMotion, wrenches: BodyWrenches) -> None:
         arm, alpha = motion.to_centre(number), motion.alpha[number]
         wrenches.push(number, -bar.mass * motion.swing(number, arm), 0.0)
         wrenches.twist(number, -about_first_pin(bar) * alpha)
-    wrenches.push(3, -motion.linkage.coupler.mass * motion.swing(2, motion.first_pin[3]), motion.to_centre(3))
+    wrenches.push(
+        3,
+        -motion.linkage.coupler.mass * motion.swing(2, motion.first_pin[3]),
+        motion.to_centre(3),
+    )
 
 
 def _make_matrix(scene: Scene, motion: BodyMotion) -> Array:
@@ -259,17 +381,24 @@ def _make_matrix(scene: Scene, motion: BodyMotion) -> Array:
         for force in (first, second):
             matrix[:, row, COLUMN[force]] = matrix[:, row + 1, COLUMN[force] + 1] = 1.0
         u = motion.unit[bar]
-        matrix[:, row + 2, COLUMN[second]], matrix[:, row + 2, COLUMN[second] + 1] = -u.imag, u.real
+        matrix[:, row + 2, COLUMN[second]], matrix[:, row + 2, COLUMN[second] + 1] = (
+            -u.imag,
+            u.real,
+        )
     if (line := _place_line(scene, motion)) is None:
         matrix[:, ROWS[scene.drive_bar][0] + 2, DRIVE] = 1.0
     else:
         unit = BodyWrenches(len(motion.theta_2))
-        for sense, point, arm in zip((-1.0, 1.0), (line.drive.start, line.drive.end), line.arms, strict=True):
+        for sense, point, arm in zip(
+            (-1.0, 1.0), (line.drive.start, line.drive.end), line.arms, strict=True
+        ):
             unit.push(point.bar, sense * line.unit, arm)
         matrix[:, :, DRIVE] = -_make_right_sides(motion.linkage, unit)
     for row, (force, reaction) in ((9, ("F32", "F23")), (11, ("F43", "F34"))):
         for axis in (0, 1):
-            matrix[:, row + axis, COLUMN[force] + axis] = matrix[:, row + axis, COLUMN[reaction] + axis] = 1.0
+            matrix[:, row + axis, COLUMN[force] + axis] = matrix[
+                :, row + axis, COLUMN[reaction] + axis
+            ] = 1.0
     return matrix
 
 
@@ -307,7 +436,9 @@ def continue_couples(F: Complex, C: Complex, k: Array) -> Array:
     k : mu r of each pin, m.
     """
     x = np.full(F.shape, np.nan)
-    remaining = np.flatnonzero(np.isfinite(F).all(axis=1) & np.isfinite(C).all(axis=(1, 2)))
+    remaining = np.flatnonzero(
+        np.isfinite(F).all(axis=1) & np.isfinite(C).all(axis=(1, 2))
+    )
     x[remaining] = 0.0
     for stage in range(1, FRICTION_STAGES + 1):
         x[remaining], settled, det = _solve_couples(
@@ -326,11 +457,15 @@ def compute_distance_from_jamming(F: Complex, C: Complex, k: Array, x: Array) ->
         _, matrix = _compute_friction_jacobian(F, C, k, x)
     far = np.full(len(x), np.nan)
     finite = np.isfinite(matrix).all(axis=(1, 2))
-    far[finite] = np.minimum(np.linalg.svd(matrix[finite], compute_uv=False)[:, -1], 1.0)
+    far[finite] = np.minimum(
+        np.linalg.svd(matrix[finite], compute_uv=False)[:, -1], 1.0
+    )
     return far
 
 
-def _compute_friction_jacobian(F: Complex, C: Complex, k: Array, x: Array) -> tuple[Array, Array]:
+def _compute_friction_jacobian(
+    F: Complex, C: Complex, k: Array, x: Array
+) -> tuple[Array, Array]:
     """Compute the pin forces under couples, (n, p), N, and the Jacobian of `continue_couples`, (n, p, p)."""
     force = F + (C * x[:, None, :]).sum(axis=-1)
     size = np.abs(force)
@@ -338,11 +473,16 @@ def _compute_friction_jacobian(F: Complex, C: Complex, k: Array, x: Array) -> tu
     return size, np.eye(len(k)) - k[:, None] * (np.conj(direction)[..., None] * C).real
 
 
-def _solve_couples(F: Complex, C: Complex, k: Array, x: Array) -> tuple[Array, NDArray[np.bool_], Array]:
+def _solve_couples(
+    F: Complex, C: Complex, k: Array, x: Array
+) -> tuple[Array, NDArray[np.bool_], Array]:
     """Solve by Newton's method from couples `x`; return also where it converged, and the Jacobian's determinant."""
     for _ in range(FRICTION_STEPS):
         size, matrix = _compute_friction_jacobian(F, C, k, x)
-        gap, terms = k * size - x, k * (np.abs(F) + (np.abs(C) * x[:, None, :]).sum(axis=-1))
+        gap, terms = (
+            k * size - x,
+            k * (np.abs(F) + (np.abs(C) * x[:, None, :]).sum(axis=-1)),
+        )
         settled = (np.abs(gap) <= FRICTION_SETTLED * terms).all(axis=1)
         step = solve_system(matrix, gap[..., None])[0][..., 0]
         moving = ~settled & np.isfinite(step).all(axis=1)

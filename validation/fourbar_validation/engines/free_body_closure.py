@@ -45,7 +45,9 @@ class Closed(NamedTuple):
     gap: Array
 
 
-def close(linkage: FourBar, theta: Array, branch: NDArray[np.int8], bar: int = 2) -> Closed:
+def close(
+    linkage: FourBar, theta: Array, branch: NDArray[np.int8], bar: int = 2
+) -> Closed:
     """Close the loop by Newton's method, from the next start where no earlier one converged.
 
     Bar 2 commanded, bars 3 and 4 span the diagonal from A to O4; of bar 3 they are bars 2 and 4, of bar 4 bars 3 and 2,
@@ -61,11 +63,16 @@ def close(linkage: FourBar, theta: Array, branch: NDArray[np.int8], bar: int = 2
     # the gap is least where bars 3 and 4 lie along the diagonal
     possible = np.maximum(e - (b + c), abs(b - c) - e) <= closed
     angles, gap = np.full((2, len(e)), np.nan), np.full(len(e), np.nan)
-    for alpha, beta in [(_compute_angle_between(e, b, c), _compute_angle_between(e, c, b)), *np.radians(STARTS)]:
+    for alpha, beta in [
+        (_compute_angle_between(e, b, c), _compute_angle_between(e, c, b)),
+        *np.radians(STARTS),
+    ]:
         remaining = np.flatnonzero(possible & np.isnan(gap))
         if not len(remaining):
             break
-        start = np.array([phi + branch * alpha, phi + np.pi - branch * beta])[:, remaining]
+        start = np.array([phi + branch * alpha, phi + np.pi - branch * beta])[
+            :, remaining
+        ]
         angles[:, remaining], gap[remaining] = _solve_newton(
             diagonal[remaining], b, c, branch[remaining], start, closed
         )
@@ -82,13 +89,23 @@ def close(linkage: FourBar, theta: Array, branch: NDArray[np.int8], bar: int = 2
 
 def _compute_angle_between(e: Array, near: float, far: float) -> Array:
     """Compute the angle between the sides e and near, by half-angle tangents; bars 3 and 4 are never in line."""
-    above, below = (e - near + far) * (far + near - e), (e + near - far) * (e + near + far)
-    angle = 2.0 * np.arctan2(np.sqrt(np.maximum(above, 0.0)), np.sqrt(np.maximum(below, 0.0)))
+    above, below = (
+        (e - near + far) * (far + near - e),
+        (e + near - far) * (e + near + far),
+    )
+    angle = 2.0 * np.arctan2(
+        np.sqrt(np.maximum(above, 0.0)), np.sqrt(np.maximum(below, 0.0))
+    )
     return np.clip(angle, IN_LINE, np.pi - 2.0 * IN_LINE)
 
 
 def _solve_newton(
-    diagonal: Complex, b: float, c: float, branch: NDArray[np.int8], theta: Array, closed: float
+    diagonal: Complex,
+    b: float,
+    c: float,
+    branch: NDArray[np.int8],
+    theta: Array,
+    closed: float,
 ) -> tuple[Array, Array]:
     """Return theta_3, theta_4 (2, n) and the gap left (n,), NaN where it does not come down to `closed`.
 
@@ -96,7 +113,9 @@ def _solve_newton(
     halved until the gap falls and that sign is kept; so it ends where no smaller gap is to be had.
     """
 
-    def look(theta: Array, indices: NDArray[np.intp]) -> tuple[Complex, Complex, Complex, Array]:
+    def look(
+        theta: Array, indices: NDArray[np.intp]
+    ) -> tuple[Complex, Complex, Complex, Array]:
         u_3, u_4 = np.exp(1j * theta)
         gap = b * u_3 - c * u_4 - diagonal[indices]
         inside = cross(u_3, u_4) * branch[indices] > 0.0
@@ -112,15 +131,22 @@ def _solve_newton(
         u_3, u_4, gap, _ = look(theta[:, moving], moving)
         sine = cross(u_3, u_4)
         # b step_3 u_3 - c step_4 u_4 = i gap
-        step = np.array([cross(1j * gap, u_4) / (b * sine), cross(1j * gap, u_3) / (c * sine)])
-        part = np.minimum(1.0, LONGEST_STEP / np.maximum(np.abs(step).max(axis=0), LONGEST_STEP))
+        step = np.array(
+            [cross(1j * gap, u_4) / (b * sine), cross(1j * gap, u_3) / (c * sine)]
+        )
+        part = np.minimum(
+            1.0, LONGEST_STEP / np.maximum(np.abs(step).max(axis=0), LONGEST_STEP)
+        )
         pending, moved = np.arange(len(moving)), np.zeros(len(moving), dtype=bool)
         for _ in range(HALVINGS):
             indices = moving[pending]
             trial = theta[:, indices] + part[pending] * step[:, pending]
             trial_size = look(trial, indices)[3]
             falls = trial_size < size[indices]
-            theta[:, indices[falls]], size[indices[falls]] = trial[:, falls], trial_size[falls]
+            theta[:, indices[falls]], size[indices[falls]] = (
+                trial[:, falls],
+                trial_size[falls],
+            )
             moved[pending[falls]] = True
             pending = pending[~falls & (size[indices] > closed)]
             if not len(pending):
@@ -144,13 +170,19 @@ def measure_cylinder(scene: Scene) -> tuple[complex, complex]:
     """Measure from the ground pin of its bar, at angle 0, to a cylinder's end on it, and to that on the ground, m."""
     drive = scene.drive
     assert drive is not None
-    on_bar, on_ground = (drive.end, drive.start) if drive.start.bar == 1 else (drive.start, drive.end)
+    on_bar, on_ground = (
+        (drive.end, drive.start) if drive.start.bar == 1 else (drive.start, drive.end)
+    )
     d, theta_1 = scene.linkage.ground, scene.linkage.ground_angle
     pivot = complex(*resolve(d, theta_1)) if on_bar.bar == 4 else 0.0j
-    return complex(*resolve(on_bar.distance, on_bar.angle)), complex(*place(on_ground, theta_1)) - pivot
+    return complex(*resolve(on_bar.distance, on_bar.angle)), complex(
+        *place(on_ground, theta_1)
+    ) - pivot
 
 
-def find_angle(command: Command, motion: Motion, arm: complex, ground: complex) -> Command:
+def find_angle(
+    command: Command, motion: Motion, arm: complex, ground: complex
+) -> Command:
     """Find the bar's angle where its cylinder has the stroke, on the side that is stated, and its rates.
 
     `arm` and `ground`: as `measure_cylinder` has them, or as an engine measures them.
@@ -170,13 +202,20 @@ def find_angle(command: Command, motion: Motion, arm: complex, ground: complex) 
     theta = towards + sense * 0.5 * (low + high)
     if motion.stroke_speed is None:
         return command._replace(angle=theta, speed=None)
-    line, velocity = across(theta), 1j * arm * np.exp(1j * theta)  # velocity of the end, per rad/s
+    line, velocity = (
+        across(theta),
+        1j * arm * np.exp(1j * theta),
+    )  # velocity of the end, per rad/s
     stroke = np.abs(line)
     with np.errstate(all="ignore"):
         slope = (np.conj(line) * velocity).real / stroke
         omega = motion.stroke_speed / slope
         # s s'' + s'^2 = |v|^2 + line . a, with a = alpha velocity - omega^2 arm
         centripetal = (np.conj(line) * (-arm * np.exp(1j * theta))).real * omega**2
-        rest = stroke * motion.stroke_acceleration + motion.stroke_speed**2 - np.abs(velocity * omega) ** 2
+        rest = (
+            stroke * motion.stroke_acceleration
+            + motion.stroke_speed**2
+            - np.abs(velocity * omega) ** 2
+        )
         alpha = (rest - centripetal) / (stroke * slope)
     return command._replace(angle=theta, speed=omega, acceleration=alpha)

@@ -55,7 +55,10 @@ class BodyMotion(NamedTuple):
             return np.sign(slip)
         i, j = PINS[pin]
         begins = self.beginning[j] - self.beginning[i]
-        begins[np.abs(begins) < TURNS_AS_ONE * (np.abs(self.beginning[j]) + np.abs(self.beginning[i]))] = 0.0
+        begins[
+            np.abs(begins)
+            < TURNS_AS_ONE * (np.abs(self.beginning[j]) + np.abs(self.beginning[i]))
+        ] = 0.0
         at_rest = np.logical_and.reduce([self.omega[bar] == 0.0 for bar in MOVING_BARS])
         return np.where(at_rest, np.sign(begins), np.sign(slip))
 
@@ -68,7 +71,9 @@ class BodyWrenches:
     """Sums of the forces (N) on the moving bars and of their moments (N m) about the first pins, (n,) each."""
 
     def __init__(self, n: int) -> None:
-        self.force: dict[int, Complex] = {bar: np.zeros(n, dtype=complex) for bar in MOVING_BARS}
+        self.force: dict[int, Complex] = {
+            bar: np.zeros(n, dtype=complex) for bar in MOVING_BARS
+        }
         self.moment: dict[int, Array] = {bar: np.zeros(n) for bar in MOVING_BARS}
 
     def push(self, bar: int, force: Any, arm: Any) -> None:
@@ -105,7 +110,10 @@ def _apply_gravity(effect: Any, motion: BodyMotion, wrenches: BodyWrenches) -> N
     """Apply m g at every mass centre."""
     for bar in MOVING_BARS:
         wrenches.push(
-            bar, motion.linkage.bar(bar).mass * make_vector((effect.magnitude, effect.angle)), motion.to_centre(bar)
+            bar,
+            motion.linkage.bar(bar).mass
+            * make_vector((effect.magnitude, effect.angle)),
+            motion.to_centre(bar),
         )
 
 
@@ -125,7 +133,9 @@ def _apply_torsion(effect: Any, motion: BodyMotion, wrenches: BodyWrenches) -> N
     """Couple -(preload + k (theta_j - theta_i - rest)), the angle within half a turn."""
     for pin, k, rest, preload in effect.springs:
         i, j = PINS[pin]
-        angle = np.angle(motion.unit[j] * np.conj(motion.unit[i]) * make_vector((1.0, -rest)))
+        angle = np.angle(
+            motion.unit[j] * np.conj(motion.unit[i]) * make_vector((1.0, -rest))
+        )
         wrenches.twist_at(pin, -(preload + k * angle))
 
 
@@ -133,15 +143,29 @@ def _apply_springs(effect: Any, motion: BodyMotion, wrenches: BodyWrenches) -> N
     """Pull preload + k (distance - length) along the line of the two points; none is known where they coincide."""
     for spring in effect.springs:
         arms = [
-            motion.unit[point.bar] * make_vector((point.distance, point.angle)) for point in (spring.start, spring.end)
+            motion.unit[point.bar] * make_vector((point.distance, point.angle))
+            for point in (spring.start, spring.end)
         ]
-        across = motion.first_pin[spring.end.bar] + arms[1] - motion.first_pin[spring.start.bar] - arms[0]
+        across = (
+            motion.first_pin[spring.end.bar]
+            + arms[1]
+            - motion.first_pin[spring.start.bar]
+            - arms[0]
+        )
         if spring.preload == spring.stiffness * spring.length:
             pull = spring.stiffness * across
         else:
-            reach = sum(motion.linkage.lengths) + abs(spring.start.distance) + abs(spring.end.distance)
+            reach = (
+                sum(motion.linkage.lengths)
+                + abs(spring.start.distance)
+                + abs(spring.end.distance)
+            )
             distance = np.where(np.abs(across) <= MEET * reach, np.nan, np.abs(across))
-            pull = (spring.preload + spring.stiffness * (distance - spring.length)) / distance * across
+            pull = (
+                (spring.preload + spring.stiffness * (distance - spring.length))
+                / distance
+                * across
+            )
         wrenches.push(spring.start.bar, pull, arms[0])
         wrenches.push(spring.end.bar, -pull, arms[1])
 
@@ -155,7 +179,9 @@ WRENCH_OF: dict[str, Callable[[Any, BodyMotion, BodyWrenches], None]] = {
     "gravity": _apply_gravity,
     "viscous": _apply_viscous,
     "friction": _apply_friction,
-    "pin_friction": lambda *_: None,  # it depends on the pin forces, and is solved with them
+    "pin_friction": lambda *_: (
+        None
+    ),  # it depends on the pin forces, and is solved with them
     "torsion": _apply_torsion,
     "springs": _apply_springs,
     "flywheel": _apply_flywheel,
@@ -176,9 +202,13 @@ def sum_acting(scene: Scene, motion: BodyMotion) -> BodyWrenches:
 def apply_load(load: Any, motion: BodyMotion, wrenches: BodyWrenches) -> None:
     """Apply a force at its point, from the mass centre, and a couple; in the bar's frame both rotate with the bar."""
     turned = motion.unit[load.bar] if load.frame == "bar" else 1.0
-    factor = 1.0 if load.table is None else _interpolate_factor(load.table, motion.theta_2)
+    factor = (
+        1.0 if load.table is None else _interpolate_factor(load.table, motion.theta_2)
+    )
     arm = motion.to_centre(load.bar) + turned * make_vector(load.at)
-    wrenches.push(load.bar, factor * turned * make_vector(load.force or (0.0, 0.0)), arm)
+    wrenches.push(
+        load.bar, factor * turned * make_vector(load.force or (0.0, 0.0)), arm
+    )
     wrenches.twist(load.bar, factor * load.moment)
 
 
@@ -194,7 +224,12 @@ def find_wound(scene: Scene, motion: BodyMotion) -> NDArray[np.bool_] | None:
 
     None where no spring counts turns, or the motion changes its branch.
     """
-    springs = [spring for effect in scene.effects if effect.key == "torsion" for spring in effect.springs]  # type: ignore[attr-defined]
+    springs = [
+        spring
+        for effect in scene.effects
+        if effect.key == "torsion"
+        for spring in effect.springs  # type: ignore[attr-defined]
+    ]
     if not springs or scene.motion.free is not None:
         return None
     begins = command(scene)
@@ -211,15 +246,28 @@ def find_wound(scene: Scene, motion: BodyMotion) -> NDArray[np.bool_] | None:
     theta = {1: np.full(len(path), link.ground_angle), 2: path}
     theta |= {bar: np.unwrap(closed.theta[bar - 3][closed.assembled]) for bar in (3, 4)}
     start = begins.theta_2[on_path][0]
-    first, places = int(np.searchsorted(path, start)), np.clip(np.searchsorted(path, motion.theta_2), 0, len(path) - 1)
+    first, places = (
+        int(np.searchsorted(path, start)),
+        np.clip(np.searchsorted(path, motion.theta_2), 0, len(path) - 1),
+    )
     for pin, _, rest, _ in springs:
         i, j = PINS[pin]
         away = theta[j] - theta[i] - rest
-        gone |= np.abs(away[places] - 2.0 * np.pi * np.floor(away[first] / (2.0 * np.pi) + 0.5)) > HALF_TURN
+        gone |= (
+            np.abs(
+                away[places] - 2.0 * np.pi * np.floor(away[first] / (2.0 * np.pi) + 0.5)
+            )
+            > HALF_TURN
+        )
     return gone
 
 
 def list_sliding_pins(scene: Scene) -> dict[str, float]:
     """Return mu r of each pin whose friction depends on its load, m."""
-    pins = [pin for effect in scene.effects if effect.key == "pin_friction" for pin in effect.pins]  # type: ignore[attr-defined]
+    pins = [
+        pin
+        for effect in scene.effects
+        if effect.key == "pin_friction"
+        for pin in effect.pins  # type: ignore[attr-defined]
+    ]
     return {name: mu * r for name, mu, r in pins if mu * r != 0.0}

@@ -83,12 +83,18 @@ class Guest(Engine):
         return replace(self, setting=name, start=partial(self.start, setting=asked))  # type: ignore[call-arg]
 
 
-def read_guests(entries: Sequence[str], known: Iterable[str], seconds: float | None = None) -> tuple[Guest, ...]:
+def read_guests(
+    entries: Sequence[str], known: Iterable[str], seconds: float | None = None
+) -> tuple[Guest, ...]:
     """Start each guest of the command line and read its hello; InputError where there is no such program or class."""
-    return name_guests([(entry, "", make_program(entry, seconds)) for entry in entries], known)
+    return name_guests(
+        [(entry, "", make_program(entry, seconds)) for entry in entries], known
+    )
 
 
-def name_guests(entries: Sequence[tuple[str, str, Program]], known: Iterable[str]) -> tuple[Guest, ...]:
+def name_guests(
+    entries: Sequence[tuple[str, str, Program]], known: Iterable[str]
+) -> tuple[Guest, ...]:
     """Read the hello of programs, each with its entry and the name that it is given, and name them apart."""
     names, guests = {FORMULAS, *known}, list[Guest]()
     for entry, chosen, program in entries:
@@ -99,8 +105,12 @@ def name_guests(entries: Sequence[tuple[str, str, Program]], known: Iterable[str
             trouble = str(error)
         except EngineError as error:
             trouble = str(error)
-            if CLASS.fullmatch(entry) and trouble.startswith(f"exit status {NOT_FOUND}: "):
-                raise InputError("--witness", entry, trouble.partition(": ")[2]) from None
+            if CLASS.fullmatch(entry) and trouble.startswith(
+                f"exit status {NOT_FOUND}: "
+            ):
+                raise InputError(
+                    "--witness", entry, trouble.partition(": ")[2]
+                ) from None
         name = stem = chosen or hello.name
         for count in range(2, 2 + len(names)):
             if name not in names:
@@ -112,7 +122,9 @@ def name_guests(entries: Sequence[tuple[str, str, Program]], known: Iterable[str
             partial(GuestClient, name, program, hello, trouble),
             hello.tolerance,
             answers=hello.answers,
-            positions=tuple(quantity for quantity in hello.answers if quantity in ANGLES),
+            positions=tuple(
+                quantity for quantity in hello.answers if quantity in ANGLES
+            ),
             stated=False,
             code=hash_files(filter(os.path.isfile, program.command)),
             version=" on ".join(filter(None, (hello.version, hello.device))),
@@ -134,7 +146,11 @@ def adjust_engines(engines: Sequence[Engine], error: float) -> tuple[Engine, ...
             engine = engine.at_setting(error=error)
         elif engine.through_time:
             engine = replace(engine, start=partial(SIMULATED_TO_ERROR, error))
-        adjusted.append(replace(engine, tolerance=tolerance, order=None) if engine.through_time else engine)
+        adjusted.append(
+            replace(engine, tolerance=tolerance, order=None)
+            if engine.through_time
+            else engine
+        )
     return tuple(adjusted)
 
 
@@ -152,15 +168,29 @@ def make_program(entry: str, seconds: float | None = None) -> Program:
     except ValueError as error:
         raise InputError("--witness", entry, f"is no command line: {error}") from None
     if not command or (program := shutil.which(command[0])) is None:
-        raise InputError("--witness", entry, "must be module:Class, or the command line of a program that is there")
+        raise InputError(
+            "--witness",
+            entry,
+            "must be module:Class, or the command line of a program that is there",
+        )
     return Program((os.path.abspath(program), *command[1:]), seconds)
 
 
-def serve(entry: str, seconds: float | None = None, python: str = sys.executable) -> Program:
+def serve(
+    entry: str, seconds: float | None = None, python: str = sys.executable
+) -> Program:
     """Make the program that serves one of our adapters, or a class of the user's."""
-    ours = [] if CHECKOUT is None else [str(CHECKOUT), str(PACKAGE.parent), str(CHECKOUT / "lab")]
+    ours = (
+        []
+        if CHECKOUT is None
+        else [str(CHECKOUT), str(PACKAGE.parent), str(CHECKOUT / "lab")]
+    )
     path = os.pathsep.join(filter(None, [*ours, os.environ.get("PYTHONPATH", "")]))
-    return Program((python, "-m", "fourbar_validation.engine", entry), seconds, (("PYTHONPATH", path),) * bool(path))
+    return Program(
+        (python, "-m", "fourbar_validation.engine", entry),
+        seconds,
+        (("PYTHONPATH", path),) * bool(path),
+    )
 
 
 def _name_program(entry: str, program: Program) -> str:
@@ -168,14 +198,19 @@ def _name_program(entry: str, program: Program) -> str:
     if CLASS.fullmatch(entry):
         return entry.partition(":")[2]
     first, *arguments = program.command
-    return write_one_line(Path(next(filter(os.path.isfile, arguments), first)).stem) or "guest"
+    return (
+        write_one_line(Path(next(filter(os.path.isfile, arguments), first)).stem)
+        or "guest"
+    )
 
 
 def hash_files(paths: Iterable[str], besides: str = "") -> str:
     """Hash files with their names, and a text."""
     digest = hashlib.sha256()
     for path in paths:
-        digest.update(f"{path} ".encode() + hashlib.sha256(Path(path).read_bytes()).digest())
+        digest.update(
+            f"{path} ".encode() + hashlib.sha256(Path(path).read_bytes()).digest()
+        )
     digest.update(besides.encode())
     return digest.hexdigest()[:16]
 
@@ -192,11 +227,17 @@ def ask_hello(program: Program) -> Hello:
 def read_hello(data: dict[str, Any]) -> Hello:
     """Check the hello of an engine; InputError names what is wrong."""
 
-    def texts(name: str, default: tuple[str, ...], allowed: Sequence[str] | None = None) -> tuple[str, ...]:
+    def texts(
+        name: str, default: tuple[str, ...], allowed: Sequence[str] | None = None
+    ) -> tuple[str, ...]:
         values = data.get(name, list(default))
-        if not isinstance(values, list) or not all(isinstance(value, str) for value in values):
+        if not isinstance(values, list) or not all(
+            isinstance(value, str) for value in values
+        ):
             raise InputError(name, values, "must be a list of texts")
-        if allowed is not None and (unknown := [value for value in values if value not in allowed]):
+        if allowed is not None and (
+            unknown := [value for value in values if value not in allowed]
+        ):
             raise InputError(name, unknown[0], f"must be among {', '.join(allowed)}")
         return tuple(map(write_one_line, values))
 
@@ -210,10 +251,18 @@ def read_hello(data: dict[str, Any]) -> Hello:
         raise EngineError(text("error") or "the engine reported an error without text")
     name = text("engine")
     if not name or name != data["engine"]:
-        raise InputError("engine", data.get("engine"), "must be a name of printable characters in one line")
+        raise InputError(
+            "engine",
+            data.get("engine"),
+            "must be a name of printable characters in one line",
+        )
     answers = texts("answers", (), QUANTITIES)
     if not answers:
-        raise InputError("answers", data.get("answers"), f"must name quantities among {', '.join(QUANTITIES)}")
+        raise InputError(
+            "answers",
+            data.get("answers"),
+            f"must name quantities among {', '.join(QUANTITIES)}",
+        )
     if "four-bar" not in texts("mechanisms", ("four-bar",)):
         raise InputError("mechanisms", data["mechanisms"], 'must hold "four-bar"')
     return Hello(
@@ -233,8 +282,15 @@ def read_hello(data: dict[str, Any]) -> Hello:
 def _read_tolerance(stated: Any) -> ErrorBound:
     if stated == EQUIVALENCE.name:
         return EQUIVALENCE
-    error, reason = stated if isinstance(stated, list) and len(stated) == 2 else (0.0, "")
-    if type(error) is not float or not 0.0 < error < 1.0 or not isinstance(reason, str) or not reason.strip():
+    error, reason = (
+        stated if isinstance(stated, list) and len(stated) == 2 else (0.0, "")
+    )
+    if (
+        type(error) is not float
+        or not 0.0 < error < 1.0
+        or not isinstance(reason, str)
+        or not reason.strip()
+    ):
         allowed = f'must be "{EQUIVALENCE.name}", or [relative error above 0 and below 1, its reason]'
         raise InputError("tolerance", stated, allowed)
     reason = f"{error:g} of the scale: {write_one_line(reason)}"
@@ -245,7 +301,9 @@ def find_needs(scene: Scene) -> list[str]:
     """List what a scene asks of an engine, in the words of hello's `effects`."""
     needs = [effect.key for effect in scene.effects]
     needs += ["loads"] * bool(scene.loads)
-    needs += ["cylinder"] if scene.drive is not None else ["drive"] * (scene.drive_bar != 2)
+    needs += (
+        ["cylinder"] if scene.drive is not None else ["drive"] * (scene.drive_bar != 2)
+    )
     return needs
 
 
@@ -253,9 +311,19 @@ class GuestClient:
     """Client of a guest's program, which runs on from scene to scene and is started again after a failure."""
 
     def __init__(
-        self, name: str, program: Program, hello: Hello, trouble: str = "", setting: dict[str, Any] | None = None
+        self,
+        name: str,
+        program: Program,
+        hello: Hello,
+        trouble: str = "",
+        setting: dict[str, Any] | None = None,
     ) -> None:
-        self.name, self._program, self._hello, self._trouble = name, program, hello, trouble
+        self.name, self._program, self._hello, self._trouble = (
+            name,
+            program,
+            hello,
+            trouble,
+        )
         self._setting = {"setting": setting} if setting else {}
         self.commands = COMMANDS if trouble else hello.commands
         self.step: float | None = None
@@ -272,7 +340,9 @@ class GuestClient:
             **self._setting,
         }
         try:
-            return protocol.answer_from_json(self.name, command, self._ask(data, len(command.angle)))
+            return protocol.answer_from_json(
+                self.name, command, self._ask(data, len(command.angle))
+            )
         except InputError as error:
             raise EngineError(str(error)) from None
 
@@ -280,10 +350,16 @@ class GuestClient:
         """Return the released motion as the guest integrates it."""
         if refusal := self._explain_refusal(["release", *find_needs(scene)]):
             return ReleasedAnswer.refused(self.name, "-", refusal)
-        data = {"ask": "release", "scene": protocol.scene_to_json(scene), **protocol.release_to_json(scene)}
+        data = {
+            "ask": "release",
+            "scene": protocol.scene_to_json(scene),
+            **protocol.release_to_json(scene),
+        }
         data |= {} if self.step is None else {"step": self.step}
         try:
-            return protocol.released_from_json(self.name, len(times), self._ask(data, len(times)))
+            return protocol.released_from_json(
+                self.name, len(times), self._ask(data, len(times))
+            )
         except InputError as error:
             raise EngineError(str(error)) from None
 
@@ -294,7 +370,11 @@ class GuestClient:
         name = self._setting.get("setting", {}).get("name")
         if name is not None and name not in self._hello.settings:
             return f"the engine's hello does not list {name!r} in settings"
-        return f"the engine's hello does not list {', '.join(lacking)} in effects" if lacking else ""
+        return (
+            f"the engine's hello does not list {', '.join(lacking)} in effects"
+            if lacking
+            else ""
+        )
 
     def _ask(self, question: dict[str, Any], positions: int) -> dict[str, Any]:
         running = _RUNNING.setdefault(self._program, Running(self._program))

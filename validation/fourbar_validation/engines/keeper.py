@@ -28,10 +28,20 @@ def call_prctl(option: int, value: int) -> None:
 
 def bound_memory(size: int) -> None:
     """Bound the data of each process, but no address space: libraries reserve more of that than they use."""
-    for limit, wanted in ((resource.RLIMIT_AS, -1), (resource.RLIMIT_DATA, size), (resource.RLIMIT_CORE, 0)):
+    for limit, wanted in (
+        (resource.RLIMIT_AS, -1),
+        (resource.RLIMIT_DATA, size),
+        (resource.RLIMIT_CORE, 0),
+    ):
         _, most = resource.getrlimit(limit)
         with suppress(ValueError, OSError):
-            resource.setrlimit(limit, (most if wanted < 0 else wanted if most < 0 else min(wanted, most), most))
+            resource.setrlimit(
+                limit,
+                (
+                    most if wanted < 0 else wanted if most < 0 else min(wanted, most),
+                    most,
+                ),
+            )
 
 
 def end_children(group: int) -> None:
@@ -40,7 +50,11 @@ def end_children(group: int) -> None:
         os.killpg(group, signal.SIGKILL)
     while True:
         with suppress(OSError):
-            for child in Path(f"/proc/self/task/{os.getpid()}/children").read_text(encoding="ascii").split():
+            for child in (
+                Path(f"/proc/self/task/{os.getpid()}/children")
+                .read_text(encoding="ascii")
+                .split()
+            ):
                 os.kill(int(child), signal.SIGKILL)
         try:
             os.waitpid(-1, 0)

@@ -71,7 +71,15 @@ PROXIMAL = Boundary(
     "the third row of the planar loop is redundant: without proximal regularisation every number is NaN",
     "pinocchio-forward",
 )
-LIMITS = (NEAREST_TOGGLE, FASTEST, SLOWEST, HEAVIEST, NEAREST_CENTRE, LIGHTEST, PROXIMAL)
+LIMITS = (
+    NEAREST_TOGGLE,
+    FASTEST,
+    SLOWEST,
+    HEAVIEST,
+    NEAREST_CENTRE,
+    LIGHTEST,
+    PROXIMAL,
+)
 
 
 def find_exceeded(scene: Scene, speed: float) -> str | None:
@@ -88,15 +96,21 @@ def find_exceeded(scene: Scene, speed: float) -> str | None:
     return None
 
 
-def compute_least_sine(linkage: FourBar, theta_2: NDArray[np.float64], assembled: NDArray[np.bool_]) -> float:
+def compute_least_sine(
+    linkage: FourBar, theta_2: NDArray[np.float64], assembled: NDArray[np.bool_]
+) -> float:
     """Compute the least |sin(theta_4 - theta_3)| between assembled neighbours, by the cosine rule."""
     d, a, b, c = linkage.lengths
     psi = np.sort(theta_2[assembled] - linkage.ground_angle)
     if not len(psi):
         return 1.0
-    turns = math.pi * np.arange(math.ceil(psi[0] / math.pi), math.floor(psi[-1] / math.pi) + 1)
+    turns = math.pi * np.arange(
+        math.ceil(psi[0] / math.pi), math.floor(psi[-1] / math.pi) + 1
+    )
     squared = d * d + a * a - 2.0 * d * a * np.cos(np.concatenate((psi, turns)))
     cosine = (b * b + c * c - squared) / (2.0 * b * c)
     sine = np.sqrt(np.clip(1.0 - cosine**2, 0.0, None))
-    between = np.abs(cosine[len(psi) :]) <= 1.0  # a turn at which the loop is open splits the motion
+    between = (
+        np.abs(cosine[len(psi) :]) <= 1.0
+    )  # a turn at which the loop is open splits the motion
     return float(np.concatenate((sine[: len(psi)], sine[len(psi) :][between])).min())

@@ -9,7 +9,13 @@ import numpy as np
 from fourbar.linkage import MOVING_BARS
 from fourbar.scene import Scene
 from fourbar_validation.compare.answer import Array
-from fourbar_validation.engines.description import FORCE_AT, name_driving, resolve, rotate, rotate_by
+from fourbar_validation.engines.description import (
+    FORCE_AT,
+    name_driving,
+    resolve,
+    rotate,
+    rotate_by,
+)
 
 if TYPE_CHECKING:
     from fourbar.effects import LinearDrive
@@ -94,7 +100,11 @@ class Loaded(EngineBars, Protocol):
 
     def ready(self, scene: Scene, terms: list[Act]) -> None:
         """Prepare the evaluation; an engine calls this once it has its bars and what acts on them."""
-        self.ground_angle, self.drive_bar, self.terms = scene.linkage.ground_angle, scene.drive_bar, terms
+        self.ground_angle, self.drive_bar, self.terms = (
+            scene.linkage.ground_angle,
+            scene.drive_bar,
+            terms,
+        )
         self.linear, self.driving = scene.drive, name_driving(scene)
         self.loaded = [pin for effect in scene.effects for pin in effect.loaded_pins]
 
@@ -121,7 +131,11 @@ class Loaded(EngineBars, Protocol):
 
     def rotate(self, bar: int, x: float, y: float) -> Array:
         """Rotate (x, y) along and across a bar's line into world axes, (2,)."""
-        rotated = rotate(self.ground_angle, x, y) if bar == 1 else rotate_by(self.rotation(bar).tolist(), x, y)
+        rotated = (
+            rotate(self.ground_angle, x, y)
+            if bar == 1
+            else rotate_by(self.rotation(bar).tolist(), x, y)
+        )
         return np.array(rotated)
 
     def first_pin(self, bar: int) -> Array:
@@ -130,14 +144,21 @@ class Loaded(EngineBars, Protocol):
 
     def end(self, point: "SpringEnd") -> Array:
         """Locate an end of a spring or of a linear drive, m, (2,)."""
-        return self.first_pin(point.bar) + self.rotate(point.bar, *resolve(point.distance, point.angle))
+        return self.first_pin(point.bar) + self.rotate(
+            point.bar, *resolve(point.distance, point.angle)
+        )
 
     def cylinder(self, bar: int) -> tuple[complex, complex]:
         """Measure it with the bars laid down along +x."""
         assert self.linear is not None
         self.place((0.0, 0.0, 0.0))
-        on_bar, on_ground = sorted((self.linear.start, self.linear.end), key=lambda end: -end.bar)
-        x, y = ((self.end(point) - self.first_pin(bar)).tolist() for point in (on_bar, on_ground))
+        on_bar, on_ground = sorted(
+            (self.linear.start, self.linear.end), key=lambda end: -end.bar
+        )
+        x, y = (
+            (self.end(point) - self.first_pin(bar)).tolist()
+            for point in (on_bar, on_ground)
+        )
         return complex(*x), complex(*y)
 
     def line(self) -> tuple[Array, Array, Array]:
@@ -161,7 +182,11 @@ class Loaded(EngineBars, Protocol):
     def push(self, bar: int, force: Array, point: Array) -> None:
         """Add a force (N, world axes) at a point (m, world axes); on the ground it does nothing."""
         if bar != 1:
-            (x, y), (f_x, f_y), wrench = (point - self.first_pin(bar)).tolist(), force.tolist(), self.wrenches[bar]
+            (x, y), (f_x, f_y), wrench = (
+                (point - self.first_pin(bar)).tolist(),
+                force.tolist(),
+                self.wrenches[bar],
+            )
             wrench[0] += f_x
             wrench[1] += f_y
             wrench[2] += x * f_y - y * f_x
@@ -187,7 +212,9 @@ class Loaded(EngineBars, Protocol):
         for _ in range(PASSES if self.loaded else 0):
             loads = {pin: math.hypot(*forces[FORCE_AT[pin]]) for pin in self.loaded}
             most = max(loads.values())
-            change = max(abs(load - self.pin_loads.get(pin, 0.0)) for pin, load in loads.items())
+            change = max(
+                abs(load - self.pin_loads.get(pin, 0.0)) for pin, load in loads.items()
+            )
             # once down to the rounding of a pass, the change falls no further
             if change <= REPEATED * most or before <= change <= ROUNDED * most:
                 return forces
@@ -206,7 +233,9 @@ class Loaded(EngineBars, Protocol):
         def passed(loads: Array) -> tuple[dict[str, Any], Array]:
             self.pin_loads = dict(zip(self.loaded, loads.tolist(), strict=True))
             forces = balanced()
-            return forces, np.array([math.hypot(*forces[FORCE_AT[pin]]) for pin in self.loaded])
+            return forces, np.array(
+                [math.hypot(*forces[FORCE_AT[pin]]) for pin in self.loaded]
+            )
 
         unit = np.eye(len(self.loaded))
         forces, loads = passed(np.zeros(len(unit)))
@@ -214,13 +243,25 @@ class Loaded(EngineBars, Protocol):
             before = math.inf
             for _ in range(STEPS):
                 forces, settled_loads = passed(share * loads)
-                most, change = float(settled_loads.max()), float(np.abs(settled_loads - loads).max())
-                if not most < DIVERGED or change <= REPEATED * most or before <= change <= ROUNDED * most:
+                most, change = (
+                    float(settled_loads.max()),
+                    float(np.abs(settled_loads - loads).max()),
+                )
+                if (
+                    not most < DIVERGED
+                    or change <= REPEATED * most
+                    or before <= change <= ROUNDED * most
+                ):
                     break
                 nudge, before = NUDGE * most, change
-                moved = [(passed(share * (loads + nudge * one))[1] - settled_loads) / nudge for one in unit]
+                moved = [
+                    (passed(share * (loads + nudge * one))[1] - settled_loads) / nudge
+                    for one in unit
+                ]
                 matrix = unit - np.stack(moved, axis=1)
-                if np.linalg.det(matrix) <= 0.0:  # 1 without friction: beyond zero the growth has turned back
+                if (
+                    np.linalg.det(matrix) <= 0.0
+                ):  # 1 without friction: beyond zero the growth has turned back
                     return {}
                 loads = loads + np.linalg.solve(matrix, settled_loads - loads)
             if not change <= ROUNDED * most or (loads < 0.0).any():

@@ -10,11 +10,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.errors import LimitError
-from fourbar.quantities import ANGLES, LINE_QUANTITIES, PIN_FORCES, STAGE_OF, STAGES, VECTORS
+from fourbar.quantities import (
+    ANGLES,
+    LINE_QUANTITIES,
+    PIN_FORCES,
+    STAGE_OF,
+    STAGES,
+    VECTORS,
+)
 from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Answer, Array
-from fourbar_validation.engines.description import SHARED, list_speeds, list_unknowns, name_driving, reduce_angle
-from fourbar_validation.engines.free_body_closure import LONGEST_STEP, NEWTON_STEPS, STARTS, find_angle
+from fourbar_validation.engines.description import (
+    SHARED,
+    list_speeds,
+    list_unknowns,
+    name_driving,
+    reduce_angle,
+)
+from fourbar_validation.engines.free_body_closure import (
+    LONGEST_STEP,
+    NEWTON_STEPS,
+    STARTS,
+    find_angle,
+)
 from fourbar_validation.engines.loaded import Assembled, EngineBars, Values
 
 START_ANGLES = np.radians(STARTS).tolist()
@@ -23,7 +41,15 @@ SHORTEST_STEP = 2.0**-40
 NOT_ANSWERED = frozenset(
     (
         *("theta_2", "omega_2", "alpha_2", "condition", "drive_condition"),
-        *("torque_error", "force_error", "torque_low", "torque_high", "friction_residual", "power", *LINE_QUANTITIES),
+        *(
+            "torque_error",
+            "force_error",
+            "torque_low",
+            "torque_high",
+            "friction_residual",
+            "power",
+            *LINE_QUANTITIES,
+        ),
         *("v_A", "v_B", "v_G2", "v_G3", "v_G4"),
     )
 )
@@ -49,11 +75,20 @@ class Assembler:
         theta = theta if bar == 2 else reduce_angle(theta)
         tree.place([theta if each == bar else 0.0 for each in (2, 3, 4)])
         points = tree.positions()
-        along = {2: points.get("A2", points["A"]), 3: points["B"] - points["A"], 4: points["B4"] - points["O4"]}
+        along = {
+            2: points.get("A2", points["A"]),
+            3: points["B"] - points["A"],
+            4: points["B4"] - points["O4"],
+        }
         diagonal = points["O4"] + along[4] if bar == 4 else points["O4"] - along[bar]
         e, d, near, far, held = (
             math.hypot(*vector.tolist())
-            for vector in (diagonal, points["O4"], *(along[other] for other in CLOSING[bar]), along[bar])
+            for vector in (
+                diagonal,
+                points["O4"],
+                *(along[other] for other in CLOSING[bar]),
+                along[bar],
+            )
         )
         closed = ROUNDING * (held + d + near + far)
         # the gap with a bar held is stationary only where the others lie along the diagonal: this is its least value
@@ -61,27 +96,45 @@ class Assembler:
             return None
         phi = math.atan2(diagonal[1], diagonal[0])
         # the triangle as measured is the nearest start, also where a bar is a millionth of the others
-        triangle = _compute_triangle_angle(e, near, far), _compute_triangle_angle(e, far, near)
+        triangle = (
+            _compute_triangle_angle(e, near, far),
+            _compute_triangle_angle(e, far, near),
+        )
         for alpha, beta in (triangle, *START_ANGLES):
             first, second = phi + branch * alpha, phi + math.pi - branch * beta
-            around = {2: (theta, first, second), 3: (first, theta, second), 4: (second + math.pi, first, theta)}
+            around = {
+                2: (theta, first, second),
+                3: (first, theta, second),
+                4: (second + math.pi, first, theta),
+            }
             theta_2, theta_3, theta_4 = around[bar]
-            q = theta_2, math.remainder(theta_3 - theta_2, math.tau), math.remainder(theta_4, math.tau)
+            q = (
+                theta_2,
+                math.remainder(theta_3 - theta_2, math.tau),
+                math.remainder(theta_4, math.tau),
+            )
             assembled = close_gap(tree, q, branch, closed, bar)
             if assembled is not None:
                 return assembled
         if max(e - (near + far), abs(near - far) - e) < -closed:
-            raise ArithmeticError(f"the loop closes at theta_{bar} = {theta!r}, but Newton's method does not find it")
+            raise ArithmeticError(
+                f"the loop closes at theta_{bar} = {theta!r}, but Newton's method does not find it"
+            )
         return None
 
 
 def _compute_triangle_angle(e: float, near: float, far: float) -> float:
     """Compute the angle between the sides e and near, by half-angle tangents."""
-    above, below = (e - near + far) * (far + near - e), (e + near - far) * (e + near + far)
+    above, below = (
+        (e - near + far) * (far + near - e),
+        (e + near - far) * (e + near + far),
+    )
     return 2.0 * math.atan2(math.sqrt(max(above, 0.0)), math.sqrt(max(below, 0.0)))
 
 
-def close_gap(tree: Assembled, q: Angles, branch: int, closed: float, bar: int = 2) -> Angles | None:
+def close_gap(
+    tree: Assembled, q: Angles, branch: int, closed: float, bar: int = 2
+) -> Angles | None:
     """Close the gap with a bar held, never leaving the branch.
 
     The determinant of the gap's derivative by the angles of the others, for bar 2 -b c sin(theta_4 - theta_3), has the
@@ -94,7 +147,9 @@ def close_gap(tree: Assembled, q: Angles, branch: int, closed: float, bar: int =
         tree.place(q)
         x, y = tree.gap()
         (e, a, b), (f, c, d) = tree.jacobian().tolist()
-        if bar == 3:  # bar 2 turns alone where its own joint turns and that of bar 3 turns back
+        if (
+            bar == 3
+        ):  # bar 2 turns alone where its own joint turns and that of bar 3 turns back
             a, c = e - a, f - c
         elif bar == 4:
             b, d = e - a, f - c
@@ -118,7 +173,10 @@ def close_gap(tree: Assembled, q: Angles, branch: int, closed: float, bar: int =
         while True:
             trial = moved(q, part * first, part * second)
             trial_state = look(trial)
-            if math.hypot(trial_state[0], trial_state[1]) < size and trial_state[6] * branch < 0.0:
+            if (
+                math.hypot(trial_state[0], trial_state[1]) < size
+                and trial_state[6] * branch < 0.0
+            ):
                 break
             part /= 2.0
             if size <= closed or part < SHORTEST_STEP:
@@ -145,8 +203,16 @@ class Exact:
             return Answer(self.name, "exact", refusal=str(error))
         start, moves, asked = time.perf_counter(), command.speed is not None, command
         wanted = STAGES if moves else ("position",)
-        solved_motion = () if command.bar == 2 and command.stroke is None else MADE[: 3 if moves else 1]
-        names = [name for name, stage in STAGE_OF.items() if stage in wanted and name not in NOT_ANSWERED]
+        solved_motion = (
+            ()
+            if command.bar == 2 and command.stroke is None
+            else MADE[: 3 if moves else 1]
+        )
+        names = [
+            name
+            for name, stage in STAGE_OF.items()
+            if stage in wanted and name not in NOT_ANSWERED
+        ]
         names += [name for name in solved_motion if name not in names]
         if command.stroke is not None:
             command = find_angle(command, scene.motion, *bars.cylinder(command.bar))
@@ -155,18 +221,32 @@ class Exact:
 
         def read(q: Angles, speed: float, acceleration: float) -> Values:
             points, theta_3, theta_4 = bars.positions(), bars.angle(3), bars.angle(4)
-            values: Values = {name: points[name] for name in ("A", "B", "G2", "G3", "G4")}
-            values |= {"theta_3": theta_3, "theta_4": theta_4, "sin_mu": math.sin(theta_4 - theta_3)}
+            values: Values = {
+                name: points[name] for name in ("A", "B", "G2", "G3", "G4")
+            }
+            values |= {
+                "theta_3": theta_3,
+                "theta_4": theta_4,
+                "sin_mu": math.sin(theta_4 - theta_3),
+            }
             values |= {"theta_2": bars.angle(2)} if solved_motion else {}
-            return values | (bars.move(command.bar, speed, acceleration) if moves else {})
+            return values | (
+                bars.move(command.bar, speed, acceleration) if moves else {}
+            )
 
         out, assembled, gap = read_each(bars, command, names, read)
         if reason := bars.refusal():
             return Answer(self.name, "exact", refusal=reason)
         for name in ANGLES:
             out[name][assembled] = np.unwrap(out[name][assembled])
-        answer = Answer(self.name, "exact", asked, assembled, out, evidence={"closure_gap": gap})
-        answer.shared, answer.own, answer.seconds = SHARED, bars.own, time.perf_counter() - start
+        answer = Answer(
+            self.name, "exact", asked, assembled, out, evidence={"closure_gap": gap}
+        )
+        answer.shared, answer.own, answer.seconds = (
+            SHARED,
+            bars.own,
+            time.perf_counter() - start,
+        )
         return answer
 
 
@@ -179,25 +259,42 @@ def read_each(
 ) -> tuple[dict[str, Array], NDArray[np.bool_], float]:
     """Read each position that assembles, NaN elsewhere; return that, where it assembles, and the greatest gap, m."""
     n, (omega, alpha) = len(command.angle), list_speeds(command)
-    missing: dict[str, Any] = {name: (math.nan, math.nan) if name in VECTORS else math.nan for name in names}
-    rows, assembled, gap, position = [missing] * n, np.zeros(n, dtype=bool), 0.0, Assembler(bars, command.bar)
-    for i, (theta, branch) in enumerate(zip(command.angle.tolist(), command.branch.tolist(), strict=True)):
+    missing: dict[str, Any] = {
+        name: (math.nan, math.nan) if name in VECTORS else math.nan for name in names
+    }
+    rows, assembled, gap, position = (
+        [missing] * n,
+        np.zeros(n, dtype=bool),
+        0.0,
+        Assembler(bars, command.bar),
+    )
+    for i, (theta, branch) in enumerate(
+        zip(command.angle.tolist(), command.branch.tolist(), strict=True)
+    ):
         if (q := position.find(theta, branch)) is not None:
             assembled[i], gap = True, max(gap, math.hypot(*bars.gap()))
             rows[i] = missing | read(q, float(omega[i]), float(alpha[i]))
-    return {name: np.array([row[name] for row in rows], float) for name in missing}, assembled, gap
+    return (
+        {name: np.array([row[name] for row in rows], float) for name in missing},
+        assembled,
+        gap,
+    )
 
 
 MADE = ("theta_2", "omega_2", "alpha_2")
 """The motion that an engine really made."""
 
 
-def make_blank(n: int, names: Iterable[str] = (*MADE, "torque", *PIN_FORCES)) -> dict[str, Array]:
+def make_blank(
+    n: int, names: Iterable[str] = (*MADE, "torque", *PIN_FORCES)
+) -> dict[str, Array]:
     """Return NaN for each of n positions, (n,) or (n, 2)."""
     return {name: np.full((n, 2) if name in VECTORS else n, np.nan) for name in names}
 
 
-def split_answer(out: dict[str, Array], branch: NDArray[np.int8]) -> tuple[Command, dict[str, Array]]:
+def split_answer(
+    out: dict[str, Array], branch: NDArray[np.int8]
+) -> tuple[Command, dict[str, Array]]:
     """Split what was read into the motion that was made, as a command, and the other quantities."""
     theta_2, omega_2, alpha_2 = (out[name] for name in MADE)
     rest = {name: values for name, values in out.items() if name not in MADE}
@@ -218,5 +315,7 @@ class LimitDetector:
         sine = self.branch * math.sin(theta_4 - theta_3)
         began, last = self.before
         if sine < 0.0:
-            self.stopped_at = began + (time - began) * max(last, 0.0) / (max(last, 0.0) - sine)
+            self.stopped_at = began + (time - began) * max(last, 0.0) / (
+                max(last, 0.0) - sine
+            )
         self.before = (time, sine)

@@ -12,7 +12,12 @@ from fourbar.effects import Gravity
 from fourbar.errors import LimitError
 from fourbar.scene import Scene, command
 from fourbar_validation.compare.answer import Array, ReleasedAnswer
-from fourbar_validation.engines.description import FIRST_PIN, find_unknown, list_parts, rotate_by
+from fourbar_validation.engines.description import (
+    FIRST_PIN,
+    find_unknown,
+    list_parts,
+    rotate_by,
+)
 from fourbar_validation.engines.effects import TERM_OF, list_acting
 from fourbar_validation.engines.loop import Assembler, Exact, LimitDetector
 from fourbar_validation.engines.tree import Tree, solve_closed
@@ -30,25 +35,40 @@ class PinocchioTree(Tree):
         self.joint, self.frame = {1: 0}, dict[str, int]()
         for part in list_parts(scene.linkage):
             joint = model.addJoint(
-                self.joint[part.bearer], pin.JointModelRZ(), _place_at(*part.first_pin), FIRST_PIN[part.bar]
+                self.joint[part.bearer],
+                pin.JointModelRZ(),
+                _place_at(*part.first_pin),
+                FIRST_PIN[part.bar],
             )
             self.joint[part.bar] = joint
             # nothing is appended, no frame either: below 2.2e-16 kg the sum of two inertias has another mass centre
             about_g = np.diag([0.0, 0.0, part.inertia])
-            model.inertias[joint] = pin.Inertia(part.mass, np.array([*part.centre, 0.0]), about_g)
+            model.inertias[joint] = pin.Inertia(
+                part.mass, np.array([*part.centre, 0.0]), about_g
+            )
             for name, place in part.points.items():
                 self.frame[name] = model.addFrame(
-                    pin.Frame(name, joint, 0, _place_at(*place), pin.FrameType.OP_FRAME), False
+                    pin.Frame(
+                        name, joint, 0, _place_at(*place), pin.FrameType.OP_FRAME
+                    ),
+                    False,
                 )
         self.data = data = model.createData()
         self.q = np.zeros(3)
         self.external = pin.StdVec_Force([pin.Force.Zero()] * model.njoints)
         # the engine's own memory, read and written in place: to look it up again costs more than a pass of the engine
-        self.at = {name: data.oMf[frame].translation[:2] for name, frame in self.frame.items()}
-        self.turned_to = {bar: data.oMi[joint].rotation[:2, :2] for bar, joint in self.joint.items()}
-        self.joint_force = {bar: data.f[joint].linear[:2] for bar, joint in self.joint.items()}
+        self.at = {
+            name: data.oMf[frame].translation[:2] for name, frame in self.frame.items()
+        }
+        self.turned_to = {
+            bar: data.oMi[joint].rotation[:2, :2] for bar, joint in self.joint.items()
+        }
+        self.joint_force = {
+            bar: data.f[joint].linear[:2] for bar, joint in self.joint.items()
+        }
         self.external_force = {
-            bar: (self.external[joint].linear, self.external[joint].angular) for bar, joint in self.joint.items()
+            bar: (self.external[joint].linear, self.external[joint].angular)
+            for bar, joint in self.joint.items()
         }
         self.ready(scene, list_acting(scene, self))
         self._weigh(self.field)
@@ -72,11 +92,15 @@ class PinocchioTree(Tree):
 
     def point_jacobian(self, name: str) -> Array:
         """Return that of a frame."""
-        return np.array(pin.getFrameJacobian(self.model, self.data, self.frame[name], WORLD)[:2])
+        return np.array(
+            pin.getFrameJacobian(self.model, self.data, self.frame[name], WORLD)[:2]
+        )
 
     def turn(self, bar: int) -> Array:
         """Return the last row of the bar's frame Jacobian."""
-        return np.array(pin.getFrameJacobian(self.model, self.data, self.frame[f"G{bar}"], WORLD)[5])
+        return np.array(
+            pin.getFrameJacobian(self.model, self.data, self.frame[f"G{bar}"], WORLD)[5]
+        )
 
     def set_motion(self, v: Array, a: Array) -> None:
         """Compute the forward kinematics."""
@@ -84,22 +108,30 @@ class PinocchioTree(Tree):
 
     def acceleration(self, name: str) -> Array:
         """Return that of a frame."""
-        motion = pin.getFrameClassicalAcceleration(self.model, self.data, self.frame[name], WORLD)
+        motion = pin.getFrameClassicalAcceleration(
+            self.model, self.data, self.frame[name], WORLD
+        )
         return np.array(motion.linear[:2])
 
-    def needed(self, field: tuple[float, float], wrenches: dict[int, list[float]]) -> Array:
+    def needed(
+        self, field: tuple[float, float], wrenches: dict[int, list[float]]
+    ) -> Array:
         """Compute recursive Newton-Euler with what acts on the bars as external forces."""
         self._weigh(field)
         for bar, (x, y, moment) in wrenches.items():
             force, couple = self.external_force[bar]
             force[:2] = rotate_by(self.rotation(bar).T.tolist(), x, y)
             couple[2] = moment
-        return np.array(pin.rnea(self.model, self.data, self.q, self.v, self.a, self.external))
+        return np.array(
+            pin.rnea(self.model, self.data, self.q, self.v, self.a, self.external)
+        )
 
     def carried(self) -> dict[int, Array]:
         """Compute what each joint transmits in one more pass."""
         self.needed(self.field, self.wrenches)
-        return {bar: self.rotation(bar) @ self.joint_force[bar] for bar in self.wrenches}
+        return {
+            bar: self.rotation(bar) @ self.joint_force[bar] for bar in self.wrenches
+        }
 
 
 PinocchioInverse = partial(Exact, "pinocchio-inverse", PinocchioTree)
@@ -124,28 +156,50 @@ class ClosedTree:
 
     def __init__(self, tree: PinocchioTree, time_constant: float) -> None:
         self.tree = tree
-        ends = [(tree.joint[bar], tree.model.frames[tree.frame[f"end{bar}"]].placement) for bar in (3, 4)]
+        ends = [
+            (tree.joint[bar], tree.model.frames[tree.frame[f"end{bar}"]].placement)
+            for bar in (3, 4)
+        ]
         closure = pin.RigidConstraintModel(
-            pin.ContactType.CONTACT_3D, tree.model, *ends[0], *ends[1], pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+            pin.ContactType.CONTACT_3D,
+            tree.model,
+            *ends[0],
+            *ends[1],
+            pin.ReferenceFrame.LOCAL_WORLD_ALIGNED,
         )
-        gains = pin.BaumgarteCorrectorParameters(1.0 / time_constant**2, 2.0 / time_constant)
+        gains = pin.BaumgarteCorrectorParameters(
+            1.0 / time_constant**2, 2.0 / time_constant
+        )
         closure.setBaumgarteCorrectorParameters(gains)
-        self.models, self.closure_data = pin.StdVec_RigidConstraintModel(), pin.StdVec_RigidConstraintData()
+        self.models, self.closure_data = (
+            pin.StdVec_RigidConstraintModel(),
+            pin.StdVec_RigidConstraintData(),
+        )
         self.models.append(closure)
         self.closure_data.append(closure.createData())
         self.data = tree.model.createData()
-        pin.initConstraintDynamics(tree.model, self.data, self.models, self.closure_data)
+        pin.initConstraintDynamics(
+            tree.model, self.data, self.models, self.closure_data
+        )
         self.proximal = pin.ProximalSettings(*PROXIMAL)
 
-    def start(self, theta_2: float, branch: int, omega_2: float) -> tuple[Array, Array] | None:
+    def start(
+        self, theta_2: float, branch: int, omega_2: float
+    ) -> tuple[Array, Array] | None:
         """Assemble at the speeds that keep the loop closed; None if it does not close."""
         q = Assembler(self.tree).find(theta_2, branch)
-        return None if q is None else (np.array(q), solve_closed(self.tree.jacobian(), omega_2))
+        return (
+            None
+            if q is None
+            else (np.array(q), solve_closed(self.tree.jacobian(), omega_2))
+        )
 
     def acceleration(self, q: Array, v: Array, tau: Array) -> Any:
         """Accelerate the closed loop under loads, effects and the flywheel's motor."""
         model, data = self.tree.model, self.data
-        return pin.constraintDynamics(model, data, q, v, tau, self.models, self.closure_data, self.proximal).copy()
+        return pin.constraintDynamics(
+            model, data, q, v, tau, self.models, self.closure_data, self.proximal
+        ).copy()
 
     def loop_force(self) -> Array:
         """Return F43 of the acceleration last found, (2,), N."""
@@ -161,7 +215,9 @@ def make_step(f: Acceleration, q: Array, v: Array, h: float) -> tuple[Array, Arr
     a3 = f(q + 0.5 * h * v2, v3)
     v4 = v + h * a3
     a4 = f(q + h * v3, v4)
-    return q + h / 6.0 * (v + 2.0 * v2 + 2.0 * v3 + v4), v + h / 6.0 * (a1 + 2.0 * a2 + 2.0 * a3 + a4)
+    return q + h / 6.0 * (v + 2.0 * v2 + 2.0 * v3 + v4), v + h / 6.0 * (
+        a1 + 2.0 * a2 + 2.0 * a3 + a4
+    )
 
 
 class PinocchioReleased:
@@ -175,21 +231,41 @@ class PinocchioReleased:
     def release(self, scene: Scene, times: Array) -> ReleasedAnswer:
         """Integrate the motion at the given times, rising from 0 (s)."""
         setting = f"RK4 {self.step:g} s"
-        if scene.loads or any(not isinstance(effect, Gravity) for effect in scene.effects):
-            return ReleasedAnswer.refused(NAME, setting, "in forward dynamics only gravity has a model here")
+        if scene.loads or any(
+            not isinstance(effect, Gravity) for effect in scene.effects
+        ):
+            return ReleasedAnswer.refused(
+                NAME, setting, "in forward dynamics only gravity has a model here"
+            )
         tree, start, none = PinocchioTree(scene), command(scene), np.zeros(3)
-        loop, detector = ClosedTree(tree, TIME_CONSTANT_STEPS * self.step), LimitDetector(int(start.branch[0]))
-        state = loop.start(float(start.theta_2[0]), int(start.branch[0]), scene.motion.omega_2 or 0.0)
+        loop, detector = (
+            ClosedTree(tree, TIME_CONSTANT_STEPS * self.step),
+            LimitDetector(int(start.branch[0])),
+        )
+        state = loop.start(
+            float(start.theta_2[0]), int(start.branch[0]), scene.motion.omega_2 or 0.0
+        )
         if state is None:
-            return ReleasedAnswer.refused(NAME, setting, "the loop does not close at the start")
+            return ReleasedAnswer.refused(
+                NAME, setting, "the loop does not close at the start"
+            )
         (q, v), rows, now = state, [], 0.0
         for t in times:
             steps = math.ceil((t - now) / self.step - 1e-6)
             for taken in range(1, steps + 1):
-                q, v = make_step(lambda q, v: loop.acceleration(q, v, none), q, v, (t - now) / steps)
+                q, v = make_step(
+                    lambda q, v: loop.acceleration(q, v, none), q, v, (t - now) / steps
+                )
                 detector.look(now + taken * (t - now) / steps, q[0] + q[1], q[2])
             now = float(t)
-            energy, data = pin.computeMechanicalEnergy(tree.model, tree.data, q, v), tree.data
-            rows.append((q[0], v[0], energy, data.kinetic_energy + abs(data.potential_energy)))
+            energy, data = (
+                pin.computeMechanicalEnergy(tree.model, tree.data, q, v),
+                tree.data,
+            )
+            rows.append(
+                (q[0], v[0], energy, data.kinetic_energy + abs(data.potential_energy))
+            )
         theta_2, omega, energy, terms = np.array(rows).T
-        return ReleasedAnswer(NAME, setting, theta_2, omega, energy, terms, detector.stopped_at)
+        return ReleasedAnswer(
+            NAME, setting, theta_2, omega, energy, terms, detector.stopped_at
+        )

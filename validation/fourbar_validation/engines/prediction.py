@@ -23,7 +23,13 @@ import numpy as np
 from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import PIN_FORCES, VECTORS
 from fourbar.scene import Command, Scene
-from fourbar_validation.compare.tolerance import EPS, ROUNDINGS, Array, Mask, sum_lengths
+from fourbar_validation.compare.tolerance import (
+    EPS,
+    ROUNDINGS,
+    Array,
+    Mask,
+    sum_lengths,
+)
 from fourbar_validation.engines.description import find_centre, list_speeds
 
 if TYPE_CHECKING:
@@ -34,27 +40,48 @@ FIRST_ORDER = 0.1
 forces and the torque undetermined; the torque's own first order can cancel."""
 
 
-def predict_from_data(scene: Scene, command: Command, quantity: str, mask: Mask | None = None) -> Array:
+def predict_from_data(
+    scene: Scene, command: Command, quantity: str, mask: Mask | None = None
+) -> Array:
     """Predict for a derivation that works in angles and lengths themselves."""
     return predict_error(scene, command, quantity, 0.0, mask)
 
 
-def predict_in_world_axes(scene: Scene, command: Command, quantity: str, mask: Mask | None = None) -> Array:
+def predict_in_world_axes(
+    scene: Scene, command: Command, quantity: str, mask: Mask | None = None
+) -> Array:
     """Predict for an engine that differences points of the linkage in world axes, as Pinocchio's frame Jacobians do."""
     return predict_error(scene, command, quantity, sum_lengths(scene.linkage), mask)
 
 
-def predict_about_mass_centre(scene: Scene, command: Command, quantity: str, mask: Mask | None = None) -> Array:
+def predict_about_mass_centre(
+    scene: Scene, command: Command, quantity: str, mask: Mask | None = None
+) -> Array:
     """Predict for an engine that moves a tree of bodies about the mass centre of all of them, as MuJoCo does.
 
     Every bar is accelerated with the first of its tree and back again by its own joint.
     """
-    furthest = max(abs(find_centre(scene.linkage.bar(number))[0]) for number in MOVING_BARS)
-    return predict_error(scene, command, quantity, sum_lengths(scene.linkage) + furthest, mask, carried=True)
+    furthest = max(
+        abs(find_centre(scene.linkage.bar(number))[0]) for number in MOVING_BARS
+    )
+    return predict_error(
+        scene,
+        command,
+        quantity,
+        sum_lengths(scene.linkage) + furthest,
+        mask,
+        carried=True,
+    )
 
 
 def predict_error(
-    scene: Scene, command: Command, quantity: str, reach: float, mask: Mask | None = None, *, carried: bool = False
+    scene: Scene,
+    command: Command,
+    quantity: str,
+    reach: float,
+    mask: Mask | None = None,
+    *,
+    carried: bool = False,
 ) -> Array:
     """Predict the absolute error of a quantity at each position, or at those of a mask, (n,).
 
@@ -65,17 +92,23 @@ def predict_error(
     errors = np.full(n, np.nan)
     for i in range(n) if mask is None else np.flatnonzero(mask).tolist():
         theta_2, branch = float(command.theta_2[i]), int(command.branch[i])
-        moved = _compute_sensitivity(scene, theta_2, branch, float(omega[i]), float(alpha[i]))
+        moved = _compute_sensitivity(
+            scene, theta_2, branch, float(omega[i]), float(alpha[i])
+        )
         if moved is None:
             continue
-        lost = ROUNDINGS * EPS * moved.data["theta_4"] >= FIRST_ORDER * float(moved.data["condition"])
+        lost = ROUNDINGS * EPS * moved.data["theta_4"] >= FIRST_ORDER * float(
+            moved.data["condition"]
+        )
         if lost and not quantity.startswith("theta"):
             errors[i] = math.inf
             continue
         errors[i] = moved.first_order(quantity, reach, carried=carried)
         if quantity == "torque":
             turned = max(moved.first_order(f"theta_{bar}", reach) for bar in (3, 4))
-            pulled = max(moved.first_order(force, reach, carried=carried) for force in PIN_FORCES)
+            pulled = max(
+                moved.first_order(force, reach, carried=carried) for force in PIN_FORCES
+            )
             errors[i] += pulled * turned * sum_lengths(scene.linkage)
     return errors
 
@@ -96,8 +129,14 @@ class Sensitivities(NamedTuple):
         parts = []
         name = "sin_mu" if name == "condition" else name
         for axis in ("_x", "_y") if name in VECTORS else ("",):
-            part = ROUNDINGS * self.data.get(name + axis, math.inf) + reach * self.loop.get(name + axis, 0.0)
-            parts.append(part + reach * reach * self.carried.get(name + axis, 0.0) if carried else part)
+            part = ROUNDINGS * self.data.get(
+                name + axis, math.inf
+            ) + reach * self.loop.get(name + axis, 0.0)
+            parts.append(
+                part + reach * reach * self.carried.get(name + axis, 0.0)
+                if carried
+                else part
+            )
         return EPS * math.hypot(*parts)
 
 
@@ -119,7 +158,10 @@ def _compute_sensitivity(
     def move(**changed: "Ball") -> "Values | None":
         return compute_outputs(scene, branch, exact | changed)
 
-    data = {name: 1.0 if name.startswith("theta") else abs(float(value.mid())) for name, value in base.items()}
+    data = {
+        name: 1.0 if name.startswith("theta") else abs(float(value.mid()))
+        for name, value in base.items()
+    }
     weights = _weigh_inputs({name: float(value) for name, value in exact.items()})
     _add_responses(data, base, move, exact, weights)
     data["condition"] = float(base["condition"].mid())
@@ -127,7 +169,9 @@ def _compute_sensitivity(
     carried: dict[str, float] = {}
     if "omega_3" in base:
         fastest = max(abs(base[f"omega_{bar}"]) for bar in MOVING_BARS)
-        hardest = max(abs(base[f"alpha_{bar}"]) for bar in MOVING_BARS) + fastest * fastest
+        hardest = (
+            max(abs(base[f"alpha_{bar}"]) for bar in MOVING_BARS) + fastest * fastest
+        )
         for name in VECTORS:  # points of the bars, by their places in world axes
             if name.startswith("a_"):
                 loop[f"{name}_x"] = loop[f"{name}_y"] = float(hardest)
@@ -135,12 +179,18 @@ def _compute_sensitivity(
             for direction in (acb(1), acb(0, 1)):
                 _add_response(loop, base, move(**{name: most * step * direction}))
     if "torque" in base:
-        strongest = max(abs(base[name + axis]) for name in PIN_FORCES for axis in ("_x", "_y"))
-        strongest += abs(base["torque"]) / sum_lengths(scene.linkage)  # the couple on a bar is rounded too
+        strongest = max(
+            abs(base[name + axis]) for name in PIN_FORCES for axis in ("_x", "_y")
+        )
+        strongest += abs(base["torque"]) / sum_lengths(
+            scene.linkage
+        )  # the couple on a bar is rounded too
         heaviest = max(scene.linkage.bar(bar).mass for bar in MOVING_BARS)
         for bar in MOVING_BARS:
             _add_response(loop, base, move(**{f"couple_{bar}": strongest * step}))
-            _add_response(carried, base, move(**{f"couple_{bar}": heaviest * hardest * step}))
+            _add_response(
+                carried, base, move(**{f"couple_{bar}": heaviest * hardest * step})
+            )
     return Sensitivities(data, loop, carried)
 
 
@@ -150,19 +200,28 @@ def _weigh_inputs(stored: dict[str, float]) -> dict[str, float]:
     weights = {name: abs(value) for name, value in stored.items() if value != 0.0}
     weights["d"] = longest
     # theta_2 - theta_1 is rounded as the larger of them is
-    weights["theta_1"] = max(abs(stored["theta_1"]), abs(stored["theta_2"]), longest / stored["d"])
+    weights["theta_1"] = max(
+        abs(stored["theta_1"]), abs(stored["theta_2"]), longest / stored["d"]
+    )
     weights["theta_2"] = max(abs(stored["theta_2"]), 1.0)
     return weights
 
 
-def compute_reference(scene: Scene, branch: int, angle: float) -> "tuple[Values, dict[str, float]] | None":
+def compute_reference(
+    scene: Scene, branch: int, angle: float
+) -> "tuple[Values, dict[str, float]] | None":
     """Compute values at one position as balls, and sum |x_i dy/dx_i| of each; None where the loop does not close."""
     from flint import arb
 
     from fourbar_validation.engines.balls import OF_PIECE, compute_outputs, make_balls
 
     exact = make_balls(scene, angle)
-    exact |= {f"{name}_{k}": arb(1) for k, load in enumerate(scene.loads) if load.table for name in OF_PIECE}
+    exact |= {
+        f"{name}_{k}": arb(1)
+        for k, load in enumerate(scene.loads)
+        if load.table
+        for name in OF_PIECE
+    }
 
     def move(**changed: "Ball") -> "Values | None":
         return compute_outputs(scene, branch, exact | changed)
@@ -191,10 +250,14 @@ def _add_responses(
     for name, weight in weights.items():
         step = weight * arb(2) ** -STEP_BITS
         sides = (move(**{name: inputs[name] + side * step}) for side in (1, -1))
-        _add_response(total, base, next((moved for moved in sides if moved is not None), None))
+        _add_response(
+            total, base, next((moved for moved in sides if moved is not None), None)
+        )
 
 
-def _add_response(total: dict[str, float], base: "Values", moved: "Values | None") -> None:
+def _add_response(
+    total: dict[str, float], base: "Values", moved: "Values | None"
+) -> None:
     """Add how far each output moves, in parts of 2^-STEP_BITS; infinitely far where it has become singular."""
     from flint import arb
 

@@ -29,7 +29,10 @@ def bound_memory() -> None:
         return
     _, hard = resource.getrlimit(resource.RLIMIT_AS)
     with suppress(ValueError, OSError):  # macOS knows the limit and sets none
-        resource.setrlimit(resource.RLIMIT_AS, (WORKER_MEMORY if hard < 0 else min(WORKER_MEMORY, hard), hard))
+        resource.setrlimit(
+            resource.RLIMIT_AS,
+            (WORKER_MEMORY if hard < 0 else min(WORKER_MEMORY, hard), hard),
+        )
 
 
 class Ended(NamedTuple):
@@ -56,7 +59,10 @@ def run_to_end(
     variables: Mapping[str, str] | None = None,
 ) -> Ended:
     """Run a command to its end, with these variables added to the environment."""
-    line, environment = [str(part) for part in command], {**os.environ, "PYTHONUTF8": "1", **(variables or {})}
+    line, environment = (
+        [str(part) for part in command],
+        {**os.environ, "PYTHONUTF8": "1", **(variables or {})},
+    )
     try:
         done = subprocess.run(
             line,
@@ -71,7 +77,9 @@ def run_to_end(
     except subprocess.TimeoutExpired:
         return Ended("", "", True, f"no answer within {seconds:g} s")
     last = (done.stderr.strip().splitlines() or [f"exit status {done.returncode}"])[-1]
-    return Ended(done.stdout, done.stderr, done.returncode not in fine, write_one_line(last))
+    return Ended(
+        done.stdout, done.stderr, done.returncode not in fine, write_one_line(last)
+    )
 
 
 KEPT = 20_000
@@ -113,14 +121,21 @@ def take_printed() -> str:
     for stream in (sys.stdout, sys.stderr):
         with suppress(Exception):  # there is none, it was closed, or is somebody else's
             stream.flush()
-    with suppress(AttributeError, OSError, TypeError):  # another system than those of the Unix family
+    with suppress(
+        AttributeError, OSError, TypeError
+    ):  # another system than those of the Unix family
         ctypes.CDLL(None).fflush(None)
     text = _take_written(file)
-    for name, descriptor in (("stdout", 1), ("stderr", 2)):  # an engine may have closed them, or sent them elsewhere
+    for name, descriptor in (
+        ("stdout", 1),
+        ("stderr", 2),
+    ):  # an engine may have closed them, or sent them elsewhere
         os.dup2(file.fileno(), descriptor)
         if getattr(getattr(sys, name), "closed", True):
             # line by line, in the order of what libraries print
-            stream = open(descriptor, "w", 1, "utf-8", "backslashreplace", closefd=False)  # noqa: SIM115
+            stream = open(  # noqa: SIM115
+                descriptor, "w", 1, "utf-8", "backslashreplace", closefd=False
+            )
             setattr(sys, name, stream)
     return make_plain(text.decode(errors="backslashreplace"))
 
@@ -132,7 +147,9 @@ def _take_written(file: IO[bytes]) -> bytes:
     text = file.read(min(size, KEPT // 2))
     skipped = max(size - KEPT, 0)
     file.seek(skipped, os.SEEK_CUR)
-    text += f"\n... {skipped} bytes left out ...\n".encode() * bool(skipped) + file.read(KEPT // 2)
+    text += f"\n... {skipped} bytes left out ...\n".encode() * bool(
+        skipped
+    ) + file.read(KEPT // 2)
     file.truncate(0)
     file.seek(0)
     return text
@@ -173,7 +190,11 @@ class Program:
 
     def limit(self, positions: int) -> float:
         """Return the seconds within which a question is answered."""
-        return SECONDS + SECONDS_PER_POSITION * positions if self.seconds is None else self.seconds
+        return (
+            SECONDS + SECONDS_PER_POSITION * positions
+            if self.seconds is None
+            else self.seconds
+        )
 
 
 @dataclass(eq=False)
@@ -190,7 +211,12 @@ class Running:
     """Why it was stopped."""
     _lock: threading.Lock = field(default_factory=threading.Lock)
 
-    def ask_again(self, question: Question, positions: int, greet: Callable[[Ask], None] | None = None) -> Question:
+    def ask_again(
+        self,
+        question: Question,
+        positions: int,
+        greet: Callable[[Ask], None] | None = None,
+    ) -> Question:
         """Ask, and ask anew a program that is killed from outside; one that fails is ended.
 
         `greet` asks what a program that is started must be asked first, and raises where the answer is wrong.
@@ -213,13 +239,23 @@ class Running:
         process = self._process or self._start()
         assert process.stdin is not None and process.stdout is not None
         self._number += 1
-        line = json.dumps({"id": self._number, **question}, allow_nan=False).encode() + b"\n"
-        seconds, most = self.program.limit(positions), LONGEST_LINE + BYTES_PER_POSITION * positions
+        line = (
+            json.dumps({"id": self._number, **question}, allow_nan=False).encode()
+            + b"\n"
+        )
+        seconds, most = (
+            self.program.limit(positions),
+            LONGEST_LINE + BYTES_PER_POSITION * positions,
+        )
         answered = threading.Event()
-        watch = threading.Thread(target=self._watch, args=(process, seconds, answered), daemon=True)
+        watch = threading.Thread(
+            target=self._watch, args=(process, seconds, answered), daemon=True
+        )
         watch.start()
         try:
-            with suppress(OSError):  # it closed its input, or is gone: what it said before tells
+            with suppress(
+                OSError
+            ):  # it closed its input, or is gone: what it said before tells
                 process.stdin.write(line)
                 process.stdin.flush()
             reply = process.stdout.readline(most + 1)
@@ -236,21 +272,38 @@ class Running:
         """Read a line; EngineError where it is not the answer that was asked for."""
         said = write_one_line(reply[:KEPT].decode(errors="backslashreplace"))
         try:
-            data = json.loads(reply, object_pairs_hook=_make_object, parse_constant=_refuse_constant)
+            data = json.loads(
+                reply, object_pairs_hook=_make_object, parse_constant=_refuse_constant
+            )
         except (ValueError, RecursionError) as error:
-            raise EngineError(f"said what is no JSON ({write_one_line(str(error))}): {said}") from None
+            raise EngineError(
+                f"said what is no JSON ({write_one_line(str(error))}): {said}"
+            ) from None
         if not isinstance(data, dict) or type(data.get("id")) is not int:
             raise EngineError(f"said what is no object with an id: {said}")
         if data["id"] != self._number:
-            raise EngineError(f"answered question {data['id']} where {self._number} was asked")
+            raise EngineError(
+                f"answered question {data['id']} where {self._number} was asked"
+            )
         return data
 
     def _start(self) -> "subprocess.Popen[bytes]":
         command = list(self.program.command)
         if os.name == "posix":
-            command = [sys.executable, "-I", "-S", KEEPER, str(os.getpid()), str(WORKER_MEMORY), *command]
+            command = [
+                sys.executable,
+                "-I",
+                "-S",
+                KEEPER,
+                str(os.getpid()),
+                str(WORKER_MEMORY),
+                *command,
+            ]
         self._errors = tempfile.TemporaryFile(buffering=0)  # noqa: SIM115 - as long as the program
-        environment, pipe = {**os.environ, **dict(self.program.variables)}, subprocess.PIPE
+        environment, pipe = (
+            {**os.environ, **dict(self.program.variables)},
+            subprocess.PIPE,
+        )
         self._process = subprocess.Popen(
             command,
             bufsize=2**16,
@@ -263,14 +316,24 @@ class Running:
         self._number, self._stopped = 0, ""
         return self._process
 
-    def _watch(self, process: "subprocess.Popen[bytes]", seconds: float, answered: threading.Event) -> None:
+    def _watch(
+        self,
+        process: "subprocess.Popen[bytes]",
+        seconds: float,
+        answered: threading.Event,
+    ) -> None:
         """Stop a program that takes too long or writes too much."""
         until = time.monotonic() + seconds
         while not answered.wait(min(1.0, max(0.0, until - time.monotonic()))):
             if time.monotonic() >= until:
                 self._stopped = f"no answer within {seconds:g} s"
-            elif self._errors is not None and os.fstat(self._errors.fileno()).st_size > MOST_ERRORS:
-                self._stopped = f"wrote more than {MOST_ERRORS} bytes to its standard error"
+            elif (
+                self._errors is not None
+                and os.fstat(self._errors.fileno()).st_size > MOST_ERRORS
+            ):
+                self._stopped = (
+                    f"wrote more than {MOST_ERRORS} bytes to its standard error"
+                )
             if self._stopped:
                 _stop(process)
                 return
@@ -281,7 +344,9 @@ class Running:
         print_kept(text)
         return text
 
-    def _find_end(self, process: "subprocess.Popen[bytes]", reply: bytes, most: int) -> EngineError:
+    def _find_end(
+        self, process: "subprocess.Popen[bytes]", reply: bytes, most: int
+    ) -> EngineError:
         """Say in one line how a program ended, or that it did not end its line."""
         if self._stopped:
             return EngineError(self._stopped)
@@ -291,7 +356,9 @@ class Running:
             status = process.wait(1.0)
         except subprocess.TimeoutExpired:
             return EngineError("closed its standard output")
-        lines = self._take_errors().decode(errors="backslashreplace").strip().splitlines()
+        lines = (
+            self._take_errors().decode(errors="backslashreplace").strip().splitlines()
+        )
         said = f": {write_one_line(lines[-1])}" if lines else ""
         if status in KILLED:
             return _KilledError(f"was killed{said}")

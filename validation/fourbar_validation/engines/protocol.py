@@ -75,13 +75,22 @@ def scene_from_json(data: Any) -> Scene:
 def command_to_json(scene: Scene, command: Command) -> dict[str, Any]:
     """Write what is commanded: an angle or a stroke, its speed and acceleration, the branch."""
     if command.stroke is None:
-        names, values = COMMANDS[command.bar], (command.angle, command.speed, command.acceleration)
+        names, values = (
+            COMMANDS[command.bar],
+            (command.angle, command.speed, command.acceleration),
+        )
     else:
-        names, values = STROKE_COMMAND, (command.stroke, command.stroke_speed, scene.motion.acceleration)
+        names, values = (
+            STROKE_COMMAND,
+            (command.stroke, command.stroke_speed, scene.motion.acceleration),
+        )
     place, speed, acceleration = names
     data = {place: _write_numbers(values[0])}
     if values[1] is not None:
-        data |= {speed: _write_numbers(values[1]), acceleration: _write_numbers(values[2])}
+        data |= {
+            speed: _write_numbers(values[1]),
+            acceleration: _write_numbers(values[2]),
+        }
     if command.stroke is not None:
         data["side"] = scene.motion.side
     same = bool((command.branch == command.branch[0]).all())
@@ -92,35 +101,70 @@ def command_to_json(scene: Scene, command: Command) -> dict[str, Any]:
         from mpmath import mp, mpf
 
         with mp.workdps(DIGITS):
-            digits = str(mp.nstr(mpf(command.remainder), DIGITS + 5))  # they read back as they were
+            digits = str(
+                mp.nstr(mpf(command.remainder), DIGITS + 5)
+            )  # they read back as they were
         data["remainder"] = [digits] * len(command.angle)
     return data
 
 
 def _write_numbers(value: Any) -> Any:
-    return float(value) if np.ndim(value) == 0 else np.asarray(value, dtype=float).tolist()
+    return (
+        float(value) if np.ndim(value) == 0 else np.asarray(value, dtype=float).tolist()
+    )
 
 
 def command_from_json(scene: Scene, data: Any) -> tuple[Scene, Command]:
     """Read a command; the scene gets the motion that it states. InputError names what is wrong."""
     names = _find_names(data)
     place, speed, acceleration = names
-    _refuse_unknown(data, (*names, "branch", "time", "remainder", *(("side",) if place == "stroke" else ())))
+    _refuse_unknown(
+        data,
+        (
+            *names,
+            "branch",
+            "time",
+            "remainder",
+            *(("side",) if place == "stroke" else ()),
+        ),
+    )
     places = _read_list(place, data[place])
     n = len(places)
-    rates = {name: _read_rate(name, data[name], n) for name in names[1:] if data.get(name) is not None}
+    rates = {
+        name: _read_rate(name, data[name], n)
+        for name in names[1:]
+        if data.get(name) is not None
+    }
     branch = _read_branch(data.get("branch", 1), n)
-    stated: dict[str, Any] = {name: rate for name, rate in rates.items() if isinstance(rate, float)}
+    stated: dict[str, Any] = {
+        name: rate for name, rate in rates.items() if isinstance(rate, float)
+    }
     if place == "stroke":
         stated["side"] = data.get("side")
-    stated |= {place: places, "branch": int(branch[0]), "through": "sign" if (branch == branch[0]).all() else "follow"}
+    stated |= {
+        place: places,
+        "branch": int(branch[0]),
+        "through": "sign" if (branch == branch[0]).all() else "follow",
+    }
     scene = replace(scene, motion=Motion(**stated))
     omega, alpha = rates.get(speed), rates.get(acceleration, 0.0)
     time = _read_list("time", data["time"], n) if data.get("time") is not None else None
-    command = Command(places, branch, omega, alpha, _read_digits(data.get("remainder"), n), time, scene.motion.bar)
+    command = Command(
+        places,
+        branch,
+        omega,
+        alpha,
+        _read_digits(data.get("remainder"), n),
+        time,
+        scene.motion.bar,
+    )
     if place == "stroke":
         unknown: Array = np.full(n, np.nan)  # no motion of the bar is commanded
-        command = command._replace(angle=unknown, speed=None if omega is None else unknown, acceleration=unknown)
+        command = command._replace(
+            angle=unknown,
+            speed=None if omega is None else unknown,
+            acceleration=unknown,
+        )
         command = command._replace(stroke=places, stroke_speed=omega)
     return scene, command
 
@@ -139,11 +183,19 @@ def _find_names(data: Any) -> tuple[str, str, str]:
 def _refuse_unknown(data: dict[str, Any], allowed: tuple[str, ...]) -> None:
     for name, value in data.items():
         if name not in allowed:
-            raise InputError(f"command.{write_one_line(name)}", value, f"unknown key; allowed: {', '.join(allowed)}")
+            raise InputError(
+                f"command.{write_one_line(name)}",
+                value,
+                f"unknown key; allowed: {', '.join(allowed)}",
+            )
 
 
 def _read_list(name: str, value: Any, n: int | None = None) -> Array:
-    wanted = "must be a list of one finite number or more" if n is None else f"must be a list of {n} finite numbers"
+    wanted = (
+        "must be a list of one finite number or more"
+        if n is None
+        else f"must be a list of {n} finite numbers"
+    )
     if not isinstance(value, list) or not value or len(value) not in (n or len(value),):
         raise InputError(f"command.{name}", value, wanted)
     array = _make_array(value)
@@ -157,14 +209,22 @@ def _read_rate(name: str, value: Any, n: int) -> float | Array:
         return _read_list(name, value, n)
     array = _make_array([value])
     if array is None or not np.isfinite(array).all():
-        raise InputError(f"command.{name}", value, f"must be a finite number, or a list of {n}")
+        raise InputError(
+            f"command.{name}", value, f"must be a finite number, or a list of {n}"
+        )
     return float(array[0])
 
 
 def _read_branch(value: Any, n: int) -> Any:
     branches = value if isinstance(value, list) else [value] * n
-    if len(branches) != n or any(type(branch) is not int or branch not in (1, -1) for branch in branches):
-        raise InputError("command.branch", value, f"must be 1 (open) or -1 (crossed), or a list of {n}")
+    if len(branches) != n or any(
+        type(branch) is not int or branch not in (1, -1) for branch in branches
+    ):
+        raise InputError(
+            "command.branch",
+            value,
+            f"must be 1 (open) or -1 (crossed), or a list of {n}",
+        )
     return np.array(branches, dtype=np.int8)
 
 
@@ -175,7 +235,12 @@ def _read_digits(value: Any, n: int) -> Any:
     from mpmath import mp, mpf
 
     wanted = f"must be a list of {n} equal decimal texts"
-    if not isinstance(value, list) or len(value) != n or not isinstance(value[0], str) or value != value[:1] * n:
+    if (
+        not isinstance(value, list)
+        or len(value) != n
+        or not isinstance(value[0], str)
+        or value != value[:1] * n
+    ):
         raise InputError("command.remainder", value, wanted)
     try:
         with mp.workdps(DIGITS):
@@ -197,22 +262,35 @@ def _make_array(values: Iterable[Any]) -> Array | None:
     except OverflowError:  # an integer beyond the doubles
         return None
     # a number beyond the doubles reads as infinity, and NaN is no JSON: no value is null
-    return array if np.isfinite(array).sum() == len(values) - values.count(None) else None
+    return (
+        array if np.isfinite(array).sum() == len(values) - values.count(None) else None
+    )
 
 
 def answer_to_json(scene: Scene, command: Command, answer: Answer) -> dict[str, Any]:
     """Write an answer, without the engine's name, which its hello states."""
     if answer.refusal is not None:
         return {"refusal": answer.refusal, "setting": answer.setting}
-    data: dict[str, Any] = {"answers": {name: _write_array(array) for name, array in answer.quantities.items()}}
+    data: dict[str, Any] = {
+        "answers": {
+            name: _write_array(array) for name, array in answer.quantities.items()
+        }
+    }
     if answer.at is not None and answer.at is not command:
         data["at"] = command_to_json(scene, answer.at)
     if answer.assembled is not None:
         data["assembled"] = np.asarray(answer.assembled, dtype=bool).tolist()
     data["setting"] = answer.setting
-    data["predicted"] = {name: _write_array(array) for name, array in answer.predicted.items()}
-    data["evidence"] = {name: float(x) if math.isfinite(x) else None for name, x in answer.evidence.items()}
-    data |= {name: getattr(answer, name) for name in ("alarms", "shared", "own", "seconds")}
+    data["predicted"] = {
+        name: _write_array(array) for name, array in answer.predicted.items()
+    }
+    data["evidence"] = {
+        name: float(x) if math.isfinite(x) else None
+        for name, x in answer.evidence.items()
+    }
+    data |= {
+        name: getattr(answer, name) for name in ("alarms", "shared", "own", "seconds")
+    }
     return {name: value for name, value in data.items() if value or name == "answers"}
 
 
@@ -223,7 +301,9 @@ def _write_array(array: Array) -> list[Any]:
         raise TypeError(f"an answer holds real numbers, not {numbers.dtype}")
     array = numbers.astype(float)
     finite = np.isfinite(array)
-    values: Any = array if finite.all() else np.where(finite, array, np.full(array.shape, None))
+    values: Any = (
+        array if finite.all() else np.where(finite, array, np.full(array.shape, None))
+    )
     return values.tolist()  # type: ignore[no-any-return]
 
 
@@ -237,20 +317,31 @@ def answer_from_json(engine: str, command: Command, data: Any) -> Answer:
     if "refusal" in data:
         return Answer(engine, setting, refusal=_read_reason(data["refusal"]))
     n = len(command.angle)
-    quantities = {name: _read_values("answers", name, values, n) for name, values in _read_object("answers", data)}
+    quantities = {
+        name: _read_values("answers", name, values, n)
+        for name, values in _read_object("answers", data)
+    }
     alarms = data.get("alarms") or []
     if not isinstance(alarms, list):
         raise InputError("alarms", alarms, "must be a list of texts")
-    predicted, evidence = (_read_object(name, data) for name in ("predicted", "evidence"))
+    predicted, evidence = (
+        _read_object(name, data) for name in ("predicted", "evidence")
+    )
     return Answer(
         engine,
         setting,
         read_motion(data.get("at"), command),
         _read_assembled(data.get("assembled"), quantities, n),
         quantities,
-        predicted={name: _read_values("predicted", name, values, n, ()) for name, values in predicted},
+        predicted={
+            name: _read_values("predicted", name, values, n, ())
+            for name, values in predicted
+        },
         alarms=[_read_text("alarms", alarm) for alarm in alarms],
-        evidence={name: float(_read_values("evidence", name, [value], 1, ())[0]) for name, value in evidence},
+        evidence={
+            name: float(_read_values("evidence", name, [value], 1, ())[0])
+            for name, value in evidence
+        },
         shared=_read_text("shared", data.get("shared", "")) or "not stated",
         own=_read_text("own", data.get("own", "")) or "not stated",
         seconds=_read_seconds("seconds", data.get("seconds", 0.0)),
@@ -262,7 +353,10 @@ def _read_reply(data: Any) -> dict[str, Any]:
     if not isinstance(data, dict):
         raise InputError("answer", data, "must be an object")
     if "error" in data:
-        raise EngineError(_read_text("error", data["error"]) or "the engine reported an error without text")
+        raise EngineError(
+            _read_text("error", data["error"])
+            or "the engine reported an error without text"
+        )
     return data
 
 
@@ -294,7 +388,9 @@ def _read_object(name: str, data: dict[str, Any]) -> list[tuple[str, Any]]:
     return [(write_one_line(key), entry) for key, entry in value.items()]
 
 
-def _read_values(table: str, name: str, value: Any, n: int, vectors: Iterable[str] = VECTORS) -> Array:
+def _read_values(
+    table: str, name: str, value: Any, n: int, vectors: Iterable[str] = VECTORS
+) -> Array:
     """Read n numbers, or n pairs of them; null becomes NaN."""
     pairs = name in vectors
     wanted = f"must be a list of {n} {'pairs [x, y]' if pairs else 'numbers'}, null where there is no value"
@@ -313,9 +409,16 @@ def _read_values(table: str, name: str, value: Any, n: int, vectors: Iterable[st
 def _read_assembled(value: Any, quantities: dict[str, Array], n: int) -> Any:
     """Read where the loop closes; left out: wherever there is a value."""
     if value is None:
-        valued = [np.isfinite(array).reshape(n, -1).any(axis=1) for array in quantities.values()]
+        valued = [
+            np.isfinite(array).reshape(n, -1).any(axis=1)
+            for array in quantities.values()
+        ]
         return np.any(valued, axis=0) if valued else np.zeros(n, dtype=bool)
-    if not isinstance(value, list) or len(value) != n or any(type(entry) is not bool for entry in value):
+    if (
+        not isinstance(value, list)
+        or len(value) != n
+        or any(type(entry) is not bool for entry in value)
+    ):
         raise InputError("assembled", value, f"must be a list of {n} true or false")
     return np.array(value, dtype=bool)
 
@@ -325,19 +428,42 @@ def read_motion(data: Any, command: Command) -> Command:
     if data is None:
         return command
     names, n = _find_names(data), len(command.angle)
-    if names not in (KINDS_OF_COMMAND[:-1] if command.stroke is not None else (COMMANDS[command.bar],)):
-        raise InputError("at", sorted(data), f"must have {command.commanded}, or for a stroke an angle of its bar")
-    bar = next(bar for bar, commanded_names in COMMANDS.items() if commanded_names == names)
+    if names not in (
+        KINDS_OF_COMMAND[:-1]
+        if command.stroke is not None
+        else (COMMANDS[command.bar],)
+    ):
+        raise InputError(
+            "at",
+            sorted(data),
+            f"must have {command.commanded}, or for a stroke an angle of its bar",
+        )
+    bar = next(
+        bar for bar, commanded_names in COMMANDS.items() if commanded_names == names
+    )
     branch = _read_branch(data["branch"], n) if "branch" in data else command.branch
-    speed, acceleration = (_read_rate(key, data[key], n) if data.get(key) is not None else None for key in names[1:])
+    speed, acceleration = (
+        _read_rate(key, data[key], n) if data.get(key) is not None else None
+        for key in names[1:]
+    )
     if acceleration is None:
         acceleration = command.acceleration if command.stroke is None else 0.0
-    made = Command(_read_list(names[0], data[names[0]], n), branch, speed, acceleration, bar=bar)
-    if command.stroke is not None:  # a stroke commands no motion of the bar: the caller knows its motion
+    made = Command(
+        _read_list(names[0], data[names[0]], n), branch, speed, acceleration, bar=bar
+    )
+    if (
+        command.stroke is not None
+    ):  # a stroke commands no motion of the bar: the caller knows its motion
         return made
     require_near(made, command)
-    stated: dict[str, Any] = {"angle": made.angle, "speed": speed, "acceleration": acceleration}
-    if all(np.array_equal(value, getattr(command, name)) for name, value in stated.items()):
+    stated: dict[str, Any] = {
+        "angle": made.angle,
+        "speed": speed,
+        "acceleration": acceleration,
+    }
+    if all(
+        np.array_equal(value, getattr(command, name)) for name, value in stated.items()
+    ):
         return command
     return command._replace(**stated, remainder=None)
 
@@ -346,14 +472,27 @@ def require_near(made: Command, command: Command) -> None:
     """Raise InputError where the motion that an engine made is no answer to the command."""
     same = made.bar == command.bar and np.array_equal(made.branch, command.branch)
     if not same or (made.speed is None) != (command.speed is None):
-        raise InputError("at", made.commanded, "must have the bar and branch of the command, and speeds where that has")
-    speed, acceleration = (0.0 if x is None else float(np.abs(x).max()) for x in (command.speed, command.acceleration))
+        raise InputError(
+            "at",
+            made.commanded,
+            "must have the bar and branch of the command, and speeds where that has",
+        )
+    speed, acceleration = (
+        0.0 if x is None else float(np.abs(x).max())
+        for x in (command.speed, command.acceleration)
+    )
     # the positions of a command are independent; an engine that runs through time is faster by what accelerates it
-    faster = float(np.sqrt(1.0 + 2.0 * acceleration * np.ptp(command.angle) / speed**2)) if speed else 1.0
+    faster = (
+        float(np.sqrt(1.0 + 2.0 * acceleration * np.ptp(command.angle) / speed**2))
+        if speed
+        else 1.0
+    )
     sizes = (1.0, speed, speed**2 + acceleration)
     allowances = (FURTHEST, FURTHEST + faster - 1.0, FURTHEST + faster**2 - 1.0)
     names = ("angle", "speed", "acceleration")
-    for key, name, size, most in zip(COMMANDS[command.bar], names, sizes, allowances, strict=True):
+    for key, name, size, most in zip(
+        COMMANDS[command.bar], names, sizes, allowances, strict=True
+    ):
         value, commanded = getattr(made, name), getattr(command, name)
         if value is not None and not np.abs(value - commanded).max() <= most * size:
             allowed = f"must be within {most * size:g} of the command"
@@ -370,7 +509,9 @@ def read_setting(data: Any) -> dict[str, Any]:
         "steps_per_turn": lambda value: type(value) is int and value > 0,
         "error": lambda value: type(value) is float and 0.0 < value < 1.0,
     }
-    fits = isinstance(data, dict) and all(key in checks and checks[key](value) for key, value in data.items())
+    fits = isinstance(data, dict) and all(
+        key in checks and checks[key](value) for key, value in data.items()
+    )
     if not fits or {"steps_per_turn", "error"} <= data.keys():
         raise InputError("setting", data, allowed)
     return dict(data)
@@ -382,19 +523,32 @@ def release_to_json(scene: Scene) -> dict[str, Any]:
     assert free is not None
     start = {"theta_2": float(motion.theta_2), "omega_2": motion.omega_2 or 0.0}
     command = {**start, "branch": motion.branch, "through": motion.through}
-    return {"command": command, "times": np.linspace(0.0, free.duration, free.steps + 1).tolist()}
+    return {
+        "command": command,
+        "times": np.linspace(0.0, free.duration, free.steps + 1).tolist(),
+    }
 
 
 def release_from_json(scene: Scene, command: Any, times: Any) -> Scene:
     """Read the start of a released motion into a scene; InputError names what is wrong."""
     if not isinstance(command, dict) or "theta_2" not in command:
-        raise InputError("command", command, "must be an object with theta_2, omega_2, branch and through")
+        raise InputError(
+            "command",
+            command,
+            "must be an object with theta_2, omega_2, branch and through",
+        )
     _refuse_unknown(command, ("theta_2", "omega_2", "branch", "through"))
     instants = _read_list("times", times)
-    theta, omega = (float(_read_list(name, [command.get(name, 0.0)])[0]) for name in ("theta_2", "omega_2"))
+    theta, omega = (
+        float(_read_list(name, [command.get(name, 0.0)])[0])
+        for name in ("theta_2", "omega_2")
+    )
     branch = int(_read_branch(command.get("branch", 1), 1)[0])
     free = Free(float(instants[-1]), len(instants) - 1)
-    return replace(scene, motion=Motion(theta, omega, 0.0, branch, command.get("through", "sign"), free))
+    return replace(
+        scene,
+        motion=Motion(theta, omega, 0.0, branch, command.get("through", "sign"), free),
+    )
 
 
 def released_to_json(released: ReleasedAnswer) -> dict[str, Any]:
@@ -402,7 +556,11 @@ def released_to_json(released: ReleasedAnswer) -> dict[str, Any]:
     if released.refusal is not None:
         return {"refusal": released.refusal, "setting": released.setting}
     answers = {name: _write_array(getattr(released, name)) for name in OF_RELEASED}
-    return {"answers": answers, "setting": released.setting, "stopped_at": released.stopped_at}
+    return {
+        "answers": answers,
+        "setting": released.setting,
+        "stopped_at": released.stopped_at,
+    }
 
 
 def released_from_json(engine: str, n: int, data: Any) -> ReleasedAnswer:
@@ -412,7 +570,9 @@ def released_from_json(engine: str, n: int, data: Any) -> ReleasedAnswer:
     if "refusal" in data:
         return ReleasedAnswer.refused(engine, setting, _read_reason(data["refusal"]))
     answers = dict(_read_object("answers", data))
-    theta, omega, energy, terms = (_read_values("answers", name, answers.get(name), n) for name in OF_RELEASED)
+    theta, omega, energy, terms = (
+        _read_values("answers", name, answers.get(name), n) for name in OF_RELEASED
+    )
     stopped_at = data.get("stopped_at")
     if stopped_at is not None:
         stopped_at = _read_seconds("stopped_at", stopped_at)

@@ -19,17 +19,30 @@ from fourbar.solution import Solution
 from fourbar_validation.compare.answer import Adapter, Answer
 from fourbar_validation.compare.compare import COMPARED, Held, Nearby, Predicted
 from fourbar_validation.compare.rows import say_error
-from fourbar_validation.compare.tolerance import EQUIVALENCE, FULL_ACCURACY, SIMULATED, Array, ErrorBound, Mask
+from fourbar_validation.compare.tolerance import (
+    EQUIVALENCE,
+    FULL_ACCURACY,
+    SIMULATED,
+    Array,
+    ErrorBound,
+    Mask,
+)
 from fourbar_validation.engines.description import list_speeds
 from fourbar_validation.engines.exact import BallArithmetic, find_refusal, shift_to
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.loop import make_blank
-from fourbar_validation.engines.prediction import predict_about_mass_centre, predict_from_data, predict_in_world_axes
+from fourbar_validation.engines.prediction import (
+    predict_about_mass_centre,
+    predict_from_data,
+    predict_in_world_axes,
+)
 from fourbar_validation.places import CHECKOUT
 
 Predictor = Callable[[Scene, Command, str, Mask], Array]
 """Predicts the absolute error of a quantity at the positions of a mask, (n,)."""
-Order = Callable[[Scene, Command, Callable[[Answer], float]], tuple[float, float, float]]
+Order = Callable[
+    [Scene, Command, Callable[[Answer], float]], tuple[float, float, float]
+]
 """Runs an engine at two coarser timesteps; their errors and the observed order."""
 
 
@@ -69,7 +82,9 @@ class Engine:
         """Name everything that its answers and verdicts depend on, alike in every process."""
         values = (getattr(self, part.name) for part in fields(self))
         return ", ".join(
-            f"{value.__module__}:{name}" if (name := getattr(value, "__qualname__", "")) else repr(value)
+            f"{value.__module__}:{name}"
+            if (name := getattr(value, "__qualname__", ""))
+            else repr(value)
             for value in values
         )
 
@@ -93,7 +108,10 @@ def find_missing(library: str) -> str | None:
             package = f"pip install {PACKAGE_OF.get(library, library)}"
             return f"{library} is not installed: {say_install(EXTRA[library]) if library in EXTRA else package}"
         return _find_broken(library, error)
-    except (Exception, SystemExit) as error:  # whatever a library raises that was built for another machine
+    except (
+        Exception,
+        SystemExit,
+    ) as error:  # whatever a library raises that was built for another machine
         return _find_broken(library, error)
     return None
 
@@ -109,7 +127,13 @@ ONE_BY_ONE = (
 WORK = {
     "formulas": "all positions in one call on arrays: angles, speeds, accelerations, pin forces and torque",
     **dict.fromkeys(
-        ("pinocchio-inverse", "mujoco-inverse", "exudyn-constraints", "opensim-constraints", "drake-inverse"),
+        (
+            "pinocchio-inverse",
+            "mujoco-inverse",
+            "exudyn-constraints",
+            "opensim-constraints",
+            "drake-inverse",
+        ),
         ONE_BY_ONE,
     ),
     "mujoco-simulated": "one motion: every position assembled, the model compiled, Runge-Kutta steps from position to "
@@ -175,14 +199,18 @@ ENGINES = (
 )
 
 
-BALLS = Engine("ball-arithmetic", BallArithmetic, FULL_ACCURACY, nearby=True, library="flint")
+BALLS = Engine(
+    "ball-arithmetic", BallArithmetic, FULL_ACCURACY, nearby=True, library="flint"
+)
 
 
 def hold_fully(engine: Engine) -> Engine:
     """Hold the engine to full accuracy, or else to the error predicted for each position."""
     if engine.tolerance not in (EQUIVALENCE, FULL_ACCURACY):
         return engine
-    return replace(engine, tolerance=FULL_ACCURACY, predictor=engine.predictor or predict_from_data)
+    return replace(
+        engine, tolerance=FULL_ACCURACY, predictor=engine.predictor or predict_from_data
+    )
 
 
 HARD_ENGINES = tuple(hold_fully(engine) for engine in (BALLS, *ENGINES))
@@ -194,12 +222,21 @@ LAB, GROUP = "fourbar-lab", "fourbar.engines"
 def load_further() -> tuple[Engine, ...]:
     """Load the engines that the lab registers; none if it is not installed."""
     try:
-        registered: Iterable[EntryPoint] = distribution(LAB).entry_points.select(group=GROUP)
-    except PackageNotFoundError:  # the environment of one engine has the lab of a checkout on its path alone
+        registered: Iterable[EntryPoint] = distribution(LAB).entry_points.select(
+            group=GROUP
+        )
+    except (
+        PackageNotFoundError
+    ):  # the environment of one engine has the lab of a checkout on its path alone
         if CHECKOUT is None or find_spec(LAB.replace("-", "_")) is None:
             return ()
-        project = tomllib.loads((CHECKOUT / "lab" / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-        registered = [EntryPoint(name, value, GROUP) for name, value in project["entry-points"][GROUP].items()]
+        project = tomllib.loads(
+            (CHECKOUT / "lab" / "pyproject.toml").read_text(encoding="utf-8")
+        )["project"]
+        registered = [
+            EntryPoint(name, value, GROUP)
+            for name, value in project["entry-points"][GROUP].items()
+        ]
     return tuple(entry.load() for entry in sorted(registered))
 
 
@@ -208,32 +245,51 @@ FOLDERS = tuple(Path(folder) for spec in [find_spec(LAB.replace("-", "_"))] if s
 """Folder of the lab, whose engines.toml a run reads too; none if the lab is not installed."""
 
 
-def hold(engine: Engine, scene: Scene, command: Command, answer: Answer, formulas: Solution | None = None) -> Held:
+def hold(
+    engine: Engine,
+    scene: Scene,
+    command: Command,
+    answer: Answer,
+    formulas: Solution | None = None,
+) -> Held:
     """Hold an answer to the engine's tolerance and quantities, with the errors predicted for it at a command.
 
     `formulas`: their solution at the command, with which an engine that can answers again within theta_2's rounding.
     """
     nearby = None if formulas is None else make_nearby(engine, scene, command, formulas)
-    return Held(engine.tolerance, engine.answers, make_prediction(engine, scene, command, answer), nearby)
+    return Held(
+        engine.tolerance,
+        engine.answers,
+        make_prediction(engine, scene, command, answer),
+        nearby,
+    )
 
 
-def make_prediction(engine: Engine, scene: Scene, command: Command, answer: Answer) -> Predicted | None:
+def make_prediction(
+    engine: Engine, scene: Scene, command: Command, answer: Answer
+) -> Predicted | None:
     """Give what computes the errors to be expected, should any be called for; an alarm leaves no own excuse."""
     if answer.refusal is not None:
         return None
     if engine.residuals:
         if answer.alarms:
             return None
-        return lambda quantity, mask: answer.predicted.get(quantity, np.zeros(len(mask)))
+        return lambda quantity, mask: answer.predicted.get(
+            quantity, np.zeros(len(mask))
+        )
     predict = engine.predictor
     if command.bar != 2 or command.stroke is not None:
         return None  # the prediction knows the command of bar 2 alone
-    if predict is None or (engine.tolerance.conditioned and (find_missing("flint") or find_refusal(scene))):
+    if predict is None or (
+        engine.tolerance.conditioned and (find_missing("flint") or find_refusal(scene))
+    ):
         return None  # the law in the condition stands alone
     return lambda quantity, mask: predict(scene, command, quantity, mask)
 
 
-def make_nearby(engine: Engine, scene: Scene, command: Command, formulas: Solution) -> Nearby | None:
+def make_nearby(
+    engine: Engine, scene: Scene, command: Command, formulas: Solution
+) -> Nearby | None:
     """Give what answers within the rounding of the theta_2 that are stated, if the engine does.
 
     Near a limit position the last digits of theta_2 decide sin(theta_4 - theta_3), and with it every other number:
@@ -242,17 +298,30 @@ def make_nearby(engine: Engine, scene: Scene, command: Command, formulas: Soluti
     A drive on bar 3 or 4 has poles of its own, which another theta_2 for the same sine does not correct.
     """
     by_input = scene.drive_bar == 2 and command.bar == 2
-    if not engine.nearby or not by_input or command.remainder is not None or command.speed is None:
+    if (
+        not engine.nearby
+        or not by_input
+        or command.remainder is not None
+        or command.speed is None
+    ):
         return None
     omega, alpha = list_speeds(command)
 
     def answer(mask: Mask) -> dict[str, Array]:
         adapter, out = engine.start(), make_blank(len(mask), COMPARED)
         for i in np.flatnonzero(mask & np.isfinite(formulas.sin_mu)).tolist():
-            shift = shift_to(scene.linkage, float(command.theta_2[i]), float(formulas.sin_mu[i]))
+            shift = shift_to(
+                scene.linkage, float(command.theta_2[i]), float(formulas.sin_mu[i])
+            )
             if shift is not None:
                 row = slice(i, i + 1)
-                moved = Command(command.theta_2[row], command.branch[row], omega[row], alpha[row], shift)
+                moved = Command(
+                    command.theta_2[row],
+                    command.branch[row],
+                    omega[row],
+                    alpha[row],
+                    shift,
+                )
                 for name, values in adapter.answer(scene, moved).quantities.items():
                     out[name][row] = values
         return out

@@ -22,7 +22,9 @@ from fourbar_validation.engines.loaded import Act, Loaded, Values, make_no_wrenc
 
 if TYPE_CHECKING:
     from fourbar.effects.spring import SpringEnd
-OMEGAS, ALPHAS = (tuple(f"{name}_{bar}" for bar in MOVING_BARS) for name in ("omega", "alpha"))
+OMEGAS, ALPHAS = (
+    tuple(f"{name}_{bar}" for bar in MOVING_BARS) for name in ("omega", "alpha")
+)
 
 
 class Tree(Loaded, Protocol):
@@ -60,7 +62,9 @@ class Tree(Loaded, Protocol):
     def acceleration(self, name: str) -> Array:
         """Return that of a point at the motion last set, (2,), m/s^2."""
 
-    def needed(self, field: tuple[float, float], wrenches: dict[int, list[float]]) -> Array:
+    def needed(
+        self, field: tuple[float, float], wrenches: dict[int, list[float]]
+    ) -> Array:
         """Return the generalized forces that the motion last set needs beyond gravity and what acts, (3,), N m."""
 
     def carried(self) -> dict[int, Array]:
@@ -78,7 +82,11 @@ class Tree(Loaded, Protocol):
 
     def positions(self) -> dict[str, Array]:
         """Locate the points of the bars."""
-        return {name: np.array(self.point(point)) for name, point in POINTS.items() if name != "A2"}
+        return {
+            name: np.array(self.point(point))
+            for name, point in POINTS.items()
+            if name != "A2"
+        }
 
     def velocity(self, bar: int) -> float:
         """Return the angular velocity of a bar, rad/s."""
@@ -108,14 +116,22 @@ class Tree(Loaded, Protocol):
         if self.linear is None:
             return self.turns[self.drive_bar]
         *_, along = self.line()
-        return np.asarray(along @ (self.end_jacobian(self.linear.end) - self.end_jacobian(self.linear.start)))
+        return np.asarray(
+            along
+            @ (
+                self.end_jacobian(self.linear.end)
+                - self.end_jacobian(self.linear.start)
+            )
+        )
 
     def end_jacobian(self, point: "SpringEnd") -> Array:
         """Return the derivative of an end of the drive, (2, 3), m: its bar's first pin, and the arm turned across."""
         if point.bar == 1:
             return np.zeros((2, 3))
         x, y = self.end(point) - self.first_pin(point.bar)
-        return self.point_jacobian(f"first_pin{point.bar}") + np.outer((-y, x), self.turns[point.bar])
+        return self.point_jacobian(f"first_pin{point.bar}") + np.outer(
+            (-y, x), self.turns[point.bar]
+        )
 
     def forces(self, loop_force: Array, drive: float) -> dict[str, Array]:
         """Return F12, F32, F14 with the loop force on bar 3 at B, its opposite on bar 4, and the drive put back."""
@@ -134,21 +150,30 @@ class Tree(Loaded, Protocol):
         except np.linalg.LinAlgError:
             return {}
         self.moving(v, a)
-        values: Values = {f"a_{name}": self.acceleration(point) for name, point in ON_BARS.items()}
+        values: Values = {
+            f"a_{name}": self.acceleration(point) for name, point in ON_BARS.items()
+        }
         values |= zip(OMEGAS, (self.rows @ v).tolist(), strict=True)
         values |= zip(ALPHAS, (self.rows @ a).tolist(), strict=True)
         solve = partial(solve_multipliers, jacobian, self.drive_column())
 
         def balanced() -> dict[str, Any]:
             unknowns = solve(self.torques())
-            return self.forces(unknowns[:2], float(unknowns[2])) | {"F43": unknowns[:2], self.driving: unknowns[2]}
+            return self.forces(unknowns[:2], float(unknowns[2])) | {
+                "F43": unknowns[:2],
+                self.driving: unknowns[2],
+            }
 
         try:
             values |= self.settled(balanced)
-        except np.linalg.LinAlgError:  # no torque or force of the drive balances the linkage here
+        except (
+            np.linalg.LinAlgError
+        ):  # no torque or force of the drive balances the linkage here
             return values
         if self.alone:
-            values[f"{self.driving}_inertia"] = float(solve(self.needed((0.0, 0.0), make_no_wrenches()))[2])
+            values[f"{self.driving}_inertia"] = float(
+                solve(self.needed((0.0, 0.0), make_no_wrenches()))[2]
+            )
         return values
 
 
@@ -156,7 +181,9 @@ BAR_2 = np.array([1.0, 0.0, 0.0])
 """Derivative of its rotation by the coordinates."""
 
 
-def solve_closed(jacobian: Array, rate: float, turn: Array = BAR_2, x: float = 0.0, y: float = 0.0) -> Array:
+def solve_closed(
+    jacobian: Array, rate: float, turn: Array = BAR_2, x: float = 0.0, y: float = 0.0
+) -> Array:
     """Solve J rates + (x, y) = 0, turn . rates = rate for the rates of the coordinates; LinAlgError at a toggle.
 
     By Cramer's rule: for bar 2 the determinant is that of `newton` to the last digit.

@@ -71,7 +71,9 @@ class WorkerContext(SpawnContext):
     Process = Worker
 
 
-def apply_watched(seconds: float | None, function: Callable[[Any], Any], items: Sequence[Any]) -> list[Any]:
+def apply_watched(
+    seconds: float | None, function: Callable[[Any], Any], items: Sequence[Any]
+) -> list[Any]:
     """Apply the function in a worker that ends its own process where one item takes longer, whatever holds it up."""
     results = []
     with Path(os.devnull).open("w", encoding="utf-8") as silent:
@@ -110,7 +112,11 @@ class Workers:
     """Processes of a Pebble pool, which carry out tasks."""
 
     def __init__(
-        self, pool: "ProcessPool", function: Callable[[Any], Any], workers: int, seconds: float | None
+        self,
+        pool: "ProcessPool",
+        function: Callable[[Any], Any],
+        workers: int,
+        seconds: float | None,
     ) -> None:
         self._pool, self._function, self._seconds = pool, function, seconds
         self._in_flight = IN_FLIGHT * workers
@@ -123,7 +129,11 @@ class Workers:
         inside, outside = self._seconds, self._seconds
         if inside is not None and outside is not None:
             single = len(items) == 1
-            inside, outside = (inside + LATER, outside) if single else (inside, outside * len(items) + LATER)
+            inside, outside = (
+                (inside + LATER, outside)
+                if single
+                else (inside, outside * len(items) + LATER)
+            )
         try:
             future: Future[list[Any]] = self._pool.schedule(
                 apply_watched, args=(inside, self._function, items), timeout=outside
@@ -161,7 +171,9 @@ class Workers:
                 break  # otherwise somebody killed it: that is not the item's doing
         return outcome
 
-    def over(self, chunks: Iterable[Chunk], instead: Instead) -> Iterator[tuple[int, list[Any]]]:
+    def over(
+        self, chunks: Iterable[Chunk], instead: Instead
+    ) -> Iterator[tuple[int, list[Any]]]:
         """Keep a bounded number of chunks running; yield each as it is done."""
         waiting = iter(chunks)
         running: dict[Any, Chunk] = {}
@@ -177,9 +189,14 @@ class Workers:
                 except (StalledError, DependencyError):
                     raise
                 except Exception as error:  # the worker died or hung, or the function failed; on whose account?
-                    clear = len(items) == 1 and getattr(error, "exitcode", None) not in FROM_OUTSIDE
+                    clear = (
+                        len(items) == 1
+                        and getattr(error, "exitcode", None) not in FROM_OUTSIDE
+                    )
                     results = [error if clear else self.attempt(item) for item in items]
-                    for place, (item, outcome) in enumerate(zip(items, results, strict=True)):
+                    for place, (item, outcome) in enumerate(
+                        zip(items, results, strict=True)
+                    ):
                         if isinstance(outcome, Exception):
                             results[place] = instead(item, outcome, self.attempt)
                 yield number, results
@@ -190,12 +207,16 @@ def fail(_: object, error: Exception, __: Attempt) -> NoReturn:
     raise error
 
 
-def apply_each(function: Callable[[Any], Any], items: Iterable[Any], workers: int) -> Iterator[Any]:
+def apply_each(
+    function: Callable[[Any], Any], items: Iterable[Any], workers: int
+) -> Iterator[Any]:
     """Apply the function to each item, however long it takes; results in the order of the items."""
     result: dict[int, list[Any]] = {}
     turn = 0
     chunks = enumerate([item] for item in items)
-    for number, results in apply_over_processes(function, chunks, workers, seconds=None, instead=fail):
+    for number, results in apply_over_processes(
+        function, chunks, workers, seconds=None, instead=fail
+    ):
         result[number] = results
         while turn in result:
             yield from result.pop(turn)
@@ -203,7 +224,12 @@ def apply_each(function: Callable[[Any], Any], items: Iterable[Any], workers: in
 
 
 def apply_over_processes(
-    function: Callable[[Any], Any], chunks: Iterable[Chunk], workers: int, *, seconds: float | None, instead: Instead
+    function: Callable[[Any], Any],
+    chunks: Iterable[Chunk],
+    workers: int,
+    *,
+    seconds: float | None,
+    instead: Instead,
 ) -> Iterator[tuple[int, list[Any]]]:
     """Apply the function to each item of the chunks, over processes; chunks as they are done.
 
@@ -222,11 +248,16 @@ def apply_over_processes(
     waiting = started()
     while True:
         with ProcessPool(
-            max_workers=workers, context=WorkerContext(), initializer=prepare_worker, initargs=[os.getpid(), function]
+            max_workers=workers,
+            context=WorkerContext(),
+            initializer=prepare_worker,
+            initargs=[os.getpid(), function],
         ) as pool:
             try:
                 crew = Workers(pool, function, workers, seconds)
-                for number, results in crew.over(chain(list(unfinished.items()), waiting), instead):
+                for number, results in crew.over(
+                    chain(list(unfinished.items()), waiting), instead
+                ):
                     yield number, results
                     del unfinished[number]
                     in_vain = 0

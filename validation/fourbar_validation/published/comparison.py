@@ -31,7 +31,9 @@ def is_explained(figure: PublishedFigure) -> bool:
     """Tell whether a difference has errata that give the published digits, or is a misprint that none can give."""
     if not figure.errata or not set(figure.errata) <= set(ERRATA):
         return False
-    return figure.reproduced() or not all(ERRATA[name].reproduced for name in figure.errata)
+    return figure.reproduced() or not all(
+        ERRATA[name].reproduced for name in figure.errata
+    )
 
 
 def explain_difference(figure: PublishedFigure) -> str:
@@ -46,7 +48,11 @@ def explain_difference(figure: PublishedFigure) -> str:
     if figure.reproduced():
         decimals = len(figure.printed.partition(".")[2])
         return f"{text}: gives {figure.made:.{min(decimals + 1, 12)}f}"
-    return f"{text} (no computation gives these digits)" if is_explained(figure) else f"{text}: does not give this"
+    return (
+        f"{text} (no computation gives these digits)"
+        if is_explained(figure)
+        else f"{text}: does not give this"
+    )
 
 
 def check(show_all: bool) -> int:
@@ -58,7 +64,11 @@ def check(show_all: bool) -> int:
     counts: Counter[tuple[str, str]] = Counter()
     met: Counter[str] = Counter()
     unexplained, reproduced = [], 0
-    console.print("Printed figures that differ from ours, and why:" if not show_all else "Printed figures:")
+    console.print(
+        "Printed figures that differ from ours, and why:"
+        if not show_all
+        else "Printed figures:"
+    )
     for figure in list_figures():
         verdict = figure.verdict()
         counts[figure.table, verdict] += 1
@@ -68,15 +78,23 @@ def check(show_all: bool) -> int:
             if not is_explained(figure):
                 unexplained.append(figure)
         if verdict == "differs" or show_all:
-            ours = f"ours {figure.ours:.10g}" + ("" if verdict == "differs" else f", {verdict}")
-            click.echo(f"{figure.table}: {figure.name}  printed {figure.printed}  {ours}")
+            ours = f"ours {figure.ours:.10g}" + (
+                "" if verdict == "differs" else f", {verdict}"
+            )
+            click.echo(
+                f"{figure.table}: {figure.name}  printed {figure.printed}  {ours}"
+            )
         if verdict == "differs":
-            click.echo(click.wrap_text(explain_difference(figure), WIDTH, "    ", "    "))
+            click.echo(
+                click.wrap_text(explain_difference(figure), WIDTH, "    ", "    ")
+            )
     total = Table(*("table", *VERDICTS), title="Printed figures against ours")
     for table in dict.fromkeys(key[0] for key in counts):
         total.add_row(table, *(str(counts[table, verdict]) for verdict in VERDICTS))
     total.add_section()
-    sums = [sum(n for (_, v), n in counts.items() if v == verdict) for verdict in VERDICTS]
+    sums = [
+        sum(n for (_, v), n in counts.items() if v == verdict) for verdict in VERDICTS
+    ]
     total.add_row(f"{sum(sums)} figures", *map(str, sums))
     console.print(total)
     misprints = sums[2] - reproduced - len(unexplained)
@@ -99,7 +117,13 @@ def check(show_all: bool) -> int:
     return FAILED if unexplained or not sum(sums) else HOLDS
 
 
-HEAD = ("error of its program, added to those above", "right", "T4 [N cm]", "F12x [N]", "F12y [N]")
+HEAD = (
+    "error of its program, added to those above",
+    "right",
+    "T4 [N cm]",
+    "F12x [N]",
+    "F12y [N]",
+)
 
 
 def list_ladder_rows() -> list[tuple[str, ...]]:
@@ -109,14 +133,24 @@ def list_ladder_rows() -> list[tuple[str, ...]]:
     section 5.7 print: 308.804 N cm and (161.418, -156.506) N.
     """
     source = read_printed()["published"]
-    tables = {"manual": source["manual_program_dynamic"], "5b": source["section_5_7_hand_solution"]}
+    tables = {
+        "manual": source["manual_program_dynamic"],
+        "5b": source["section_5_7_hand_solution"],
+    }
 
     def write(figures: Mapping[str, str | float]) -> tuple[str, ...]:
-        return (f"{float(figures['T4']):.9f}", f"{float(figures['F12x']):.3f}", f"{float(figures['F12y']):.3f}")
+        return (
+            f"{float(figures['T4']):.9f}",
+            f"{float(figures['F12x']):.3f}",
+            f"{float(figures['F12y']):.3f}",
+        )
 
     rows = []
     for erratum, x in climb_ladder():
-        did, right = "nothing wrong: SI, uniform bars m (L^2 + w^2)/12", "the answer of this project"
+        did, right = (
+            "nothing wrong: SI, uniform bars m (L^2 + w^2)/12",
+            "the answer of this project",
+        )
         if erratum in ERRATA:
             did, right = f"#{erratum} {ERRATA[erratum].title}", ERRATA[erratum].right
         elif erratum:
@@ -129,7 +163,12 @@ def list_ladder_rows() -> list[tuple[str, ...]]:
 
 @click.command()
 @click.option("--all", "show_all", is_flag=True, help="List every figure.")
-@click.option("-o", "--out", type=click.Path(path_type=Path, dir_okay=False), help="Write the steps as Markdown.")
+@click.option(
+    "-o",
+    "--out",
+    type=click.Path(path_type=Path, dir_okay=False),
+    help="Write the steps as Markdown.",
+)
 def published(show_all: bool, out: Path | None) -> int:
     """Compare the figures of the sources with ours; exit 1 on a difference that no erratum explains."""
     from rich.console import Console
@@ -137,9 +176,24 @@ def published(show_all: bool, out: Path | None) -> int:
     try:  # a missing requirement of the last source is noticed before the first is printed
         import_module("scipy.integrate")
     except ModuleNotFoundError:
-        raise DependencyError(f"a free motion among the sources needs SciPy: {say_install('validation')}") from None
+        raise DependencyError(
+            f"a free motion among the sources needs SciPy: {say_install('validation')}"
+        ) from None
     rows = list_ladder_rows()
-    Console().print(make_table(HEAD, rows, 2, title="The published torque, error by error", show_lines=True))
+    Console().print(
+        make_table(
+            HEAD, rows, 2, title="The published torque, error by error", show_lines=True
+        )
+    )
     if out is not None:
-        write_text(out, render("fourbar_validation.published", "ladder.md.j2", head=HEAD, rows=rows, program=PROGRAM))
+        write_text(
+            out,
+            render(
+                "fourbar_validation.published",
+                "ladder.md.j2",
+                head=HEAD,
+                rows=rows,
+                program=PROGRAM,
+            ),
+        )
     return check(show_all)

@@ -24,7 +24,9 @@ class Erratum(NamedTuple):
     """True if it may be a slip of the transcription that was read."""
 
 
-LISTED = tomllib.loads((Path(__file__).parent / "errata.toml").read_text(encoding="utf-8"))["erratum"]
+LISTED = tomllib.loads(
+    (Path(__file__).parent / "errata.toml").read_text(encoding="utf-8")
+)["erratum"]
 ERRATA = {entry["id"]: Erratum(**entry) for entry in LISTED}
 """The errata of the sources, as data: `errata.toml` says what each field is."""
 
@@ -49,13 +51,18 @@ class PublishedFigure(NamedTuple):
 
     def reproduced(self) -> bool:
         """Tell whether the errata give the published digits, rounded or truncated."""
-        return self.made is not None and compare(self.printed, self.made, self.noise) != "differs"
+        return (
+            self.made is not None
+            and compare(self.printed, self.made, self.noise) != "differs"
+        )
 
 
 def compare(printed: str, value: float, noise: float = 0.0) -> str:
     """Compare `value` to the published number of decimals: rounded, truncated, or it differs."""
     theirs, ours = Decimal(printed), Decimal(value)
     unit = Decimal(1).scaleb(int(theirs.as_tuple().exponent))
-    if ours.quantize(unit, ROUND_HALF_EVEN) == theirs or abs(ours - theirs) <= Decimal(noise):
+    if ours.quantize(unit, ROUND_HALF_EVEN) == theirs or abs(ours - theirs) <= Decimal(
+        noise
+    ):
         return "rounded"
     return "truncated" if ours.quantize(unit, ROUND_DOWN) == theirs else "differs"

@@ -19,7 +19,21 @@ from fourbar_validation.compare.tolerance import EPS
 from fourbar_validation.published.thirteen import FreeBodies, assemble
 
 DATA = Path(__file__).parent / "data"
-UNKNOWNS = ("F12x", "F12y", "F32x", "F32y", "F23x", "F23y", "F43x", "F43y", "F14x", "F14y", "F34x", "F34y", "T4")
+UNKNOWNS = (
+    "F12x",
+    "F12y",
+    "F32x",
+    "F32y",
+    "F23x",
+    "F23y",
+    "F43x",
+    "F43y",
+    "F14x",
+    "F14y",
+    "F34x",
+    "F34y",
+    "T4",
+)
 LENGTHS = (20.0, 48.0, 55.0, 20.0)
 """Bars 1 to 4, cm."""
 MASSES = {2: 57.0, 3: 0.544, 4: 0.2}
@@ -86,7 +100,9 @@ def make_scene(theta_2: Array | float, branch: int = 1) -> fourbar.Scene:
     )
     loads = [fourbar.Load(2, (LOAD, 0.0), (0.01 * LOAD_ARM, LOAD_ANGLE))]
     loads += [fourbar.Load(bar, moment=0.01 * COUPLE) for bar in (2, 3, 4)]
-    return fourbar.Scene(linkage, fourbar.Motion(theta_2, OMEGA_2, branch=branch), 4, tuple(loads))
+    return fourbar.Scene(
+        linkage, fourbar.Motion(theta_2, OMEGA_2, branch=branch), 4, tuple(loads)
+    )
 
 
 def compute_motion(theta_2: Array, branch: int = 1) -> fourbar.Solution:
@@ -98,8 +114,19 @@ def compute_right_unknowns() -> dict[str, float]:
     """Compute the 13 unknowns by our formulas at theta_2 = 135 deg, N and N cm."""
     s = fourbar.solve(make_scene(THETA_2))
     assert s.F32 is not None and s.F43 is not None and s.torque is not None
-    pins: dict[str, Any] = {"F12": s.F12, "F32": s.F32, "F23": -s.F32, "F43": s.F43, "F14": s.F14, "F34": -s.F43}
-    forces = {name + axis: float(pins[name][0, k]) for name in pins for k, axis in enumerate("xy")}
+    pins: dict[str, Any] = {
+        "F12": s.F12,
+        "F32": s.F32,
+        "F23": -s.F32,
+        "F43": s.F43,
+        "F14": s.F14,
+        "F34": -s.F43,
+    }
+    forces = {
+        name + axis: float(pins[name][0, k])
+        for name in pins
+        for k, axis in enumerate("xy")
+    }
     return {**forces, "T4": 100.0 * float(s.torque[0])}
 
 
@@ -116,7 +143,8 @@ class Kinematics:
         s = compute_motion(np.array([THETA_2]))
         self.theta_3, self.theta_4 = float(s.theta_3[0]), to_ours(float(s.theta_4[0]))
         self.omega, self.alpha = (
-            {bar: float(getattr(s, f"{name}_{bar}")[0]) for bar in MOVING_BARS} for name in ("omega", "alpha")
+            {bar: float(getattr(s, f"{name}_{bar}")[0]) for bar in MOVING_BARS}
+            for name in ("omega", "alpha")
         )
         assert s.a_A is not None
         self.a_A = 100.0 * s.a_A[0]
@@ -133,7 +161,9 @@ class Kinematics:
         }
 
 
-def make_equations(errors: ProgramErrors, inertias: tuple[float, float] | None = None) -> tuple[Array, Array]:
+def make_equations(
+    errors: ProgramErrors, inertias: tuple[float, float] | None = None
+) -> tuple[Array, Array]:
     """Make matrix and right side of section 5.7 at theta_2 = 135 deg, N and N cm.
 
     sum F = m A and sum M_G = I alpha of bars 2, 3, 4; F32 = -F23 and F34 = -F43.
@@ -155,24 +185,36 @@ def make_equations(errors: ProgramErrors, inertias: tuple[float, float] | None =
     per_mass = 1.0 if errors.mass_times_acceleration_unscaled else TO_N
     per_inertia = 1.0 if errors.inertia_times_alpha_unscaled else TO_N
     force = {bar: per_mass * MASSES[bar] * k.a_G[bar] for bar in MOVING_BARS}
-    moment = {bar: np.array([per_inertia * about_G[bar] * k.alpha[bar] - COUPLE]) for bar in MOVING_BARS}
+    moment = {
+        bar: np.array([per_inertia * about_G[bar] * k.alpha[bar] - COUPLE])
+        for bar in MOVING_BARS
+    }
     force[2][0] -= LOAD
-    moment[2] += split_components(LOAD_ARM, LOAD_ANGLE)[1] * LOAD  # minus the moment of the load, -y F
+    moment[2] += (
+        split_components(LOAD_ARM, LOAD_ANGLE)[1] * LOAD
+    )  # minus the moment of the load, -y F
     first, second = (
-        {bar: np.array([k.arms[name]]) for bar, name in zip(MOVING_BARS, names, strict=True)}
+        {
+            bar: np.array([k.arms[name]])
+            for bar, name in zip(MOVING_BARS, names, strict=True)
+        }
         for names in (("R12", "R23", "R14"), ("R32", "R43", "R34"))
     )
     matrix, right = assemble(FreeBodies(first, second, force, moment), 4)
     return matrix[0], right[0]
 
 
-def compute_thesis_program(errors: ProgramErrors, inertias: tuple[float, float] | None = None) -> dict[str, float]:
+def compute_thesis_program(
+    errors: ProgramErrors, inertias: tuple[float, float] | None = None
+) -> dict[str, float]:
     """Compute the 13 unknowns of section 5.7 at theta_2 = 135 deg, N and N cm."""
     unknowns = np.linalg.solve(*make_equations(errors, inertias))
     return dict(zip(UNKNOWNS, map(float, unknowns), strict=True))
 
 
-def round_off(errors: ProgramErrors, inertias: tuple[float, float] | None = None) -> dict[str, float]:
+def round_off(
+    errors: ProgramErrors, inertias: tuple[float, float] | None = None
+) -> dict[str, float]:
     """Bound how far an elimination of these equations may be off in each unknown, whoever makes it: N and N cm.
 
     13 eps |A^-1| (|A| |x| + |b|): each number of the system carries up to as many roundings as there are
@@ -180,7 +222,9 @@ def round_off(errors: ProgramErrors, inertias: tuple[float, float] | None = None
     """
     matrix, right = make_equations(errors, inertias)
     unknowns = np.linalg.solve(matrix, right)
-    moved = np.abs(np.linalg.inv(matrix)) @ (np.abs(matrix) @ np.abs(unknowns) + np.abs(right))
+    moved = np.abs(np.linalg.inv(matrix)) @ (
+        np.abs(matrix) @ np.abs(unknowns) + np.abs(right)
+    )
     return dict(zip(UNKNOWNS, map(float, len(UNKNOWNS) * EPS * moved), strict=True))
 
 
@@ -202,4 +246,7 @@ STEPS: tuple[tuple[str, ProgramErrors, tuple[float, float] | None], ...] = (
 
 def climb_ladder() -> list[tuple[str, dict[str, float]]]:
     """Compute the unknowns after each further erratum, from right to published."""
-    return [(erratum, compute_thesis_program(errors, inertias)) for erratum, errors, inertias in STEPS]
+    return [
+        (erratum, compute_thesis_program(errors, inertias))
+        for erratum, errors, inertias in STEPS
+    ]

@@ -33,28 +33,44 @@ class TextbookAnswer(NamedTuple):
 
 def list_answers() -> list[TextbookAnswer]:
     """List all of them."""
-    return [TextbookAnswer(**entry) for entry in tomllib.loads(ANSWERS.read_text(encoding="utf-8"))["answer"]]
+    return [
+        TextbookAnswer(**entry)
+        for entry in tomllib.loads(ANSWERS.read_text(encoding="utf-8"))["answer"]
+    ]
 
 
 def compare_textbooks() -> Iterator[PublishedFigure]:
     """Compare each answer with ours."""
     for answer in list_answers():
         ours = compute_value(_solve(answer.scene), answer.quantity, answer.position)
-        yield PublishedFigure("public test cases", f"{answer.scene} {answer.quantity}", answer.printed, ours)
+        yield PublishedFigure(
+            "public test cases",
+            f"{answer.scene} {answer.quantity}",
+            answer.printed,
+            ours,
+        )
 
 
 def compute_value(solution: fourbar.Solution, quantity: str, position: int) -> float:
     """Compute a result, its negative, or the difference of two, at one position."""
     first, minus, second = quantity.partition(" - ")
     if minus:
-        return compute_value(solution, first, position) - compute_value(solution, second, position)
+        return compute_value(solution, first, position) - compute_value(
+            solution, second, position
+        )
     if quantity.startswith("-"):
         return -compute_value(solution, quantity[1:], position)
-    name, axis = (quantity[:-2], AXES[quantity[-2:]]) if quantity[-2:] in AXES else (quantity, None)
+    name, axis = (
+        (quantity[:-2], AXES[quantity[-2:]])
+        if quantity[-2:] in AXES
+        else (quantity, None)
+    )
     values: Any
     if name == "v_A":
         assert solution.omega_2 is not None
-        values = solution.omega_2[:, None] * np.stack([-solution.A[:, 1], solution.A[:, 0]], axis=1)
+        values = solution.omega_2[:, None] * np.stack(
+            [-solution.A[:, 1], solution.A[:, 0]], axis=1
+        )
     else:
         values = getattr(solution, name)
     return float(values[position] if axis is None else values[position, axis])
@@ -74,7 +90,11 @@ def compare_maple() -> Iterator[PublishedFigure]:
     real = sheet["reduced_equations"]["real_constant"]
     yield PublishedFigure("Maple", "real constant", real, a * math.cos(theta_2) - d)
     for branch, solution in zip((1, -1), sheet["solutions"], strict=True):
-        s = fourbar.solve(fourbar.Scene(linkage, fourbar.Motion(theta_2, branch=branch)))
+        s = fourbar.solve(
+            fourbar.Scene(linkage, fourbar.Motion(theta_2, branch=branch))
+        )
         for name, angle in (("theta3", s.theta_3), ("theta4", s.theta_4)):
             key = f"{solution['configuration']} {name}"
-            yield PublishedFigure("Maple", key, solution[f"{name}_printed_rad"], float(angle[0]))
+            yield PublishedFigure(
+                "Maple", key, solution[f"{name}_printed_rad"], float(angle[0])
+            )

@@ -61,24 +61,44 @@ def list_thesis_figures() -> Iterator[PublishedFigure]:
 
 def list_positions() -> Iterator[PublishedFigure]:
     """List section 2.4's table: theta_3 and theta_4 of both roots at 281 positions."""
-    rows = list(csv.DictReader((DATA / "positions.csv").read_text(encoding="utf-8").splitlines()))
+    rows = list(
+        csv.DictReader(
+            (DATA / "positions.csv").read_text(encoding="utf-8").splitlines()
+        )
+    )
     theta_2 = np.radians([float(row["theta2_deg"]) for row in rows])
-    for branch, third, fourth in ((1, "theta3_1", "theta4_2"), (-1, "theta3_2", "theta4_1")):
+    for branch, third, fourth in (
+        (1, "theta3_1", "theta4_2"),
+        (-1, "theta3_2", "theta4_1"),
+    ):
         s = compute_motion(theta_2, branch)
         for row, theta_3, theta_4 in zip(rows, s.theta_3, s.theta_4, strict=True):
-            for name, angle in ((third, float(theta_3)), (fourth, to_ours(float(theta_4)))):
+            for name, angle in (
+                (third, float(theta_3)),
+                (fourth, to_ours(float(theta_4))),
+            ):
                 text = row[f"{name}_deg"]
                 ours = math.degrees(angle)
                 ours += 360.0 * round((float(text) - ours) / 360.0)
                 where_it_is = f"{row['theta2_deg']} {name}"
                 lost = ("6",) if where_it_is == "136 theta3_1" else ()
-                yield PublishedFigure("2.4 positions", where_it_is, text, ours, lost, 10.0 * ours if lost else None)
+                yield PublishedFigure(
+                    "2.4 positions",
+                    where_it_is,
+                    text,
+                    ours,
+                    lost,
+                    10.0 * ours if lost else None,
+                )
 
 
 def list_half_angle_constants() -> Iterator[PublishedFigure]:
     """List section 2.4 at theta_2 = 90 deg: k1 cos + k2 sin + k3 + e^2 = 0, A t^2 + B t + C = 0, t = tan(theta/2)."""
     theta_2 = math.radians(90.0)
-    x, y = a * math.cos(theta_2) + d * math.cos(THETA_1), a * math.sin(theta_2) + d * math.sin(THETA_1)
+    x, y = (
+        a * math.cos(theta_2) + d * math.cos(THETA_1),
+        a * math.sin(theta_2) + d * math.sin(THETA_1),
+    )
     roots = {branch: compute_motion(np.array([theta_2]), branch) for branch in (1, -1)}
     angles = {
         "theta3_1": float(roots[1].theta_3[0]),
@@ -88,21 +108,51 @@ def list_half_angle_constants() -> Iterator[PublishedFigure]:
     }
     for name, length, second in (("theta4", c, b), ("theta3", b, c)):
         k1, k2, k3 = 2.0 * length * x, 2.0 * length * y, x * x + y * y - second**2
-        ours = {"k1": k1, "k2": k2, "k3": k3, "A": k3 + length**2 - k1, "B": 2.0 * k2, "C": k3 + length**2 + k1}
+        ours = {
+            "k1": k1,
+            "k2": k2,
+            "k3": k3,
+            "A": k3 + length**2 - k1,
+            "B": 2.0 * k2,
+            "C": k3 + length**2 + k1,
+        }
         ours |= {f"{key}_deg": math.degrees(angle) for key, angle in angles.items()}
-        for key, text in read_printed()["published"]["section_2_4_theta2_90"][name].items():
-            yield PublishedFigure("2.4 constants", key if key.startswith("theta") else f"{name} {key}", text, ours[key])
+        for key, text in read_printed()["published"]["section_2_4_theta2_90"][
+            name
+        ].items():
+            yield PublishedFigure(
+                "2.4 constants",
+                key if key.startswith("theta") else f"{name} {key}",
+                text,
+                ours[key],
+            )
 
 
 def list_simulation_window() -> Iterator[PublishedFigure]:
     """List the manual's window: angles e1..e4 in rad and deg, of theta_2 = 0."""
     s = compute_motion(np.array([0.0]))
     theta_3, theta_4 = float(s.theta_3[0]), to_ours(float(s.theta_4[0]))
-    ours = {"e1_rad": THETA_1, "e2_rad": 0.0, "e3_rad": theta_3, "e4_rad": theta_4, "teta1_deg": to_degrees(THETA_1)}
-    ours |= {"tetaDos_deg": 0.0, "anguloTres_deg": to_degrees(theta_3), "anguloCuatro_deg": to_degrees(theta_4)}
+    ours = {
+        "e1_rad": THETA_1,
+        "e2_rad": 0.0,
+        "e3_rad": theta_3,
+        "e4_rad": theta_4,
+        "teta1_deg": to_degrees(THETA_1),
+    }
+    ours |= {
+        "tetaDos_deg": 0.0,
+        "anguloTres_deg": to_degrees(theta_3),
+        "anguloCuatro_deg": to_degrees(theta_4),
+    }
     for name, text in read_printed()["published"]["manual_simulation_window"].items():
         if name != "note":
-            yield PublishedFigure("manual, window", name, text, ours[name], ("17",) if name == "tetaDos_deg" else ())
+            yield PublishedFigure(
+                "manual, window",
+                name,
+                text,
+                ours[name],
+                ("17",) if name == "tetaDos_deg" else (),
+            )
 
 
 def list_limits() -> Iterator[PublishedFigure]:
@@ -116,16 +166,34 @@ def list_limits() -> Iterator[PublishedFigure]:
         4: (a**2 + d**2 - (b - c) ** 2) / (2.0 * a * d),
     }
     limits = {2: to_degrees(output[-1].theta_2), 4: to_degrees(dead_centre[0].theta_2)}
-    for row in json.loads((DATA / "limits.json").read_text(encoding="utf-8"))["table_3_2"]:
+    for row in json.loads((DATA / "limits.json").read_text(encoding="utf-8"))[
+        "table_3_2"
+    ]:
         number = row["row"]
-        yield PublishedFigure("3.2 limits", f"row {number} cosine", row["discriminant_printed"], cosines[number])
+        yield PublishedFigure(
+            "3.2 limits",
+            f"row {number} cosine",
+            row["discriminant_printed"],
+            cosines[number],
+        )
         if number == 2:
             made = limits[2] - to_degrees(THETA_1)
-            yield PublishedFigure("3.2 limits", "row 2 theta_2", row["value_printed_deg"], limits[2], ("14",), made)
+            yield PublishedFigure(
+                "3.2 limits",
+                "row 2 theta_2",
+                row["value_printed_deg"],
+                limits[2],
+                ("14",),
+                made,
+            )
         if number == 4:
-            yield PublishedFigure("3.2 limits", "row 4 theta_2", row["value_printed_deg"], limits[4])
+            yield PublishedFigure(
+                "3.2 limits", "row 4 theta_2", row["value_printed_deg"], limits[4]
+            )
             arc = limits[4] - math.degrees(to_ours(THETA_1))
-            yield PublishedFigure("3.2 limits", "row 4 arc cosine", row["acos_printed_deg"], arc)
+            yield PublishedFigure(
+                "3.2 limits", "row 4 arc cosine", row["acos_printed_deg"], arc
+            )
 
 
 def cut(value: float, decimals: int) -> float:
@@ -143,7 +211,11 @@ def compute_our_kinematics(k: Kinematics) -> dict[str, float]:
 
     A alpha_3 + B alpha_4 = C and D alpha_3 + E alpha_4 = F.
     """
-    speeds = ((a, OMEGA_2, THETA_2), (b, k.omega[3], k.theta_3), (c, k.omega[4], k.theta_4))
+    speeds = (
+        (a, OMEGA_2, THETA_2),
+        (b, k.omega[3], k.theta_3),
+        (c, k.omega[4], k.theta_4),
+    )
     values = {
         "theta3_deg": to_degrees(k.theta_3),
         "theta4_deg": to_degrees(k.theta_4),
@@ -151,12 +223,23 @@ def compute_our_kinematics(k: Kinematics) -> dict[str, float]:
         **{f"alpha{bar}": alpha for bar, alpha in k.alpha.items()},
         "A": b * math.sin(k.theta_3),
         "B": c * math.sin(k.theta_4),
-        "C": -sum(length * omega**2 * math.cos(theta) for length, omega, theta in speeds),
+        "C": -sum(
+            length * omega**2 * math.cos(theta) for length, omega, theta in speeds
+        ),
         "D": -b * math.cos(k.theta_3),
         "E": -c * math.cos(k.theta_4),
-        "F": -sum(length * omega**2 * math.sin(theta) for length, omega, theta in speeds),
+        "F": -sum(
+            length * omega**2 * math.sin(theta) for length, omega, theta in speeds
+        ),
     }
-    vectors = {"A_G2": k.a_G[2], "A_A": k.a_A, "A_G3/A": k.a_G[3] - k.a_A, "A_G3": k.a_G[3], "A_G4": k.a_G[4], **k.arms}
+    vectors = {
+        "A_G2": k.a_G[2],
+        "A_A": k.a_A,
+        "A_G3/A": k.a_G[3] - k.a_A,
+        "A_G3": k.a_G[3],
+        "A_G4": k.a_G[4],
+        **k.arms,
+    }
     for name, (x, y) in vectors.items():
         values |= {f"{name}_i": x, f"{name}_j": y, f"{name}_mod": math.hypot(x, y)}
         values[f"{name}_ang_deg"] = to_degrees(math.atan2(y, x))
@@ -178,14 +261,29 @@ def list_slips(k: Kinematics) -> dict[str, tuple[tuple[str, ...], float]]:
 def list_kinematics(k: Kinematics) -> Iterator[PublishedFigure]:
     """List section 4.12, and the manual's table of the program's 17 digits."""
     ours, slips = compute_our_kinematics(k), list_slips(k)
-    by_hand = {"R23_j": (("12",), compute_cut_arm(k, 6)), "R43_j": (("12",), -compute_cut_arm(k, 6))}
+    by_hand = {
+        "R23_j": (("12",), compute_cut_arm(k, 6)),
+        "R43_j": (("12",), -compute_cut_arm(k, 6)),
+    }
     for name, text in read_printed()["published"]["section_4_12_hand"].items():
         errata, made = {**slips, **by_hand}.get(name, ((), None))
         yield PublishedFigure("4.12", name, text, ours[name], errata, made)
     for name, text in read_printed()["published"]["manual_program_kinematic"].items():
         errata, made = slips.get(name, ((), None))
-        size = {"t": math.degrees(1.0), "R": abs(CENTRE[2]), "A": float(np.abs(k.a_G[2]).max())}.get(name[0], 1.0)
-        yield PublishedFigure("manual, kinematics", name, text, ours[name], errata, made, ANGLE_NOISE * size)
+        size = {
+            "t": math.degrees(1.0),
+            "R": abs(CENTRE[2]),
+            "A": float(np.abs(k.a_G[2]).max()),
+        }.get(name[0], 1.0)
+        yield PublishedFigure(
+            "manual, kinematics",
+            name,
+            text,
+            ours[name],
+            errata,
+            made,
+            ANGLE_NOISE * size,
+        )
 
 
 def list_constants(k: Kinematics) -> Iterator[PublishedFigure]:
@@ -203,13 +301,23 @@ def list_constants(k: Kinematics) -> Iterator[PublishedFigure]:
             compute_inertia(bar, about_long_axis=True),
         )
     load = split_components(LOAD_ARM, LOAD_ANGLE)
-    ours: dict[str, float] = {"R_ext_i": load[0], "R_ext_j": load[1], "moment_of_force_N_cm": -load[1] * LOAD}
+    ours: dict[str, float] = {
+        "R_ext_i": load[0],
+        "R_ext_j": load[1],
+        "moment_of_force_N_cm": -load[1] * LOAD,
+    }
     slips: dict[str, tuple[tuple[str, ...], float]] = {}
     for bar, a_G in k.a_G.items():
         force = LOAD if bar == 2 else 0.0
         slip = k.slip if bar == 3 else 0.0
-        ours[f"k{bar}x"], ours[f"k{bar}y"] = TO_N * MASSES[bar] * a_G[0] - force, TO_N * MASSES[bar] * a_G[1]
-        slips[f"k{bar}x"] = (("4", "1") if slip else ("1",), MASSES[bar] * (a_G[0] + slip) - force)
+        ours[f"k{bar}x"], ours[f"k{bar}y"] = (
+            TO_N * MASSES[bar] * a_G[0] - force,
+            TO_N * MASSES[bar] * a_G[1],
+        )
+        slips[f"k{bar}x"] = (
+            ("4", "1") if slip else ("1",),
+            MASSES[bar] * (a_G[0] + slip) - force,
+        )
         slips[f"k{bar}y"] = (("1",), MASSES[bar] * a_G[1])
     ours["k2_5"] = -COUPLE + load[1] * LOAD
     for bar, alpha, sign in ((3, k.alpha[3], -1.0), (4, k.alpha[4], 1.0)):
@@ -235,15 +343,21 @@ def list_constants(k: Kinematics) -> Iterator[PublishedFigure]:
     }
     for name, text in source["published"]["section_5_7_hand_constants"].items():
         errata, changed = by_hand.get(name, ((), None))
-        yield PublishedFigure("5.7 constants", name, text, float(ours[name]), errata, changed)
+        yield PublishedFigure(
+            "5.7 constants", name, text, float(ours[name]), errata, changed
+        )
     matrix = source["published"]["section_5_7_matrix_as_printed"]
     sides = [f"k{bar}{key}" for bar in (2, 3, 4) for key in ("x", "y", "_5")]
     entries = list(zip(sides, matrix["rhs"], strict=False))
     for bar, row in ((2, "row3_bar2"), (3, "row6_bar3"), (4, "row9_bar4")):
         entries += [(f"k{bar}_{n}", text) for n, text in enumerate(matrix[row][:4], 1)]
     for name, text in entries:
-        errata, changed = {key: value for key, value in slips.items() if "12" not in value[0]}.get(name, ((), None))
-        yield PublishedFigure("5.7 matrix", name, text, float(ours[name]), errata, changed)
+        errata, changed = {
+            key: value for key, value in slips.items() if "12" not in value[0]
+        }.get(name, ((), None))
+        yield PublishedFigure(
+            "5.7 matrix", name, text, float(ours[name]), errata, changed
+        )
     for number, text in enumerate(matrix["rhs"][9:], 10):
         yield PublishedFigure("5.7 matrix", f"right side, row {number}", text, 0.0)
     yield PublishedFigure("5.7 matrix", "T4 in row 9", matrix["row9_bar4"][4], 1.0)
@@ -259,4 +373,12 @@ def list_unknowns() -> Iterator[PublishedFigure]:
     ):
         noise = round_off(*STEPS[step][1:])  # printed with up to 17 digits
         for name, text in read_printed()["published"][key].items():
-            yield PublishedFigure(label, name, text, right[name], (*names, *last), steps[step][1][name], noise[name])
+            yield PublishedFigure(
+                label,
+                name,
+                text,
+                right[name],
+                (*names, *last),
+                steps[step][1][name],
+                noise[name],
+            )

@@ -34,15 +34,27 @@ def assemble(bodies: FreeBodies, drive_bar: int) -> tuple[Array, Array]:
     """Assemble the matrices (n, 13, 13) and right-hand sides (n, 13)."""
     n = len(bodies.inertia_moment[2])
     matrix, right = np.zeros((n, 13, 13)), np.zeros((n, 13))
-    for row, bar, first, second in ((0, 2, F12, F32), (3, 3, F23, F43), (6, 4, F14, F34)):
-        for force, arm in ((first, bodies.to_first[bar]), (second, bodies.to_second[bar])):
+    for row, bar, first, second in (
+        (0, 2, F12, F32),
+        (3, 3, F23, F43),
+        (6, 4, F14, F34),
+    ):
+        for force, arm in (
+            (first, bodies.to_first[bar]),
+            (second, bodies.to_second[bar]),
+        ):
             matrix[:, row, force] = matrix[:, row + 1, force + 1] = 1.0
-            matrix[:, row + 2, force], matrix[:, row + 2, force + 1] = -arm[:, 1], arm[:, 0]
+            matrix[:, row + 2, force], matrix[:, row + 2, force + 1] = (
+                -arm[:, 1],
+                arm[:, 0],
+            )
         if bar == drive_bar:
             matrix[:, row + 2, TORQUE] = 1.0
         right[:, row : row + 2] = bodies.inertia_force[bar]
         right[:, row + 2] = bodies.inertia_moment[bar]
-    for row, (force, reaction) in enumerate(((F32, F23), (F32 + 1, F23 + 1), (F43, F34), (F43 + 1, F34 + 1)), start=9):
+    for row, (force, reaction) in enumerate(
+        ((F32, F23), (F32 + 1, F23 + 1), (F43, F34), (F43 + 1, F34 + 1)), start=9
+    ):
         matrix[:, row, force] = matrix[:, row, reaction] = 1.0
     return matrix, right
 

@@ -21,14 +21,24 @@ from fourbar_validation.compare.columns import CSV_ROWS, null_nan
 from fourbar_validation.compare.rows import FAILS, MADE_OF, Counts, Row, sort_rows
 from fourbar_validation.regression import render
 from fourbar_validation.regression.changes import Differences, compare_runs
-from fourbar_validation.regression.record import ABOUT, ACCEPTED, TABLES, About, accept, find_baseline, open_run
+from fourbar_validation.regression.record import (
+    ABOUT,
+    ACCEPTED,
+    TABLES,
+    About,
+    accept,
+    find_baseline,
+    open_run,
+)
 from fourbar_validation.regression.scenes import find_renamed
 
 HISTORY = "history.parquet"
 TIME = "time"
 
 
-def append(file: Path, about: About, rows: list[Row], times: Mapping[tuple[str, str], float]) -> None:
+def append(
+    file: Path, about: About, rows: list[Row], times: Mapping[tuple[str, str], float]
+) -> None:
     """Append a run to the table, which is made if there is none.
 
     A run with the same date and rows is appended once. InputError if the file is damaged or no such table.
@@ -39,40 +49,69 @@ def append(file: Path, about: About, rows: list[Row], times: Mapping[tuple[str, 
     table = _write_table(about, rows, times)
     if file.exists():
         try:
-            old = pq.read_table(pa.BufferReader(file.read_bytes()), page_checksum_verification=True)
+            old = pq.read_table(
+                pa.BufferReader(file.read_bytes()), page_checksum_verification=True
+            )
             if table["run"][0].as_py() in set(old["run"].to_pylist()):
                 return
             table = pa.concat_tables([old, table], promote_options="default")
         except (OSError, ValueError, KeyError, TypeError, pa.ArrowException):
-            raise InputError("--to", str(file), "is damaged, or no table written by `accept`") from None
+            raise InputError(
+                "--to", str(file), "is damaged, or no table written by `accept`"
+            ) from None
     sink = pa.BufferOutputStream()
     pq.write_table(table, sink, compression="zstd", write_page_checksum=True)
     file.parent.mkdir(parents=True, exist_ok=True)
     write_bytes(file, sink.getvalue().to_pybytes())
 
 
-def _write_table(about: About, rows: list[Row], times: Mapping[tuple[str, str], float]) -> Any:
+def _write_table(
+    about: About, rows: list[Row], times: Mapping[tuple[str, str], float]
+) -> Any:
     """Write a run as columns; a text that recurs is kept once."""
     import pyarrow as pa
 
     nothing: dict[str, Any] = dict.fromkeys((*MADE_OF, "times_formulas"))
-    lines = [nothing | {name: null_nan(getattr(row, name)) for name in MADE_OF} for row in sort_rows(rows)]
+    lines = [
+        nothing | {name: null_nan(getattr(row, name)) for name in MADE_OF}
+        for row in sort_rows(rows)
+    ]
     for (scene, engine), ratio in sorted(times.items()):
-        lines.append(nothing | {"scene": scene, "engine": engine, "quantity": TIME, "times_formulas": ratio})
-    name = hashlib.sha256(repr((about.date, [tuple(line.values()) for line in lines])).encode()).hexdigest()[:16]
-    run = {"run": name, "date": about.date, "commit": about.commit, "machine": about.machine}
+        lines.append(
+            nothing
+            | {
+                "scene": scene,
+                "engine": engine,
+                "quantity": TIME,
+                "times_formulas": ratio,
+            }
+        )
+    name = hashlib.sha256(
+        repr((about.date, [tuple(line.values()) for line in lines])).encode()
+    ).hexdigest()[:16]
+    run = {
+        "run": name,
+        "date": about.date,
+        "commit": about.commit,
+        "machine": about.machine,
+    }
     run |= {"settings": json.dumps(about.settings, sort_keys=True)}
     run |= {f"version_{name}": version for name, version in about.versions.items()}
     hashes = {
-        scene: hashlib.sha256(json.dumps(dict(entries), sort_keys=True).encode()).hexdigest()[:16]
+        scene: hashlib.sha256(
+            json.dumps(dict(entries), sort_keys=True).encode()
+        ).hexdigest()[:16]
         for scene, entries in about.scenes.items()
     }
     kinds = MADE_OF | {"times_formulas": float}
     word, number = pa.dictionary(pa.int32(), pa.string()), pa.float64()
     names = [*run, *MADE_OF, "scene_hash", "times_formulas"]
-    schema = pa.schema([(name, number if kinds.get(name) is float else word) for name in names])
+    schema = pa.schema(
+        [(name, number if kinds.get(name) is float else word) for name in names]
+    )
     return pa.Table.from_pylist(
-        [run | line | {"scene_hash": hashes.get(line["scene"], "")} for line in lines], schema=schema
+        [run | line | {"scene_hash": hashes.get(line["scene"], "")} for line in lines],
+        schema=schema,
     )
 
 
@@ -93,7 +132,11 @@ def add_output_options(command: Callable[..., Any]) -> Callable[..., Any]:
     for form in reversed(FORMS):
         path = click.Path(path_type=Path, dir_okay=False)
         text = f"Write the differences as {form} too"
-        text += "; of a run held against nothing its own comparisons." if form == "junit" else "."
+        text += (
+            "; of a run held against nothing its own comparisons."
+            if form == "junit"
+            else "."
+        )
         command = click.option(f"--{form}", type=path, help=text)(command)
     return command
 
@@ -107,7 +150,10 @@ def add_choosing_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def report_differences(
-    old: Path, new: Path, forms: dict[str, Path | None], chosen: dict[str, str | None] | None = None
+    old: Path,
+    new: Path,
+    forms: dict[str, Path | None],
+    chosen: dict[str, str | None] | None = None,
 ) -> int:
     """Print the differences, write the forms wanted; 1 on a regression, or where nothing was compared."""
     from rich.console import Console
@@ -115,12 +161,23 @@ def report_differences(
 
     before, after = open_run(old, "OLD"), open_run(new, "NEW")
     names = find_renamed(before.about.scenes, after.about.scenes)
-    keep = _is_chosen(chosen or {}, lambda column: chain(before.words(column), after.words(column)), names)
+    keep = _is_chosen(
+        chosen or {},
+        lambda column: chain(before.words(column), after.words(column)),
+        names,
+    )
     engines = set(after.words("engine"))
-    scenes = track(after.scenes(keep), "comparing", console=Console(stderr=True), transient=True)
-    differences = compare_runs((before.about, before.scenes(keep)), (after.about, scenes), engines)
+    scenes = track(
+        after.scenes(keep), "comparing", console=Console(stderr=True), transient=True
+    )
+    differences = compare_runs(
+        (before.about, before.scenes(keep)), (after.about, scenes), engines
+    )
     unproven = [str(run.table) for run in (before, after) if not run.verified]
-    differences.notes += [f"{table}: not verified, its {ABOUT} states no SHA-256 or is missing" for table in unproven]
+    differences.notes += [
+        f"{table}: not verified, its {ABOUT} states no SHA-256 or is missing"
+        for table in unproven
+    ]
     for form, path in forms.items():
         if path is not None:
             write_text(path, FORMS[form](differences))
@@ -148,10 +205,18 @@ def _is_chosen(
             if len(offered) < NAMED:
                 offered.add(word)
         for name in sorted(missing) or ([] if names else [text]):
-            raise InputError(f"--{option}", name, "must be among " + ", ".join(sorted(offered)))
-        both = {name for pair in renamed.items() if names & {*pair} for name in pair} if option == "only" else set()
+            raise InputError(
+                f"--{option}", name, "must be among " + ", ".join(sorted(offered))
+            )
+        both = (
+            {name for pair in renamed.items() if names & {*pair} for name in pair}
+            if option == "only"
+            else set()
+        )
         wanted[CHOICES[option]] = names | both
-    return lambda row: all(getattr(row, column) in names for column, names in wanted.items())
+    return lambda row: all(
+        getattr(row, column) in names for column, names in wanted.items()
+    )
 
 
 @click.command()
@@ -160,7 +225,12 @@ def _is_chosen(
 @add_choosing_options
 @add_output_options
 def compare(
-    old: str, new: Path, only: str | None, engines: str | None, quantity: str | None, **forms: Path | None
+    old: str,
+    new: Path,
+    only: str | None,
+    engines: str | None,
+    quantity: str | None,
+    **forms: Path | None,
 ) -> int:
     """Say what changed from OLD (a run's folder, its results.csv, or an accepted name) to NEW.
 
@@ -169,14 +239,23 @@ def compare(
     Exit status 1 on a regression: a verdict that got worse, an error that grew beyond round-off and its allowance,
     a row that was run for and is gone, a new row that fails; and where nothing was compared.
     """
-    return report_differences(find_baseline(old), new, forms, {"only": only, "engines": engines, "quantity": quantity})
+    return report_differences(
+        find_baseline(old),
+        new,
+        forms,
+        {"only": only, "engines": engines, "quantity": quantity},
+    )
 
 
 @click.command(name="accept")
 @click.argument("results", type=click.Path(path_type=Path))
 @click.option("--to", type=click.Path(path_type=Path, file_okay=False), metavar="DIR",
               help=f"Keep it there; left out: {ACCEPTED}/ next to RESULTS.")  # fmt: skip
-@click.option("--even-failing", is_flag=True, help="Accept a run in which a comparison fails, or none was made.")
+@click.option(
+    "--even-failing",
+    is_flag=True,
+    help="Accept a run in which a comparison fails, or none was made.",
+)
 def accept_command(results: Path, to: Path | None, even_failing: bool) -> None:
     """Record RESULTS (a run's folder) as the accepted state that later runs are compared with.
 
@@ -185,21 +264,41 @@ def accept_command(results: Path, to: Path | None, even_failing: bool) -> None:
     folder = results if results.is_dir() else results.parent
     target = folder.absolute().parent / ACCEPTED if to is None else to
     if target.resolve() == folder.resolve():
-        raise InputError("--to", str(target), "must be another folder than that of the results")
+        raise InputError(
+            "--to", str(target), "must be another folder than that of the results"
+        )
     for name in (*TABLES, ABOUT, HISTORY):
         if (target / name).is_dir():
-            raise InputError("--to", str(target / name), "must name a file, not a folder")
+            raise InputError(
+                "--to", str(target / name), "must name a file, not a folder"
+            )
     run = open_run(results)
     counts = Counts(run.rows())
     if counts.status != HOLDS and not even_failing:
-        why = f"{counts[FAILS]} comparisons fail" if counts[FAILS] else "nothing was compared"
-        raise InputError("RESULTS", str(results), f"must hold, or say --even-failing: {why}")
+        why = (
+            f"{counts[FAILS]} comparisons fail"
+            if counts[FAILS]
+            else "nothing was compared"
+        )
+        raise InputError(
+            "RESULTS", str(results), f"must hold, or say --even-failing: {why}"
+        )
     if not run.verified:  # the record does not say whether it lost some of its rows
-        raise InputError(run.key, str(run.table), f"needs a {ABOUT} with its rows and SHA-256; `run` writes one")
+        raise InputError(
+            run.key,
+            str(run.table),
+            f"needs a {ABOUT} with its rows and SHA-256; `run` writes one",
+        )
     too_long = counts.total > CSV_ROWS
     if not too_long:  # first: if the table is damaged nothing is written
-        times = {(scene, engine): time for scene, some in run.times() for engine, time in some}
+        times = {
+            (scene, engine): time
+            for scene, some in run.times()
+            for engine, time in some
+        }
         append(target / HISTORY, run.about, list(run.rows()), times)
     accept(run, target)
-    history = f"too many for {HISTORY}" if too_long else f"appended to {target / HISTORY}"
+    history = (
+        f"too many for {HISTORY}" if too_long else f"appended to {target / HISTORY}"
+    )
     click.echo(f"accepted: {target} ({counts.total} rows; {history})")

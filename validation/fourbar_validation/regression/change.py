@@ -69,7 +69,12 @@ class Change:
 
 
 def compare_row(
-    key: Key, old: Row | None, new: Row | None, *, asked: bool = True, differs: Kind | None = None
+    key: Key,
+    old: Row | None,
+    new: Row | None,
+    *,
+    asked: bool = True,
+    differs: Kind | None = None,
 ) -> Change:
     """Compare a row of both runs, or take that of one of them.
 
@@ -77,16 +82,30 @@ def compare_row(
     """
     round_off = math.nan
     if old is None:
-        kind = Kind.NEW_FAILURE if new is not None and new.verdict == FAILS else Kind.NEW
+        kind = (
+            Kind.NEW_FAILURE if new is not None and new.verdict == FAILS else Kind.NEW
+        )
     elif new is None and not asked:
         kind = Kind.NOT_RUN
     elif new is None:
-        kind = Kind.GONE_FAILURE if old.verdict == FAILS and old.quantity in WHOLE else Kind.GONE
+        kind = (
+            Kind.GONE_FAILURE
+            if old.verdict == FAILS and old.quantity in WHOLE
+            else Kind.GONE
+        )
     else:
-        round_off = ROUND_OFF * EPS / min((c for c in (old.condition, new.condition) if c > 0.0), default=1.0)
+        round_off = (
+            ROUND_OFF
+            * EPS
+            / min((c for c in (old.condition, new.condition) if c > 0.0), default=1.0)
+        )
         kind = _choose_kind(old, new, round_off)
         if differs is not None:
-            kind = Kind.NEW_FAILURE if new.verdict == FAILS and old.verdict != FAILS else differs
+            kind = (
+                Kind.NEW_FAILURE
+                if new.verdict == FAILS and old.verdict != FAILS
+                else differs
+            )
     return Change(kind, key, old, new, round_off)
 
 
@@ -94,12 +113,18 @@ def _choose_kind(old: Row, new: Row, round_off: float) -> Kind:
     if old.verdict != new.verdict:
         worse = VERDICTS.index(new.verdict) > VERDICTS.index(old.verdict)
         return Kind.VERDICT_WORSE if worse else Kind.VERDICT_BETTER
-    if not new.compared or old.error == new.error or (math.isnan(old.error) and math.isnan(new.error)):
+    if (
+        not new.compared
+        or old.error == new.error
+        or (math.isnan(old.error) and math.isnan(new.error))
+    ):
         return Kind.SAME
     if abs(new.error - old.error) <= round_off:
         return Kind.ROUND_OFF
     if new.error > NOTICEABLE * old.error or math.isnan(new.error):
-        within = new.passed and new.error <= NOTICEABLE * old.allowed  # an allowance that was widened holds nothing
+        within = (
+            new.passed and new.error <= NOTICEABLE * old.allowed
+        )  # an allowance that was widened holds nothing
         return Kind.GREW if within else Kind.WORSE
     if old.error > NOTICEABLE * new.error:
         return Kind.BETTER

@@ -9,10 +9,21 @@ from typing import TypeVar
 
 from fourbar.errors import FAILED, HOLDS, InputError
 from fourbar_validation.compare.rows import FORMULAS, VERDICTS, Counts, Row
-from fourbar_validation.regression.change import OTHER_QUESTION, REGRESSIONS, Change, Key, Kind, compare_row
+from fourbar_validation.regression.change import (
+    OTHER_QUESTION,
+    REGRESSIONS,
+    Change,
+    Key,
+    Kind,
+    compare_row,
+)
 from fourbar_validation.regression.fault import Fault
 from fourbar_validation.regression.record import About
-from fourbar_validation.regression.scenes import SceneChange, find_renamed, list_scene_changes
+from fourbar_validation.regression.scenes import (
+    SceneChange,
+    find_renamed,
+    list_scene_changes,
+)
 
 KEPT = 10_000
 """Rows of one kind that are listed, the worst of them; all are counted."""
@@ -43,7 +54,10 @@ class Named:
         self._last = name
 
     def __iter__(self) -> Iterator[str]:
-        yield from (f"{name} ({count} row{'s' if count > 1 else ''})" for name, count in self._rows.items())
+        yield from (
+            f"{name} ({count} row{'s' if count > 1 else ''})"
+            for name, count in self._rows.items()
+        )
         if self._others:
             yield f"{self._others} more ({self._rows_of_others} rows)"
 
@@ -76,7 +90,11 @@ class Differences:
         self.kinds.update(change.kind for change in changes)
         self.counts.add(change.new for change in changes if change.new is not None)
         alike = (change for change in changes if change.kind not in OTHER_QUESTION)
-        self._compared.add(change.new for change in alike if change.new is not None and change.old is not None)
+        self._compared.add(
+            change.new
+            for change in alike
+            if change.new is not None and change.old is not None
+        )
         self.fault.add(changes)
         scene_was_run = any(change.new is not None for change in changes)
         for change in changes:
@@ -84,21 +102,34 @@ class Differences:
                 self._engines_not_run.add(change.key[1])
             elif change.kind is Kind.NOT_RUN:
                 self._scenes_not_run.add(f"scene {change.key[0]}")
-            elif change.kind in OTHER_QUESTION and change.old is not None and change.new is not None:
-                self._not_compared.add(_say_why_not_compared(change, change.old, change.new))
+            elif (
+                change.kind in OTHER_QUESTION
+                and change.old is not None
+                and change.new is not None
+            ):
+                self._not_compared.add(
+                    _say_why_not_compared(change, change.old, change.new)
+                )
             same_kind = self._changes.setdefault(change.kind, [])
             same_kind.append(change)
             if len(same_kind) > 2 * self.kept:
-                self._changes[change.kind] = nlargest(self.kept, same_kind, key=lambda one: one.severity)
+                self._changes[change.kind] = nlargest(
+                    self.kept, same_kind, key=lambda one: one.severity
+                )
 
     def of(self, kind: Kind) -> list[Change]:
         """List the changes of one kind, the worst first; at most `kept` of them."""
-        return nlargest(self.kept, self._changes.get(kind, ()), key=lambda one: one.severity)
+        return nlargest(
+            self.kept, self._changes.get(kind, ()), key=lambda one: one.severity
+        )
 
     @property
     def changes(self) -> list[Change]:
         """Return the changes that are kept, by scene, engine, setting and quantity."""
-        return sorted((change for kind in Kind for change in self.of(kind)), key=lambda change: change.key)
+        return sorted(
+            (change for kind in Kind for change in self.of(kind)),
+            key=lambda change: change.key,
+        )
 
     @property
     def rows(self) -> int:
@@ -152,16 +183,23 @@ def compare_runs(
 
     `engines`: those that have rows in the new run.
     """
-    scenes = {change.scene: change for change in list_scene_changes(old[0].scenes, new[0].scenes)}
+    scenes = {
+        change.scene: change
+        for change in list_scene_changes(old[0].scenes, new[0].scenes)
+    }
     names = find_renamed(old[0].scenes, new[0].scenes)
     surroundings, older = _list_surroundings(old[0], new[0])
     notes = [f"renamed: {before} -> {after}" for before, after in names.items()]
     differences = Differences(surroundings, list(scenes.values()), notes, kept)
     answering = {FORMULAS} | engines | (new[0].engines or set())
     for scene, before, after in _merge_scenes(_rename_scenes(old[1], names), new[1]):
-        run_for = scene in new[0].scenes if new[0].scenes else bool(after) or not engines
+        run_for = (
+            scene in new[0].scenes if new[0].scenes else bool(after) or not engines
+        )
         rows = _index_rows(scene, before), _index_rows(scene, after)
-        differences.add(_compare_scene(*rows, answering if run_for else set(), scenes.get(scene)))
+        differences.add(
+            _compare_scene(*rows, answering if run_for else set(), scenes.get(scene))
+        )
     if older:
         compared = f"{differences.compared} of {differences.rows} rows are compared: the others are of one run alone"
         differences.notes += [compared, *older]
@@ -172,33 +210,53 @@ def _rename_scenes(scenes: ByScene[T], names: Mapping[str, str]) -> ByScene[T]:
     """Return the old run's scenes under the new run's names; nothing is held in memory if none differs."""
     if not names:
         return scenes
-    return sorted(((names.get(name, name), rows) for name, rows in scenes), key=lambda scene: scene[0])
+    return sorted(
+        ((names.get(name, name), rows) for name, rows in scenes),
+        key=lambda scene: scene[0],
+    )
 
 
-def _merge_scenes(old: ByScene[T], new: ByScene[T]) -> Iterator[tuple[str, Sequence[T], Sequence[T]]]:
+def _merge_scenes(
+    old: ByScene[T], new: ByScene[T]
+) -> Iterator[tuple[str, Sequence[T], Sequence[T]]]:
     """Yield each scene that either run has, with what both have of it; InputError where the scenes are not in order."""
-    both = merge(_require_order("OLD", old), _require_order("NEW", new), key=lambda entry: entry[0])
+    both = merge(
+        _require_order("OLD", old),
+        _require_order("NEW", new),
+        key=lambda entry: entry[0],
+    )
     for scene, entries in groupby(both, key=lambda entry: entry[0]):
         by_run = {run: rows for _, run, rows in entries}
         yield scene, by_run.get("OLD", ()), by_run.get("NEW", ())
 
 
-def _require_order(run: str, scenes: ByScene[T]) -> Iterator[tuple[str, str, Sequence[T]]]:
+def _require_order(
+    run: str, scenes: ByScene[T]
+) -> Iterator[tuple[str, str, Sequence[T]]]:
     last = None
     for scene, rows in scenes:
         if last is not None and scene <= last:
-            raise InputError(run, scene, f"must stand before scene {last}: a table of `run` is sorted by scene")
+            raise InputError(
+                run,
+                scene,
+                f"must stand before scene {last}: a table of `run` is sorted by scene",
+            )
         last = scene
         yield scene, run, rows
 
 
 def _index_rows(scene: str, rows: Iterable[Row]) -> dict[Key, Row]:
-    worst_last = sorted(rows, key=lambda row: VERDICTS.index(row.verdict))  # the worse of two rows of one name counts
+    worst_last = sorted(
+        rows, key=lambda row: VERDICTS.index(row.verdict)
+    )  # the worse of two rows of one name counts
     return {(scene, row.engine, row.setting, row.quantity): row for row in worst_last}
 
 
 def _compare_scene(
-    before: Mapping[Key, Row], after: Mapping[Key, Row], engines: set[str], change: SceneChange | None
+    before: Mapping[Key, Row],
+    after: Mapping[Key, Row],
+    engines: set[str],
+    change: SceneChange | None,
 ) -> list[Change]:
     """Tell what happened to each row of a scene, for which `engines` were to answer, and what changed in it."""
     renamed = _pair_settings(before, after)
@@ -206,13 +264,21 @@ def _compare_scene(
     for key in sorted((before.keys() | after.keys()) - set(renamed.values())):
         differs = Kind.OTHER_SETTING if key in renamed else None
         if change is not None:
-            differs = Kind.OTHER_POSITIONS if change.positions_alone else Kind.OTHER_SCENE
+            differs = (
+                Kind.OTHER_POSITIONS if change.positions_alone else Kind.OTHER_SCENE
+            )
         new = after.get(renamed.get(key, key))
-        changes.append(compare_row(key, before.get(key), new, asked=key[1] in engines, differs=differs))
+        changes.append(
+            compare_row(
+                key, before.get(key), new, asked=key[1] in engines, differs=differs
+            )
+        )
     return changes
 
 
-def _pair_settings(before: Mapping[Key, Row], after: Mapping[Key, Row]) -> dict[Key, Key]:
+def _pair_settings(
+    before: Mapping[Key, Row], after: Mapping[Key, Row]
+) -> dict[Key, Key]:
     """Pair the rows that each run has with a single setting of its own: old key to new key."""
 
     def index_single(keys: Iterable[Key]) -> dict[tuple[str, str, str], Key]:
@@ -221,25 +287,47 @@ def _pair_settings(before: Mapping[Key, Row], after: Mapping[Key, Row]) -> dict[
             groups.setdefault((key[0], key[1], key[3]), []).append(key)
         return {name: group[0] for name, group in groups.items() if len(group) == 1}
 
-    old, new = index_single(before.keys() - after.keys()), index_single(after.keys() - before.keys())
-    return {old[name]: new[name] for name in old.keys() & new.keys() if "-" not in (old[name][2], new[name][2])}
+    old, new = (
+        index_single(before.keys() - after.keys()),
+        index_single(after.keys() - before.keys()),
+    )
+    return {
+        old[name]: new[name]
+        for name in old.keys() & new.keys()
+        if "-" not in (old[name][2], new[name][2])
+    }
 
 
-def _list_surroundings(old: About, new: About) -> tuple[list[tuple[str, str, str]], list[str]]:
+def _list_surroundings(
+    old: About, new: About
+) -> tuple[list[tuple[str, str, str]], list[str]]:
     """List what the runs were made with where it differs, and what a record cannot say."""
     pairs = [("commit", old.commit, new.commit)] if old.commit and new.commit else []
     pairs += _take_both(old.versions, new.versions)
     pairs.append(("machine", old.machine, new.machine))
-    pairs += [pair for pair in _take_both(old.settings, new.settings) if pair[0] != "suite"]
+    pairs += [
+        pair for pair in _take_both(old.settings, new.settings) if pair[0] != "suite"
+    ]
     suites = [about.settings.get("suite", "not recorded")[:12] for about in (old, new)]
     notes = []
     if suites[0] != suites[1] and not (old.scenes and new.scenes):
-        silent = "neither run says" if not (old.scenes or new.scenes) else "the older record does not say"
+        silent = (
+            "neither run says"
+            if not (old.scenes or new.scenes)
+            else "the older record does not say"
+        )
         notes.append(f"the scenes' hash is another ({suites[0]} -> {suites[1]}), and {silent} what they ask: "
                      "a scene that changed cannot be named, rows are compared by name alone")  # fmt: skip
-    return [(what, before, after) for what, before, after in pairs if before != after], notes
+    return [
+        (what, before, after) for what, before, after in pairs if before != after
+    ], notes
 
 
-def _take_both(old: Mapping[str, str], new: Mapping[str, str]) -> list[tuple[str, str, str]]:
+def _take_both(
+    old: Mapping[str, str], new: Mapping[str, str]
+) -> list[tuple[str, str, str]]:
     unstated = "not recorded"
-    return [(what, old.get(what, unstated), new.get(what, unstated)) for what in sorted(old.keys() | new.keys())]
+    return [
+        (what, old.get(what, unstated), new.get(what, unstated))
+        for what in sorted(old.keys() | new.keys())
+    ]

@@ -33,10 +33,16 @@ class Group:
         self.scenes += 1
         self.rows += len(changes)
         self.quantities.update(change.key[3] for change in changes)
-        self.worst = max((*changes, *([self.worst] if self.worst else [])), key=lambda change: change.severity)
+        self.worst = max(
+            (*changes, *([self.worst] if self.worst else [])),
+            key=lambda change: change.severity,
+        )
 
     def __str__(self) -> str:
-        names = ", ".join(name if n == 1 else f"{name} {n}" for name, n in self.quantities.most_common(6))
+        names = ", ".join(
+            name if n == 1 else f"{name} {n}"
+            for name, n in self.quantities.most_common(6)
+        )
         more = ", ..." if len(self.quantities) > 6 else ""
         cause = f", {self.cause}" if self.cause else ""
         return f"{self.engine}, {self.scenes} of {self.of_scenes} scenes, {self.rows} rows ({names}{more}){cause}"
@@ -53,10 +59,14 @@ class Fault:
     def add(self, changes: Iterable[Change]) -> None:
         """Add the rows of one scene."""
         changes = list(changes)
-        self._scenes.update({change.key[1] for change in changes if change.kind is not Kind.NOT_RUN})
+        self._scenes.update(
+            {change.key[1] for change in changes if change.kind is not Kind.NOT_RUN}
+        )
         groups: dict[tuple[str, Kind, str], list[Change]] = {}
         for change in changes:
-            groups.setdefault((change.key[1], change.kind, find_cause(change)), []).append(change)
+            groups.setdefault(
+                (change.key[1], change.kind, find_cause(change)), []
+            ).append(change)
         for key, some in groups.items():
             if key not in self._groups and len(self._groups) >= MOST_CAUSES:
                 key = (*key[:2], "other causes")  # noqa: PLW2901
@@ -77,7 +87,15 @@ class Fault:
         for group in groups:
             group.of_scenes = self._scenes[group.engine]
         order = list(Kind)
-        return sorted(groups, key=lambda g: (order.index(g.kind), *(-x for x in _rank_severity(g)), -g.rows, g.engine))
+        return sorted(
+            groups,
+            key=lambda g: (
+                order.index(g.kind),
+                *(-x for x in _rank_severity(g)),
+                -g.rows,
+                g.engine,
+            ),
+        )
 
     @property
     def sentences(self) -> list[str]:
@@ -86,8 +104,13 @@ class Fault:
         of_scenes: Counter[str] = Counter()
         for (text, engines), n in self._who.items():
             counts[text] += n
-            of_scenes[text] = max(of_scenes[text], min(self._scenes[engine] for engine in engines))
-        return [f"{text}, {n} of {of_scenes[text]} scenes" for text, n in counts.most_common()]
+            of_scenes[text] = max(
+                of_scenes[text], min(self._scenes[engine] for engine in engines)
+            )
+        return [
+            f"{text}, {n} of {of_scenes[text]} scenes"
+            for text, n in counts.most_common()
+        ]
 
 
 def _rank_severity(group: Group) -> tuple[bool, float]:
@@ -95,13 +118,25 @@ def _rank_severity(group: Group) -> tuple[bool, float]:
 
 
 def _is_compared_exactly(row: Row | None) -> bool:
-    return row is not None and row.setting == EXACT and row.compared and row.engine != FORMULAS
+    return (
+        row is not None
+        and row.setting == EXACT
+        and row.compared
+        and row.engine != FORMULAS
+    )
 
 
 def find_cause(change: Change) -> str:
     """Take the reason without its numbers: one cause has one text in all scenes."""
-    if change.kind in (Kind.VERDICT_WORSE, Kind.VERDICT_BETTER, Kind.NEW_FAILURE) and change.new is not None:
-        came = f"{change.old.verdict} -> {change.new.verdict}" if change.old is not None else change.new.verdict
+    if (
+        change.kind in (Kind.VERDICT_WORSE, Kind.VERDICT_BETTER, Kind.NEW_FAILURE)
+        and change.new is not None
+    ):
+        came = (
+            f"{change.old.verdict} -> {change.new.verdict}"
+            if change.old is not None
+            else change.new.verdict
+        )
         return f"{came}: {NUMBER.sub('#', change.new.reason)}"
     return ""
 
@@ -115,4 +150,6 @@ def write_sentence(worse: set[str], exact: set[str]) -> str:
         return "all engines disagree, and the identities hold: the formulas, or what all engines are given"
     if not engines:
         return "only the identities: the formulas, or what is stated of them"
-    return f"only {', '.join(sorted(engines))}" + (" and an identity" if FORMULAS in worse else "")
+    return f"only {', '.join(sorted(engines))}" + (
+        " and an identity" if FORMULAS in worse else ""
+    )

@@ -27,7 +27,12 @@ SHIPPED = Path(__file__).parent
 """Folder of the accepted state of this project's models."""
 T = TypeVar("T")
 ACCEPTED = "accepted"
-TABLE, COLUMNS, ABOUT, TIMINGS = "results.csv", "results.parquet", "record.json", "timings.csv"
+TABLE, COLUMNS, ABOUT, TIMINGS = (
+    "results.csv",
+    "results.parquet",
+    "record.json",
+    "timings.csv",
+)
 TABLES = (TABLE, COLUMNS, TIMINGS)
 UNFINISHED = "run.json"
 """File that a run keeps in its folder until it is finished."""
@@ -56,9 +61,16 @@ class About:
         return None if names is None else set(filter(None, names.split(", ")))
 
 
-def describe_run(engines: Sequence[Engine], suite: str, scenes: Mapping[str, Mapping[str, str]] | None = None) -> About:
+def describe_run(
+    engines: Sequence[Engine],
+    suite: str,
+    scenes: Mapping[str, Mapping[str, str]] | None = None,
+) -> About:
     """Describe a run made here and now."""
-    simulated = next((engine.tolerance.factor for engine in engines if engine.tolerance.in_time), SIMULATED.factor)
+    simulated = next(
+        (engine.tolerance.factor for engine in engines if engine.tolerance.in_time),
+        SIMULATED.factor,
+    )
     settings = {
         "engines": ", ".join(engine.name for engine in engines),
         "suite": suite,
@@ -67,8 +79,19 @@ def describe_run(engines: Sequence[Engine], suite: str, scenes: Mapping[str, Map
     }
     described = {name: dict(entries) for name, entries in (scenes or {}).items()}
     now = datetime.now(UTC).isoformat(timespec="seconds")
-    versions = {guest.name: guest.version for guest in engines if isinstance(guest, Guest) and guest.version}
-    return About(list_versions() | find_kernels() | versions, name_machine(), settings, described, now, _find_commit())
+    versions = {
+        guest.name: guest.version
+        for guest in engines
+        if isinstance(guest, Guest) and guest.version
+    }
+    return About(
+        list_versions() | find_kernels() | versions,
+        name_machine(),
+        settings,
+        described,
+        now,
+        _find_commit(),
+    )
 
 
 def _find_commit() -> str:
@@ -79,7 +102,14 @@ def _find_commit() -> str:
     if CHECKOUT is None:
         return ""
     try:
-        done = subprocess.run(command, cwd=CHECKOUT, capture_output=True, encoding="utf-8", check=True, timeout=10)
+        done = subprocess.run(
+            command,
+            cwd=CHECKOUT,
+            capture_output=True,
+            encoding="utf-8",
+            check=True,
+            timeout=10,
+        )
     except (OSError, subprocess.SubprocessError):
         return ""
     return done.stdout.strip()
@@ -88,9 +118,15 @@ def _find_commit() -> str:
 def write_about(record: About, folder: Path) -> None:
     """Write record.json next to the results, with rows and SHA-256 of each table, and of itself."""
     present = [path for name in TABLES if (path := folder / name).is_file()]
-    tables = {path.name: {"rows": count_rows(path), "sha256": _hash_file(path)} for path in present}
+    tables = {
+        path.name: {"rows": count_rows(path), "sha256": _hash_file(path)}
+        for path in present
+    }
     kept = asdict(record) | {"tables": tables}
-    write_text(folder / ABOUT, json.dumps(kept | {"sha256": _hash_own(kept)}, indent=1, sort_keys=True) + "\n")
+    write_text(
+        folder / ABOUT,
+        json.dumps(kept | {"sha256": _hash_own(kept)}, indent=1, sort_keys=True) + "\n",
+    )
 
 
 def _hash_file(path: Path) -> str:
@@ -102,7 +138,9 @@ def _hash_own(kept: Mapping[str, Any]) -> str:
     return hashlib.sha256(json.dumps(kept, sort_keys=True).encode()).hexdigest()
 
 
-def _require_whole(tables: Mapping[str, Mapping[str, Any]], folder: Path, read: str, key: str) -> None:
+def _require_whole(
+    tables: Mapping[str, Mapping[str, Any]], folder: Path, read: str, key: str
+) -> None:
     """Raise an InputError that names the first table of a folder that is not what its record says."""
     present = {name for name in TABLES if (folder / name).is_file()}
     for name in sorted({*tables, *present, read}):
@@ -140,9 +178,13 @@ class Recorded:
         """Yield the rows in their order; InputError if the table is damaged."""
         yield from self._read(read_columns(self.table))
 
-    def scenes(self, keep: Callable[[Row], bool] = lambda _: True) -> Iterator[tuple[str, list[Row]]]:
+    def scenes(
+        self, keep: Callable[[Row], bool] = lambda _: True
+    ) -> Iterator[tuple[str, list[Row]]]:
         """Read the rows that are wanted, scene by scene."""
-        for scene, some in groupby(filter(keep, self.rows()), key=lambda row: row.scene):
+        for scene, some in groupby(
+            filter(keep, self.rows()), key=lambda row: row.scene
+        ):
             yield scene, list(some)
 
     def words(self, column: str) -> Iterator[str]:
@@ -156,19 +198,36 @@ class Recorded:
             return
         try:
             with table.open(newline="", encoding="utf-8") as file:
-                for scene, some in groupby(csv.DictReader(file), key=lambda row: row["scene"]):
+                for scene, some in groupby(
+                    csv.DictReader(file), key=lambda row: row["scene"]
+                ):
                     yield (
                         make_plain(read_cell_text(scene)),
-                        [(make_plain(read_cell_text(row["engine"])), float(row["times_formulas"])) for row in some],
+                        [
+                            (
+                                make_plain(read_cell_text(row["engine"])),
+                                float(row["times_formulas"]),
+                            )
+                            for row in some
+                        ],
                     )
         except (KeyError, TypeError, ValueError, csv.Error):
-            raise InputError(self.key, str(table), "is not a table of times written by `run`") from None
+            raise InputError(
+                self.key, str(table), "is not a table of times written by `run`"
+            ) from None
 
     def _read(self, entries: Iterator[T]) -> Iterator[T]:
         try:
             yield from entries
-        except (KeyError, TypeError, ValueError, OSError):  # a column, a cell or a number is missing, or is no text
-            raise InputError(self.key, str(self.table), "is not a table written by `run`") from None
+        except (
+            KeyError,
+            TypeError,
+            ValueError,
+            OSError,
+        ):  # a column, a cell or a number is missing, or is no text
+            raise InputError(
+                self.key, str(self.table), "is not a table written by `run`"
+            ) from None
 
 
 def open_run(path: Path, key: str = "RESULTS") -> Recorded:
@@ -181,13 +240,27 @@ def open_run(path: Path, key: str = "RESULTS") -> Recorded:
     if not table.is_file() and long.is_file():  # too many rows for a text
         table = long
     if not table.is_file():
-        raise InputError(key, str(path), f"must be a folder with {TABLE} or {COLUMNS}, or such a file")
+        raise InputError(
+            key,
+            str(path),
+            f"must be a folder with {TABLE} or {COLUMNS}, or such a file",
+        )
     if (table.parent / UNFINISHED).is_file():
-        raise InputError(key, str(table), "must be of a run that was finished: run it again, and it is resumed")
+        raise InputError(
+            key,
+            str(table),
+            "must be of a run that was finished: run it again, and it is resumed",
+        )
     record = table.parent / ABOUT
-    run = _open_described(record, table, key) if record.is_file() else Recorded(NOTHING_KNOWN, table, key=key)
+    run = (
+        _open_described(record, table, key)
+        if record.is_file()
+        else Recorded(NOTHING_KNOWN, table, key=key)
+    )
     if next(run.rows(), None) is None:
-        raise InputError(key, str(table), "must hold at least one comparison: it has none")
+        raise InputError(
+            key, str(table), "must hold at least one comparison: it has none"
+        )
     return run
 
 
@@ -210,7 +283,10 @@ def _open_described(record: Path, table: Path, key: str) -> Recorded:
 def make_record(kept: dict[str, Any]) -> About:
     """Make the record of what a file says of a run; its words are somebody's text."""
     versions, settings = (_make_plain(kept[name]) for name in ("versions", "settings"))
-    scenes = {make_plain(name): _make_plain(entries) for name, entries in kept.get("scenes", {}).items()}
+    scenes = {
+        make_plain(name): _make_plain(entries)
+        for name, entries in kept.get("scenes", {}).items()
+    }
     date, commit = (make_plain(kept.get(name, "")) for name in ("date", "commit"))
     return About(versions, make_plain(kept["machine"]), settings, scenes, date, commit)
 

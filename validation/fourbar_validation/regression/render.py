@@ -8,7 +8,11 @@ from fourbar_validation.regression.fault import Group
 from fourbar_validation.report.junit import JunitCase, count_beyond, write_document
 from fourbar_validation.report.templating import render, write_number
 
-SHOWN = tuple(kind for kind in Kind if kind not in (Kind.SAME, Kind.ROUND_OFF, Kind.NOT_RUN, *OTHER_QUESTION))
+SHOWN = tuple(
+    kind
+    for kind in Kind
+    if kind not in (Kind.SAME, Kind.ROUND_OFF, Kind.NOT_RUN, *OTHER_QUESTION)
+)
 """Kinds shown by engine and cause; rows that were not run, or ask another question, are named together."""
 AT_MOST = 50
 """Engines and causes listed in text and Markdown."""
@@ -28,7 +32,11 @@ def write_verdict(diff: Differences) -> str:
     head = f"{many} regression{'s' if many > 1 else ''}" if many else "No regression"
     if diff.nothing and not many:
         head = "Nothing was compared with the old run"
-    rows = f"{diff.compared} of {diff.rows}" if diff.compared < diff.rows else f"{diff.rows}"
+    rows = (
+        f"{diff.compared} of {diff.rows}"
+        if diff.compared < diff.rows
+        else f"{diff.rows}"
+    )
     moved = f" in {rows} rows: {', '.join(counts)}" if counts else ""
     return f"{head}{moved}. New run: {diff.counts.sentence()}"
 
@@ -40,7 +48,9 @@ def write_line(change: Change) -> str:
         assert change.new is not None
         return f"{name}: {change.new.verdict}, error {write_number(change.new.error)}"
     if change.new is None:
-        return f"{name}: was {change.old.verdict}, error {write_number(change.old.error)}"
+        return (
+            f"{name}: was {change.old.verdict}, error {write_number(change.old.error)}"
+        )
     old, new = change.old, change.new
     words = f"{name}: error {write_number(old.error)} -> {write_number(new.error)}"
     if old.verdict != new.verdict:
@@ -77,7 +87,9 @@ def _group_rows(diff: Differences) -> tuple[list[Group], list[str]]:
 def _list_worst(diff: Differences, kind: Kind) -> list[str]:
     """List the worst rows of a kind; say how many more there are."""
     more = diff.kinds[kind] - ROWS
-    return [write_line(change) for change in diff.of(kind)[:ROWS]] + ([f"and {more} more"] if more > 0 else [])
+    return [write_line(change) for change in diff.of(kind)[:ROWS]] + (
+        [f"and {more} more"] if more > 0 else []
+    )
 
 
 def list_other_questions(diff: Differences) -> list[tuple[str, list[str]]]:
@@ -94,12 +106,23 @@ def list_other_questions(diff: Differences) -> list[tuple[str, list[str]]]:
 def write_markdown(diff: Differences) -> str:
     """Write for a comment on a pull request."""
     groups, more = _group_rows(diff)
-    return _render("changes.md.j2", diff, groups, lambda kind: _list_worst(diff, kind), more).rstrip("\n") + "\n"
+    return (
+        _render(
+            "changes.md.j2", diff, groups, lambda kind: _list_worst(diff, kind), more
+        ).rstrip("\n")
+        + "\n"
+    )
 
 
 def write_html(diff: Differences) -> str:
     """Write a page of its own."""
-    return _render("changes.html.j2", diff, diff.fault.groups(SHOWN), lambda kind: _write_cells(diff.of(kind)), ())
+    return _render(
+        "changes.html.j2",
+        diff,
+        diff.fault.groups(SHOWN),
+        lambda kind: _write_cells(diff.of(kind)),
+        (),
+    )
 
 
 def _write_cells(changes: Sequence[Change]) -> list[tuple[str, ...]]:
@@ -107,7 +130,10 @@ def _write_cells(changes: Sequence[Change]) -> list[tuple[str, ...]]:
     cells: list[tuple[str, ...]] = []
     for change in changes[:LISTED]:
         scene, engine, setting, quantity = change.key
-        old, new = ((write_number(row.error), row.verdict) if row else ("", "") for row in (change.old, change.new))
+        old, new = (
+            (write_number(row.error), row.verdict) if row else ("", "")
+            for row in (change.old, change.new)
+        )
         why = f": {change.new.reason}" if change.new and not change.new.passed else ""
         cells.append(
             (
@@ -125,13 +151,26 @@ def _write_cells(changes: Sequence[Change]) -> list[tuple[str, ...]]:
 
 
 def _render(
-    name: str, diff: Differences, groups: list[Group], rows: Callable[[Kind], Sequence[object]], more: Sequence[str]
+    name: str,
+    diff: Differences,
+    groups: list[Group],
+    rows: Callable[[Kind], Sequence[object]],
+    more: Sequence[str],
 ) -> str:
     kinds = [
-        (kind, [group for group in groups if group.kind is kind], rows(kind)) for kind in SHOWN if diff.kinds[kind]
+        (kind, [group for group in groups if group.kind is kind], rows(kind))
+        for kind in SHOWN
+        if diff.kinds[kind]
     ]
-    what = {"verdict": write_verdict(diff), "questions": list_other_questions(diff), "more": more, "headings": HEADINGS}
-    return render("fourbar_validation.regression", name, found=diff, kinds=kinds, **what)
+    what = {
+        "verdict": write_verdict(diff),
+        "questions": list_other_questions(diff),
+        "more": more,
+        "headings": HEADINGS,
+    }
+    return render(
+        "fourbar_validation.regression", name, found=diff, kinds=kinds, **what
+    )
 
 
 def write_junit(diff: Differences) -> str:
@@ -151,11 +190,18 @@ def _list_cases(diff: Differences) -> Iterator[JunitCase]:
         elif change.new is None:
             yield JunitCase(*name, "skipped", kind, write_line(change))
         elif not change.new.compared:
-            yield JunitCase(*name, "skipped", kind, f"{change.new.verdict}: {change.new.reason}")
+            yield JunitCase(
+                *name, "skipped", kind, f"{change.new.verdict}: {change.new.reason}"
+            )
         else:
             yield JunitCase(*name, "passed")
     yield from count_beyond(diff.rows - len(diff.changes))
     if diff.nothing:
         yield JunitCase(
-            "all scenes", "all scenes", "anything is compared", "failure", "nothing compared", write_verdict(diff)
+            "all scenes",
+            "all scenes",
+            "anything is compared",
+            "failure",
+            "nothing compared",
+            write_verdict(diff),
         )

@@ -24,7 +24,10 @@ def describe_scenes(suite: Suite) -> dict[str, dict[str, str]]:
     """Describe each scene of a suite by its name; none of a suite of more than MOST_DESCRIBED."""
     if len(suite) > MOST_DESCRIBED:
         return {}
-    return {suite.name(index): describe_changes(suite.scene(index)) for index in range(len(suite))}
+    return {
+        suite.name(index): describe_changes(suite.scene(index))
+        for index in range(len(suite))
+    }
 
 
 def describe_changes(scene: Scene) -> dict[str, str]:
@@ -33,7 +36,11 @@ def describe_changes(scene: Scene) -> dict[str, str]:
         entries = tomllib.loads(dump(scene))
     except FourBarError:  # a scene that no file can state
         return {"scene": repr(scene)}
-    return dict(_flatten("", {key: value for key, value in entries.items() if key not in NO_QUESTION}))
+    return dict(
+        _flatten(
+            "", {key: value for key, value in entries.items() if key not in NO_QUESTION}
+        )
+    )
 
 
 def _flatten(prefix: str, value: Any) -> Iterable[tuple[str, str]]:
@@ -44,7 +51,10 @@ def _flatten(prefix: str, value: Any) -> Iterable[tuple[str, str]]:
         for number, entry in enumerate(value, 1):
             yield from _flatten(f"{prefix}.{number}", entry)
     else:
-        yield prefix, ", ".join(map(str, value)) if isinstance(value, list) else str(value)
+        yield (
+            prefix,
+            ", ".join(map(str, value)) if isinstance(value, list) else str(value),
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,26 +71,39 @@ class SceneChange:
         return all(key.startswith(WHERE) for key, _, _ in self.entries)
 
     def __str__(self) -> str:
-        parts = "; ".join(f"{key} {_shorten(old, new)}" for key, old, new in self.entries)
+        parts = "; ".join(
+            f"{key} {_shorten(old, new)}" for key, old, new in self.entries
+        )
         return f"scene {self.scene}: {parts}"
 
 
 def _shorten(old: str, new: str) -> str:
     """Write a unit that both have once: "0.048 -> 0.05 kg m^2"."""
     (number, _, unit), (_, _, new_unit) = old.partition(" "), new.partition(" ")
-    return f"{number} -> {new}" if unit and unit == new_unit and "," not in old else f"{old} -> {new}"
+    return (
+        f"{number} -> {new}"
+        if unit and unit == new_unit and "," not in old
+        else f"{old} -> {new}"
+    )
 
 
-def find_renamed(old: Mapping[str, Description], new: Mapping[str, Description]) -> dict[str, str]:
+def find_renamed(
+    old: Mapping[str, Description], new: Mapping[str, Description]
+) -> dict[str, str]:
     """Find the scenes that state the same under a name that the other run does not have: old name to new name."""
     names: dict[str, list[str]] = {}
     for name in sorted(new.keys() - old.keys(), reverse=True):
         names.setdefault(repr(sorted(new[name].items())), []).append(name)
-    pairs = ((name, names.get(repr(sorted(old[name].items())))) for name in sorted(old.keys() - new.keys()))
+    pairs = (
+        (name, names.get(repr(sorted(old[name].items()))))
+        for name in sorted(old.keys() - new.keys())
+    )
     return {name: same.pop() for name, same in pairs if same}
 
 
-def list_scene_changes(old: Mapping[str, Description], new: Mapping[str, Description]) -> list[SceneChange]:
+def list_scene_changes(
+    old: Mapping[str, Description], new: Mapping[str, Description]
+) -> list[SceneChange]:
     """List the scenes of both runs that ask something else now."""
     changes = []
     for name in sorted(old.keys() & new.keys()):

@@ -16,9 +16,25 @@ from fourbar.solve import solve
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.reversals import Reversal, break_curve
 from fourbar_validation.compare.scales import scale_of
-from fourbar_validation.compare.tolerance import EQUIVALENCE, SIMULATED, Array, find_condition, find_error, magnitude
+from fourbar_validation.compare.tolerance import (
+    EQUIVALENCE,
+    SIMULATED,
+    Array,
+    find_condition,
+    find_error,
+    magnitude,
+)
 from fourbar_validation.report.record import Record
-from fourbar_validation.report.svg import ALLOWED, BAND, FLOOR, INK, PAPER, choose_style, set_frame, write_svg
+from fourbar_validation.report.svg import (
+    ALLOWED,
+    BAND,
+    FLOOR,
+    INK,
+    PAPER,
+    choose_style,
+    set_frame,
+    write_svg,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,7 +44,13 @@ MARKS = 10
 STRETCHES = 24
 """Stretches of a sweep; the error shown in each is its largest."""
 PLOT_COLOURS = {
-    **{"#1a1a1a": "--ink", "#6b6b6b": "--soft", "#d9d9d9": "--grid", "#e4e4e4": "--grid", "#ffffff": "--paper"},
+    **{
+        "#1a1a1a": "--ink",
+        "#6b6b6b": "--soft",
+        "#d9d9d9": "--grid",
+        "#e4e4e4": "--grid",
+        "#ffffff": "--paper",
+    },
     **{"#007a5a": "--e2", "#d55e00": "--e3", "#8a3b78": "--e4"},
 }
 """Colours of `fourbar plot`, and the page's own that take their place."""
@@ -40,7 +62,11 @@ SUBSCRIPT = str.maketrans("234", "₂₃₄")
 def draw_scene_figure(record: Record) -> str | None:
     """Draw the linkage and, for a sweep, the answers as SVGs; None where nothing assembles."""
     solution = record.solution
-    if record.scene is None or solution is None or not np.any(solution.status_code == OK):
+    if (
+        record.scene is None
+        or solution is None
+        or not np.any(solution.status_code == OK)
+    ):
         return None
     linkage = _draw_linkage(record.name, record.scene, solution)
     if np.count_nonzero(solution.status_code == OK) < 2:
@@ -52,7 +78,9 @@ def _draw_linkage(name: str, scene: Scene, solution: Solution) -> str:
     """Draw the linkage as `fourbar plot` does, at its best conditioned position."""
     from matplotlib.figure import Figure
 
-    best = int(np.argmax(np.where(solution.status_code == OK, solution.condition, -1.0)))
+    best = int(
+        np.argmax(np.where(solution.status_code == OK, solution.condition, -1.0))
+    )
     with apply_style():
         figure, labels = Figure(figsize=(4.3, 4.0), layout="constrained"), Labels()
         here = solve(scene, "position", at=solution.at.part(slice(best, best + 1)))
@@ -66,15 +94,23 @@ def _draw_linkage(name: str, scene: Scene, solution: Solution) -> str:
 
 def _draw_answers(record: Record, solution: Solution) -> str:
     """Draw one SVG per quantity: values, and errors of the simulation and of the exact engines on axes of their own."""
-    answers = [answer for answer in record.answers if answer.refusal is None and answer.quantities]
+    answers = [
+        answer
+        for answer in record.answers
+        if answer.refusal is None and answer.quantities
+    ]
     drive = COUPLE.value if solution.drive is None else LINE.value
     shown = (drive, "F32") if solution.F32 is not None else ANGLES
     if record.scene is not None and record.scene.motion.free is not None:
         shown = MOTION_AND_FORCE
-    return "".join(_draw_picture(quantity, record, solution, answers) for quantity in shown)
+    return "".join(
+        _draw_picture(quantity, record, solution, answers) for quantity in shown
+    )
 
 
-def _draw_picture(quantity: str, record: Record, solution: Solution, answers: list[Answer]) -> str:
+def _draw_picture(
+    quantity: str, record: Record, solution: Solution, answers: list[Answer]
+) -> str:
     from matplotlib.figure import Figure
 
     shown = [answer for answer in answers if quantity in answer.quantities]
@@ -82,12 +118,20 @@ def _draw_picture(quantity: str, record: Record, solution: Solution, answers: li
     exact = [answer for answer in shown if not choose_style(answer.engine).simulated]
     groups = [group for group in (simulated, exact) if group]
     figure = Figure(figsize=(4.3, 2.2 + 1.0 * len(groups)), layout="constrained")
-    panels = figure.subplots(1 + len(groups), 1, sharex=True, height_ratios=[1.9, *[1.0] * len(groups)], squeeze=False)
+    panels = figure.subplots(
+        1 + len(groups),
+        1,
+        sharex=True,
+        height_ratios=[1.9, *[1.0] * len(groups)],
+        squeeze=False,
+    )
     axes = list(panels[:, 0])
     _draw_values(axes[0], quantity, solution, [*exact, *simulated], record.jumps)
     for below, group in zip(axes[1:], groups, strict=True):
         _draw_errors(below, quantity, record, solution, group)
-        below.set_ylabel("error / scale" if quantity in FORCES else "error (rad)", fontsize=7.5)
+        below.set_ylabel(
+            "error / scale" if quantity in FORCES else "error (rad)", fontsize=7.5
+        )
     axes[-1].set_xlabel("time (s)" if solution.time is not None else "θ₂ (°)")
     figure.align_ylabels(axes)
     for panel in axes:
@@ -95,38 +139,69 @@ def _draw_picture(quantity: str, record: Record, solution: Solution, answers: li
     return write_svg(figure, f"{record.name} {quantity}")
 
 
-def _draw_values(axes: "Axes", quantity: str, solution: Solution, answers: list[Answer], jumps: list[Reversal]) -> None:
+def _draw_values(
+    axes: "Axes",
+    quantity: str,
+    solution: Solution,
+    answers: list[Answer],
+    jumps: list[Reversal],
+) -> None:
     """Draw the formulas as a band, broken at jumps, and each engine's marks on it at positions of its own."""
     good = solution.status_code == OK
     ours = np.where(good, _take_plain(quantity, getattr(solution, quantity)), np.nan)
     base, line = _choose_base(solution, None), ours
     if jumps:
         theta_2, line = break_curve(
-            solution.theta_2, ours, jumps, lambda side: _take_plain(quantity, getattr(side, quantity))
+            solution.theta_2,
+            ours,
+            jumps,
+            lambda side: _take_plain(quantity, getattr(side, quantity)),
         )
         base = np.degrees(theta_2)
     axes.plot(base, line, color=BAND, lw=5, solid_capstyle="butt")
     for turn, answer in enumerate(answers):
         theirs = _take_plain(quantity, answer.quantities[quantity])
         phase = (turn + 0.5) / (len(answers) * MARKS)
-        places = np.unique(((np.arange(MARKS) / MARKS + phase) * len(theirs)).astype(int))
-        axes.plot(_choose_base(solution, answer.at)[places], theirs[places], **_mark(answer, 5.5))
+        places = np.unique(
+            ((np.arange(MARKS) / MARKS + phase) * len(theirs)).astype(int)
+        )
+        axes.plot(
+            _choose_base(solution, answer.at)[places],
+            theirs[places],
+            **_mark(answer, 5.5),
+        )
     _limit_to_bulk(axes, ours[good])
     axes.set_ylabel(_label(quantity, solution))
 
 
-def _draw_errors(axes: "Axes", quantity: str, record: Record, solution: Solution, answers: list[Answer]) -> None:
+def _draw_errors(
+    axes: "Axes",
+    quantity: str,
+    record: Record,
+    solution: Solution,
+    answers: list[Answer],
+) -> None:
     """Draw the largest error of each segment on a logarithmic axis, the worst one ringed, and what is allowed."""
     from matplotlib.ticker import LogLocator, NullLocator
 
     good, scene = solution.status_code == OK, record.scene
     assert scene is not None
     if choose_style(answers[0].engine).simulated:
-        held_to = (r.allowed for r in record.rows if (r.engine, r.quantity) == (answers[0].engine, quantity))
+        held_to = (
+            r.allowed
+            for r in record.rows
+            if (r.engine, r.quantity) == (answers[0].engine, quantity)
+        )
         allowed = np.full(len(solution), next(held_to, SIMULATED.factor))
     else:
         allowed = EQUIVALENCE.allowed(find_condition(quantity, scene.linkage, solution))
-    axes.plot(_choose_base(solution, None), np.where(good, allowed, np.nan), color=ALLOWED, lw=1.1, ls=(0, (5, 2)))
+    axes.plot(
+        _choose_base(solution, None),
+        np.where(good, allowed, np.nan),
+        color=ALLOWED,
+        lw=1.1,
+        ls=(0, (5, 2)),
+    )
     low, high = float(np.nanmin(allowed[good])), float(np.nanmax(allowed[good]))
     for turn, answer in enumerate(answers):
         formulas = solution if answer.at is None else solve(scene, at=answer.at)
@@ -136,10 +211,21 @@ def _draw_errors(axes: "Axes", quantity: str, record: Record, solution: Solution
         places = find_worst_of_segments(error, turn / len(answers))
         if not len(places):
             continue
-        x, heights = _choose_base(solution, answer.at)[places], np.maximum(error[places], FLOOR)
+        x, heights = (
+            _choose_base(solution, answer.at)[places],
+            np.maximum(error[places], FLOOR),
+        )
         axes.plot(x, heights, **_mark(answer, 3.2) | {"mew": 0.8})
         worst = int(np.argmax(heights))
-        axes.plot(x[worst], heights[worst], "o", ms=9, mfc="none", mec=choose_style(answer.engine).colour, mew=0.9)
+        axes.plot(
+            x[worst],
+            heights[worst],
+            "o",
+            ms=9,
+            mfc="none",
+            mec=choose_style(answer.engine).colour,
+            mew=0.9,
+        )
         low, high = min(low, float(heights.min())), max(high, float(heights.max()))
     axes.set_yscale("log")
     axes.set_ylim(low / 4.0, 5.0 * high)
@@ -147,10 +233,20 @@ def _draw_errors(axes: "Axes", quantity: str, record: Record, solution: Solution
     axes.yaxis.set_minor_locator(NullLocator())
     middle = int(np.flatnonzero(good)[np.count_nonzero(good) // 2])
     place = (float(_choose_base(solution, None)[middle]), float(allowed[middle]))
-    axes.annotate("allowed", place, (0, -9), textcoords="offset points", fontsize=7.5, ha="center", color=ALLOWED)
+    axes.annotate(
+        "allowed",
+        place,
+        (0, -9),
+        textcoords="offset points",
+        fontsize=7.5,
+        ha="center",
+        color=ALLOWED,
+    )
 
 
-def find_worst_of_segments(error: Array, phase: float) -> np.ndarray[Any, np.dtype[np.intp]]:
+def find_worst_of_segments(
+    error: Array, phase: float
+) -> np.ndarray[Any, np.dtype[np.intp]]:
     """Find the index of the largest error in each of STRETCHES stretches; `phase` in [0, 1) shifts where they begin.
 
     What is not finite is left out: the table says that it fails.
@@ -161,13 +257,22 @@ def find_worst_of_segments(error: Array, phase: float) -> np.ndarray[Any, np.dty
     for start, stop in pairwise(bounds):
         piece = error[start:stop]
         if np.isfinite(piece).any():
-            worst.append(start + int(np.nanargmax(np.where(np.isfinite(piece), piece, np.nan))))
+            worst.append(
+                start + int(np.nanargmax(np.where(np.isfinite(piece), piece, np.nan)))
+            )
     return np.array(worst, dtype=np.intp)
 
 
 def _mark(answer: Answer, size: float) -> dict[str, Any]:
     look = choose_style(answer.engine)
-    return {"color": look.colour, "ls": "none", "marker": look.marker, "ms": size, "mfc": PAPER, "mew": 1.2}
+    return {
+        "color": look.colour,
+        "ls": "none",
+        "marker": look.marker,
+        "ms": size,
+        "mfc": PAPER,
+        "mew": 1.2,
+    }
 
 
 def _take_plain(quantity: str, values: Array) -> Array:
@@ -198,7 +303,17 @@ def _limit_to_bulk(axes: "Axes", values: Array) -> None:
     """Limit the axis to 96 % of the positions; near a pole the curve leaves the picture."""
     low, high = np.nanpercentile(values, [2.0, 98.0])
     span = high - low
-    if span > 0.0 and (np.nanmax(values) > high + 3 * span or np.nanmin(values) < low - 3 * span):
+    if span > 0.0 and (
+        np.nanmax(values) > high + 3 * span or np.nanmin(values) < low - 3 * span
+    ):
         axes.set_ylim(low - 0.5 * span, high + 0.5 * span)
         note = "axis ends where the curve leaves towards a pole"
-        axes.annotate(note, (0.99, 0.97), xycoords="axes fraction", fontsize=7, ha="right", va="top", color=INK)
+        axes.annotate(
+            note,
+            (0.99, 0.97),
+            xycoords="axes fraction",
+            fontsize=7,
+            ha="right",
+            va="top",
+            color=INK,
+        )

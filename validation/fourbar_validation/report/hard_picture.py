@@ -11,7 +11,15 @@ from fourbar.scene import Command, Scene
 from fourbar.scene import command as command_of
 from fourbar.solve import solve
 from fourbar_validation.compare.answer import Answer, Array
-from fourbar_validation.compare.tolerance import DEGRADED, EPS, K, divide, find_condition, find_error, magnitude
+from fourbar_validation.compare.tolerance import (
+    DEGRADED,
+    EPS,
+    K,
+    divide,
+    find_condition,
+    find_error,
+    magnitude,
+)
 from fourbar_validation.engines.prediction import predict_in_world_axes
 from fourbar_validation.engines.registry import HARD_ENGINES, Engine
 from fourbar_validation.report.svg import choose_style, write_svg
@@ -55,21 +63,45 @@ def list_approaches() -> list[Approach]:
     near = DISTANCES[DISTANCES >= 0.99e-8]
     inward = -1.0 if stretched else 1.0
     return [
-        Approach("toggle: bars 3, 4 collinear", set_angles(dress(rocker, 1), limit + inward * DISTANCES), DISTANCES),
-        Approach("pole of T4: omega_4 = 0", set_angles(dress(crank), pole + DISTANCES, branch, drive_bar=4), DISTANCES),
+        Approach(
+            "toggle: bars 3, 4 collinear",
+            set_angles(dress(rocker, 1), limit + inward * DISTANCES),
+            DISTANCES,
+        ),
+        Approach(
+            "pole of T4: omega_4 = 0",
+            set_angles(dress(crank), pole + DISTANCES, branch, drive_bar=4),
+            DISTANCES,
+        ),
         # on the branch that crosses: the one that stays parallel is regular
-        Approach("change point of a parallelogram", set_angles(dress(lengths), half_turn + near, 1), near),
+        Approach(
+            "change point of a parallelogram",
+            set_angles(dress(lengths), half_turn + near, 1),
+            near,
+        ),
     ]
 
 
-def list_errors(scene: Scene, quantity: str, engine: Engine) -> tuple[Array, Array] | None:
+def list_errors(
+    scene: Scene, quantity: str, engine: Engine
+) -> tuple[Array, Array] | None:
     """Return (theta_2, error relative to the value itself) of one engine, or None where it refuses."""
     command = command_of(scene)
     if engine.through_time:
-        psi = np.abs(command.theta_2 - command.theta_2[0]) - abs(command.theta_2[-1] - command.theta_2[0])
-        command = Command(command.theta_2[-psi > SIMULATED_FROM], command.branch[-psi > SIMULATED_FROM], *command[2:4])
+        psi = np.abs(command.theta_2 - command.theta_2[0]) - abs(
+            command.theta_2[-1] - command.theta_2[0]
+        )
+        command = Command(
+            command.theta_2[-psi > SIMULATED_FROM],
+            command.branch[-psi > SIMULATED_FROM],
+            *command[2:4],
+        )
     answer: Answer = engine.start().answer(scene, command)
-    if answer.refusal is not None or quantity not in answer.quantities or answer.at is None:
+    if (
+        answer.refusal is not None
+        or quantity not in answer.quantities
+        or answer.at is None
+    ):
         return None
     ours = solve(scene, "force", at=answer.at)
     values = getattr(ours, quantity)
@@ -93,7 +125,9 @@ def draw_picture() -> str:
     for row, quantity in enumerate(SHOWN):
         axes[row][0].set_ylabel(f"error of {quantity}, of its own size")
     handles, labels = axes[0][0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=4, frameon=False, fontsize=8)
+    figure.legend(
+        handles, labels, loc="outside upper center", ncols=4, frameon=False, fontsize=8
+    )
     return write_svg(figure, "where it gets hard")
 
 
@@ -101,10 +135,20 @@ def _draw(axes: Any, approach: Approach, quantity: str) -> None:
     solution = solve(approach.scene, "force")
     size = magnitude(getattr(solution, quantity))
     singular = _find_singular(approach)
-    predicted = divide(predict_in_world_axes(approach.scene, command_of(approach.scene), quantity), size)
+    predicted = divide(
+        predict_in_world_axes(approach.scene, command_of(approach.scene), quantity),
+        size,
+    )
     law = K * EPS / find_condition(quantity, approach.scene.linkage, solution)
     shown = np.isfinite(predicted)
-    axes.loglog(approach.distances, law, color=INK, linestyle=(0, (1, 1)), linewidth=1, label="law K eps/condition")
+    axes.loglog(
+        approach.distances,
+        law,
+        color=INK,
+        linestyle=(0, (1, 1)),
+        linewidth=1,
+        label="law K eps/condition",
+    )
     axes.fill_between(
         approach.distances[shown],
         predicted[shown],
@@ -117,7 +161,12 @@ def _draw(axes: Any, approach: Approach, quantity: str) -> None:
     for engine in HARD_ENGINES:
         curve = list_errors(approach.scene, quantity, engine)
         if curve is not None and len(curve[0]):
-            axes.loglog(np.abs(curve[0] - singular), curve[1], label=engine.name, **choose_style(engine.name).line)
+            axes.loglog(
+                np.abs(curve[0] - singular),
+                curve[1],
+                label=engine.name,
+                **choose_style(engine.name).line,
+            )
     axes.set_xlim(approach.distances[0] * 2, approach.distances[-1] / 2)
     axes.set_ylim(FLOOR, 1e3)
     axes.grid(visible=True, color=INK, alpha=0.2)

@@ -6,10 +6,29 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from fourbar.quantities import LINE, UNKNOWNS
-from fourbar_validation.compare.rows import FAILS, REFUSES, UNDECIDED, Counts, Row, sort_rows, write_rows
+from fourbar_validation.compare.rows import (
+    FAILS,
+    REFUSES,
+    UNDECIDED,
+    Counts,
+    Row,
+    sort_rows,
+    write_rows,
+)
 from fourbar_validation.report.record import Record
-from fourbar_validation.report.summary import OWN, OWN_ENGINES, STATEMENT, Summary, compute_shares
-from fourbar_validation.report.templating import count_or_size, render, write_number, write_share
+from fourbar_validation.report.summary import (
+    OWN,
+    OWN_ENGINES,
+    STATEMENT,
+    Summary,
+    compute_shares,
+)
+from fourbar_validation.report.templating import (
+    count_or_size,
+    render,
+    write_number,
+    write_share,
+)
 
 ALL_OPEN = 8
 """Most scenes that are all shown open; the bodies of more are packed, and unpacked when they are opened."""
@@ -28,12 +47,16 @@ class Cell(NamedTuple):
     @property
     def kind(self) -> str:
         """Word for its colour."""
-        return {FAILS: "fails", REFUSES: "refuses", UNDECIDED: "undecided"}.get(self.row.verdict, "holds")
+        return {FAILS: "fails", REFUSES: "refuses", UNDECIDED: "undecided"}.get(
+            self.row.verdict, "holds"
+        )
 
     @property
     def shown(self) -> str:
         """Return the text of its cell."""
-        return {"refuses": "refuses", "undecided": "undecided"}.get(self.kind, write_share(self.used))
+        return {"refuses": "refuses", "undecided": "undecided"}.get(
+            self.kind, write_share(self.used)
+        )
 
 
 class SectionFigure(NamedTuple):
@@ -102,10 +125,18 @@ def write_html(
     """
     from markupsafe import Markup
 
-    views = [_make_view(scene, first_lines.get(scene.name, 2), pictures or {}) for scene in summary.shown]
-    csv = base64.b64encode(write_rows(cell.row for view in views for cell in view.cells).encode("utf-8"))
+    views = [
+        _make_view(scene, first_lines.get(scene.name, 2), pictures or {})
+        for scene in summary.shown
+    ]
+    csv = base64.b64encode(
+        write_rows(cell.row for view in views for cell in view.cells).encode("utf-8")
+    )
     engines = _list_engines(cell.row for view in views for cell in view.cells)
-    failing = sorted((cell for view in views for cell in view.cells if cell.row.failed), key=lambda c: c.line)
+    failing = sorted(
+        (cell for view in views for cell in view.cells if cell.row.failed),
+        key=lambda c: c.line,
+    )
     return render(
         "fourbar_validation.report",
         "report.html.j2",
@@ -116,15 +147,24 @@ def write_html(
         own=OWN,
         failing=failing,
         lazy=len(views) > ALL_OPEN,
-        figures={scene.name: Markup(scene.figure) for scene in summary.shown if scene.figure},  # drawn by our own code
+        figures={
+            scene.name: Markup(scene.figure) for scene in summary.shown if scene.figure
+        },  # drawn by our own code
         no_pictures=no_pictures,
         sections=sections,
-        independence=[(engine, *texts) for engine, texts in sorted(summary.independence.items())],
+        independence=[
+            (engine, *texts) for engine, texts in sorted(summary.independence.items())
+        ],
         tolerances=[
-            (tolerance.name, count_or_size(tolerance.factor), tolerance.reason) for tolerance in summary.tolerances
+            (tolerance.name, count_or_size(tolerance.factor), tolerance.reason)
+            for tolerance in summary.tolerances
         ],
         orders=[
-            (scene, *map(write_number, (e["error_at_4h"], e["error_at_2h"])), f"{e['observed_order']:.1f}")
+            (
+                scene,
+                *map(write_number, (e["error_at_4h"], e["error_at_2h"])),
+                f"{e['observed_order']:.1f}",
+            )
             for scene, e in summary.orders
         ],
         statement=STATEMENT,
@@ -134,25 +174,43 @@ def write_html(
 
 def write_markdown(summary: Summary) -> str:
     """Write the report as Markdown, short enough for a comment on a pull request."""
-    return render("fourbar_validation.report", "report.md.j2", s=summary, statement=STATEMENT)
+    return render(
+        "fourbar_validation.report", "report.md.j2", s=summary, statement=STATEMENT
+    )
 
 
-def _make_view(scene: Record, first_line: int, pictures: Mapping[str, str]) -> SceneView:
+def _make_view(
+    scene: Record, first_line: int, pictures: Mapping[str, str]
+) -> SceneView:
     rows = sort_rows(scene.rows)
     cells = [
         Cell(line, *row_and_share)
-        for line, row_and_share in enumerate(zip(rows, compute_shares(rows), strict=True), first_line)
+        for line, row_and_share in enumerate(
+            zip(rows, compute_shares(rows), strict=True), first_line
+        )
     ]
-    ranked = sorted(reversed(cells), key=lambda cell: (cell.row.compared, cell.used))  # the last cell of a place stays
+    ranked = sorted(
+        reversed(cells), key=lambda cell: (cell.row.compared, cell.used)
+    )  # the last cell of a place stays
     by_place = {(cell.row.quantity, cell.row.engine): cell for cell in ranked}
     # a share of undecided numbers is no error, unless it fails
-    worst = {cell.row.engine: cell for cell in ranked if cell.row.quantity != "undecided" or cell.row.failed}
+    worst = {
+        cell.row.engine: cell
+        for cell in ranked
+        if cell.row.quantity != "undecided" or cell.row.failed
+    }
     names = {cell.row.quantity for cell in cells}
-    quantities = [name for name in ORDER if name in names] + sorted(names.difference(ORDER))
+    quantities = [name for name in ORDER if name in names] + sorted(
+        names.difference(ORDER)
+    )
     engines = _list_engines(cell.row for cell in cells)
-    return SceneView(scene, cells, engines, quantities, by_place, worst, pictures.get(scene.name))
+    return SceneView(
+        scene, cells, engines, quantities, by_place, worst, pictures.get(scene.name)
+    )
 
 
 def _list_engines(rows: Any) -> list[str]:
     """List the engines by name, the formulas (their identities) last."""
-    return sorted({row.engine for row in rows}, key=lambda name: (name == "formulas", name))
+    return sorted(
+        {row.engine for row in rows}, key=lambda name: (name == "formulas", name)
+    )

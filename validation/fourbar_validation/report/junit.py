@@ -31,11 +31,18 @@ def list_cases(rows: Iterable[Row]) -> Iterator[JunitCase]:
         if row.failed and failures < LISTED:
             failures += 1
             yield JunitCase(
-                *name, "failure", row.verdict, f"error {row.error!r}, allowed {row.allowed!r}: {row.reason}"
+                *name,
+                "failure",
+                row.verdict,
+                f"error {row.error!r}, allowed {row.allowed!r}: {row.reason}",
             )
         elif not row.failed and listed < LISTED:
             listed += 1
-            yield JunitCase(*name, "passed") if row.compared else JunitCase(*name, "skipped", row.verdict, row.reason)
+            yield (
+                JunitCase(*name, "passed")
+                if row.compared
+                else JunitCase(*name, "skipped", row.verdict, row.reason)
+            )
         else:
             others += 1
     yield from count_beyond(others)
@@ -44,7 +51,13 @@ def list_cases(rows: Iterable[Row]) -> Iterator[JunitCase]:
 def count_beyond(rows: int) -> Iterator[JunitCase]:
     """Count what is not listed, as one case."""
     if rows > 0:
-        yield JunitCase("all scenes", "all scenes", f"{rows} rows more: see results.parquet", "skipped", "not listed")
+        yield JunitCase(
+            "all scenes",
+            "all scenes",
+            f"{rows} rows more: see results.parquet",
+            "skipped",
+            "not listed",
+        )
 
 
 def write_document(title: str, cases: Iterable[JunitCase]) -> str:
@@ -55,13 +68,23 @@ def write_document(title: str, cases: Iterable[JunitCase]) -> str:
     for case in cases:
         if case.suite not in suites:
             suites[case.suite] = ET.SubElement(report, "testsuite", name=case.suite)
-        element = ET.SubElement(suites[case.suite], "testcase", name=case.name, classname=case.classname, time="0.0")
+        element = ET.SubElement(
+            suites[case.suite],
+            "testcase",
+            name=case.name,
+            classname=case.classname,
+            time="0.0",
+        )
         if case.outcome != "passed":
             ET.SubElement(element, case.outcome, message=case.message, type=case.kind)
         for name in (case.suite, ""):
             counts.update(((name, "tests"), (name, case.outcome)))
     for name, element in {**suites, "": report}.items():
-        for attribute, outcome in (("tests", "tests"), ("failures", "failure"), ("skipped", "skipped")):
+        for attribute, outcome in (
+            ("tests", "tests"),
+            ("failures", "failure"),
+            ("skipped", "skipped"),
+        ):
             element.set(attribute, str(counts[name, outcome]))
         element.set("errors", "0")
     return ET.tostring(report, encoding="unicode", xml_declaration=True) + "\n"

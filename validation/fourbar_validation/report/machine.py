@@ -11,7 +11,13 @@ from typing import Any
 
 from fourbar_validation.places import FORMULAS, PACKAGE
 
-PACKAGES = {"fourbar": "fourbar", "numpy": "numpy", "mujoco": "mujoco", "pinocchio": "pin", "scipy": "scipy"}
+PACKAGES = {
+    "fourbar": "fourbar",
+    "numpy": "numpy",
+    "mujoco": "mujoco",
+    "pinocchio": "pin",
+    "scipy": "scipy",
+}
 """Name in the report and name of the distribution."""
 DISTRIBUTIONS = PACKAGES | {name: name for name in ("drake", "exudyn", "opensim")}
 """Distribution of each package, including those that need not be installed."""
@@ -40,7 +46,10 @@ def name_machine() -> str:
 
 def describe_setup() -> str:
     """Name versions and machine, for the foot of a page."""
-    return ", ".join(f"{name} {version}" for name, version in list_versions().items()) + f"; {name_machine()}"
+    return (
+        ", ".join(f"{name} {version}" for name, version in list_versions().items())
+        + f"; {name_machine()}"
+    )
 
 
 def _find_processor() -> str:
@@ -59,7 +68,9 @@ def find_kernels() -> dict[str, str]:
 
     config: dict[str, Any] = np.show_config(mode="dicts")  # type: ignore[assignment]
     simd = config["SIMD Extensions"]
-    kernels = {"cpu_features": " ".join((*simd.get("baseline", ()), *simd.get("found", ())))}
+    kernels = {
+        "cpu_features": " ".join((*simd.get("baseline", ()), *simd.get("found", ())))
+    }
     kernel = find_blas()
     return kernels | ({"blas_kernel": kernel} if kernel else {})
 
@@ -68,10 +79,19 @@ def find_blas() -> str:
     """Find the kernel that NumPy's OpenBLAS took, such as "openblas SkylakeX"; nothing for another BLAS."""
     import numpy as np
 
-    folder = Path(np.__file__).parents[1] / "numpy.libs"  # Windows looks for no symbol in what a library loads
-    for file in (*folder.glob("*openblas*.dll"), Path(np._core._multiarray_umath.__file__)):  # type: ignore[attr-defined]
+    folder = (
+        Path(np.__file__).parents[1] / "numpy.libs"
+    )  # Windows looks for no symbol in what a library loads
+    for file in (
+        *folder.glob("*openblas*.dll"),
+        Path(np._core._multiarray_umath.__file__),  # type: ignore[attr-defined]
+    ):
         library = ctypes.CDLL(str(file))
-        for name in (f"{prefix}openblas_get_corename{ending}" for prefix in ("scipy_", "") for ending in ("64_", "")):
+        for name in (
+            f"{prefix}openblas_get_corename{ending}"
+            for prefix in ("scipy_", "")
+            for ending in ("64_", "")
+        ):
             if (get_name := getattr(library, name, None)) is not None:
                 get_name.restype = ctypes.c_char_p
                 return f"openblas {get_name().decode()}"
@@ -82,8 +102,16 @@ def find_blas() -> str:
 def name_code(*further: Path) -> dict[str, str]:
     """Name and version or hash of everything that decides a number, `further` packages among it; one for a run."""
     builds = {name: build(package) for name, package in DISTRIBUTIONS.items()}
-    build_hashes = {f"build of {name}": digest for name, digest in builds.items() if digest and name != "fourbar"}
-    return {"code": hash_modules(FORMULAS, PACKAGE, *further), **list_versions(), **build_hashes}
+    build_hashes = {
+        f"build of {name}": digest
+        for name, digest in builds.items()
+        if digest and name != "fourbar"
+    }
+    return {
+        "code": hash_modules(FORMULAS, PACKAGE, *further),
+        **list_versions(),
+        **build_hashes,
+    }
 
 
 def hash_modules(*packages: Path) -> str:
@@ -91,9 +119,16 @@ def hash_modules(*packages: Path) -> str:
     digest = hashlib.sha256()
     for package in packages:
         for path in sorted(package.rglob("*")):
-            if path.suffix in CODE and path.is_file() and package / "models" not in path.parents:
+            if (
+                path.suffix in CODE
+                and path.is_file()
+                and package / "models" not in path.parents
+            ):
                 data = path.read_bytes()
-                digest.update(f"{path.relative_to(package.parent).as_posix()} {len(data)}\n".encode() + data)
+                digest.update(
+                    f"{path.relative_to(package.parent).as_posix()} {len(data)}\n".encode()
+                    + data
+                )
     return digest.hexdigest()[:16]
 
 

@@ -49,8 +49,16 @@ class Record:
         """Return a copy without the scene, the solution and the answers."""
         return replace(
             self,
-            independence={answer.engine: (answer.shared, answer.own) for answer in self.answers if answer.own},
-            evidence={answer.engine: answer.evidence for answer in self.answers if answer.evidence},
+            independence={
+                answer.engine: (answer.shared, answer.own)
+                for answer in self.answers
+                if answer.own
+            },
+            evidence={
+                answer.engine: answer.evidence
+                for answer in self.answers
+                if answer.evidence
+            },
             reversals=[str(jump) for jump in self.jumps],
             figure=figure,
             scene=None,
@@ -64,15 +72,24 @@ class Record:
         kept = asdict(replace(self, rows=[]))
         for name in ("scene", "solution", "answers", "jumps"):
             del kept[name]
-        return kept | {"rows": [[getattr(row, name) for name in MADE_OF] for row in sort_rows(self.rows)]}
+        return kept | {
+            "rows": [
+                [getattr(row, name) for name in MADE_OF] for row in sort_rows(self.rows)
+            ]
+        }
 
     @classmethod
     def restore(cls, kept: dict[str, Any]) -> "Record":
         """Return the record from the data that `kept_all` returned."""
         rows = [Row(*row) for row in kept["rows"]]
         timings = [Timing(**timing) for timing in kept["timings"]]
-        independence = {engine: (shared, alone) for engine, (shared, alone) in kept["independence"].items()}
-        return cls(**{**kept, "timings": timings, "independence": independence, "rows": rows})
+        independence = {
+            engine: (shared, alone)
+            for engine, (shared, alone) in kept["independence"].items()
+        }
+        return cls(
+            **{**kept, "timings": timings, "independence": independence, "rows": rows}
+        )
 
     def joined(self, further: "Record") -> "Record":
         """Add the answers of another set of engines; the rows of the formulas stand once."""
@@ -80,7 +97,10 @@ class Record:
         return replace(
             self,
             rows=[*self.rows, *(row for row in further.rows if row not in rows)],
-            timings=[*self.timings, *(timing for timing in further.timings if timing.engine != FORMULAS)],
+            timings=[
+                *self.timings,
+                *(timing for timing in further.timings if timing.engine != FORMULAS),
+            ],
             left_out=[*self.left_out, *further.left_out],
             independence={**self.independence, **further.independence},
             evidence={**self.evidence, **further.evidence},

@@ -17,7 +17,9 @@ CAPTION = (
     "Error against the formulas, relative to the value itself, towards a singular position. Dotted: the law "
     "K eps/condition. Band: what rounding was computed to do there, up to ten times that; above it a row fails."
 )
-MUST = "each family of singular and extreme linkages must come out as its statement says. "
+MUST = (
+    "each family of singular and extreme linkages must come out as its statement says. "
+)
 PICTURES = {
     "work-precision-force.svg": "Error of the worst pin force over the CPU time of a revolution, for every method",
     "orders.svg": "Error of the driving torque and of each pin force over the time step; a jump is ringed",
@@ -43,7 +45,9 @@ def collect_sections(hard: Iterable[Row] | None, out: Path) -> list[Section]:
     elif results.is_file() and (out / HARD / "report.html").is_file():
         section = collect_hard_cases(read_columns(results))
         links = [(f"{HARD}/report.html",) * 2]
-        sections.append(replace(section, text=f"From the run in {HARD}/: {MUST}", links=links))
+        sections.append(
+            replace(section, text=f"From the run in {HARD}/: {MUST}", links=links)
+        )
     folders = sorted(path.parent for path in (out / COST).glob("*/cost.csv"))
     return [*sections, *(_read_study(folder) for folder in folders[:MOST])]
 
@@ -73,21 +77,48 @@ def collect_hard_cases(rows: Iterable[Row], picture: str | None = None) -> Secti
     ]
     headings = ("family", "scenes", *VERDICTS, "verdict", "what must happen")
     figures = [SectionFigure(ALT, CAPTION, svg=picture)] if picture else []
-    return Section(HARD, "Hard cases", MUST.capitalize(), headings, table, figures, (), (1, 2 + len(VERDICTS)))
+    return Section(
+        HARD,
+        "Hard cases",
+        MUST.capitalize(),
+        headings,
+        table,
+        figures,
+        (),
+        (1, 2 + len(VERDICTS)),
+    )
 
 
 def _list_limits() -> Section:
     """List the limits that engines declare, with the reason of each."""
     from fourbar_validation.engines.limits import LIMITS
 
-    rows = [(limit.engine, limit.name, f"{limit.boundary:g} {limit.unit}".rstrip(), limit.reason) for limit in LIMITS]
+    rows = [
+        (
+            limit.engine,
+            limit.name,
+            f"{limit.boundary:g} {limit.unit}".rstrip(),
+            limit.reason,
+        )
+        for limit in LIMITS
+    ]
     text = "Where an engine refuses to answer, declared as data before it is asked."
-    return Section("engine-limits", "Limits of the engines", text, ("engine", "of what", "boundary", "why"), rows)
+    return Section(
+        "engine-limits",
+        "Limits of the engines",
+        text,
+        ("engine", "of what", "boundary", "why"),
+        rows,
+    )
 
 
 def find_family(scene: str) -> str | None:
     """Find the family whose name a scene's begins with; of several the longest."""
-    names = [family.name for family in FAMILIES if scene.startswith(family.name.replace(" ", "-") + "-")]
+    names = [
+        family.name
+        for family in FAMILIES
+        if scene.startswith(family.name.replace(" ", "-") + "-")
+    ]
     return max(names, key=len, default=None)
 
 
@@ -97,10 +128,18 @@ def _read_study(folder: Path) -> Section:
         picture = folder / name
         if picture.is_file() and picture.stat().st_size <= LARGEST:
             data = base64.b64encode(picture.read_bytes()).decode("ascii")
-            figures.append(SectionFigure(alt, f"{alt}.", image=f"data:image/svg+xml;base64,{data}"))
+            figures.append(
+                SectionFigure(alt, f"{alt}.", image=f"data:image/svg+xml;base64,{data}")
+            )
     text = (
         f"What each digit of {folder.name} costs, from the study in {COST}/{folder.name}/. Times are per revolution: "
         "what is stepped runs through it once and reads nothing, what is exact answers each of the scene's positions. "
     )
     links = [(name, f"{COST}/{folder.name}/{name}") for name in ("cost.md", "cost.csv")]
-    return Section(f"cost-{folder.name}", f"The study of {folder.name}", text, figures=figures, links=links)
+    return Section(
+        f"cost-{folder.name}",
+        f"The study of {folder.name}",
+        text,
+        figures=figures,
+        links=links,
+    )

@@ -13,7 +13,14 @@ from typing import TypeVar
 import numpy as np
 
 from fourbar.errors import HOLDS
-from fourbar_validation.compare.rows import DEGRADED, FORMULAS, REFUSES, SHIPPED, Counts, Row
+from fourbar_validation.compare.rows import (
+    DEGRADED,
+    FORMULAS,
+    REFUSES,
+    SHIPPED,
+    Counts,
+    Row,
+)
 from fourbar_validation.compare.tolerance import (
     EPS,
     EQUIVALENCE,
@@ -68,7 +75,11 @@ class EngineLine:
         self.counts.add([row])
         if row.quantity == "undecided":
             self.undecided = max(self.undecided, row.error)
-        if row.compared and used > self.used and (row.quantity != "undecided" or row.failed):
+        if (
+            row.compared
+            and used > self.used
+            and (row.quantity != "undecided" or row.failed)
+        ):
             self.worst, self.used = row, used
 
 
@@ -136,18 +147,24 @@ class Summary:
             self._engines.setdefault(name, EngineLine(name)).add(row, used)
         compared, loose = _count_compared(scene.rows)
         self.pairs, self.loose = self.pairs + compared, self.loose + len(loose)
-        self._loosest = _keep_largest(LOOSEST_SHOWN, [*self._loosest, *loose], ALLOWANCE)
+        self._loosest = _keep_largest(
+            LOOSEST_SHOWN, [*self._loosest, *loose], ALLOWANCE
+        )
         for engine, reason in sorted(_list_left_out(scene)):
             kind = (engine, NUMBER.sub("#", reason))
             self._refusals[kind] += 1
             self._first_reason.setdefault(kind, reason)
         worst = _find_worst(scene.rows)
         self.judged += len(worst)
-        self._worst = _keep_largest(WORST_SHOWN, [*self._worst, *worst], lambda w: w.used)
+        self._worst = _keep_largest(
+            WORST_SHOWN, [*self._worst, *worst], lambda w: w.used
+        )
         for row in scene.rows:
             if row.reason.startswith(EQUIVALENCE.name) and math.isfinite(row.error):
                 k = row.error * row.condition / EPS
-                self.measured_k[row.engine] = max(self.measured_k.get(row.engine, 0.0), k)
+                self.measured_k[row.engine] = max(
+                    self.measured_k.get(row.engine, 0.0), k
+                )
         self.independence.update(scene.independence)
         self._add_times(scene)
         self._add_orders(scene)
@@ -155,7 +172,9 @@ class Summary:
             self._failing += [scene][: SCENES_SHOWN - len(self._failing)]
         else:
             most = max((w.used for w in worst), default=0.0)
-            self._holding = _keep_largest(SCENES_SHOWN, [*self._holding, (most, scene)], lambda entry: entry[0])
+            self._holding = _keep_largest(
+                SCENES_SHOWN, [*self._holding, (most, scene)], lambda entry: entry[0]
+            )
 
     def picture(self, drawn: Record) -> None:
         """Add what was drawn and measured of a scene that is shown."""
@@ -173,13 +192,23 @@ class Summary:
                 times.append((1e6 * timing.seconds / timing.positions, ratio))
 
     def _add_orders(self, scene: Record) -> None:
-        orders = [(scene.name, evidence) for evidence in scene.evidence.values() if "observed_order" in evidence]
-        self._orders = _keep_largest(ORDERS_SHOWN, [*self._orders, *orders], _find_lowest)
+        orders = [
+            (scene.name, evidence)
+            for evidence in scene.evidence.values()
+            if "observed_order" in evidence
+        ]
+        self._orders = _keep_largest(
+            ORDERS_SHOWN, [*self._orders, *orders], _find_lowest
+        )
 
     @property
     def verdict(self) -> str:
         """Say it in one sentence."""
-        not_run = f"; not run: {', '.join(engine for engine, _ in self.missing)}" if self.missing else ""
+        not_run = (
+            f"; not run: {', '.join(engine for engine, _ in self.missing)}"
+            if self.missing
+            else ""
+        )
         return self.counts.sentence() + not_run
 
     @property
@@ -188,7 +217,10 @@ class Summary:
         if not self.loose:
             return ""
         worst = nlargest(LOOSEST_SHOWN, self._loosest, key=ALLOWANCE)
-        examples = ", ".join(f"{row.quantity} of {row.scene} (allowed {row.allowed:.1e})" for row in worst)
+        examples = ", ".join(
+            f"{row.quantity} of {row.scene} (allowed {row.allowed:.1e})"
+            for row in worst
+        )
         return f'{self.loose} of {self.pairs} quantities of a scene are at best "{DEGRADED}"; the widest: {examples}'
 
     @property
@@ -201,20 +233,28 @@ class Summary:
         """Return every independent engine by name, then our own consistency."""
         versions = {name.lower(): version for name, version in self.versions.items()}
         for line in self._engines.values():
-            version = self.stated.get(line.name, versions.get(line.name.partition("-")[0], ""))
+            version = self.stated.get(
+                line.name, versions.get(line.name.partition("-")[0], "")
+            )
             line.version = "" if line.name.endswith(f" {version}") else version
             engine = FORMULAS if line.name == OWN else line.name
             if times := self._times.get(engine):
-                line.microseconds, line.times_formulas = map(median, zip(*times, strict=True))
+                line.microseconds, line.times_formulas = map(
+                    median, zip(*times, strict=True)
+                )
                 line.work = WORK.get(engine, "")
-        return sorted(self._engines.values(), key=lambda line: (line.name == OWN, line.name))
+        return sorted(
+            self._engines.values(), key=lambda line: (line.name == OWN, line.name)
+        )
 
     @property
     def worst(self) -> list[Worst]:
         """Return the worst by scene and engine; of more than WORST_SHOWN those that used most, in that order."""
         if self.judged > WORST_SHOWN:
             return nlargest(WORST_SHOWN, self._worst, key=lambda w: w.used)
-        return sorted(self._worst, key=lambda w: (w.row.scene, w.row.engine, w.row.setting))
+        return sorted(
+            self._worst, key=lambda w: (w.row.scene, w.row.engine, w.row.setting)
+        )
 
     @property
     def refusals(self) -> list[tuple[str, str, int]]:
@@ -222,13 +262,20 @@ class Summary:
 
         Reasons that differ by their numbers alone are one, with the numbers of the first scene.
         """
-        return [(kind[0], self._first_reason[kind], count) for kind, count in sorted(self._refusals.items())]
+        return [
+            (kind[0], self._first_reason[kind], count)
+            for kind, count in sorted(self._refusals.items())
+        ]
 
     @property
     def orders(self) -> list[tuple[str, dict[str, float]]]:
         """Return (scene, errors at 4h and 2h and observed order) of simulations: at most ORDERS_SHOWN, lowest first."""
         few = len(self._orders) <= ORDERS_SHOWN
-        return self._orders if few else nlargest(ORDERS_SHOWN, self._orders, key=_find_lowest)
+        return (
+            self._orders
+            if few
+            else nlargest(ORDERS_SHOWN, self._orders, key=_find_lowest)
+        )
 
     @property
     def shown(self) -> list[Record]:
@@ -241,7 +288,9 @@ class Summary:
         return self._find_most_used(PICTURED)
 
     def _find_most_used(self, most: int) -> list[Record]:
-        holding = nlargest(most - len(self._failing), self._holding, key=lambda entry: entry[0])
+        holding = nlargest(
+            most - len(self._failing), self._holding, key=lambda entry: entry[0]
+        )
         return [*self._failing, *(scene for _, scene in holding)]
 
 
@@ -254,8 +303,13 @@ def _list_left_out(scene: Record) -> set[tuple[str, str]]:
 
 def compute_shares(rows: Sequence[Row]) -> list[float]:
     """Return error/allowed; infinite without an answer, 0 if the error is 0 or nothing was compared."""
-    of_all = find_used(np.array([row.error for row in rows]), np.array([row.allowed for row in rows]))
-    return [share if row.compared else 0.0 for row, share in zip(rows, of_all.tolist(), strict=True)]
+    of_all = find_used(
+        np.array([row.error for row in rows]), np.array([row.allowed for row in rows])
+    )
+    return [
+        share if row.compared else 0.0
+        for row, share in zip(rows, of_all.tolist(), strict=True)
+    ]
 
 
 def _count_compared(rows: Sequence[Row]) -> tuple[int, list[Row]]:
@@ -264,7 +318,11 @@ def _count_compared(rows: Sequence[Row]) -> tuple[int, list[Row]]:
     for row in rows:
         if row.compared:
             by_quantity.setdefault(row.quantity, []).append(row)
-    loose = [rows_of_one for rows_of_one in by_quantity.values() if all(row.verdict == DEGRADED for row in rows_of_one)]
+    loose = [
+        rows_of_one
+        for rows_of_one in by_quantity.values()
+        if all(row.verdict == DEGRADED for row in rows_of_one)
+    ]
     return len(by_quantity), [min(rows_of_one, key=ALLOWANCE) for rows_of_one in loose]
 
 
@@ -276,7 +334,14 @@ def _find_worst(rows: Sequence[Row]) -> list[Worst]:
     worst = []
     for group in groups.values():
         share, row = max(group, key=lambda entry: entry[0])
-        worst.append(Worst(row, share, len(group), sum(row_of_group.failed for _, row_of_group in group)))
+        worst.append(
+            Worst(
+                row,
+                share,
+                len(group),
+                sum(row_of_group.failed for _, row_of_group in group),
+            )
+        )
     return worst
 
 

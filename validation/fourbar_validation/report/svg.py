@@ -13,7 +13,9 @@ from typing import Any, NamedTuple
 from fourbar_validation.compare.tolerance import EPS
 
 PAGE = Path(__file__).parent / "templates" / "page.css"
-LIGHT: dict[str, str] = dict(re.findall(r"(--[\w-]+): light-dark\((#\w+),", PAGE.read_text(encoding="utf-8")))
+LIGHT: dict[str, str] = dict(
+    re.findall(r"(--[\w-]+): light-dark\((#\w+),", PAGE.read_text(encoding="utf-8"))
+)
 """Colours of a light page by the names of their custom properties."""
 INK, SOFT, GRID, BAND, ALLOWED, PAPER = (
     LIGHT[f"--{name}"] for name in ("ink", "soft", "grid", "under", "allowed", "paper")
@@ -40,7 +42,12 @@ class Style(NamedTuple):
     @property
     def line(self) -> dict[str, Any]:
         """Return the style of a curve with its marks, as matplotlib takes it."""
-        return {"color": self.colour, "marker": self.marker, "markersize": 3.5, "linewidth": 1.0}
+        return {
+            "color": self.colour,
+            "marker": self.marker,
+            "markersize": 3.5,
+            "linewidth": 1.0,
+        }
 
 
 STYLES = {
@@ -70,7 +77,10 @@ GROUP_NAME = re.compile(r'<g id="[^"]*"')
 
 def choose_style(engine: str) -> Style:
     """Choose the style of an engine: one that is not named in `STYLES` has the next of `OTHERS`."""
-    return STYLES.get(engine) or OTHERS[NUMBERS.setdefault(engine, len(NUMBERS)) % len(OTHERS)]
+    return (
+        STYLES.get(engine)
+        or OTHERS[NUMBERS.setdefault(engine, len(NUMBERS)) % len(OTHERS)]
+    )
 
 
 def set_frame(axes: Any) -> None:
@@ -92,9 +102,19 @@ def draw_svg(figure: Any, salt: str) -> str:
     import matplotlib
 
     text = io.StringIO()
-    settings: Any = {"svg.fonttype": "none", "svg.hashsalt": salt, "font.size": 8.5, "font.family": "sans-serif"}
+    settings: Any = {
+        "svg.fonttype": "none",
+        "svg.hashsalt": salt,
+        "font.size": 8.5,
+        "font.family": "sans-serif",
+    }
     with matplotlib.rc_context(settings):
-        figure.savefig(text, format="svg", transparent=True, metadata={"Date": None, "Creator": None})
+        figure.savefig(
+            text,
+            format="svg",
+            transparent=True,
+            metadata={"Date": None, "Creator": None},
+        )
     svg = text.getvalue()
     return svg[svg.index("<svg") :]
 

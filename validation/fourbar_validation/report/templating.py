@@ -18,9 +18,13 @@ def render(package: str, name: str, /, **what: object) -> str:
     """
     from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 
-    page = name.endswith(".html.j2")  # in Markdown `write_cell` escapes what would break out
+    page = name.endswith(
+        ".html.j2"
+    )  # in Markdown `write_cell` escapes what would break out
     environment = Environment(
-        loader=ChoiceLoader([PackageLoader(package), PackageLoader("fourbar_validation.report")]),
+        loader=ChoiceLoader(
+            [PackageLoader(package), PackageLoader("fourbar_validation.report")]
+        ),
         undefined=StrictUndefined,
         autoescape=page,
         trim_blocks=True,
@@ -30,10 +34,14 @@ def render(package: str, name: str, /, **what: object) -> str:
     environment.filters |= {
         "number": write_number,
         "plain": count_or_size,
-        "degrees": lambda radians: "-" if math.isnan(radians) else f"{math.degrees(radians):.3f}",
+        "degrees": lambda radians: (
+            "-" if math.isnan(radians) else f"{math.degrees(radians):.3f}"
+        ),
         "share": write_share,
         "cell": write_cell,
-        "packed": lambda text: base64.b64encode(gzip.compress(text.encode("utf-8"), mtime=0)).decode(),
+        "packed": lambda text: base64.b64encode(
+            gzip.compress(text.encode("utf-8"), mtime=0)
+        ).decode(),
         "colour": lambda engine: f"var({choose_style(engine).variable})",
         "symbol": lambda engine: choose_style(engine).symbol,
     }
@@ -52,7 +60,15 @@ def write_share(value: float) -> str:
     """Write error/allowed in two digits."""
     if math.isinf(value):
         return "∞"
-    return "0" if value == 0.0 else "<0.01" if value < 0.01 else f"{value:.2f}" if value < 10.0 else f"{value:.1e}"
+    return (
+        "0"
+        if value == 0.0
+        else "<0.01"
+        if value < 0.01
+        else f"{value:.2f}"
+        if value < 10.0
+        else f"{value:.1e}"
+    )
 
 
 def write_number(value: float) -> str:

@@ -37,18 +37,26 @@ def print_table(summary: Summary, out: Path, *, verbose: bool = False) -> None:
             f"error {write_number(row.error)}, allowed {write_number(row.allowed)}: {escape(clean_line(row.reason))}"
         )
     if summary.counts[FAILS] > len(summary.failures):
-        console.print(f"{summary.counts[FAILS] - len(summary.failures)} more rows fail; results.csv has them.")
+        console.print(
+            f"{summary.counts[FAILS] - len(summary.failures)} more rows fail; results.csv has them."
+        )
     if verbose:
         for engine, reason, count in summary.refusals:
             scenes = f"{count} scene{'s' if count > 1 else ''}"
-            console.print(f"{escape(engine)} left out in {scenes}: {escape(clean_line(reason))}")
+            console.print(
+                f"{escape(engine)} left out in {scenes}: {escape(clean_line(reason))}"
+            )
     elif summary.refusals:
         count = sum(count for *_, count in summary.refusals)
-        console.print(f"{count} comparisons were left out, for {len(summary.refusals)} reasons; --verbose lists them.")
+        console.print(
+            f"{count} comparisons were left out, for {len(summary.refusals)} reasons; --verbose lists them."
+        )
     for engine, reason in summary.missing:
         console.print(f"[bold red]Not run:[/] {escape(engine)}: {escape(reason)}")
     console.print(f"[bold]{escape(summary.verdict)}.[/]")
-    console.print(f"Report: {escape(clean_line(str(out / 'report.html')))}", soft_wrap=True)
+    console.print(
+        f"Report: {escape(clean_line(str(out / 'report.html')))}", soft_wrap=True
+    )
 
 
 def _make_engine_table(summary: Summary) -> "Table":
@@ -62,14 +70,18 @@ def _make_engine_table(summary: Summary) -> "Table":
             shown.add_row(escape(name), "-", "-", "nothing compared")
             continue
         quantity = f"{row.engine} {row.quantity}" if line.name == OWN else row.quantity
-        place = "" if math.isnan(row.theta_2) else f", {math.degrees(row.theta_2):.1f} deg"
+        place = (
+            "" if math.isnan(row.theta_2) else f", {math.degrees(row.theta_2):.1f} deg"
+        )
         cells = (
             name,
             write_short(row.error),
             write_short(row.allowed),
             f"{quantity} of {clean_line(row.scene)}{place}",
         )
-        shown.add_row(*map(escape, cells), style="bold red" if line.counts[FAILS] else "")
+        shown.add_row(
+            *map(escape, cells), style="bold red" if line.counts[FAILS] else ""
+        )
     return shown
 
 
@@ -78,8 +90,14 @@ def _make_worst_table(summary: Summary) -> "Table":
 
     title = "worst row of each scene and engine"
     if len(summary.worst) < summary.judged:
-        title = f"worst rows of {len(summary.worst)} of {summary.judged} scenes and engines"
-    shown = _make_bare_table(("scene and engine", "worst"), ("error", "allowed", "used", "at deg"), title=title)
+        title = (
+            f"worst rows of {len(summary.worst)} of {summary.judged} scenes and engines"
+        )
+    shown = _make_bare_table(
+        ("scene and engine", "worst"),
+        ("error", "allowed", "used", "at deg"),
+        title=title,
+    )
     for scene, group in groupby(summary.worst, key=lambda w: w.row.scene):
         shown.add_row(f"[bold]{escape(clean_line(scene))}[/]")
         for w in group:
@@ -87,24 +105,35 @@ def _make_worst_table(summary: Summary) -> "Table":
                 write_short(w.row.error),
                 write_short(w.row.allowed),
                 f"{w.used:.2g}",
-                "-" if math.isnan(w.row.theta_2) else f"{math.degrees(w.row.theta_2):.1f}",
+                "-"
+                if math.isnan(w.row.theta_2)
+                else f"{math.degrees(w.row.theta_2):.1f}",
             )
             words = (f"  {escape(w.row.engine)}", escape(w.row.quantity))
             shown.add_row(*words, *numbers, style="" if w.failed == 0 else "bold red")
     return shown
 
 
-def _make_bare_table(words: Sequence[str], numbers: Sequence[str], title: str | None = None) -> "Table":
+def _make_bare_table(
+    words: Sequence[str], numbers: Sequence[str], title: str | None = None
+) -> "Table":
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
 
     shown = Table(title=title, box=SIMPLE_HEAD, pad_edge=False, collapse_padding=True)
     for heading in (*words, *numbers):
-        shown.add_column(heading, justify="left" if heading in words else "right", no_wrap=True)
+        shown.add_column(
+            heading, justify="left" if heading in words else "right", no_wrap=True
+        )
     return shown
 
 
-def make_table(headings: Sequence[str], rows: Iterable[Sequence[str]], words: int = 1, **options: Any) -> "Table":
+def make_table(
+    headings: Sequence[str],
+    rows: Iterable[Sequence[str]],
+    words: int = 1,
+    **options: Any,
+) -> "Table":
     """Make a table whose first columns are words and whose others are numbers."""
     from rich.box import SIMPLE_HEAD
     from rich.markup import escape
@@ -113,7 +142,9 @@ def make_table(headings: Sequence[str], rows: Iterable[Sequence[str]], words: in
     settings: dict[str, Any] = {"box": SIMPLE_HEAD, "pad_edge": False}
     shown = Table(**(settings | options))
     for index, heading in enumerate(headings):
-        shown.add_column(heading, justify="left" if index < words else "right", overflow="fold")
+        shown.add_column(
+            heading, justify="left" if index < words else "right", overflow="fold"
+        )
     for row in rows:
         shown.add_row(*(escape(clean_line(cell)) for cell in row))
     return shown

@@ -42,12 +42,18 @@ def compare_answer(question: Question, engine: Engine, answer: Answer) -> list[R
         question = Question(question.name, question.scene, answer.at)
     name, scene, formulas = question.name, question.scene, question.solution
     held = hold(engine, scene, question.at, answer, formulas)
-    comparison = Comparison(name, scene, answer, formulas, held, question.reference, question.scales)
+    comparison = Comparison(
+        name, scene, answer, formulas, held, question.reference, question.scales
+    )
     rows = comparison.rows()
     if (ratio := answer.evidence.get("mass_ratio", 1.0)) > LIGHT:
         why = f"; of coupler and output one is {ratio:.1e} times lighter"
-        rows = [replace(row, reason=row.reason + why) if row.failed else row for row in rows]
-    answers = answer.assembled is not None and len(answer.assembled) == len(formulas)  # otherwise a row has failed
+        rows = [
+            replace(row, reason=row.reason + why) if row.failed else row for row in rows
+        ]
+    answers = answer.assembled is not None and len(answer.assembled) == len(
+        formulas
+    )  # otherwise a row has failed
     if answers and has_angles(answer):
         rows.append(comparison.closure())
     return rows
@@ -58,30 +64,56 @@ def _observe_order(question: Question, engine: Engine) -> dict[str, float]:
 
     def error(answer: Answer) -> float:
         rows = compare_answer(question, replace(engine, answers=FORCES), answer)
-        return max((row.error for row in rows if row.quantity in FORCES), default=math.nan)  # a refusal has none
+        return max(
+            (row.error for row in rows if row.quantity in FORCES), default=math.nan
+        )  # a refusal has none
 
     assert engine.order is not None
-    coarse, fine, order = engine.order(question.scene, remove_angles(question.at), error)
+    coarse, fine, order = engine.order(
+        question.scene, remove_angles(question.at), error
+    )
     seen = {"error_at_4h": coarse, "error_at_2h": fine, "observed_order": order}
-    return seen if all(map(math.isfinite, seen.values())) else {}  # a coarse run may leave what the scene covers
+    return (
+        seen if all(map(math.isfinite, seen.values())) else {}
+    )  # a coarse run may leave what the scene covers
 
 
 def compare_statements(question: Question) -> Iterator[Row]:
     """Compare what the formulas state of the linkage, whatever its motion, with every exact engine."""
-    stated, part = limit_positions.Stated.of(question.scene.linkage), "statements of the linkage"
+    stated, part = (
+        limit_positions.Stated.of(question.scene.linkage),
+        "statements of the linkage",
+    )
 
     def rows(engine: Engine, answer: Answer) -> list[Row]:
         predicted = make_prediction(engine, question.scene, question.at, answer)
         try:
-            return check_statements(question.name, question.scene, question.adapter(engine), answer, stated, predicted)
+            return check_statements(
+                question.name,
+                question.scene,
+                question.adapter(engine),
+                answer,
+                stated,
+                predicted,
+            )
         except LimitError as limit:
-            return [Row.unmeasured(question.name, engine.name, part, "all", REFUSES, str(limit))]
+            return [
+                Row.unmeasured(
+                    question.name, engine.name, part, "all", REFUSES, str(limit)
+                )
+            ]
 
     for engine in question.engines:
         answer, _ = question.answered.get(engine.name, (None, 0.0))
-        exact = engine.stated and engine.tolerance.conditioned and "theta_3" in engine.answers
+        exact = (
+            engine.stated
+            and engine.tolerance.conditioned
+            and "theta_3" in engine.answers
+        )
         if exact and answer is not None and answer.refusal is None:
-            yield from question.attempt(partial(rows, engine, answer), engine.name, part)
+            yield from question.attempt(
+                partial(rows, engine, answer), engine.name, part
+            )
 
 
 def check_statements(
@@ -102,15 +134,24 @@ def check_statements(
     """
     linkage = scene.linkage
     stated = limit_positions.Stated.of(linkage) if stated is None else stated
-    seen = look(engine, linkage, [*limit_positions.choose_places(stated), *transmission.choose_places(linkage)])
+    seen = look(
+        engine,
+        linkage,
+        [*limit_positions.choose_places(stated), *transmission.choose_places(linkage)],
+    )
     findings = {
         "range": limit_positions.compare_ranges(stated, engine),
         "limit_positions": limit_positions.compare_limit_positions(stated, seen),
-        "transmission": transmission.compare_transmission(scene, seen, answer, predicted),
+        "transmission": transmission.compare_transmission(
+            scene, seen, answer, predicted
+        ),
     }
     if mobility.change_points(linkage):
         findings["through"] = limit_positions.check_through(linkage, engine)
-    return [make_worst_row(name, answer, quantity, list(rows)) for quantity, rows in findings.items()]
+    return [
+        make_worst_row(name, answer, quantity, list(rows))
+        for quantity, rows in findings.items()
+    ]
 
 
 def compare_inertia(question: Question) -> Iterator[Row]:
@@ -121,33 +162,55 @@ def compare_inertia(question: Question) -> Iterator[Row]:
     scene = question.scene
     if question.at.speed is None or not (scene.loads or scene.effects):
         return
-    bare = Question(question.name, replace(scene, loads=(), effects=()), question.at, output=question.output)
+    bare = Question(
+        question.name,
+        replace(scene, loads=(), effects=()),
+        question.at,
+        output=question.output,
+    )
     for name, (answer, seconds) in question.answered.items():
         if f"{name_driving(scene)}_inertia" in answer.quantities:
             bare.answered[name] = _take_inertia(answer, name_driving(scene)), seconds
     for engine in question.engines:
-        if COUPLE.value in engine.answers and engine.name in question.answered:  # one that broke down has its row
-            yield from question.attempt(partial(_check_inertia, question, bare, engine), engine.name, "inertia alone")
+        if (
+            COUPLE.value in engine.answers and engine.name in question.answered
+        ):  # one that broke down has its row
+            yield from question.attempt(
+                partial(_check_inertia, question, bare, engine),
+                engine.name,
+                "inertia alone",
+            )
 
 
 def _check_inertia(question: Question, bare: Question, engine: Engine) -> Iterator[Row]:
-    answer, (loaded, _) = bare.answer(engine), question.answered.get(engine.name, (None, 0.0))
+    answer, (loaded, _) = (
+        bare.answer(engine),
+        question.answered.get(engine.name, (None, 0.0)),
+    )
     if answer.refusal is not None and loaded is not None and loaded.refusal is not None:
         return  # the refusal has its row
     drive = name_driving(question.scene)
     rows = compare_answer(bare, replace(engine, answers=(drive,)), answer)
-    rows = [row for row in rows if row.quantity == drive or row.verdict in (REFUSES, FAILS)]
+    rows = [
+        row for row in rows if row.quantity == drive or row.verdict in (REFUSES, FAILS)
+    ]
     rows = [row for row in rows if row.quantity != "undecided"]
     if rows:  # a failure besides the torque, or in place of it, is not left out
         worst = max(rows, key=lambda row: VERDICTS.index(row.verdict))
-        reason = worst.reason if worst.quantity in (drive, "all") else f"{worst.quantity}: {worst.reason}"
+        reason = (
+            worst.reason
+            if worst.quantity in (drive, "all")
+            else f"{worst.quantity}: {worst.reason}"
+        )
         yield replace(worst, quantity=f"{drive}_inertia", reason=reason)
 
 
 def _take_inertia(answer: Answer, drive: str) -> Answer:
     """Take the part of an answer that is of the bars' inertia."""
     alone = {**answer.quantities, drive: answer.quantities[f"{drive}_inertia"]}
-    alone.pop("drive_condition", None)  # it says how near loads and friction are to jamming
+    alone.pop(
+        "drive_condition", None
+    )  # it says how near loads and friction are to jamming
     return replace(answer, quantities=alone, evidence={}, alarms=[])
 
 

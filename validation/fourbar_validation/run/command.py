@@ -14,14 +14,37 @@ from fourbar_validation.compare.columns import read_columns
 from fourbar_validation.compare.rows import FAILS
 from fourbar_validation.engines.environments import read_engines, start_engines
 from fourbar_validation.engines.guests import Guest, adjust_engines, read_guests
-from fourbar_validation.engines.registry import ENGINES, HARD_ENGINES, Engine, hold_fully, load_further
-from fourbar_validation.regression.accept import FORMS, add_output_options, report_differences
+from fourbar_validation.engines.registry import (
+    ENGINES,
+    HARD_ENGINES,
+    Engine,
+    hold_fully,
+    load_further,
+)
+from fourbar_validation.regression.accept import (
+    FORMS,
+    add_output_options,
+    report_differences,
+)
 from fourbar_validation.regression.record import COLUMNS, find_baseline, open_run
 from fourbar_validation.report.junit import list_cases, write_document
-from fourbar_validation.run.run import DRAWING, SAMPLE, WORKERS, Progress, RunOptions, run
+from fourbar_validation.run.run import (
+    DRAWING,
+    SAMPLE,
+    WORKERS,
+    Progress,
+    RunOptions,
+    run,
+)
 from fourbar_validation.scenes.hard_families import Hard
 from fourbar_validation.scenes.random import UNEVEN_TYPE, DrawnType
-from fourbar_validation.scenes.suites import Random, Suite, read_default_suite, read_scene_files, read_suite
+from fourbar_validation.scenes.suites import (
+    Random,
+    Suite,
+    read_default_suite,
+    read_scene_files,
+    read_suite,
+)
 
 ALL_TYPES = ",".join(kind.value for kind in DrawnType)
 EXCLUDED = (
@@ -65,16 +88,29 @@ class Request:
     def require_consistent(self) -> None:
         """Refuse options that contradict each other or would do nothing, and files that cannot be written."""
         for option, excluded, why in EXCLUDED:
-            if getattr(self, option) is not None and getattr(self, excluded) not in (None, ()):
+            if getattr(self, option) is not None and getattr(self, excluded) not in (
+                None,
+                (),
+            ):
                 raise InputError(f"--{option}", getattr(self, option), why)
         for option in OF_RANDOM:
             if getattr(self, option) is not None and self.random is None:
-                raise InputError(f"--{option}", getattr(self, option), "is of random linkages; say --random N too")
+                raise InputError(
+                    f"--{option}",
+                    getattr(self, option),
+                    "is of random linkages; say --random N too",
+                )
         for form, path in self.forms.items():
             if path is not None:
                 if self.against is None and form != "junit":
-                    raise InputError(f"--{form}", str(path), "tells differences; say --against BASELINE too")
-                if self.out.exists() or path.parent != self.out:  # a folder that the run will make
+                    raise InputError(
+                        f"--{form}",
+                        str(path),
+                        "tells differences; say --against BASELINE too",
+                    )
+                if (
+                    self.out.exists() or path.parent != self.out
+                ):  # a folder that the run will make
                     require_file(path, *self.scenes)
         if self.against is not None:
             open_run(find_baseline(self.against), "--against")
@@ -83,21 +119,57 @@ class Request:
 @click.command(name="run")
 @click.argument("scenes", nargs=-1, type=click.Path(path_type=Path))
 @click.option(
-    "-o", "--out", type=click.Path(path_type=Path, file_okay=False), default=Path("results"), show_default=True
+    "-o",
+    "--out",
+    type=click.Path(path_type=Path, file_okay=False),
+    default=Path("results"),
+    show_default=True,
 )
-@click.option("--engines", metavar="NAMES", help="Comma-separated engines, of engines.toml too; left out: all of ours.")
-@click.option("--error", type=float, metavar="E", help="Simulate no more precisely than this relative error.")
-@click.option("--suite", metavar="hard|FILE", help="Judge the hard cases, or the scenes that FILE lists.")
-@click.option("--random", type=click.IntRange(min=1), help="Judge this many random linkages instead.")
-@click.option("--seed", type=click.IntRange(min=0), metavar="S", help="Seed of the random linkages; left out: 0.")
+@click.option(
+    "--engines",
+    metavar="NAMES",
+    help="Comma-separated engines, of engines.toml too; left out: all of ours.",
+)
+@click.option(
+    "--error",
+    type=float,
+    metavar="E",
+    help="Simulate no more precisely than this relative error.",
+)
+@click.option(
+    "--suite",
+    metavar="hard|FILE",
+    help="Judge the hard cases, or the scenes that FILE lists.",
+)
+@click.option(
+    "--random",
+    type=click.IntRange(min=1),
+    help="Judge this many random linkages instead.",
+)
+@click.option(
+    "--seed",
+    type=click.IntRange(min=0),
+    metavar="S",
+    help="Seed of the random linkages; left out: 0.",
+)
 @click.option(
     "--type",
     metavar="TYPES",
     help=f"Types of the random linkages, comma-separated: {ALL_TYPES} (all); or uneven: with every ratio over ten "
     "decades and every effect but loaded friction, for exact engines.",
 )
-@click.option("--workers", type=click.IntRange(min=1), default=WORKERS, show_default=True, help="Number of processes.")
-@click.option("--against", metavar="BASELINE", help="Compare with an accepted name or an earlier run's folder.")
+@click.option(
+    "--workers",
+    type=click.IntRange(min=1),
+    default=WORKERS,
+    show_default=True,
+    help="Number of processes.",
+)
+@click.option(
+    "--against",
+    metavar="BASELINE",
+    help="Compare with an accepted name or an earlier run's folder.",
+)
 @click.option(
     "--witness",
     metavar="MODULE:CLASS|COMMAND",
@@ -118,8 +190,16 @@ class Request:
     metavar="N",
     help="Judge studies, derivatives, bounds, equilibria, SDF and USD in this many scenes, evenly chosen.",
 )
-@click.option("--verbose", is_flag=True, help="Print the worst row of each scene and engine, and what was left out.")
-@click.option("--no-pictures", is_flag=True, help="Draw nothing and measure no observed order; no verdict changes.")
+@click.option(
+    "--verbose",
+    is_flag=True,
+    help="Print the worst row of each scene and engine, and what was left out.",
+)
+@click.option(
+    "--no-pictures",
+    is_flag=True,
+    help="Draw nothing and measure no observed order; no verdict changes.",
+)
 @add_output_options
 def command(**stated: Any) -> int:
     """Judge scenes (default: models/ and capabilities/); write results.csv, timings.csv, report.md, report.html."""
@@ -133,20 +213,33 @@ def command(**stated: Any) -> int:
     folders = [path.parent for path in request.scenes]
     chosen = choose_engines(request.engines, engines, folders, request.time_limit)
     present, missing = find_askable(chosen, by_name=request.engines is not None)
-    options = RunOptions(request.workers, not request.no_pictures, request.sample_shipped)
+    options = RunOptions(
+        request.workers, not request.no_pictures, request.sample_shipped
+    )
     with ShownProgress(len(suite)) as progress:
         summary = run(suite, request.out, present, options, missing, progress)
     print_table(summary, request.out, verbose=request.verbose)
     worse = False
     if request.against is not None:
-        worse = bool(report_differences(find_baseline(request.against), request.out, request.forms))
+        worse = bool(
+            report_differences(
+                find_baseline(request.against), request.out, request.forms
+            )
+        )
     elif request.junit is not None:
-        write_text(request.junit, write_document(summary.verdict, list_cases(read_columns(request.out / COLUMNS))))
+        write_text(
+            request.junit,
+            write_document(
+                summary.verdict, list_cases(read_columns(request.out / COLUMNS))
+            ),
+        )
     if summary.counts[FAILS] or worse:
         return FAILED
     if missing:
         names = ",".join(engine.name for engine in present)
-        raise DependencyError(f"{missing[0][1]}, or say --engines {names} where those are all that is wanted")
+        raise DependencyError(
+            f"{missing[0][1]}, or say --engines {names} where those are all that is wanted"
+        )
     return summary.counts.status
 
 
@@ -155,16 +248,24 @@ def select_scenes(request: Request) -> tuple[Suite, tuple[Engine, ...]]:
     engines: tuple[Engine, ...] = (*ENGINES, *load_further())
     if hard := request.suite == "hard":
         engines = (*HARD_ENGINES, *map(hold_fully, load_further()))
-    guests: tuple[Engine, ...] = read_guests(request.witness, [engine.name for engine in engines], request.time_limit)
+    guests: tuple[Engine, ...] = read_guests(
+        request.witness, [engine.name for engine in engines], request.time_limit
+    )
     suite: Suite
     if hard:
         suite, guests = Hard(), tuple(map(hold_fully, guests))
     elif request.suite is not None:
         suite = read_suite(Path(request.suite))
     elif request.random is not None:
-        suite = Random(request.random, request.seed or 0, read_linkage_types(request.type or ALL_TYPES))
+        suite = Random(
+            request.random,
+            request.seed or 0,
+            read_linkage_types(request.type or ALL_TYPES),
+        )
     else:
-        suite = read_scene_files(request.scenes) if request.scenes else read_default_suite()
+        suite = (
+            read_scene_files(request.scenes) if request.scenes else read_default_suite()
+        )
     return suite, (*engines, *guests)
 
 
@@ -176,7 +277,11 @@ def read_linkage_types(text: str) -> tuple[DrawnType, ...]:
         return tuple(DrawnType(name.strip()) for name in text.split(","))
     except ValueError:
         allowed = ALL_TYPES.replace(",", ", ")
-        raise InputError("--type", text, f"must be {UNEVEN_TYPE} or a comma-separated list of {allowed}") from None
+        raise InputError(
+            "--type",
+            text,
+            f"must be {UNEVEN_TYPE} or a comma-separated list of {allowed}",
+        ) from None
 
 
 def choose_engines(
@@ -192,22 +297,43 @@ def choose_engines(
     """
     if named is None:
         further = {engine.name for engine in load_further()}
-        return tuple(engine for engine in engines if engine.name not in further or not engine.missing())
+        return tuple(
+            engine
+            for engine in engines
+            if engine.name not in further or not engine.missing()
+        )
     offered = {engine.name: engine for engine in engines}
     names = [name.strip() for name in named.split(",") if name.strip()]
     described = read_engines(folders)
     for name in names or [named]:
         if name not in offered and name not in described:
-            raise InputError("--engines", name, "must be among " + ", ".join([*offered, *described]))
-    chosen = tuple(engine for name, engine in offered.items() if name in names or isinstance(engine, Guest))
-    return (*chosen, *start_engines([described[name] for name in names if name not in offered], engines, seconds))
+            raise InputError(
+                "--engines", name, "must be among " + ", ".join([*offered, *described])
+            )
+    chosen = tuple(
+        engine
+        for name, engine in offered.items()
+        if name in names or isinstance(engine, Guest)
+    )
+    return (
+        *chosen,
+        *start_engines(
+            [described[name] for name in names if name not in offered], engines, seconds
+        ),
+    )
 
 
-def find_askable(engines: tuple[Engine, ...], *, by_name: bool) -> tuple[tuple[Engine, ...], list[tuple[str, str]]]:
+def find_askable(
+    engines: tuple[Engine, ...], *, by_name: bool
+) -> tuple[tuple[Engine, ...], list[tuple[str, str]]]:
     """Find those that can answer here, and the others with the reason; DependencyError where those were named."""
-    missing = [(engine.name, reason) for engine in engines if (reason := engine.missing())]
+    missing = [
+        (engine.name, reason) for engine in engines if (reason := engine.missing())
+    ]
     if missing and by_name:
-        raise DependencyError("; ".join(f"{name}: {reason}" for name, reason in missing))
+        raise DependencyError(
+            "; ".join(f"{name}: {reason}" for name, reason in missing)
+        )
     return tuple(engine for engine in engines if not engine.missing()), missing
 
 
@@ -216,11 +342,25 @@ class ShownProgress(Progress):
 
     def __init__(self, scenes: int) -> None:
         from rich.console import Console
-        from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
+        from rich.progress import (
+            BarColumn,
+            MofNCompleteColumn,
+            TextColumn,
+            TimeRemainingColumn,
+        )
         from rich.progress import Progress as Bars
 
-        columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-        self.bars, self.scenes, self.tasks = Bars(*columns, console=Console(stderr=True)), scenes, dict[str, Any]()
+        columns = (
+            TextColumn("{task.description}"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TimeRemainingColumn(),
+        )
+        self.bars, self.scenes, self.tasks = (
+            Bars(*columns, console=Console(stderr=True)),
+            scenes,
+            dict[str, Any](),
+        )
 
     def __enter__(self) -> "ShownProgress":
         """Begin to show."""
@@ -228,7 +368,10 @@ class ShownProgress(Progress):
         return self
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
     ) -> None:
         """Leave the bars as they are."""
         self.bars.stop()
@@ -240,5 +383,7 @@ class ShownProgress(Progress):
     def advance(self, stage: str, scenes: int) -> None:
         """Move the bar of the stage; how many scenes are drawn is not told before."""
         if stage not in self.tasks:
-            self.tasks[stage] = self.bars.add_task(stage, total=None if stage == DRAWING else self.scenes)
+            self.tasks[stage] = self.bars.add_task(
+                stage, total=None if stage == DRAWING else self.scenes
+            )
         self.bars.advance(self.tasks[stage], scenes)

@@ -16,7 +16,17 @@ from fourbar.effects.effect import list_bodies
 from fourbar.evaluation.case import compute_state
 from fourbar.formulas.pin_forces import Wrenches
 from fourbar.linkage import MOVING_BARS, PIN_FORCE
-from fourbar.quantities import COUPLE, LINE, NO_LEVER, NO_TORQUE, NOT_ASSEMBLED, OK, OVERFLOW, SEVERAL, SINGULAR
+from fourbar.quantities import (
+    COUPLE,
+    LINE,
+    NO_LEVER,
+    NO_TORQUE,
+    NOT_ASSEMBLED,
+    OK,
+    OVERFLOW,
+    SEVERAL,
+    SINGULAR,
+)
 from fourbar.scene import Scene
 from fourbar.solution import Solution
 from fourbar_validation.compare.compare import CLOSURE, NOWHERE
@@ -62,7 +72,11 @@ def check_identities(question: Question) -> Iterator[Row]:
     closing = solution.assembled & (solution.status_code != OVERFLOW)
     gap = find_gap(linkage, solution.theta_2, solution.theta_3, solution.theta_4)
     yield _make_row(question, "closure", CLOSURE, gap, closing)
-    if question.scene.motion.angle is None and question.scene.motion.law is None and command.bar == 2:
+    if (
+        question.scene.motion.angle is None
+        and question.scene.motion.law is None
+        and command.bar == 2
+    ):
         yield _check_sweep(question)
     if solution.F12 is not None and (solution.status_code == OK).any():
         yield from _check_sums(question)
@@ -79,17 +93,25 @@ def _check_sweep(question: Question) -> Row:
         missed = np.maximum(-find_margin(linkage, command.theta_2), 0.0)
     else:
         left_out = min(np.radians(1.0), 0.5 * (stop - start))
-        missed = np.abs(find_margin(linkage, np.array([start - left_out, stop + left_out])))
+        missed = np.abs(
+            find_margin(linkage, np.array([start - left_out, stop + left_out]))
+        )
     allowed = IDENTITY.factor * count_half_turns(linkage.ground_angle, command.theta_2)
     reason = "one degree short of where the loop just closes, or a whole turn"
     return question.row("sweep", np.array([missed.max()]), allowed, reason)
 
 
-def _make_row(question: Question, quantity: str, equation: str, error: Array, judged: Mask) -> Row:
+def _make_row(
+    question: Question, quantity: str, equation: str, error: Array, judged: Mask
+) -> Row:
     """Make the row of an equation from its error, in parts of its terms, where it is worst."""
-    condition = 1.0 / count_half_turns(question.scene.linkage.ground_angle, question.at.angle)
+    condition = 1.0 / count_half_turns(
+        question.scene.linkage.ground_angle, question.at.angle
+    )
     reason = f"identity: {equation}" if judged.any() else NOWHERE
-    return question.row(quantity, error, IDENTITY.factor / condition, reason, judged, condition)
+    return question.row(
+        quantity, error, IDENTITY.factor / condition, reason, judged, condition
+    )
 
 
 class _Balance:
@@ -110,7 +132,9 @@ class _Balance:
 
     def carry(self, force: Array, point: Array) -> None:
         """Add the size alone of the moment of a force inside, which cancels."""
-        self.moments = self.moments + np.hypot(point[..., 0], point[..., 1]) * magnitude(force)
+        self.moments = self.moments + np.hypot(
+            point[..., 0], point[..., 1]
+        ) * magnitude(force)
 
     def twist(self, couple: Array, sense: float = 1.0) -> None:
         """Add a couple."""
@@ -121,7 +145,11 @@ class _Balance:
 def _check_sums(question: Question) -> Iterator[Row]:
     """Check that F12 + F14 + loads = sum of m a_G, the moments of the same about O2 with the torque, and the power."""
     scene, solution = question.scene, question.solution
-    assert solution.F12 is not None and solution.F14 is not None and solution.drive_condition is not None
+    assert (
+        solution.F12 is not None
+        and solution.F14 is not None
+        and solution.drive_condition is not None
+    )
     assert solution.F32 is not None and solution.F43 is not None
     actions, O4 = _sum_actions(question)
     drive = COUPLE.value if solution.drive is None else LINE.value
@@ -137,37 +165,59 @@ def _check_sums(question: Question) -> Iterator[Row]:
     for number in MOVING_BARS:
         force_on, couple = acting.on(number)
         # the ground's pull on bars 2 and 4 goes through their pins; between moving bars it cancels
-        resultant = force_on + actions.through.get({2: "O2", 4: "O4"}.get(number, ""), 0.0)
+        resultant = force_on + actions.through.get(
+            {2: "O2", 4: "O4"}.get(number, ""), 0.0
+        )
         load = np.broadcast_to(resultant, len(solution))
         balance.push(np.stack([load.real, load.imag], axis=1), first_pins[number])
         balance.twist(couple)
         accelerated = scene.linkage.bar(number).mass * getattr(solution, f"a_G{number}")
         balance.push(accelerated, getattr(solution, f"G{number}"), -1.0)
-        balance.twist(actions.bodies[number - 2].I * getattr(solution, f"alpha_{number}"), -1.0)
+        balance.twist(
+            actions.bodies[number - 2].I * getattr(solution, f"alpha_{number}"), -1.0
+        )
     # the forces of the bars that are not driven are solved apart, and the torque is that of virtual work
     with np.errstate(divide="ignore", invalid="ignore"):
-        force_size = balance.forces / (find_lever(scene.linkage) * solution.drive_condition)
+        force_size = balance.forces / (
+            find_lever(scene.linkage) * solution.drive_condition
+        )
         moment_size = balance.moments / find_condition(drive, scene.linkage, solution)
     judged = solution.status_code == OK
     # the sense of dry friction at a pin at rest is decided by rounding: not the same here as in the answer
     judged &= ~question.reversing(IDENTITY.factor)
     yield _check_power(question, drive, judged)
-    forces, moments = divide(magnitude(balance.force), force_size), divide(np.abs(balance.moment), moment_size)
-    yield _make_row(question, "force_sum", "F12 + F14 + loads = sum of m a_G", forces, judged)
-    yield _make_row(question, "moment_sum", "moments about O2, with the torque", moments, judged)
+    forces, moments = (
+        divide(magnitude(balance.force), force_size),
+        divide(np.abs(balance.moment), moment_size),
+    )
+    yield _make_row(
+        question, "force_sum", "F12 + F14 + loads = sum of m a_G", forces, judged
+    )
+    yield _make_row(
+        question, "moment_sum", "moments about O2, with the torque", moments, judged
+    )
 
 
 def _sum_actions(question: Question) -> tuple[Actions, Array]:
     """Sum what acts at the speeds that were answered, not at another evaluation of them; also the place of O4."""
     scene, command, solution = question.scene, question.at, question.solution
     state = compute_state(scene, command)
-    speeds = {f"omega_{bar}": getattr(solution, f"omega_{bar}") for bar in MOVING_BARS if bar != command.bar}
+    speeds = {
+        f"omega_{bar}": getattr(solution, f"omega_{bar}")
+        for bar in MOVING_BARS
+        if bar != command.bar
+    }
     state = state._replace(moving=state.moving._replace(**speeds))
     with np.errstate(all="ignore"):
-        actions = Actions(state, list_bodies(scene.linkage, scene.effects)).add((*scene.loads, *scene.effects))
+        actions = Actions(state, list_bodies(scene.linkage, scene.effects)).add(
+            (*scene.loads, *scene.effects)
+        )
         for term in scene.effects:
             if term.loaded_pins:
-                term.act_known(actions, {name: getattr(solution, name) for name in PIN_FORCE.values()})
+                term.act_known(
+                    actions,
+                    {name: getattr(solution, name) for name in PIN_FORCE.values()},
+                )
         if solution.drive is not None:
             solution.drive.act(actions, solution.drive_force)
     O4 = complex(np.ravel(state.foot(4))[0])
@@ -177,8 +227,16 @@ def _sum_actions(question: Question) -> tuple[Actions, Array]:
 def _check_power(question: Question, drive: str, judged: Mask) -> Row:
     """Compare the power of the drive with its torque or force times the speed at which it works."""
     solution = question.solution
-    works = getattr(solution, drive) * getattr(solution, f"omega_{solution.drive_bar}", solution.stroke_speed)
-    return _make_row(question, "power", "of the drive", divide(np.abs(solution.power - works), np.abs(works)), judged)
+    works = getattr(solution, drive) * getattr(
+        solution, f"omega_{solution.drive_bar}", solution.stroke_speed
+    )
+    return _make_row(
+        question,
+        "power",
+        "of the drive",
+        divide(np.abs(solution.power - works), np.abs(works)),
+        judged,
+    )
 
 
 def _compute_cross(u: Array, v: Array) -> Array:
@@ -198,16 +256,29 @@ def check_status(question: Question) -> Iterator[Row]:
 def _solve_exactly(question: Question) -> tuple[OfSome | None, OfSome | None]:
     """Give the sine between bars 3 and 4 in many digits, and how many solutions friction has, at some positions."""
     scene, command = question.scene, question.at
-    unknown = command.remainder is not None or command.commanded != "theta_2" or find_missing("flint")
+    unknown = (
+        command.remainder is not None
+        or command.commanded != "theta_2"
+        or find_missing("flint")
+    )
     loaded = any(effect.loaded_pins for effect in scene.effects)
     return (
-        None if unknown else lambda indices: compute_sines(scene.linkage, select_positions(command, indices)),
-        (lambda indices: count_solutions(scene, select_positions(command, indices))) if loaded else None,
+        None
+        if unknown
+        else lambda indices: compute_sines(
+            scene.linkage, select_positions(command, indices)
+        ),
+        (lambda indices: count_solutions(scene, select_positions(command, indices)))
+        if loaded
+        else None,
     )
 
 
 def compare_status(
-    question: Question, reference: Solution, sines: OfSome | None = None, solutions: OfSome | None = None
+    question: Question,
+    reference: Solution,
+    sines: OfSome | None = None,
+    solutions: OfSome | None = None,
 ) -> Row:
     """Count where the formulas have a value and `reference` has none, or the reverse, where it has digits left.
 
@@ -224,38 +295,72 @@ def compare_status(
         ours, theirs = getattr(formulas, quantity), getattr(reference, quantity)
         if ours is None or theirs is None:
             continue
-        sound = find_condition(quantity, scene.linkage, reference) * NOTHING_TO_TELL > EPS
+        sound = (
+            find_condition(quantity, scene.linkage, reference) * NOTHING_TO_TELL > EPS
+        )
         differ |= sound & ~large & (np.isfinite(ours) != np.isfinite(theirs))
     differ &= formulas.status_code != NOT_ASSEMBLED
     if reference.drive_condition is not None:
-        accelerations = [formulas.a_G2, formulas.a_G3, formulas.a_G4, *formulas.acceleration.values()]
+        accelerations = [
+            formulas.a_G2,
+            formulas.a_G3,
+            formulas.a_G4,
+            *formulas.acceleration.values(),
+        ]
         # if everything that the forces need is finite, a missing number is the forces' own
-        moves = np.isfinite(np.hstack([a for a in accelerations if a is not None])).all(axis=1)
+        moves = np.isfinite(np.hstack([a for a in accelerations if a is not None])).all(
+            axis=1
+        )
         in_line = reference.drive_condition < IN_ONE_LINE
         differ |= (formulas.status_code == OVERFLOW) & moves & in_line
-        differ |= np.isin(formulas.status_code, (NO_TORQUE, NO_LEVER)) & (reference.drive_condition > NEAR)
-    close = mark_touching(scene.linkage, formulas.theta_2) | (reference.condition < NEAR) | (formulas.condition < NEAR)
-    if sines is not None and len(near := np.flatnonzero(close)):  # exact arithmetic has to decide there
+        differ |= np.isin(formulas.status_code, (NO_TORQUE, NO_LEVER)) & (
+            reference.drive_condition > NEAR
+        )
+    close = (
+        mark_touching(scene.linkage, formulas.theta_2)
+        | (reference.condition < NEAR)
+        | (formulas.condition < NEAR)
+    )
+    if sines is not None and len(
+        near := np.flatnonzero(close)
+    ):  # exact arithmetic has to decide there
         sine = np.abs(sines(near))
         closes, in_line = np.isfinite(sine), formulas.status_code[near] == SINGULAR
         differ[near] |= (formulas.status_code[near] == NOT_ASSEMBLED) == closes
-        differ[near] |= closes & np.where(in_line, sine > IN_ONE_LINE, sine < 1.0 / 16.0 * IN_ONE_LINE)
-    if solutions is not None and len(many := np.flatnonzero(formulas.status_code == SEVERAL)[:SAMPLE]):
+        differ[near] |= closes & np.where(
+            in_line, sine > IN_ONE_LINE, sine < 1.0 / 16.0 * IN_ONE_LINE
+        )
+    if solutions is not None and len(
+        many := np.flatnonzero(formulas.status_code == SEVERAL)[:SAMPLE]
+    ):
         differ[many] |= solutions(many) < 2
     if solutions is not None and len(ok := np.flatnonzero(formulas.status_code == OK)):
         some = ok[np.unique(np.linspace(0, len(ok) - 1, SAMPLE).astype(int))]
         differ[some] |= solutions(some) > 1
     index, wrong = find_worst(differ.astype(float)), np.count_nonzero(differ)
-    stated = ", ".join(f"{count} {name}" for name, count in Counter(formulas.status).items() if name != "ok")
-    reason = f"the formulas state: {stated}" if stated else "every position has its values"
+    stated = ", ".join(
+        f"{count} {name}"
+        for name, count in Counter(formulas.status).items()
+        if name != "ok"
+    )
+    reason = (
+        f"the formulas state: {stated}" if stated else "every position has its values"
+    )
     if differ.any():
-        reason = f"{wrong} positions differ, the first is {formulas.status[index]}; {reason}"
-    return question.row("status", float(wrong) * differ, 0.0, reason, theta_2=formulas.theta_2)
+        reason = (
+            f"{wrong} positions differ, the first is {formulas.status[index]}; {reason}"
+        )
+    return question.row(
+        "status", float(wrong) * differ, 0.0, reason, theta_2=formulas.theta_2
+    )
 
 
 def _mark_large(scene: Scene, reference: Solution) -> Mask:
     """Mark where numbers are so large that the formulas may have to give up, (n,)."""
-    large = np.full(len(reference), max(scene.linkage.lengths) > LARGE or min(scene.linkage.lengths) < 1.0 / LARGE)
+    large = np.full(
+        len(reference),
+        max(scene.linkage.lengths) > LARGE or min(scene.linkage.lengths) < 1.0 / LARGE,
+    )
     for name in ("omega_2", "alpha_2", *STAGES, "F12", "F43"):
         values = getattr(reference, name)
         if values is not None:

@@ -15,9 +15,20 @@ from fourbar_validation.engines.guests import list_numbers
 from fourbar_validation.engines.registry import ENGINES, Engine
 from fourbar_validation.report.record import Record
 from fourbar_validation.report.svg import NUMBERS
-from fourbar_validation.run.answers import check_mjcf, compare_answers, compare_inertia, compare_statements
+from fourbar_validation.run.answers import (
+    check_mjcf,
+    compare_answers,
+    compare_inertia,
+    compare_statements,
+)
 from fourbar_validation.run.identities import check_identities, check_status
-from fourbar_validation.run.printed import check_blocks, check_error_bars, check_law, check_points, check_residual
+from fourbar_validation.run.printed import (
+    check_blocks,
+    check_error_bars,
+    check_law,
+    check_points,
+    check_residual,
+)
 from fourbar_validation.run.question import Question, select_positions
 from fourbar_validation.run.released import check_released
 from fourbar_validation.run.shipped.bounds import extremes
@@ -50,14 +61,41 @@ CHECKS = (
         needs_theta_2="error bars: balls are asked at theta_2, and `stability --bar` at the other bars",
     ),
     Check(check_residual),
-    Check(Question.find_reversals, needs_theta_2="reversals of dry friction: they are drawn over theta_2"),
+    Check(
+        Question.find_reversals,
+        needs_theta_2="reversals of dry friction: they are drawn over theta_2",
+    ),
     Check(compare_answers),
-    Check(compare_statements, needs_theta_2="statements of the linkage: engines are led to its limits by theta_2"),
+    Check(
+        compare_statements,
+        needs_theta_2="statements of the linkage: engines are led to its limits by theta_2",
+    ),
     Check(check_mjcf, needs_theta_2="MJCF as shipped: it drives bar 2"),
     Check(compare_inertia),
-    Check(check_released, free=True, needs_theta_2="released motions: engines begin at theta_2"),
-    *(Check(rows, shipped=True) for rows in (study, sensitivity, internal_forces, extremes, tolerances, equilibria)),
-    *(Check(rows, shipped=True, needs_theta_2=f"{rows.__name__}: the file opens at theta_2") for rows in (sdf, usd)),
+    Check(
+        check_released,
+        free=True,
+        needs_theta_2="released motions: engines begin at theta_2",
+    ),
+    *(
+        Check(rows, shipped=True)
+        for rows in (
+            study,
+            sensitivity,
+            internal_forces,
+            extremes,
+            tolerances,
+            equilibria,
+        )
+    ),
+    *(
+        Check(
+            rows,
+            shipped=True,
+            needs_theta_2=f"{rows.__name__}: the file opens at theta_2",
+        )
+        for rows in (sdf, usd)
+    ),
 )
 """All checks of a scene. An exception in a check fails its own rows only."""
 OUTPUT = "output.txt"
@@ -79,7 +117,9 @@ def judge_for_report(
     record = judge(name, scene, engines, order=draw, shipped=shipped)
     for i, row in enumerate(record.rows):
         if row.failed and row.engine in record.output:
-            record.rows[i] = replace(row, reason=f"{row.reason}; what it printed: {OUTPUT}")
+            record.rows[i] = replace(
+                row, reason=f"{row.reason}; what it printed: {OUTPUT}"
+            )
     figure = None
     if draw:
         from fourbar_validation.report.figures import draw_scene_figure
@@ -90,7 +130,12 @@ def judge_for_report(
 
 
 def judge(
-    name: str, scene: Scene, engines: Sequence[Engine] = ENGINES, *, order: bool = True, shipped: bool = False
+    name: str,
+    scene: Scene,
+    engines: Sequence[Engine] = ENGINES,
+    *,
+    order: bool = True,
+    shipped: bool = False,
 ) -> Record:
     """Make every check of one scene.
 
@@ -102,7 +147,15 @@ def judge(
     begin = time.perf_counter()
     question.solution  # noqa: B018 - timed
     seconds = time.perf_counter() - begin
-    if shipped and not free and (question.at.speed is None or question.free_body is None or question.free_body.refusal):
+    if (
+        shipped
+        and not free
+        and (
+            question.at.speed is None
+            or question.free_body is None
+            or question.free_body.refusal
+        )
+    ):
         reason = "they are checked against the free bodies, which have no forces for this scene"
         question.left_out.append(f"functions other than solve: {reason}")
         shipped = False
@@ -110,7 +163,9 @@ def judge(
     for check in CHECKS:
         if check.free == free and (shipped or not check.shipped):
             if check.needs_theta_2 and question.at.commanded != "theta_2":
-                question.left_out.append(f"{check.needs_theta_2}; {question.at.commanded} is commanded")
+                question.left_out.append(
+                    f"{check.needs_theta_2}; {question.at.commanded} is commanded"
+                )
                 continue
             called = check.make_rows.__name__
             engine, part = (called, "") if check.shipped else (FORMULAS, called)
@@ -124,8 +179,15 @@ def ask(name: str, scene: Scene, engines: Sequence[Engine]) -> Question:
     if scene.motion.free is not None:
         return Question(name, scene, command, engines)
     question = Question(name, scene, command)
-    numbers = (command.angle, command.branch, 0.0 if command.speed is None else command.speed, command.acceleration)
-    if len(command.angle) > 1 and all(np.ptp(values) == 0 for values in numbers):  # a sweep of equal positions
+    numbers = (
+        command.angle,
+        command.branch,
+        0.0 if command.speed is None else command.speed,
+        command.acceleration,
+    )
+    if len(command.angle) > 1 and all(
+        np.ptp(values) == 0 for values in numbers
+    ):  # a sweep of equal positions
         question.left_out.append("positions: all are the same, one is evaluated")
         question.at = select_positions(command, np.array([0]))._replace(time=None)
     question.engines = list(_select_needed(engines, question.at, question.left_out))
@@ -133,19 +195,27 @@ def ask(name: str, scene: Scene, engines: Sequence[Engine]) -> Question:
     return question
 
 
-def _select_needed(engines: Iterable[Engine], command: Command, left_out: list[str]) -> Iterator[Engine]:
+def _select_needed(
+    engines: Iterable[Engine], command: Command, left_out: list[str]
+) -> Iterator[Engine]:
     """Select the engines that the question needs; the others are left out before they are imported."""
     for engine in engines:
         reason = None
         if command.speed is None:
             reason = (
-                None if engine.positions else "the scene states positions only, and this engine computes only forces"
+                None
+                if engine.positions
+                else "the scene states positions only, and this engine computes only forces"
             )
         elif engine.through_time and not np.any(command.speed):
             reason = "omega_2 is 0: nothing moves through time"
         elif engine.through_time and len(command.angle) == 1:
             reason = "a simulation needs more than one position"
         if reason is None:
-            yield engine if command.speed is not None else replace(engine, answers=engine.positions)
+            yield (
+                engine
+                if command.speed is not None
+                else replace(engine, answers=engine.positions)
+            )
         else:
             left_out.append(f"{engine.name}: {reason}")

@@ -29,7 +29,13 @@ class Job:
         return make_plain(self.suite.name(self.scene))
 
 
-def make_jobs(suite: Suite, scenes: Iterable[int], engines: Sequence[Engine], draw: bool, sample: int = 0) -> list[Job]:
+def make_jobs(
+    suite: Suite,
+    scenes: Iterable[int],
+    engines: Sequence[Engine],
+    draw: bool,
+    sample: int = 0,
+) -> list[Job]:
     """Make the jobs of some scenes; one of a file carries its own text alone.
 
     `sample`: number of scenes of the suite, evenly chosen, in which functions other than `solve` are checked too.
@@ -39,7 +45,9 @@ def make_jobs(suite: Suite, scenes: Iterable[int], engines: Sequence[Engine], dr
         shipped = (i + 1) * sample // len(suite) > i * sample // len(suite)
         if isinstance(suite, Files):
             drawn = draw and suite.name(i) not in suite.not_drawn
-            jobs.append(Job(replace(suite, texts=(suite.texts[i],)), 0, engines, drawn, shipped))
+            jobs.append(
+                Job(replace(suite, texts=(suite.texts[i],)), 0, engines, drawn, shipped)
+            )
         else:
             jobs.append(Job(suite, i, engines, draw, shipped))
     return jobs
@@ -48,7 +56,9 @@ def make_jobs(suite: Suite, scenes: Iterable[int], engines: Sequence[Engine], dr
 def judge_job(job: Job) -> Record:
     """Judge one scene; runs in a worker."""
     scene = job.suite.scene(job.scene)
-    return judge_for_report(job.name, scene, job.engines, draw=job.draw, shipped=job.shipped)
+    return judge_for_report(
+        job.name, scene, job.engines, draw=job.draw, shipped=job.shipped
+    )
 
 
 def judge_by_engine(job: Job, _: Exception, attempt: processes.Attempt) -> Record:
@@ -60,19 +70,29 @@ def judge_by_engine(job: Job, _: Exception, attempt: processes.Attempt) -> Recor
         if isinstance(outcome, Record):
             record = outcome if record is None else record.joined(outcome)
         else:
-            breakdowns.append(make_breakdown(job.name, engines[0].name if engines else "formulas", outcome))
+            breakdowns.append(
+                make_breakdown(
+                    job.name, engines[0].name if engines else "formulas", outcome
+                )
+            )
     record = record or Record(job.name)
     return replace(record, rows=[*record.rows, *breakdowns])
 
 
 def find_time_limit(suite: Suite, engines: Iterable[Engine]) -> float:
     """Return the seconds after which a scene of the suite is taken to hang; guests have limits of their own besides."""
-    limit = processes.SECONDS + SECONDS_PER_POSITION * (suite.positions if isinstance(suite, Files) else 0)
-    return limit + QUESTIONS * sum(guest.seconds or limit for guest in engines if isinstance(guest, Guest))
+    limit = processes.SECONDS + SECONDS_PER_POSITION * (
+        suite.positions if isinstance(suite, Files) else 0
+    )
+    return limit + QUESTIONS * sum(
+        guest.seconds or limit for guest in engines if isinstance(guest, Guest)
+    )
 
 
 def judge_chunks(
     chunks: Iterable[tuple[int, list[Job]]], limit: float, workers: int
 ) -> Iterator[tuple[int, list[Record]]]:
     """Judge numbered chunks of jobs, each as it is done; a job that takes longer than `limit` (s) hangs."""
-    return processes.apply_over_processes(judge_job, chunks, workers, seconds=limit, instead=judge_by_engine)
+    return processes.apply_over_processes(
+        judge_job, chunks, workers, seconds=limit, instead=judge_by_engine
+    )

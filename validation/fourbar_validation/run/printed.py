@@ -54,12 +54,22 @@ ROUNDED_SOMEWHERE = 20
 
 def check_points(question: Question) -> Iterator[Row]:
     """Check the scene's own points."""
-    if question.scene.points and question.reference is not None and question.at.speed is not None:
-        yield compare_points(question, question.scene, question.solution, question.reference)
+    if (
+        question.scene.points
+        and question.reference is not None
+        and question.at.speed is not None
+    ):
+        yield compare_points(
+            question, question.scene, question.solution, question.reference
+        )
 
 
 def compare_points(
-    question: Question, scene: Scene, solution: Solution, reference: Solution, least: float = 0.0
+    question: Question,
+    scene: Scene,
+    solution: Solution,
+    reference: Solution,
+    least: float = 0.0,
 ) -> Row:
     """Compare places, velocities and accelerations of a scene's own points, from the angles of another derivation.
 
@@ -67,32 +77,64 @@ def compare_points(
     """
     link, n = scene.linkage, len(reference)
     zero = np.zeros(n)
-    theta = {1: zero + link.ground_angle, 2: reference.theta_2, 3: reference.theta_3, 4: reference.theta_4}
-    speed = {bar: zero if bar == 1 else _find_known(reference, f"omega_{bar}", n) for bar in theta}
-    growth = {bar: zero if bar == 1 else _find_known(reference, f"alpha_{bar}", n) for bar in theta}
+    theta = {
+        1: zero + link.ground_angle,
+        2: reference.theta_2,
+        3: reference.theta_3,
+        4: reference.theta_4,
+    }
+    speed = {
+        bar: zero if bar == 1 else _find_known(reference, f"omega_{bar}", n)
+        for bar in theta
+    }
+    growth = {
+        bar: zero if bar == 1 else _find_known(reference, f"alpha_{bar}", n)
+        for bar in theta
+    }
 
     def swing(bar: int, distance: float, angle: float) -> list[NDArray[np.complex128]]:
         arm = distance * np.exp(1j * (theta[bar] + angle))
         return [arm, 1j * speed[bar] * arm, (1j * growth[bar] - speed[bar] ** 2) * arm]
 
-    first_pins = {3: swing(2, link.input.length, 0.0), 4: [link.ground * np.exp(1j * theta[1]), 0.0 * zero, 0.0 * zero]}
+    first_pins = {
+        3: swing(2, link.input.length, 0.0),
+        4: [link.ground * np.exp(1j * theta[1]), 0.0 * zero, 0.0 * zero],
+    }
     error = np.zeros(n)
     usable = (solution.status_code == OK) & (reference.condition >= least)
     usable &= find_condition("F12", link, reference) * NOTHING_TO_TELL > EPS
     for point in scene.points:
-        arms, first_pin = swing(point.bar, *point.from_pin), first_pins.get(point.bar, [zero, zero, zero])
-        tables, like = (solution.points, solution.velocity, solution.acceleration), ("B", "v_B", "a_B")
+        arms, first_pin = (
+            swing(point.bar, *point.from_pin),
+            first_pins.get(point.bar, [zero, zero, zero]),
+        )
+        tables, like = (
+            (solution.points, solution.velocity, solution.acceleration),
+            ("B", "v_B", "a_B"),
+        )
         for ours, kind, arm, at_foot in zip(tables, like, arms, first_pin, strict=True):
             if point.name in ours:
                 theirs = np.stack(((arm + at_foot).real, (arm + at_foot).imag), axis=1)
                 size = np.abs(arm) + np.abs(at_foot) + sum_lengths(scene.linkage)
                 if kind != "B":
-                    size = np.abs(arm) + np.abs(at_foot) + sum_terms(kind, scene, reference)
-                apart = find_error(kind, ours[point.name], theirs, size) * find_condition(kind, link, reference)
-                error = np.where(usable, np.maximum(error, np.where(np.isnan(apart), np.inf, apart)), error)
+                    size = (
+                        np.abs(arm)
+                        + np.abs(at_foot)
+                        + sum_terms(kind, scene, reference)
+                    )
+                apart = find_error(
+                    kind, ours[point.name], theirs, size
+                ) * find_condition(kind, link, reference)
+                error = np.where(
+                    usable,
+                    np.maximum(error, np.where(np.isnan(apart), np.inf, apart)),
+                    error,
+                )
     allowed = EQUIVALENCE.factor * count_half_turns(link.ground_angle, solution.theta_2)
     what = f"the {len(scene.points)} points of the scene"
-    return question.row("points", error, allowed, what, usable, theta_2=solution.theta_2)
+    return question.row(
+        "points", error, allowed, what, usable, theta_2=solution.theta_2
+    )
 
 
 def _find_known(reference: Solution, quantity: str, n: int) -> Array:
@@ -107,13 +149,19 @@ def check_blocks(question: Question) -> Iterator[Row]:
         return
     n = len(command.angle)
     ok = np.flatnonzero(solution.status_code == OK)
-    long = np.concatenate((np.resize(ok if len(ok) else np.arange(n), BLOCK), np.arange(n)))
+    long = np.concatenate(
+        (np.resize(ok if len(ok) else np.arange(n), BLOCK), np.arange(n))
+    )
     ends = np.unique([0, BLOCK - 1, BLOCK, len(long) - 1])
     repeated = select_positions(command, long)
-    if sum(len(effect.loaded_pins) for effect in scene.effects) > 1:  # each may take a search
+    if (
+        sum(len(effect.loaded_pins) for effect in scene.effects) > 1
+    ):  # each may take a search
         repeated.angle[1 : BLOCK - 1] = np.nan
     together = solve(scene, "force", at=repeated)
-    error = (together.status_code[ends] != solution.status_code[long[ends]]).astype(float)
+    error = (together.status_code[ends] != solution.status_code[long[ends]]).astype(
+        float
+    )
     for quantity in ("sin_mu", "B", "alpha_3", *FORCES):
         if (ours := getattr(solution, quantity)) is None:
             continue
@@ -123,7 +171,9 @@ def check_blocks(question: Question) -> Iterator[Row]:
         with np.errstate(all="ignore"):  # beyond the range of doubles there is no size
             size = scale_of(quantity, scene, solution, ours)[long[ends]]
         condition = find_condition(quantity, scene.linkage, solution)[long[ends]]
-        condition = np.where(np.isnan(condition), 1.0, condition)  # decided by the command where nothing closes
+        condition = np.where(
+            np.isnan(condition), 1.0, condition
+        )  # decided by the command where nothing closes
         # evaluated by the same code, but not in the same company of a processor's registers
         apart = find_error(quantity, one, expected, size) * condition
         error[finite] = np.maximum(error[finite], apart[finite])
@@ -133,57 +183,119 @@ def check_blocks(question: Question) -> Iterator[Row]:
         apart = find_error(angle, angles, getattr(solution, angle), np.ones(n))
         half_turns = count_half_turns(scene.linkage.ground_angle, command.angle)
         apart *= find_condition(angle, scene.linkage, solution) / half_turns
-        error[-1] = max(error[-1], np.nan_to_num(apart[ok], nan=np.inf).max(initial=0.0))
+        error[-1] = max(
+            error[-1], np.nan_to_num(apart[ok], nan=np.inf).max(initial=0.0)
+        )
     reason = f"{len(long)} positions at once against {n}"
-    yield question.row("blocks", error, EQUIVALENCE.factor, reason, theta_2=together.theta_2[ends])
+    yield question.row(
+        "blocks", error, EQUIVALENCE.factor, reason, theta_2=together.theta_2[ends]
+    )
 
 
 def check_error_bars(question: Question) -> Iterator[Row]:
     """Check the error bars by the true error, in 320 bits; no bar may be larger than what a comparison is allowed."""
     scene, command, solution = question.scene, question.at, question.solution
-    if command.omega_2 is None or command.remainder is not None or find_refusal(scene) or find_missing("flint"):
+    if (
+        command.omega_2 is None
+        or command.remainder is not None
+        or find_refusal(scene)
+        or find_missing("flint")
+    ):
         return
     # the sense of dry friction at a pin at rest is no question of rounding
-    usable = np.flatnonzero((solution.status_code == OK) & ~question.reversing(EQUIVALENCE.factor))
+    usable = np.flatnonzero(
+        (solution.status_code == OK) & ~question.reversing(EQUIVALENCE.factor)
+    )
     if not len(usable):
         return
     spread = np.linspace(0, len(usable) - 1, SAMPLE).astype(int).tolist()
     indices = usable[
-        np.unique([*spread, *(int(np.argmin(pull[usable])) for pull in _compute_pulls(scene, command, solution))])
+        np.unique(
+            [
+                *spread,
+                *(
+                    int(np.argmin(pull[usable]))
+                    for pull in _compute_pulls(scene, command, solution)
+                ),
+            ]
+        )
     ]
     sampled = select_positions(command, indices)
-    exact, ours = BallArithmetic().answer(scene, sampled), solve(scene, "error", at=sampled)
+    exact, ours = (
+        BallArithmetic().answer(scene, sampled),
+        solve(scene, "error", at=sampled),
+    )
     reference = make_reference(scene, exact)
     for bar, quantities in (("torque_error", ("torque",)), ("force_error", PIN_FORCES)):
         width = getattr(ours, bar)
-        true = np.max([magnitude(getattr(ours, q) - exact.quantities[q]) for q in quantities], axis=0)
-        size = np.max([take_smallest_scale(q, scene, ours, reference) for q in quantities], axis=0)
-        condition = take_strictest_condition(quantities[0], scene.linkage, ours, reference)
+        true = np.max(
+            [magnitude(getattr(ours, q) - exact.quantities[q]) for q in quantities],
+            axis=0,
+        )
+        size = np.max(
+            [take_smallest_scale(q, scene, ours, reference) for q in quantities], axis=0
+        )
+        condition = take_strictest_condition(
+            quantities[0], scene.linkage, ours, reference
+        )
         tells = condition * NOTHING_TO_TELL > EPS
-        turns = np.array([count_half_turns(scene.linkage.ground_angle, theta_2) for theta_2 in sampled.theta_2])
+        turns = np.array(
+            [
+                count_half_turns(scene.linkage.ground_angle, theta_2)
+                for theta_2 in sampled.theta_2
+            ]
+        )
         wide = divide(width, size) * condition / (K * EPS * turns)
-        if (beyond := tells & (wide > 1.0)).any():  # allowed is only what rounding the data does
-            expected = np.max([predict_from_data(scene, sampled, quantity, beyond) for quantity in quantities], axis=0)
+        if (
+            beyond := tells & (wide > 1.0)
+        ).any():  # allowed is only what rounding the data does
+            expected = np.max(
+                [
+                    predict_from_data(scene, sampled, quantity, beyond)
+                    for quantity in quantities
+                ],
+                axis=0,
+            )
             wide = np.where(beyond, divide(width, expected), wide)
         share = np.where(tells, np.maximum(divide(true, BARS * width), wide), 0.0)
         share[tells & ~np.isfinite(width)] = np.inf
         index = find_worst(share)
         reason = f"the error is {true[index]:.1e}, the bar {width[index]:.1e}, of {size[index]:.1e}"
-        yield question.row(bar, share, 1.0, reason, tells, float(condition[index]), sampled.theta_2)
+        yield question.row(
+            bar, share, 1.0, reason, tells, float(condition[index]), sampled.theta_2
+        )
 
 
-def _compute_pulls(scene: Scene, command: Command, solution: Solution) -> Iterator[Array]:
+def _compute_pulls(
+    scene: Scene, command: Command, solution: Solution
+) -> Iterator[Array]:
     """Compute what each spring, torsion spring and load over a table does, by free bodies: (n,), N and N m together."""
     assert solution.theta_3 is not None and solution.theta_4 is not None
-    motion = move(scene.linkage, command.theta_2, *list_speeds(command), solution.theta_3, solution.theta_4)
-    alone: list[Scene] = [replace(scene, loads=(load,), effects=()) for load in scene.loads if load.table is not None]
+    motion = move(
+        scene.linkage,
+        command.theta_2,
+        *list_speeds(command),
+        solution.theta_3,
+        solution.theta_4,
+    )
+    alone: list[Scene] = [
+        replace(scene, loads=(load,), effects=())
+        for load in scene.loads
+        if load.table is not None
+    ]
     for effect in scene.effects:
         if isinstance(effect, (Springs, Torsion)):
             kind = type(effect)
-            alone += [replace(scene, loads=(), effects=(kind((one,)),)) for one in effect.springs]  # type: ignore[arg-type]
+            alone += [
+                replace(scene, loads=(), effects=(kind((one,)),))  # type: ignore[arg-type]
+                for one in effect.springs
+            ]
     for one in alone:
         wrenches = sum_acting(one, motion)
-        yield sum(np.abs(wrenches.force[bar]) + np.abs(wrenches.moment[bar]) for bar in MOVING_BARS)  # type: ignore[misc]
+        yield sum(
+            np.abs(wrenches.force[bar]) + np.abs(wrenches.moment[bar])
+            for bar in MOVING_BARS
+        )  # type: ignore[misc]
 
 
 def check_residual(question: Question) -> Iterator[Row]:
@@ -195,18 +307,33 @@ def check_residual(question: Question) -> Iterator[Row]:
     assert solution.drive_condition is not None
     for effect in scene.effects:
         for pin, mu, r in getattr(effect, "pins", ()):
-            terms = np.fmax(terms, mu * r * magnitude(getattr(solution, PIN_FORCE[pin])))
+            terms = np.fmax(
+                terms, mu * r * magnitude(getattr(solution, PIN_FORCE[pin]))
+            )
     sliding = np.isfinite(terms) & (terms > 0.0) & (solution.status_code == OK)
     if np.any(solution.omega_2 == 0.0) or not sliding.any():
         yield Row.unmeasured(
-            question.name, FORMULAS, "exact", "friction_residual", UNDECIDED, "no pin slides under load"
+            question.name,
+            FORMULAS,
+            "exact",
+            "friction_residual",
+            UNDECIDED,
+            "no pin slides under load",
         )
         return
-    error = np.where(sliding, residual / np.where(sliding, terms, 1.0) * solution.drive_condition, 0.0)
+    error = np.where(
+        sliding,
+        residual / np.where(sliding, terms, 1.0) * solution.drive_condition,
+        0.0,
+    )
     reason = "couples of mu r |F|, relative to the largest"
-    row = question.row("friction_residual", error, K * EPS, reason, theta_2=solution.theta_2)
+    row = question.row(
+        "friction_residual", error, K * EPS, reason, theta_2=solution.theta_2
+    )
     if np.count_nonzero(sliding) >= ROUNDED_SOMEWHERE and not residual[sliding].any():
-        row = replace(row, verdict=FAILS, reason="not even rounding is left at any position")
+        row = replace(
+            row, verdict=FAILS, reason="not even rounding is left at any position"
+        )
     yield row
 
 
@@ -233,13 +360,22 @@ def check_law(question: Question) -> Iterator[Row]:
     if law.ends == "rest":
         errors.append(np.abs(speed[[0, -1]]) / size)
     elif law.ends == "periodic":
-        errors.append(np.abs([speed[0] - speed[-1], (first[0] - last[-1]) / h.min()]) / size)
+        errors.append(
+            np.abs([speed[0] - speed[-1], (first[0] - last[-1]) / h.min()]) / size
+        )
     else:  # one cubic through the first two pieces, and through the last two
         jerk = (last - first) / h
-        errors.append(np.abs([jerk[1] - jerk[0], jerk[-1] - jerk[-2]]) * float(h.min()) / bent)
+        errors.append(
+            np.abs([jerk[1] - jerk[0], jerk[-1] - jerk[-2]]) * float(h.min()) / bent
+        )
     piece = np.clip(np.searchsorted(t, command.time, side="right") - 1, 0, len(h) - 1)
     theta, omega, alpha = _interpolate_hermite(
-        command.time - t[piece], angle[piece], speed[piece], first[piece], last[piece], h[piece]
+        command.time - t[piece],
+        angle[piece],
+        speed[piece],
+        first[piece],
+        last[piece],
+        h[piece],
     )
     along = [
         np.abs(theta - command.angle) / max(1.0, farthest),
@@ -247,9 +383,14 @@ def check_law(question: Question) -> Iterator[Row]:
         np.abs(alpha - command.acceleration) / bent,
     ]
     error = np.max(along, axis=0)
-    error[find_worst(error)] = np.max([error[find_worst(error)], *(misfit.max(initial=0.0) for misfit in errors)])
+    error[find_worst(error)] = np.max(
+        [error[find_worst(error)], *(misfit.max(initial=0.0) for misfit in errors)]
+    )
     yield question.row(
-        "law", error, IDENTITY.factor, "the piecewise cubic through the table, its acceleration continuous"
+        "law",
+        error,
+        IDENTITY.factor,
+        "the piecewise cubic through the table, its acceleration continuous",
     )
 
 

@@ -13,7 +13,11 @@ from fourbar.solution import Solution
 from fourbar.solve import solve
 from fourbar_validation.compare.answer import Adapter, Answer, explain_refusal
 from fourbar_validation.compare.compare import Scales
-from fourbar_validation.compare.reversals import Reversal, find_reversals, mark_reversing
+from fourbar_validation.compare.reversals import (
+    Reversal,
+    find_reversals,
+    mark_reversing,
+)
 from fourbar_validation.compare.rows import FORMULAS, Row, make_breakdown, make_plain
 from fourbar_validation.compare.scales import make_reference
 from fourbar_validation.compare.tolerance import Array, Mask
@@ -59,7 +63,9 @@ class Question:
         """Solve the scene as far as anything is compared: error bars take ten times as long as all the rest."""
         if self.scene.motion.free is not None:
             return solve(self.scene)
-        return solve(self.scene, "position" if self.at.speed is None else "force", at=self.at)
+        return solve(
+            self.scene, "position" if self.at.speed is None else "force", at=self.at
+        )
 
     @cached_property
     def solution(self) -> Solution:
@@ -80,7 +86,11 @@ class Question:
         """Conditions and sizes by free bodies, the reference of every comparison; None: an answer has its own."""
         try:
             with np.errstate(all="ignore"):
-                return None if self.free_body is None else make_reference(self.scene, self.free_body)
+                return (
+                    None
+                    if self.free_body is None
+                    else make_reference(self.scene, self.free_body)
+                )
         except ArithmeticError:
             return None
 
@@ -128,14 +138,26 @@ class Question:
         """
         place = self.at.angle if theta_2 is None else theta_2
         who = (self.name, FORMULAS, "exact")
-        return Row.judged(who, quantity, error, allowed, reason, place, condition, where)
+        return Row.judged(
+            who, quantity, error, allowed, reason, place, condition, where
+        )
 
     def record(self, rows: list[Row], seconds: float) -> Record:
         """Make the record of the scene; `seconds`: that the formulas took."""
-        answered = [self.answered[engine.name] for engine in self.engines if engine.name in self.answered]
-        timings = [Timing(self.name, FORMULAS, "exact", len(self.solution), seconds), *self.timings]
+        answered = [
+            self.answered[engine.name]
+            for engine in self.engines
+            if engine.name in self.answered
+        ]
+        timings = [
+            Timing(self.name, FORMULAS, "exact", len(self.solution), seconds),
+            *self.timings,
+        ]
         n = len(self.at.angle)
-        timings += [Timing(self.name, answer.engine, answer.setting, n, took) for answer, took in answered]
+        timings += [
+            Timing(self.name, answer.engine, answer.setting, n, took)
+            for answer, took in answered
+        ]
         return Record(
             self.name,
             self.scene,
@@ -150,7 +172,9 @@ class Question:
             jumps=self.jumps,
         )
 
-    def attempt(self, check: Callable[[], Iterable[Row]], engine: str, part: str = "") -> Iterator[Row]:
+    def attempt(
+        self, check: Callable[[], Iterable[Row]], engine: str, part: str = ""
+    ) -> Iterator[Row]:
         """Yield the rows of a check; what it raises is a failure of its own, in a row of its own."""
         try:
             yield from check()
@@ -177,7 +201,9 @@ def remove_angles(command: Command) -> Command:
         return command
     unknown = np.full_like(command.angle, np.nan)
     speed = None if command.speed is None else unknown
-    return command._replace(angle=unknown, speed=speed, acceleration=unknown, condition=None, lost=None)
+    return command._replace(
+        angle=unknown, speed=speed, acceleration=unknown, condition=None, lost=None
+    )
 
 
 def select_positions(command: Command, indices: NDArray[np.intp]) -> Command:

@@ -21,10 +21,23 @@ from fourbar.scene import Command, Scene
 from fourbar.solution import Solution
 from fourbar_validation.compare.answer import Array, ReleasedAnswer
 from fourbar_validation.compare.compare import Comparison
-from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, FORMULAS, REFUSES, UNDECIDED, Row
+from fourbar_validation.compare.rows import (
+    AGREES,
+    DEGRADED,
+    FAILS,
+    FORMULAS,
+    REFUSES,
+    UNDECIDED,
+    Row,
+)
 from fourbar_validation.compare.scales import make_reference
 from fourbar_validation.compare.tolerance import DEGRADED as TIMES_PREDICTED
-from fourbar_validation.compare.tolerance import EQUIVALENCE, divide, find_worst, replace_zero_size
+from fourbar_validation.compare.tolerance import (
+    EQUIVALENCE,
+    divide,
+    find_worst,
+    replace_zero_size,
+)
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.guests import Guest
 from fourbar_validation.engines.registry import Engine, find_missing, hold
@@ -71,24 +84,40 @@ class Pendulum(NamedTuple):
         from scipy.special import ellipj, ellipk, ellipkinc
 
         k, sense = self.W / self.J, math.copysign(1.0, self.omega_0)
-        bottom = math.sqrt(self.omega_0**2 + 2.0 * k * (1.0 + math.cos(self.phi_0)))  # speed at the lowest point
+        bottom = math.sqrt(
+            self.omega_0**2 + 2.0 * k * (1.0 + math.cos(self.phi_0))
+        )  # speed at the lowest point
         m = 4.0 * k / bottom**2
         # half the angle from the lowest point is the amplitude; it starts at phi_0 - pi, seen along the motion
         start = ellipkinc(0.5 * (sense * self.phi_0 - math.pi), m)
         turns = 0.5 * bottom * times + start
-        half_turns = np.round(turns / (2.0 * ellipk(m)))  # the amplitude grows by pi in every 2 K
+        half_turns = np.round(
+            turns / (2.0 * ellipk(m))
+        )  # the amplitude grows by pi in every 2 K
         _, _, dn, amplitude = ellipj(turns - half_turns * 2.0 * ellipk(m), m)
-        return sense * (2.0 * (amplitude + math.pi * half_turns) + math.pi), sense * bottom * dn
+        return sense * (
+            2.0 * (amplitude + math.pi * half_turns) + math.pi
+        ), sense * bottom * dn
 
 
 def make_pendulum(scene: Scene) -> Pendulum | None:
     """Give the pendulum that the scene is, or None; it must turn over, or none of this is an answer."""
     d, a, b, c = scene.linkage.lengths
     effects = scene.effects
-    if not (a == c and b == d and scene.motion.through == "follow" and not scene.loads and len(effects) == 1):
+    if not (
+        a == c
+        and b == d
+        and scene.motion.through == "follow"
+        and not scene.loads
+        and len(effects) == 1
+    ):
         return None
     down = effects[0]
-    if not (isinstance(down, Gravity) and math.isclose(down.angle, -math.pi / 2) and scene.motion.omega_2):
+    if not (
+        isinstance(down, Gravity)
+        and math.isclose(down.angle, -math.pi / 2)
+        and scene.motion.omega_2
+    ):
         return None
     J = W = 0.0
     for number in MOVING_BARS:
@@ -96,7 +125,11 @@ def make_pendulum(scene: Scene) -> Pendulum | None:
         r, phi = bar.mass_centre
         if phi != 0.0:
             return None
-        J += bar.mass * a * a if number == 3 else bar.moment_of_inertia + bar.mass * r * r
+        J += (
+            bar.mass * a * a
+            if number == 3
+            else bar.moment_of_inertia + bar.mass * r * r
+        )
         W += bar.mass * down.magnitude * (a if number == 3 else r)
     phi_0 = float(np.asarray(scene.motion.theta_2)) - math.pi / 2
     pendulum = Pendulum(J, W, phi_0, scene.motion.omega_2)
@@ -121,24 +154,32 @@ def check_released(question: Question) -> Iterator[Row]:
         phi, rate = pendulum.motion(times)
         truth = _Truth(phi + math.pi / 2, rate)
         none = np.zeros(len(solution))
-        ours = ReleasedAnswer("formulas", "exact", solution.theta_2, solution.omega_2, none, none)
+        ours = ReleasedAnswer(
+            "formulas", "exact", solution.theta_2, solution.omega_2, none, none
+        )
         yield from _make_rows(question, ours, None, truth)
 
     def rows(start: Callable[[float], Any], longest: float) -> list[Row]:
         pairs = math.ceil(free.duration / free.steps / (2.0 * longest) - 1e-6)
-        step = free.duration / free.steps / (2.0 * pairs)  # two of them, or more, from one instant to the next
+        step = (
+            free.duration / free.steps / (2.0 * pairs)
+        )  # two of them, or more, from one instant to the next
         begin = time.perf_counter()
         fine = start(step).release(scene, times)
         seconds = time.perf_counter() - begin
         coarse = None if fine.refusal else start(2.0 * step).release(scene, times)
-        question.timings.append(Timing(name, fine.engine, fine.setting, len(times), seconds))
+        question.timings.append(
+            Timing(name, fine.engine, fine.setting, len(times), seconds)
+        )
         if fine.refusal is not None:
             question.left_out.append(f"{fine.engine}: {fine.refusal}")
         return _make_rows(question, fine, coarse, truth)
 
     for engine in question.engines:
         if isinstance(engine, Guest) and engine.releases:
-            yield from question.attempt(partial(rows, engine.at_step, LONGEST_STEP), engine.name)
+            yield from question.attempt(
+                partial(rows, engine.at_step, LONGEST_STEP), engine.name
+            )
     for adapter, (start, longest, library) in FORWARD.items():
         if reason := find_missing(library):
             question.left_out.append(f"{adapter}: {reason}")
@@ -153,38 +194,81 @@ def _compare_forces(question: Question) -> Iterator[Row]:
     """
     name, scene, solution = question.name, question.scene, question.solution
     none = solution.torque if solution.drive is None else solution.drive_force
-    assert solution.omega_2 is not None and solution.alpha_2 is not None and none is not None
+    assert (
+        solution.omega_2 is not None
+        and solution.alpha_2 is not None
+        and none is not None
+    )
     what = "a released linkage has no drive"
-    yield Row.judged((name, FORMULAS, "exact"), "torque", np.abs(none), 0.0, what, solution.theta_2)
-    held = replace(scene, motion=scene.motion.replace(free=None, acceleration=0.0), drive_bar=2, drive=None)
-    command = Command(solution.theta_2, solution.branch, solution.omega_2, solution.alpha_2)
+    yield Row.judged(
+        (name, FORMULAS, "exact"), "torque", np.abs(none), 0.0, what, solution.theta_2
+    )
+    held = replace(
+        scene,
+        motion=scene.motion.replace(free=None, acceleration=0.0),
+        drive_bar=2,
+        drive=None,
+    )
+    command = Command(
+        solution.theta_2, solution.branch, solution.omega_2, solution.alpha_2
+    )
     driven_ones = [
         (
-            Question(name, prescribed, select_positions(command, indices), output=question.output),
+            Question(
+                name,
+                prescribed,
+                select_positions(command, indices),
+                output=question.output,
+            ),
             take_member(solution, indices),
         )
         for prescribed, indices in _prescribe(held, command)
     ]
     for engine in question.engines:
-        if engine.tolerance == EQUIVALENCE and "theta_3" in engine.answers and not engine.missing():
+        if (
+            engine.tolerance == EQUIVALENCE
+            and "theta_3" in engine.answers
+            and not engine.missing()
+        ):
             rows = partial(_keep_worst_forces, engine, driven_ones)
             yield from question.attempt(rows, engine.name, "forces")
 
 
-def _keep_worst_forces(engine: Engine, driven: list[tuple[Question, Solution]]) -> list[Row]:
+def _keep_worst_forces(
+    engine: Engine, driven: list[tuple[Question, Solution]]
+) -> list[Row]:
     """Compare what one engine answers to each part of the motion, and keep the worst row of each quantity."""
-    return keep_worst(row for question, solution in driven for row in _compare_forces_by(engine, question, solution))
+    return keep_worst(
+        row
+        for question, solution in driven
+        for row in _compare_forces_by(engine, question, solution)
+    )
 
 
-def _compare_forces_by(engine: Engine, driven: Question, solution: Solution) -> list[Row]:
+def _compare_forces_by(
+    engine: Engine, driven: Question, solution: Solution
+) -> list[Row]:
     """Compare what one engine answers to the motion as a prescribed one."""
     answer, scene = driven.answer(engine), driven.scene
     if answer.refusal is not None:
-        return [Row.unmeasured(driven.name, answer.engine, answer.setting, "all", REFUSES, answer.refusal)]
+        return [
+            Row.unmeasured(
+                driven.name,
+                answer.engine,
+                answer.setting,
+                "all",
+                REFUSES,
+                answer.refusal,
+            )
+        ]
     reference = make_reference(scene, answer)
     assert reference is not None
     # the formulas are conditioned by the angle that is independent there, an engine by theta_2
-    conditioned = replace(solution, condition=reference.condition, drive_condition=reference.drive_condition)
+    conditioned = replace(
+        solution,
+        condition=reference.condition,
+        drive_condition=reference.drive_condition,
+    )
     conditioned.drive_bar, conditioned.at = 2, driven.at
     names = tuple(name for name in UNKNOWNS if name in engine.answers)
     # nor are theta_2, omega_2 and alpha_2 more than that angle's, rounded: what that costs there is computed
@@ -193,29 +277,45 @@ def _compare_forces_by(engine: Engine, driven: Question, solution: Solution) -> 
     return [row for row in rows if row.quantity != "undecided"]
 
 
-def _prescribe(scene: Scene, command: Command) -> Iterator[tuple[Scene, NDArray[np.intp]]]:
+def _prescribe(
+    scene: Scene, command: Command
+) -> Iterator[tuple[Scene, NDArray[np.intp]]]:
     """Prescribe the instants at which the linkage moves, and each standstill with the couples of dry friction there.
 
     An engine has no friction at rest. A standstill that lasts is held: every pin takes the same part of its torque, and
     no more than all of it; one that ends begins to move against the whole torque.
     """
     assert command.omega_2 is not None
-    friction = next((effect for effect in scene.effects if isinstance(effect, Friction)), None)
-    resting = np.flatnonzero(command.omega_2 == 0.0) if friction is not None else np.empty(0, dtype=int)
+    friction = next(
+        (effect for effect in scene.effects if isinstance(effect, Friction)), None
+    )
+    resting = (
+        np.flatnonzero(command.omega_2 == 0.0)
+        if friction is not None
+        else np.empty(0, dtype=int)
+    )
     moving = np.setdiff1d(np.arange(len(command.theta_2)), resting)
     if len(moving):
         yield scene, moving
     if friction is None:
         return
-    bare = replace(scene, effects=tuple(effect for effect in scene.effects if effect is not friction))
+    bare = replace(
+        scene,
+        effects=tuple(effect for effect in scene.effects if effect is not friction),
+    )
     numbers = np.stack((command.theta_2, command.alpha_2), axis=1)[resting]
     for first in resting[np.unique(numbers, axis=0, return_index=True)[1]].tolist():
         index = np.array([first])
         here = select_positions(command, index)
-        needed, begins = FreeBody().answer(bare, here).quantities["torque"][0], float(np.sign(here.alpha_2)[0])
+        needed, begins = (
+            FreeBody().answer(bare, here).quantities["torque"][0],
+            float(np.sign(here.alpha_2)[0]),
+        )
         turning = FreeBody().answer(bare, here._replace(speed=np.ones(1))).quantities
         rate = {1: 0.0, 2: 1.0, 3: turning["omega_3"][0], 4: turning["omega_4"][0]}
-        slips = {pin: rate[PINS[pin][1]] - rate[PINS[pin][0]] for pin, _ in friction.torques}
+        slips = {
+            pin: rate[PINS[pin][1]] - rate[PINS[pin][0]] for pin, _ in friction.torques
+        }
         most = sum(torque * abs(slips[pin]) for pin, torque in friction.torques)
         part = -begins or float(np.clip(needed / most, -1.0, 1.0))
         loads = [
@@ -235,18 +335,36 @@ class _Truth(NamedTuple):
     stopped_at: float | None = None
 
 
-def _make_rows(question: Question, fine: ReleasedAnswer, coarse: ReleasedAnswer | None, truth: _Truth) -> list[Row]:
-    free, through, n = question.scene.motion.free, question.scene.motion.through, len(truth.theta_2)
+def _make_rows(
+    question: Question,
+    fine: ReleasedAnswer,
+    coarse: ReleasedAnswer | None,
+    truth: _Truth,
+) -> list[Row]:
+    free, through, n = (
+        question.scene.motion.free,
+        question.scene.motion.through,
+        len(truth.theta_2),
+    )
     assert free is not None
     who = (question.name, fine.engine, fine.setting)
     if fine.refusal is not None:
         return [Row.unmeasured(*who, "all", REFUSES, fine.refusal)]
     if len(fine.theta_2) < n:
-        return [Row.unmeasured(*who, "all", FAILS, f"it stopped after {len(fine.theta_2)} of {n} instants")]
+        return [
+            Row.unmeasured(
+                *who,
+                "all",
+                FAILS,
+                f"it stopped after {len(fine.theta_2)} of {n} instants",
+            )
+        ]
 
     def numbers(answer: ReleasedAnswer) -> dict[str, Array]:
         series = {"theta_2": answer.theta_2[:n], "omega_2": answer.omega_2[:n]}
-        if coarse is not None:  # the formulas integrate the energy equation itself; their drift is part of their test
+        if (
+            coarse is not None
+        ):  # the formulas integrate the energy equation itself; their drift is part of their test
             series["energy"] = answer.energy[:n] - answer.energy[0]
             if through == "sign":
                 series["stopped_at"] = _find_end(answer.stopped_at, free.duration)
@@ -260,25 +378,43 @@ def _make_rows(question: Question, fine: ReleasedAnswer, coarse: ReleasedAnswer 
     }
     rows = []
     for name, values in numbers(fine).items():
-        right, size = right_and_size[name][0], replace_zero_size(np.array(right_and_size[name][1]))
+        right, size = (
+            right_and_size[name][0],
+            replace_zero_size(np.array(right_and_size[name][1])),
+        )
         error, expected = divide(np.abs(values - right), size), 0.0
         if coarse is not None:
             coarser = numbers(coarse)[name]
             alike = len(coarser) == len(values)
-            expected = float(divide(np.abs(values - coarser).max(), size)) if alike else math.nan
+            expected = (
+                float(divide(np.abs(values - coarser).max(), size))
+                if alike
+                else math.nan
+            )
         index = find_worst(error)
         full = FULL[name] * max(1.0, free.duration / UNIT)
         allowed = max(full, TIMES_PREDICTED * expected)
         if error[index] <= full:
             verdict, reason = AGREES, f"a free motion of {free.duration:g} s"
         elif not (error[index] <= allowed and math.isfinite(expected)):
-            verdict, reason = FAILS, f"{error[index]:.1e} where {expected:.1e} was predicted"
+            verdict, reason = (
+                FAILS,
+                f"{error[index]:.1e} where {expected:.1e} was predicted",
+            )
         elif expected >= 1.0:
-            verdict, reason = UNDECIDED, f"an error of {expected:.1e} of the value is predicted"
+            verdict, reason = (
+                UNDECIDED,
+                f"an error of {expected:.1e} of the value is predicted",
+            )
         else:
-            verdict, reason = DEGRADED, f"{error[index]:.1e} of {expected:.1e} predicted from twice the step"
+            verdict, reason = (
+                DEGRADED,
+                f"{error[index]:.1e} of {expected:.1e} predicted from twice the step",
+            )
         place = float(fine.theta_2[n - 1 if name == "stopped_at" else index])
-        rows.append(Row(*who, name, float(error[index]), allowed, verdict, reason, place, 1.0))
+        rows.append(
+            Row(*who, name, float(error[index]), allowed, verdict, reason, place, 1.0)
+        )
     return rows
 
 

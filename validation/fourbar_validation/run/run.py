@@ -17,7 +17,13 @@ from fourbar_validation.compare.tolerance import IDENTITY
 from fourbar_validation.engines.guests import Guest, list_numbers
 from fourbar_validation.engines.mujoco.picture import render_pictures
 from fourbar_validation.engines.registry import Engine
-from fourbar_validation.regression.record import ABOUT, COLUMNS, TABLE, describe_run, write_about
+from fourbar_validation.regression.record import (
+    ABOUT,
+    COLUMNS,
+    TABLE,
+    describe_run,
+    write_about,
+)
 from fourbar_validation.regression.scenes import describe_scenes
 from fourbar_validation.report.html import write_html, write_markdown
 from fourbar_validation.report.machine import name_code
@@ -88,7 +94,10 @@ def run(
     draw_at_once = options.drawn and len(suite) - without_pictures <= PICTURED
     simulated = any(engine.through_time for engine in engines)
     size = max(CHUNK[draw_at_once or simulated], math.ceil(len(suite) / MOST_PARTS))
-    chunks = [range(start, min(start + size, len(suite))) for start in range(0, len(suite), size)]
+    chunks = [
+        range(start, min(start + size, len(suite)))
+        for start in range(0, len(suite), size)
+    ]
     identity = {
         "scenes": suite.fingerprint(),
         "engines": [engine.fingerprint() for engine in engines],
@@ -97,9 +106,13 @@ def run(
         "sample": options.sample,
     }
     summary = Summary()
-    summary.tolerances = list(dict.fromkeys((IDENTITY, *(engine.tolerance for engine in engines))))
+    summary.tolerances = list(
+        dict.fromkeys((IDENTITY, *(engine.tolerance for engine in engines)))
+    )
     summary.missing = missing
-    summary.stated = {guest.name: guest.version for guest in engines if isinstance(guest, Guest)}
+    summary.stated = {
+        guest.name: guest.version for guest in engines if isinstance(guest, Guest)
+    }
     with Store(out, identity, OUTCOME).held() as store:
         for name in OUTCOME:
             (out / name).unlink(missing_ok=True)
@@ -108,52 +121,90 @@ def run(
             progress.note(line)
         progress.advance(JUDGING, sum(len(chunks[number]) for number in done))
         todo = (number for number in range(len(chunks)) if number not in done)
-        jobs = ((n, pool.make_jobs(suite, chunks[n], engines, draw_at_once, options.sample)) for n in todo)
+        jobs = (
+            (n, pool.make_jobs(suite, chunks[n], engines, draw_at_once, options.sample))
+            for n in todo
+        )
         limit = pool.find_time_limit(suite, engines)
         for number, records in pool.judge_chunks(jobs, limit, options.workers):
             store.put(number, [record.kept_all() for record in records])
             progress.advance(JUDGING, len(records))
         first_lines = _collect(suite, chunks, store, summary, progress)
-        pictured = {record.name for record in summary.pictured} if options.drawn else set()
-        shown = [index for index in range(len(suite)) if make_plain(suite.name(index)) in pictured]
+        pictured = (
+            {record.name for record in summary.pictured} if options.drawn else set()
+        )
+        shown = [
+            index
+            for index in range(len(suite))
+            if make_plain(suite.name(index)) in pictured
+        ]
         if shown and not draw_at_once:
-            jobs = ((index, [_redraw(suite, index, summary, engines)]) for index in shown)
+            jobs = (
+                (index, [_redraw(suite, index, summary, engines)]) for index in shown
+            )
             for _, records in pool.judge_chunks(jobs, limit, options.workers):
                 summary.picture(*records)
                 progress.advance(DRAWING, 1)
-        write_about(describe_run(engines, suite.fingerprint(), describe_scenes(suite)), out)
+        write_about(
+            describe_run(engines, suite.fingerprint(), describe_scenes(suite)), out
+        )
         write_text(out / "report.md", write_markdown(summary))
         generated = any(engine.generated for engine in engines)
         models, why_not = picture_models(suite, shown) if generated else ({}, "")
-        sections = collect_sections(read_columns(out / COLUMNS) if isinstance(suite, Hard) else None, out)
+        sections = collect_sections(
+            read_columns(out / COLUMNS) if isinstance(suite, Hard) else None, out
+        )
         NUMBERS.update(list_numbers(engines))
-        page = write_html(summary, first_lines, pictures=models, no_pictures=why_not, sections=sections)
+        page = write_html(
+            summary,
+            first_lines,
+            pictures=models,
+            no_pictures=why_not,
+            sections=sections,
+        )
         write_text(out / "report.html", page)
         store.finish()
     return summary
 
 
 def _collect(
-    suite: Suite, chunks: Sequence[range], store: Store, summary: Summary, progress: Progress
+    suite: Suite,
+    chunks: Sequence[range],
+    store: Store,
+    summary: Summary,
+    progress: Progress,
 ) -> dict[str, int]:
     """Write the tables from the parts of the store, add each scene to the summary; return each scene's first line."""
     out = store.folder
-    with Columns(out) as columns, draft_file(out / OUTPUT) as output, draft_file(out / "timings.csv") as times:
+    with (
+        Columns(out) as columns,
+        draft_file(out / OUTPUT) as output,
+        draft_file(out / "timings.csv") as times,
+    ):
         times.write(write_csv(TIMINGS, []))
         for number, scenes in enumerate(chunks):
             records = [Record.restore(kept) for kept in store.read(number)]
             for scene, record in zip(scenes, records, strict=True):
                 name = make_plain(suite.name(scene))
-                record.rows = record.rows or [Row.unmeasured(name, FORMULAS, "", "all", FAILS, "nothing was judged")]
+                record.rows = record.rows or [
+                    Row.unmeasured(
+                        name, FORMULAS, "", "all", FAILS, "nothing was judged"
+                    )
+                ]
                 summary.add(record)
                 times.write(write_csv((), list_timings(record)))
-                output.writelines(f"{record.name}: {engine}\n{text}\n\n" for engine, text in record.output.items())
+                output.writelines(
+                    f"{record.name}: {engine}\n{text}\n\n"
+                    for engine, text in record.output.items()
+                )
             columns.add([row for record in records for row in record.rows])
             progress.advance(COLLECTING, len(scenes))
     return columns.first_lines
 
 
-def _redraw(suite: Suite, scene: int, summary: Summary, engines: Sequence[Engine]) -> pool.Job:
+def _redraw(
+    suite: Suite, scene: int, summary: Summary, engines: Sequence[Engine]
+) -> pool.Job:
     """Make the job of judging a scene once more, now with its pictures: its answers were not kept.
 
     An engine that broke down, or hung, in the scene is not started in it again.
@@ -161,7 +212,9 @@ def _redraw(suite: Suite, scene: int, summary: Summary, engines: Sequence[Engine
     name = make_plain(suite.name(scene))
     rows = next(record.rows for record in summary.pictured if record.name == name)
     broken = {row.engine for row in rows if row.failed and row.quantity == "all"}
-    (job,) = pool.make_jobs(suite, [scene], [one for one in engines if one.name not in broken], draw=True)
+    (job,) = pool.make_jobs(
+        suite, [scene], [one for one in engines if one.name not in broken], draw=True
+    )
     return job
 
 
@@ -171,7 +224,9 @@ def picture_models(suite: Suite, scenes: Iterable[int]) -> tuple[dict[str, str],
     for index in scenes:
         try:
             texts[suite.name(index)] = write_mjcf(suite.scene(index))
-        except FourBarError:  # bars without mass, a motion law: the engines' own rows say so
+        except (
+            FourBarError
+        ):  # bars without mass, a motion law: the engines' own rows say so
             continue
     return render_pictures(texts)
 

@@ -26,8 +26,14 @@ class RunningError(FourBarError):
 class Store:
     """The parts of one run in its folder: `identity` is what they depend on, `outcome` the files it ends with."""
 
-    def __init__(self, folder: Path, identity: dict[str, Any], outcome: Sequence[str] = ()) -> None:
-        self.folder, self.parts, self._written = folder, folder / "parts", ("lock", "run.json", *outcome)
+    def __init__(
+        self, folder: Path, identity: dict[str, Any], outcome: Sequence[str] = ()
+    ) -> None:
+        self.folder, self.parts, self._written = (
+            folder,
+            folder / "parts",
+            ("lock", "run.json", *outcome),
+        )
         self._identity = json.dumps(identity, indent=1, sort_keys=True) + "\n"
         self._run = hashlib.sha256(self._identity.encode()).hexdigest()
         self.notes: list[str] = []
@@ -42,12 +48,18 @@ class Store:
         for name in self._written:
             require_file(self.folder / name)
         if self.parts.exists() and not self.parts.is_dir():
-            raise InputError("--out", str(self.parts), "must be a folder, in which a run keeps its parts")
+            raise InputError(
+                "--out",
+                str(self.parts),
+                "must be a folder, in which a run keeps its parts",
+            )
         lock = FileLock(self.folder / "lock", timeout=0)
         try:
             lock.acquire()
         except Timeout:
-            raise RunningError(f"{self.folder}: another run is writing into this folder") from None
+            raise RunningError(
+                f"{self.folder}: another run is writing into this folder"
+            ) from None
         try:
             self._begin()
             yield self
@@ -59,7 +71,9 @@ class Store:
         same = marker.is_file() and marker.read_text(encoding="utf-8") == self._identity
         if not same:
             if marker.is_file() and self.parts.is_dir() and any(self.parts.iterdir()):
-                self.notes.append(f"made again: the parts of another run ({self._name_difference(marker)})")
+                self.notes.append(
+                    f"made again: the parts of another run ({self._name_difference(marker)})"
+                )
             marker.unlink(missing_ok=True)
             shutil.rmtree(self.parts, ignore_errors=True)
         self.parts.mkdir(exist_ok=True)
@@ -71,8 +85,15 @@ class Store:
     def _name_difference(self, marker: Path) -> str:
         """Name what the earlier run differs in from this one."""
         try:
-            before, now = json.loads(marker.read_text(encoding="utf-8")), json.loads(self._identity)
-            return ", ".join(name for name in sorted({*before, *now}) if before.get(name) != now.get(name))
+            before, now = (
+                json.loads(marker.read_text(encoding="utf-8")),
+                json.loads(self._identity),
+            )
+            return ", ".join(
+                name
+                for name in sorted({*before, *now})
+                if before.get(name) != now.get(name)
+            )
         except (AttributeError, TypeError, ValueError):
             return "its run.json is damaged"
 
@@ -84,14 +105,20 @@ class Store:
                 self._unpack(path)
                 done.add(int(path.name))
             except ValueError as error:
-                self.notes.append(f"made again: {path.parent.name}/{path.name}: {error}")
+                self.notes.append(
+                    f"made again: {path.parent.name}/{path.name}: {error}"
+                )
                 _remove(path)
         return done
 
     def put(self, chunk: int, results: Sequence[Any]) -> None:
         """Write a finished chunk, its results as JSON has them."""
         packed = gzip.compress("\n".join(map(json.dumps, results)).encode(), 1, mtime=0)
-        head = {"chunk": chunk, "run": self._run, "sha256": hashlib.sha256(packed).hexdigest()}
+        head = {
+            "chunk": chunk,
+            "run": self._run,
+            "sha256": hashlib.sha256(packed).hexdigest(),
+        }
         write_bytes(self._find_path(chunk), json.dumps(head).encode() + b"\n" + packed)
 
     def _find_path(self, chunk: int) -> Path:
@@ -120,7 +147,9 @@ class Store:
         try:
             lines = gzip.decompress(self._unpack(path)).decode().splitlines()
         except (ValueError, FileNotFoundError) as error:
-            raise DependencyError(f"{path}: {error}; run it again, and this part is made again") from None
+            raise DependencyError(
+                f"{path}: {error}; run it again, and this part is made again"
+            ) from None
         return [json.loads(line) for line in lines]
 
     def finish(self) -> None:

@@ -13,7 +13,13 @@ from fourbar.effects import Gravity, Load
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, Bar, FourBar
 from fourbar.scene import Scene
 from fourbar.scene.motion import BRANCH_NAMES, Free, Motion, Sweep
-from fourbar_validation.scenes.random import DrawnType, Ranges, draw_bars, draw_lengths, draw_uniform
+from fourbar_validation.scenes.random import (
+    DrawnType,
+    Ranges,
+    draw_bars,
+    draw_lengths,
+    draw_uniform,
+)
 
 Lengths = tuple[float, float, float, float]
 """(ground, input, coupler, output), m."""
@@ -39,7 +45,9 @@ CHANGE = tuple(10.0**-k for k in range(1, 9))
 
 def draw_linkage(kind: DrawnType, seed: int) -> Lengths:
     """Draw random lengths of a type, from its seed alone."""
-    return draw_lengths(np.random.default_rng([seed, list(DrawnType).index(kind)]), kind)
+    return draw_lengths(
+        np.random.default_rng([seed, list(DrawnType).index(kind)]), kind
+    )
 
 
 def dress(lengths: Lengths, seed: int = 0) -> Scene:
@@ -49,7 +57,11 @@ def dress(lengths: Lengths, seed: int = 0) -> Scene:
     bars = draw_bars(rng, moving, BARS)
     weight = 9.81 * sum(bar.mass for bar in bars)
     loads = (
-        Load(4, (weight, float(rng.uniform(-3, 3))), (0.2 * moving[2], float(rng.uniform(-3, 3)))),
+        Load(
+            4,
+            (weight, float(rng.uniform(-3, 3))),
+            (0.2 * moving[2], float(rng.uniform(-3, 3))),
+        ),
         Load(3, moment=0.1 * weight * moving[1]),
     )
     linkage = FourBar(d, bars[0], bars[1], bars[2], float(rng.uniform(-1, 1)))
@@ -76,7 +88,8 @@ def replace_bars(scene: Scene, **bars: Bar) -> Scene:
 def _compute_corners(side: float, second_side: float, opposite: float) -> list[float]:
     """Compute the angles, of either sign, between two sides of a triangle by its third side, if it closes."""
     cosine = (
-        (side * side + second_side * second_side - opposite * opposite) / (2 * side * second_side)
+        (side * side + second_side * second_side - opposite * opposite)
+        / (2 * side * second_side)
         if second_side
         else 2.0
     )
@@ -131,17 +144,29 @@ def toggle(*, distances: tuple[float, ...] = TOGGLE, seeds: range = range(2)) ->
                 beyond = psi - inward * np.array(distances)
                 for branch, name in BRANCH_NAMES.items():
                     label = f"{kind.value} {seed} {'stretched' if stretched else 'folded'} {name}"
-                    yield label, set_angles(dress(lengths, seed), [*inside, *beyond[::-1]], branch)
+                    yield (
+                        label,
+                        set_angles(
+                            dress(lengths, seed), [*inside, *beyond[::-1]], branch
+                        ),
+                    )
 
 
-def approach_poles(*, bar: int, distances: tuple[float, ...] = POLE, seeds: range = range(2)) -> Scenes:
+def approach_poles(
+    *, bar: int, distances: tuple[float, ...] = POLE, seeds: range = range(2)
+) -> Scenes:
     """Approach the position where the driven bar 3 or 4 stands still, from both sides."""
-    offsets = np.array([*(-x for x in (*REGULAR, *distances)), *distances[::-1], *REGULAR[::-1]])
+    offsets = np.array(
+        [*(-x for x in (*REGULAR, *distances)), *distances[::-1], *REGULAR[::-1]]
+    )
     for seed in seeds:
         lengths = draw_linkage(CRANK, seed)
         poles = find_parallel_2_4(lengths) if bar == 3 else find_collinear_2_3(lengths)
         for number, (psi, branch) in enumerate(poles[:3]):
-            yield f"{seed} {number}", set_angles(dress(lengths, seed), psi + offsets, branch, drive_bar=bar)
+            yield (
+                f"{seed} {number}",
+                set_angles(dress(lengths, seed), psi + offsets, branch, drive_bar=bar),
+            )
 
 
 def driven_output(*, steps: int = 180, seeds: range = range(2)) -> Scenes:
@@ -164,11 +189,16 @@ CHANGE_POINTS: dict[str, tuple[Lengths, int, tuple[float, ...]]] = {
 
 def approach_change_point(*, distances: tuple[float, ...] = CHANGE) -> Scenes:
     """Close to a change point, on both sides and both branches."""
-    offsets = np.array([*(-x for x in (*REGULAR, *distances)), *distances[::-1], *REGULAR[::-1]])
+    offsets = np.array(
+        [*(-x for x in (*REGULAR, *distances)), *distances[::-1], *REGULAR[::-1]]
+    )
     for kind, (lengths, _, points) in CHANGE_POINTS.items():
         for psi in points:
             for branch, name in BRANCH_NAMES.items():
-                yield f"{kind} {math.degrees(psi):.0f} {name}", set_angles(dress(lengths), psi + offsets, branch)
+                yield (
+                    f"{kind} {math.degrees(psi):.0f} {name}",
+                    set_angles(dress(lengths), psi + offsets, branch),
+                )
 
 
 def sweep_change_point(*, steps: int = 73) -> Scenes:
@@ -177,23 +207,41 @@ def sweep_change_point(*, steps: int = 73) -> Scenes:
         for through in ("sign", "follow"):
             scene = dress(lengths)
             start = scene.linkage.ground_angle + 0.3
-            motion = Motion(Sweep(start, start + 2 * math.pi, steps), 3.0, 0.0, branch, through)
+            motion = Motion(
+                Sweep(start, start + 2 * math.pi, steps), 3.0, 0.0, branch, through
+            )
             yield f"{kind} {through}", replace(scene, motion=motion)
 
 
-def miss_grashof(*, gaps: tuple[float, ...] = (1e-3, 1e-6, 1e-9, 1e-12), steps: int = 60) -> Scenes:
+def miss_grashof(
+    *, gaps: tuple[float, ...] = (1e-3, 1e-6, 1e-9, 1e-12), steps: int = 60
+) -> Scenes:
     """Miss s + l = p + q by a hair on either side: the sweep passes close to where it would change."""
     for gap in gaps:
         for sign in (1.0, -1.0):
             d, a, b = 0.4, 0.1, 0.25
             scene = dress((d, a, b, d + a - b + sign * gap))
-            sweep = Sweep(scene.linkage.ground_angle, scene.linkage.ground_angle + 2 * math.pi, steps)
-            yield f"{sign * gap:+.0e}", replace(scene, motion=scene.motion.replace(angle=sweep, acceleration=0.0))
+            sweep = Sweep(
+                scene.linkage.ground_angle,
+                scene.linkage.ground_angle + 2 * math.pi,
+                steps,
+            )
+            yield (
+                f"{sign * gap:+.0e}",
+                replace(
+                    scene, motion=scene.motion.replace(angle=sweep, acceleration=0.0)
+                ),
+            )
 
 
 def sweep_turn(scene: Scene, steps: int = 36) -> Scene:
     """Sweep through one turn of the input."""
-    return replace(scene, motion=scene.motion.replace(angle=Sweep(0.1, 0.1 + 2 * math.pi, steps), acceleration=0.0))
+    return replace(
+        scene,
+        motion=scene.motion.replace(
+            angle=Sweep(0.1, 0.1 + 2 * math.pi, steps), acceleration=0.0
+        ),
+    )
 
 
 def shorten_crank(*, exponents: range = range(-6, 0)) -> Scenes:
@@ -207,7 +255,9 @@ def vary_mass_ratio(*, exponents: tuple[int, ...] = (-6, -3, 3, 6)) -> Scenes:
     base = sweep_turn(dress(PLAIN))
     for name, bar in list_moving(base):
         for k in exponents:
-            heavy = replace(bar, mass=bar.mass * 10.0**k, inertia=bar.moment_of_inertia * 10.0**k)
+            heavy = replace(
+                bar, mass=bar.mass * 10.0**k, inertia=bar.moment_of_inertia * 10.0**k
+            )
             yield f"{name} 1e{k:+d}", replace_bars(base, **{name: heavy})
 
 
@@ -215,9 +265,17 @@ def remove_inertia() -> Scenes:
     """Take bars without rotational inertia, without mass, and loads only on massless bars."""
     base = sweep_turn(dress(PLAIN))
     for name, bar in list_moving(base):
-        yield f"{name} point mass", replace_bars(base, **{name: replace(bar, inertia=0.0)})
+        yield (
+            f"{name} point mass",
+            replace_bars(base, **{name: replace(bar, inertia=0.0)}),
+        )
         yield f"{name} massless", replace_bars(base, **{name: Bar(bar.length)})
-    yield "all massless", replace_bars(base, **{name: Bar(bar.length) for name, bar in list_moving(base)})
+    yield (
+        "all massless",
+        replace_bars(
+            base, **{name: Bar(bar.length) for name, bar in list_moving(base)}
+        ),
+    )
 
 
 def move_centres_out(*, times: tuple[float, ...] = (3.0, 100.0, 1e4)) -> Scenes:
@@ -225,7 +283,12 @@ def move_centres_out(*, times: tuple[float, ...] = (3.0, 100.0, 1e4)) -> Scenes:
     base = sweep_turn(dress(PLAIN))
     for name, bar in list_moving(base):
         for k in times:
-            yield f"{name} {k:g}", replace_bars(base, **{name: replace(bar, centre=(k * bar.length, 2.0))})
+            yield (
+                f"{name} {k:g}",
+                replace_bars(
+                    base, **{name: replace(bar, centre=(k * bar.length, 2.0))}
+                ),
+            )
 
 
 def scale_sizes(*, exponents: range = range(-6, 7, 2)) -> Scenes:
@@ -239,7 +302,10 @@ def scale_speeds(*, exponents: tuple[int, ...] = (-6, -3, 0, 3, 6)) -> Scenes:
     base = sweep_turn(dress(PLAIN))
     for k in exponents:
         for sign, name in ((1.0, "+"), (-1.0, "-")):
-            yield f"{name}1e{k:+d}", replace(base, motion=base.motion.replace(speed=sign * 10.0**k))
+            yield (
+                f"{name}1e{k:+d}",
+                replace(base, motion=base.motion.replace(speed=sign * 10.0**k)),
+            )
 
 
 def scale_loads(*, exponents: tuple[int, ...] = (-9, -3, 3, 9)) -> Scenes:
@@ -248,12 +314,16 @@ def scale_loads(*, exponents: tuple[int, ...] = (-9, -3, 3, 9)) -> Scenes:
     for k in exponents:
         scaled = []
         for load in base.loads:
-            force = None if load.force is None else (load.force[0] * 10.0**k, load.force[1])
+            force = (
+                None if load.force is None else (load.force[0] * 10.0**k, load.force[1])
+            )
             scaled.append(replace(load, force=force, moment=load.moment * 10.0**k))
         yield f"1e{k:+d}", replace(base, loads=tuple(scaled))
 
 
-def sweep_out_and_back(*, beyond: float = 0.5, steps: int = 40, seeds: range = range(2)) -> Scenes:
+def sweep_out_and_back(
+    *, beyond: float = 0.5, steps: int = 40, seeds: range = range(2)
+) -> Scenes:
     """Sweep out of the range in which the linkage assembles, and back."""
     for seed in seeds:
         lengths = draw_linkage(ROCKER, seed)
@@ -261,7 +331,10 @@ def sweep_out_and_back(*, beyond: float = 0.5, steps: int = 40, seeds: range = r
         outward = 1.0 if stretched else -1.0
         out = np.linspace(psi - outward * 0.6, psi + outward * beyond, steps)
         for branch, name in BRANCH_NAMES.items():
-            yield f"{seed} {name}", set_angles(dress(lengths, seed), [*out, *out[::-1]], branch)
+            yield (
+                f"{seed} {name}",
+                set_angles(dress(lengths, seed), [*out, *out[::-1]], branch),
+            )
 
 
 def drive_thesis_to_limits(*, steps: int = 120) -> Scenes:
@@ -270,11 +343,15 @@ def drive_thesis_to_limits(*, steps: int = 120) -> Scenes:
     linkage = FourBar(0.20, *bars, math.radians(45.0))
     (psi, _), *_ = find_collinear_3_4(linkage.lengths)
     for branch, name in BRANCH_NAMES.items():
-        sweep = Sweep(linkage.ground_angle + psi, linkage.ground_angle + 2 * math.pi - psi, steps)
+        sweep = Sweep(
+            linkage.ground_angle + psi, linkage.ground_angle + 2 * math.pi - psi, steps
+        )
         yield name, Scene(linkage, Motion(sweep, 0.2244, branch=branch), 4)
 
 
-def released(*, durations: tuple[float, ...] = (10.0, 100.0), steps: int = 100) -> Scenes:
+def released(
+    *, durations: tuple[float, ...] = (10.0, 100.0), steps: int = 100
+) -> Scenes:
     """Release IFToMM benchmark A02 with one window: 1 m, 1 kg links, upright, first pin at 1 m/s, gravity 9.81."""
     bar = Bar(1.0, 1.0)
     linkage = FourBar(1.0, bar, bar, bar)
@@ -293,7 +370,9 @@ class Family:
     scenes: Callable[[], Scenes]
 
 
-STATEMENTS = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+STATEMENTS = tomllib.loads(
+    Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
+)
 FAMILIES = tuple(
     Family(name, STATEMENTS[name], scenes)
     for name, scenes in {
@@ -344,6 +423,8 @@ def _make_scenes() -> list[tuple[str, Scene]]:
     scenes = []
     for family in FAMILIES:
         for label, scene in family.scenes():
-            titled = replace(scene, title=f"{family.name}: {label}", source=family.statement)
+            titled = replace(
+                scene, title=f"{family.name}: {label}", source=family.statement
+            )
             scenes.append((f"{family.name} {label}".replace(" ", "-"), titled))
     return sorted(scenes, key=lambda pair: pair[0])

@@ -9,7 +9,17 @@ from typing import Any
 
 import numpy as np
 
-from fourbar.effects import Flywheel, Friction, Gravity, Load, Spring, SpringEnd, Springs, Torsion, Viscous
+from fourbar.effects import (
+    Flywheel,
+    Friction,
+    Gravity,
+    Load,
+    Spring,
+    SpringEnd,
+    Springs,
+    Torsion,
+    Viscous,
+)
 from fourbar.formulas.mobility import choose_range
 from fourbar.linkage import MOVING_BARS, PINS, Bar, FourBar
 from fourbar.scene import Scene
@@ -39,7 +49,11 @@ def draw_product(*draws: Draw) -> Draw:
     return lambda rng: math.prod(draw(rng) for draw in draws)
 
 
-ANY_ANGLE, ANY_PART, EITHER_SIGN = draw_uniform(-math.pi, math.pi), draw_uniform(0.0, 1.0), draw_uniform(-1.0, 1.0)
+ANY_ANGLE, ANY_PART, EITHER_SIGN = (
+    draw_uniform(-math.pi, math.pi),
+    draw_uniform(0.0, 1.0),
+    draw_uniform(-1.0, 1.0),
+)
 ANY_SPEED = draw_decades(-1.0, 2.0)
 
 
@@ -92,7 +106,9 @@ class RandomFamily:
         """Draw a scene."""
         lengths, draw_angles = self.draw_place(rng)
         scene = draw_scene(rng, lengths, self.ranges)
-        return replace(scene, motion=scene.motion.replace(angle=draw_angles(rng, scene.linkage)))
+        return replace(
+            scene, motion=scene.motion.replace(angle=draw_angles(rng, scene.linkage))
+        )
 
 
 def command_angle(psi: float) -> Angles:
@@ -100,7 +116,9 @@ def command_angle(psi: float) -> Angles:
     return lambda _, linkage: linkage.ground_angle + psi
 
 
-def draw_bars(rng: np.random.Generator, lengths: Sequence[float], ranges: Ranges) -> list[Bar]:
+def draw_bars(
+    rng: np.random.Generator, lengths: Sequence[float], ranges: Ranges
+) -> list[Bar]:
     """Draw bars 2, 3, 4 of these lengths (m)."""
     bars = []
     for length in lengths:
@@ -110,18 +128,30 @@ def draw_bars(rng: np.random.Generator, lengths: Sequence[float], ranges: Ranges
     return bars
 
 
-def draw_scene(rng: np.random.Generator, lengths: Sequence[float], ranges: Ranges) -> Scene:
+def draw_scene(
+    rng: np.random.Generator, lengths: Sequence[float], ranges: Ranges
+) -> Scene:
     """Draw a scene on (ground, input, coupler, output), m, at theta_2 = 0."""
     d, *moving = (float(length) for length in lengths)
     bars = draw_bars(rng, moving, ranges)
     linkage = FourBar(d, bars[0], bars[1], bars[2], ranges.ground_angle(rng))
     weight = 9.81 * (math.fsum(bar.mass for bar in bars) or 1.0)
-    loads = tuple(_draw_load(rng, linkage, weight, ranges) for _ in range(int(rng.integers(0, 3))))
+    loads = tuple(
+        _draw_load(rng, linkage, weight, ranges) for _ in range(int(rng.integers(0, 3)))
+    )
     effects: list[Any] = [Gravity()] if rng.random() < ranges.gravity else []
     couple = 0.1 * weight * max(moving)
     for kind, share in ((Viscous, ranges.viscous), (Friction, ranges.friction)):
         if rng.random() < share:
-            effects.append(kind.at(**{pin: couple * float(rng.random()) for pin in PINS if rng.random() < 0.5}))
+            effects.append(
+                kind.at(
+                    **{
+                        pin: couple * float(rng.random())
+                        for pin in PINS
+                        if rng.random() < 0.5
+                    }
+                )
+            )
     effects += _draw_springs(rng, linkage, weight, ranges) if ranges.sprung else []
     omega = float(rng.choice([-1.0, 1.0])) * ranges.speed(rng)
     alpha = float(rng.choice([0.0, omega**2 * ranges.acceleration(rng)]))
@@ -129,7 +159,9 @@ def draw_scene(rng: np.random.Generator, lengths: Sequence[float], ranges: Range
     return Scene(linkage, motion, int(rng.choice(MOVING_BARS)), loads, tuple(effects))
 
 
-def _draw_load(rng: np.random.Generator, linkage: FourBar, weight: float, ranges: Ranges) -> Load:
+def _draw_load(
+    rng: np.random.Generator, linkage: FourBar, weight: float, ranges: Ranges
+) -> Load:
     """Draw a force and a moment, or one of them, on any bar."""
     bar = int(rng.choice(MOVING_BARS))
     length, size = linkage.bar(bar).length, weight * ranges.load(rng)
@@ -139,23 +171,46 @@ def _draw_load(rng: np.random.Generator, linkage: FourBar, weight: float, ranges
     return Load(bar, force, arm, moment, "bar" if rng.random() < 0.5 else "world")
 
 
-def _draw_springs(rng: np.random.Generator, linkage: FourBar, weight: float, ranges: Ranges) -> list[Any]:
+def _draw_springs(
+    rng: np.random.Generator, linkage: FourBar, weight: float, ranges: Ranges
+) -> list[Any]:
     """Draw springs, torsion springs and flywheels that carry the weights about as they are loaded."""
     effects: list[Any] = []
     size = weight * abs(ranges.load(rng))
     if rng.random() < ranges.sprung:
-        one, second = (int(bar) for bar in rng.choice([1, *MOVING_BARS], 2, replace=False))
+        one, second = (
+            int(bar) for bar in rng.choice([1, *MOVING_BARS], 2, replace=False)
+        )
         start, end = (
-            SpringEnd(bar, linkage.lengths[bar - 1] * ranges.arm(rng), ANY_ANGLE(rng)) for bar in (one, second)
+            SpringEnd(bar, linkage.lengths[bar - 1] * ranges.arm(rng), ANY_ANGLE(rng))
+            for bar in (one, second)
         )
         length = max(linkage.lengths)
         effects.append(
-            Springs((Spring(start, end, (size or 1.0) / length, length * ANY_PART(rng), size * EITHER_SIGN(rng)),))
+            Springs(
+                (
+                    Spring(
+                        start,
+                        end,
+                        (size or 1.0) / length,
+                        length * ANY_PART(rng),
+                        size * EITHER_SIGN(rng),
+                    ),
+                )
+            )
         )
     if rng.random() < ranges.sprung:
         couple = size * max(linkage.lengths[1:])
         effects.append(
-            Torsion.at(**{str(rng.choice(list(PINS))): (couple or 1.0, ANY_ANGLE(rng), couple * EITHER_SIGN(rng))})
+            Torsion.at(
+                **{
+                    str(rng.choice(list(PINS))): (
+                        couple or 1.0,
+                        ANY_ANGLE(rng),
+                        couple * EITHER_SIGN(rng),
+                    )
+                }
+            )
         )
     if rng.random() < ranges.sprung:
         bar = int(rng.choice([2, 4]))
@@ -174,7 +229,12 @@ class DrawnType(Enum):
     TRIPLE_ROCKER = "triple-rocker"
 
 
-SHORTEST = {DrawnType.DRAG_LINK: 0, DrawnType.CRANK_ROCKER: 1, DrawnType.DOUBLE_ROCKER: 2, DrawnType.ROCKER_CRANK: 3}
+SHORTEST = {
+    DrawnType.DRAG_LINK: 0,
+    DrawnType.CRANK_ROCKER: 1,
+    DrawnType.DOUBLE_ROCKER: 2,
+    DrawnType.ROCKER_CRANK: 3,
+}
 """Index in (ground, input, coupler, output) of the shortest bar of a Grashof linkage of each type."""
 UNEVEN_TYPE = "uneven"
 """Name that stands for the family `UNEVEN_FAMILY` in place of types."""
@@ -183,7 +243,9 @@ CLEARANCE = 0.02
 """A random linkage keeps this part of its longest bar away from the change-point equality s + l = p + q."""
 
 
-def draw_lengths(rng: np.random.Generator, kind: DrawnType) -> tuple[float, float, float, float]:
+def draw_lengths(
+    rng: np.random.Generator, kind: DrawnType
+) -> tuple[float, float, float, float]:
     """Draw (ground, input, coupler, output) of the given type, longest bar 1, away from change points."""
     while True:
         lengths = np.sort(rng.uniform(0.1, 1.0, 4))
@@ -201,7 +263,9 @@ def draw_lengths(rng: np.random.Generator, kind: DrawnType) -> tuple[float, floa
             return tuple(float(x) for x in others)  # type: ignore[return-value]
 
 
-def draw_uneven_lengths(rng: np.random.Generator, crank: Draw, coupler: Draw) -> tuple[Sequence[float], float]:
+def draw_uneven_lengths(
+    rng: np.random.Generator, crank: Draw, coupler: Draw
+) -> tuple[Sequence[float], float]:
     """Draw (ground, input, coupler, output), m, and an angle theta_2 - theta_1 at which they close, rad.
 
     `crank` and `coupler`: of the ground, and of the diagonal from A to O4 at that angle.
@@ -238,7 +302,9 @@ def _draw_uneven_place(rng: np.random.Generator) -> Place:
     size = 10.0 ** rng.uniform(-3.0, 3.0)
 
     def draw_angles(rng: np.random.Generator, linkage: FourBar) -> Any:
-        return linkage.ground_angle + psi + np.array([0.0, 1e-3, rng.uniform(-3.0, 3.0)])
+        return (
+            linkage.ground_angle + psi + np.array([0.0, 1e-3, rng.uniform(-3.0, 3.0)])
+        )
 
     return [size * x for x in lengths], draw_angles
 
@@ -266,7 +332,10 @@ def _draw_machine_place(kind: DrawnType, rng: np.random.Generator) -> Place:
     return lengths, lambda _, linkage: Sweep(*choose_range(linkage), POSITIONS - 1)
 
 
-MACHINE_FAMILIES = {kind: RandomFamily(partial(_draw_machine_place, kind), MACHINES) for kind in DrawnType}
+MACHINE_FAMILIES = {
+    kind: RandomFamily(partial(_draw_machine_place, kind), MACHINES)
+    for kind in DrawnType
+}
 
 
 def draw_random_scene(seed: int, index: int, types: tuple[DrawnType, ...]) -> Scene:

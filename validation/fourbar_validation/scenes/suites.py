@@ -120,7 +120,11 @@ def read_scene_files(paths: Iterable[Path]) -> Files:
         if stems[name] > 1:
             name = _write_printed(file.with_suffix("").as_posix())
         if name in texts:
-            raise InputError("SCENE", str(file), f"must have a name of its own: another file is {name!r} too")
+            raise InputError(
+                "SCENE",
+                str(file),
+                f"must have a name of its own: another file is {name!r} too",
+            )
         text = read_text(file)
         most = max(most, _count_positions(loads(text, str(file)), file))
         texts[name] = text
@@ -160,22 +164,37 @@ def read_suite(path: Path) -> Files:
         return InputError("--suite", entry, allowed, str(path))
 
     if not path.exists():
-        raise refuse(path.name, 'must be "hard" or a file that lists scenes: there is no such file')
+        raise refuse(
+            path.name,
+            'must be "hard" or a file that lists scenes: there is no such file',
+        )
     text = writing.read_text(path, "--suite", LARGEST_LIST)
     try:
-        lines = [line.partition("#")[0].strip() for line in text.splitlines()]  # one entry each; # begins a comment
-        entries = tomllib.loads(text).get("scenes") if path.suffix == ".toml" else [line for line in lines if line]
+        lines = [
+            line.partition("#")[0].strip() for line in text.splitlines()
+        ]  # one entry each; # begins a comment
+        entries = (
+            tomllib.loads(text).get("scenes")
+            if path.suffix == ".toml"
+            else [line for line in lines if line]
+        )
     except (ValueError, RecursionError):  # no TOML
         raise refuse(path.name, "is no list of scenes") from None
-    if not isinstance(entries, list) or not all(isinstance(entry, str) and entry for entry in entries):
-        raise refuse(path.name, 'must have scenes = ["a.toml", ...], or one scene file per line')
+    if not isinstance(entries, list) or not all(
+        isinstance(entry, str) and entry for entry in entries
+    ):
+        raise refuse(
+            path.name, 'must have scenes = ["a.toml", ...], or one scene file per line'
+        )
     files: list[Path] = []
     for entry in entries:
         if Path(entry).is_absolute() or ".." in Path(entry).parts or "\0" in entry:
             raise refuse(entry, "must lie in the folder of the list, or below it")
         matches = [path.parent / entry]
         if "*" in entry:
-            matches = sorted(file for file in path.parent.glob(entry) if not file.samefile(path))
+            matches = sorted(
+                file for file in path.parent.glob(entry) if not file.samefile(path)
+            )
         if not matches:
             raise refuse(entry, "names no file")
         files += matches

@@ -15,7 +15,15 @@ import pytest
 from matplotlib.text import Text
 
 import fourbar
-from fourbar.effects import Effect, Flywheel, PinFriction, Spring, SpringEnd, Springs, Torsion
+from fourbar.effects import (
+    Effect,
+    Flywheel,
+    PinFriction,
+    Spring,
+    SpringEnd,
+    Springs,
+    Torsion,
+)
 from fourbar.effects.effect import list_bodies
 from fourbar.errors import DependencyError, InputError, NotAssembledError
 from fourbar.formulas.mobility import find_intervals
@@ -24,7 +32,12 @@ from fourbar.formulas.torque import inertia
 from fourbar.scene.motion import Law
 from fourbar.show import plot
 from fourbar.show.duty import compute_energies
-from fourbar.show.plot.curves import break_at_poles, choose_limit, find_free_place, find_poles
+from fourbar.show.plot.curves import (
+    break_at_poles,
+    choose_limit,
+    find_free_place,
+    find_poles,
+)
 from fourbar.show.plot.figures import FIGURES, TAKERS, draw_figure
 from fourbar.show.plot.film import choose_frames
 from fourbar.show.plot.freebody import list_actions
@@ -54,7 +67,9 @@ CRANK_ROCKER = crank_rocker()
 @cache
 def composed(scene, name, branches="one", position=None, units="SI"):
     """A figure of a scene, composed once for all that look at it."""
-    return draw_figure(scene, name, position=position, branches=branches, units=fourbar.units(units)).figure
+    return draw_figure(
+        scene, name, position=position, branches=branches, units=fourbar.units(units)
+    ).figure
 
 
 @pytest.mark.slow
@@ -66,7 +81,9 @@ def test_the_same_scene_gives_the_same_bytes(tmp_path: Path, file_format: str) -
     first, second = (path.read_bytes() for path in files)
     assert first.startswith(SIGNATURES[file_format])
     assert first == second
-    assert sorted(p.name for p in tmp_path.iterdir()) == sorted(p.name for p in files)  # nothing half-written
+    assert sorted(p.name for p in tmp_path.iterdir()) == sorted(
+        p.name for p in files
+    )  # nothing half-written
 
 
 def texts_shown(figure):
@@ -82,7 +99,11 @@ def texts_shown(figure):
         if not axes.axison:
             off_axis |= {axes.xaxis.label, axes.yaxis.label}
     texts = figure.findobj(lambda artist: isinstance(artist, Text))
-    shown = [t for t in texts if t.get_visible() and t.get_text().strip() and t not in off_axis]
+    shown = [
+        t
+        for t in texts
+        if t.get_visible() and t.get_text().strip() and t not in off_axis
+    ]
     return [(t.get_text(), t.get_window_extent(renderer)) for t in shown]
 
 
@@ -93,7 +114,8 @@ def clashes(figure) -> list[tuple[str, str]]:
         (p, q)
         for k, (p, a) in enumerate(texts)
         for q, b in texts[k + 1 :]
-        if min(a.x1, b.x1) - max(a.x0, b.x0) > TOUCH and min(a.y1, b.y1) - max(a.y0, b.y0) > TOUCH
+        if min(a.x1, b.x1) - max(a.x0, b.x0) > TOUCH
+        and min(a.y1, b.y1) - max(a.y0, b.y0) > TOUCH
     ]
 
 
@@ -105,18 +127,33 @@ def test_every_figure_draws_both_branches_and_no_texts_overlap(name: str) -> Non
         texts, page = texts_shown(figure), figure.bbox
         assert len(texts) > 5
         for text, box in texts:
-            assert page.x0 <= box.x0 and box.x1 <= page.x1 and page.y0 <= box.y0 and box.y1 <= page.y1, text
+            assert (
+                page.x0 <= box.x0
+                and box.x1 <= page.x1
+                and page.y0 <= box.y0
+                and box.y1 <= page.y1
+            ), text
         assert not clashes(figure)
 
 
 def test_no_text_stands_on_a_bar() -> None:
-    scene = fourbar.load(Path(__file__).parents[4] / "models" / "gallery" / "hoecken.toml")
+    scene = fourbar.load(
+        Path(__file__).parents[4] / "models" / "gallery" / "hoecken.toml"
+    )
     figure = draw_figure(scene, "linkage", dimensions=True).figure
     (axes,) = figure.axes
-    bars = [line.get_path().transformed(axes.transData) for line in axes.lines if line.get_linewidth() > 4.0]
-    boxes = [text.get_window_extent().padded(2.25 * figure.dpi / 72.0) for text in axes.texts]
+    bars = [
+        line.get_path().transformed(axes.transData)
+        for line in axes.lines
+        if line.get_linewidth() > 4.0
+    ]
+    boxes = [
+        text.get_window_extent().padded(2.25 * figure.dpi / 72.0) for text in axes.texts
+    ]
     assert len(bars) == 3 and len(boxes) > 8
-    assert not any(bar.intersects_bbox(box, filled=False) for bar in bars for box in boxes)
+    assert not any(
+        bar.intersects_bbox(box, filled=False) for bar in bars for box in boxes
+    )
 
 
 @pytest.mark.slow
@@ -129,7 +166,9 @@ def test_every_axis_of_theta_2_is_in_degrees_and_every_axis_has_a_unit() -> None
             assert label.endswith(")"), label
         if "theta_2" in axes.get_xlabel():
             assert axes.get_xlabel().endswith("(°)")
-            assert axes.get_xlim() == pytest.approx(np.degrees([0.1, 0.1 + 2 * math.pi]))
+            assert axes.get_xlim() == pytest.approx(
+                np.degrees([0.1, 0.1 + 2 * math.pi])
+            )
 
 
 def solved(scene: fourbar.Scene) -> fourbar.Solution:
@@ -142,7 +181,9 @@ def test_drawn_curves_are_those_of_the_solution() -> None:
     scene = crank_rocker()
     solution = solved(scene)
     axes = composed(scene, "kinematics").axes
-    drawn = {line.get_label(): line.get_ydata() for panel in axes for line in panel.lines}
+    drawn = {
+        line.get_label(): line.get_ydata() for panel in axes for line in panel.lines
+    }
     np.testing.assert_allclose(drawn[r"$\theta_4$"], np.degrees(solution.theta_4))
     np.testing.assert_allclose(drawn[r"$\omega_3$"], solution.omega_3)
     np.testing.assert_allclose(drawn[r"$\alpha_4$"], solution.alpha_4)
@@ -159,14 +200,23 @@ def test_bars_are_drawn_to_scale_at_the_requested_position() -> None:
     assert lengths == pytest.approx([100.0, 250.0, 220.0])  # mm
     (x, y) = bars[0].get_xydata()[1]
     assert math.atan2(y, x) == pytest.approx(1.3)
-    x_scale, y_scale = (np.diff(axes.transData.transform([(0, 0), step]), axis=0)[0] for step in ((1, 0), (0, 1)))
+    x_scale, y_scale = (
+        np.diff(axes.transData.transform([(0, 0), step]), axis=0)[0]
+        for step in ((1, 0), (0, 1))
+    )
     assert x_scale[0] == pytest.approx(y_scale[1])
 
 
 def test_the_coupler_figure_shows_the_points_of_the_scene() -> None:
-    scene = crank_rocker(points=(fourbar.Point("P", 3, (0.15, 0.7)), fourbar.Point("Q", 4, (0.1, 0.0))))
+    scene = crank_rocker(
+        points=(fourbar.Point("P", 3, (0.15, 0.7)), fourbar.Point("Q", 4, (0.1, 0.0)))
+    )
     (axes,) = draw_figure(scene, "coupler", units=fourbar.units("m")).figure.axes
-    curves = {line.get_label(): line.get_xydata() for line in axes.lines if line.get_label()[0] != "_"}
+    curves = {
+        line.get_label(): line.get_xydata()
+        for line in axes.lines
+        if line.get_label()[0] != "_"
+    }
     assert list(curves) == ["$A$", "$B$", "P"]  # Q belongs to the output
     np.testing.assert_allclose(curves["P"], solved(scene).points["P"], atol=1e-15)
 
@@ -176,7 +226,9 @@ def test_free_bodies_say_their_position_and_couples_have_an_arrow_and_no_sign() 
     figure = composed(crank_rocker(), "freebody", position=math.radians(135.0))
     lines = [text for text, _ in texts_shown(figure) if text[0] in "↺↻"]
     assert lines and not any(" = −" in line for line in lines)
-    assert " ".join(figure.subfigs[0].get_supxlabel().split()).startswith("At θ₂ = 135°. ")
+    assert " ".join(figure.subfigs[0].get_supxlabel().split()).startswith(
+        "At θ₂ = 135°. "
+    )
 
 
 @pytest.mark.slow
@@ -203,7 +255,10 @@ def test_positions_that_do_not_assemble_leave_a_gap_and_poles_cut_the_line() -> 
     _, top = panel.get_ylim()
     assert top < np.nanmax(np.abs(shown.sweep.torque))
     caption = " ".join(
-        t.get_text() for t in composed(thesis(FULL_TURN), "torque").findobj(lambda artist: isinstance(artist, Text))
+        t.get_text()
+        for t in composed(thesis(FULL_TURN), "torque").findobj(
+            lambda artist: isinstance(artist, Text)
+        )
     )
     assert "Torque clipped at" in caption.replace("\n", " ")
 
@@ -217,7 +272,9 @@ def test_an_ordinary_curve_is_not_clipped() -> None:
 def test_transmission_angle_marks_limits_and_dead_centres() -> None:
     panel = composed(thesis(FULL_TURN), "transmission").axes[0]
     marks = {
-        line.get_label().split(":")[0]: np.sort(line.get_xdata()) for line in panel.lines if line.get_marker() in "sD"
+        line.get_label().split(":")[0]: np.sort(line.get_xdata())
+        for line in panel.lines
+        if line.get_marker() in "sD"
     }
     d, a, b, c = thesis().linkage.lengths
     # bars 3 and 4 folded: |b - c| between A and O4; bars 2 and 3 in line on the sweep: c seen from O2 at b - a or a + b
@@ -228,10 +285,16 @@ def test_transmission_angle_marks_limits_and_dead_centres() -> None:
     assert len(marks["dead centre"]) == 1
     assert min(abs(marks["dead centre"][0] - e) for e in expected) < 1e-9
     crossed_scene = thesis(FULL_TURN)
-    crossed_scene = replace(crossed_scene, motion=crossed_scene.motion.replace(branch=-1))
+    crossed_scene = replace(
+        crossed_scene, motion=crossed_scene.motion.replace(branch=-1)
+    )
     panel = composed(crossed_scene, "transmission").axes[0]
-    crossed = next(line.get_xdata()[0] for line in panel.lines if line.get_marker() == "D")
-    assert crossed + marks["dead centre"][0] == pytest.approx(sum(expected))  # its mirror image in the ground's line
+    crossed = next(
+        line.get_xdata()[0] for line in panel.lines if line.get_marker() == "D"
+    )
+    assert crossed + marks["dead centre"][0] == pytest.approx(
+        sum(expected)
+    )  # its mirror image in the ground's line
 
 
 SPRUNG = ((1, 3), (2, 3), (4, 3))
@@ -241,7 +304,12 @@ EFFECTS = (
     fourbar.Friction.at(B=0.03),
     PinFriction.at(A=(0.2, 0.01), O4=(0.1, 0.02)),
     Torsion.at(B=(0.5, 1.0, 0.1)),
-    Springs(tuple(Spring(SpringEnd(i, 0.1, -1.5), SpringEnd(j, 0.08, 0.2), 50.0, 0.05) for i, j in SPRUNG)),
+    Springs(
+        tuple(
+            Spring(SpringEnd(i, 0.1, -1.5), SpringEnd(j, 0.08, 0.2), 50.0, 0.05)
+            for i, j in SPRUNG
+        )
+    ),
     Flywheel(0.01, 4),
 )
 
@@ -249,27 +317,39 @@ EFFECTS = (
 CYLINDER = fourbar.LinearDrive(SpringEnd(2, 0.17, -1.1), SpringEnd(4, 0.09, 0.7))
 
 
-BETWEEN_NEIGHBOURS = fourbar.LinearDrive(SpringEnd(2, 0.17, -1.1), SpringEnd(3, 0.09, 0.7))
-
-
-@pytest.mark.parametrize("drive", (2, 3, 4, CYLINDER, BETWEEN_NEIGHBOURS), ids=["2", "3", "4", "2-4", "2-3"])
-@pytest.mark.parametrize(
-    "effects", [EFFECTS, *((one,) for one in EFFECTS)], ids=lambda some: "+".join(e.key for e in some)
+BETWEEN_NEIGHBOURS = fourbar.LinearDrive(
+    SpringEnd(2, 0.17, -1.1), SpringEnd(3, 0.09, 0.7)
 )
-def test_free_bodies_balance(drive: int | fourbar.LinearDrive, effects: tuple[Effect, ...]) -> None:
+
+
+@pytest.mark.parametrize(
+    "drive", (2, 3, 4, CYLINDER, BETWEEN_NEIGHBOURS), ids=["2", "3", "4", "2-4", "2-3"]
+)
+@pytest.mark.parametrize(
+    "effects",
+    [EFFECTS, *((one,) for one in EFFECTS)],
+    ids=lambda some: "+".join(e.key for e in some),
+)
+def test_free_bodies_balance(
+    drive: int | fourbar.LinearDrive, effects: tuple[Effect, ...]
+) -> None:
     drive_bar, line = (drive, None) if isinstance(drive, int) else (None, drive)
     shown = make_view(crank_rocker(drive_bar=drive_bar, drive=line, effects=effects))
     for bar in (2, 3, 4):
         arrows, couples = list_actions(shown, bar)
         forces = np.array([arrow.force for arrow in arrows])
         assert np.abs(forces.sum()) <= BALANCE * np.abs(forces).max()
-        moments = [(a.at.conjugate() * a.force).imag for a in arrows] + [c.moment for c in couples]
+        moments = [(a.at.conjugate() * a.force).imag for a in arrows] + [
+            c.moment for c in couples
+        ]
         assert abs(sum(moments)) <= BALANCE * max(map(abs, moments))
         assert any(c.text == f"$T_{bar}$" for c in couples) == (bar == drive_bar)
 
 
 @pytest.mark.slow
-def test_a_linear_drive_is_drawn_with_its_force_and_the_poles_of_that(tmp_path: Path) -> None:
+def test_a_linear_drive_is_drawn_with_its_force_and_the_poles_of_that(
+    tmp_path: Path,
+) -> None:
     scene = crank_rocker(drive=CYLINDER)
     for figure in ("overview", "torque", "freebody"):
         plot.draw(scene, tmp_path / f"{figure}.svg", figure)
@@ -288,14 +368,20 @@ def test_a_scene_without_velocity_draws_positions_only(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_the_position_drawn_of_both_branches_is_one_and_stands_clear_of_their_poles() -> None:
+def test_the_position_drawn_of_both_branches_is_one_and_stands_clear_of_their_poles() -> (
+    None
+):
     alone = make_view(thesis(FULL_TURN)).here
     scenes = [set_branch(thesis(FULL_TURN), sign) for sign in (1, -1)]
     position = choose_common_position(scenes)
     assert position is not None
     sweeps = [make_view(scene).sweep for scene in scenes]
-    both = np.fmin.reduce([quality for s in sweeps for quality in (s.condition, s.drive_condition)])
-    best = min(CLEAR, float(np.nanmax(both)))  # the two poles leave no position clear of both by more than 0.25
+    both = np.fmin.reduce(
+        [quality for s in sweeps for quality in (s.condition, s.drive_condition)]
+    )
+    best = min(
+        CLEAR, float(np.nanmax(both))
+    )  # the two poles leave no position clear of both by more than 0.25
     assert best > 0.2
     for scene in scenes:
         here = make_view(scene, position).here
@@ -303,7 +389,10 @@ def test_the_position_drawn_of_both_branches_is_one_and_stands_clear_of_their_po
     assert min(alone.condition[0], alone.drive_condition[0]) >= CLEAR
     # the position of the open branch alone is a pole of the crossed one
     assert make_view(scenes[1], float(alone.theta_2[0])).here.drive_condition[0] < CLEAR
-    titles = {axes.get_title(loc="left").split(",")[0] for axes in composed(thesis(FULL_TURN), "linkage", "both").axes}
+    titles = {
+        axes.get_title(loc="left").split(",")[0]
+        for axes in composed(thesis(FULL_TURN), "linkage", "both").axes
+    }
     assert len(titles) == 1
 
 
@@ -332,11 +421,19 @@ def test_hostile_titles_are_text(tmp_path: Path) -> None:
         ("a.bmp", {}),
         ("a.png", {"figure": "pie"}),
         ("a.png", {"branches": "all"}),
-        *(("a.png", {"figure": figure, "position": 1.0}) for figure in ("hodograph", "sensitivity")),
-        *(("a.png", {"figure": figure, "dimensions": True}) for figure in ("torque", "coupler", "freebody")),
+        *(
+            ("a.png", {"figure": figure, "position": 1.0})
+            for figure in ("hodograph", "sensitivity")
+        ),
+        *(
+            ("a.png", {"figure": figure, "dimensions": True})
+            for figure in ("torque", "coupler", "freebody")
+        ),
     ],
 )
-def test_what_is_not_allowed_is_named(tmp_path: Path, name: str, options: dict[str, Any]) -> None:
+def test_what_is_not_allowed_is_named(
+    tmp_path: Path, name: str, options: dict[str, Any]
+) -> None:
     with pytest.raises(InputError, match="must"):
         plot.draw(crank_rocker(), tmp_path / name, **options)
     assert not list(tmp_path.iterdir())
@@ -347,15 +444,23 @@ def test_a_position_and_dimensions_show_where_they_are_taken() -> None:
     for option, value in {"position": 1.0, "dimensions": True}.items():
         for figure in TAKERS[option]:
             if figure not in ("stroke", "energy"):  # of other scenes
-                plain, changed = (draw_figure(crank_rocker(), figure, **options) for options in ({}, {option: value}))
+                plain, changed = (
+                    draw_figure(crank_rocker(), figure, **options)
+                    for options in ({}, {option: value})
+                )
                 assert plain._repr_svg_() != changed._repr_svg_(), (figure, option)
 
 
 @pytest.mark.slow
 def test_threads_draw_what_one_draws_and_leave_the_settings_as_they_were() -> None:
-    drawn, before = crank_rocker().plot("torque")._repr_svg_(), dict(matplotlib.rcParams)
+    drawn, before = (
+        crank_rocker().plot("torque")._repr_svg_(),
+        dict(matplotlib.rcParams),
+    )
     with ThreadPoolExecutor(4) as pool:
-        assert set(pool.map(lambda _: crank_rocker().plot("torque")._repr_svg_(), range(8))) == {drawn}
+        assert set(
+            pool.map(lambda _: crank_rocker().plot("torque")._repr_svg_(), range(8))
+        ) == {drawn}
     assert dict(matplotlib.rcParams) == before
 
 
@@ -364,10 +469,16 @@ def test_a_position_that_does_not_assemble_is_refused(tmp_path: Path) -> None:
         plot.draw(thesis(), tmp_path / "a.png", "linkage", position=math.radians(45.0))
 
 
-def released(steps: int = 300, duration: float = 0.6, **changes: object) -> fourbar.Scene:
+def released(
+    steps: int = 300, duration: float = 0.6, **changes: object
+) -> fourbar.Scene:
     """The crank-rocker let go from rest under gravity, a load and damping."""
     motion = fourbar.Motion(0.5, 0.0, free=fourbar.Free(duration, steps))
-    parts = {"motion": motion, "effects": (fourbar.Gravity(), fourbar.Viscous.at(O2=0.002, B=0.001)), **changes}
+    parts = {
+        "motion": motion,
+        "effects": (fourbar.Gravity(), fourbar.Viscous.at(O2=0.002, B=0.001)),
+        **changes,
+    }
     return crank_rocker(**parts)
 
 
@@ -377,18 +488,29 @@ def by_law() -> fourbar.Scene:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("scene", (released(60, 1.2), by_law()), ids=("released", "by law"))
+@pytest.mark.parametrize(
+    "scene", (released(60, 1.2), by_law()), ids=("released", "by law")
+)
 def test_a_motion_through_time_is_drawn_over_time(scene: fourbar.Scene) -> None:
     solution = solved(scene)
-    drawn = {line.get_label(): line for panel in composed(scene, "kinematics").axes for line in panel.lines}
-    for name, values in ((r"$\theta_2$", np.degrees(solution.theta_2)), (r"$\omega_4$", solution.omega_4)):
+    drawn = {
+        line.get_label(): line
+        for panel in composed(scene, "kinematics").axes
+        for line in panel.lines
+    }
+    for name, values in (
+        (r"$\theta_2$", np.degrees(solution.theta_2)),
+        (r"$\omega_4$", solution.omega_4),
+    ):
         np.testing.assert_allclose(drawn[name].get_xdata(), solution.time)
         np.testing.assert_allclose(drawn[name].get_ydata(), values)
     free = scene.motion.free is not None
     for name in ("overview", "energy" if free else "torque"):
         figure = composed(scene, name)
         assert not clashes(figure), name
-        flat = [axes for axes in figure.axes if axes.name == "rectilinear" and axes.axison]
+        flat = [
+            axes for axes in figure.axes if axes.name == "rectilinear" and axes.axison
+        ]
         assert all(axes.get_xlabel().endswith(("(s)", "m)")) for axes in flat)
 
 
@@ -396,21 +518,33 @@ def test_a_motion_through_time_is_drawn_over_time(scene: fourbar.Scene) -> None:
 def test_branches_that_are_released_for_different_times_share_their_scales() -> None:
     bars = [fourbar.Bar(0.22, 0.5), fourbar.Bar(0.25, 0.8), fourbar.Bar(0.2, 0.4)]
     motion = fourbar.Motion(math.radians(60.0), 0.0, free=fourbar.Free(2.0, 200))
-    scene = fourbar.Scene(fourbar.FourBar(0.3, *bars), motion, effects=(fourbar.Gravity(),))
+    scene = fourbar.Scene(
+        fourbar.FourBar(0.3, *bars), motion, effects=(fourbar.Gravity(),)
+    )
     lasting = [len(make_view(set_branch(scene, sign)).sweep) for sign in (1, -1)]
     assert lasting[0] != lasting[1]  # each stops at a limit position of its own
     for name in ("kinematics", "energy"):
         axes = composed(scene, name, "both").axes
         half = len(axes) // 2
         for panel, twin in zip(axes[:half], axes[half:], strict=True):
-            assert (panel.get_xlim(), panel.get_ylim()) == (twin.get_xlim(), twin.get_ylim())
-            assert (panel.get_xlabel(), panel.get_ylabel()) == (twin.get_xlabel(), twin.get_ylabel())
+            assert (panel.get_xlim(), panel.get_ylim()) == (
+                twin.get_xlim(),
+                twin.get_ylim(),
+            )
+            assert (panel.get_xlabel(), panel.get_ylabel()) == (
+                twin.get_xlabel(),
+                twin.get_ylabel(),
+            )
 
 
-def test_the_position_of_a_motion_through_time_is_one_that_it_passes(tmp_path: Path) -> None:
+def test_the_position_of_a_motion_through_time_is_one_that_it_passes(
+    tmp_path: Path,
+) -> None:
     shown = make_view(released(), position=0.3)
     k = int(np.argmin(np.abs(shown.sweep.theta_2 - 0.3)))
-    assert shown.here.time[0] == shown.sweep.time[k] and shown.here.F12[0] == pytest.approx(shown.sweep.F12[k])
+    assert shown.here.time[0] == shown.sweep.time[k] and shown.here.F12[
+        0
+    ] == pytest.approx(shown.sweep.F12[k])
     with pytest.raises(NotAssembledError, match="does not pass"):
         plot.draw(released(), tmp_path / "a.svg", position=9.0)
 
@@ -420,7 +554,13 @@ ENERGY = 1e-6
 
 
 def test_the_work_of_what_acts_is_the_kinetic_energy() -> None:
-    scene = released(effects=(fourbar.Gravity(), fourbar.Viscous.at(O2=0.002, B=0.001), Flywheel(0.01, 4)))
+    scene = released(
+        effects=(
+            fourbar.Gravity(),
+            fourbar.Viscous.at(O2=0.002, B=0.001),
+            Flywheel(0.01, 4),
+        )
+    )
     motion = fourbar.solve(scene)
     energies = compute_energies(scene, motion)
     assert set(energies.work) == {"loads", "gravity", "viscous"}
@@ -428,18 +568,30 @@ def test_the_work_of_what_acts_is_the_kinetic_energy() -> None:
         list_bodies(scene.linkage, scene.effects),
         compute_state(scene.linkage, motion.theta_2, motion.branch),
     )
-    of_input, of_others = inertia(scene.linkage.input.length, carried, place.position, place.k)
+    of_input, of_others = inertia(
+        scene.linkage.input.length, carried, place.position, place.k
+    )
     expected = 0.5 * (of_input + of_others) * motion.omega_2**2
     np.testing.assert_allclose(energies.kinetic, expected, rtol=1e-9, atol=1e-15)
     assert energies.kinetic.max() > 0.1
     assert np.all(np.diff(energies.work["viscous"]) <= 0.0)
-    np.testing.assert_allclose(sum(energies.work.values()), energies.kinetic, atol=ENERGY * energies.kinetic.max())
+    np.testing.assert_allclose(
+        sum(energies.work.values()),
+        energies.kinetic,
+        atol=ENERGY * energies.kinetic.max(),
+    )
     panel = composed(scene, "energy").axes[0]
     assert panel.get_ylabel() in ("energy (J)", "energy (mJ)")
 
 
-def test_figures_that_a_motion_does_not_have_are_refused_in_one_line(tmp_path: Path) -> None:
-    for scene, figure in ((released(), "torque"), (crank_rocker(), "energy"), (by_law(), "energy")):
+def test_figures_that_a_motion_does_not_have_are_refused_in_one_line(
+    tmp_path: Path,
+) -> None:
+    for scene, figure in (
+        (released(), "torque"),
+        (crank_rocker(), "energy"),
+        (by_law(), "energy"),
+    ):
         with pytest.raises(InputError, match="free motion"):
             plot.draw(scene, tmp_path / "a.svg", figure)
     assert not list(tmp_path.iterdir())
@@ -461,7 +613,9 @@ def test_both_branches_are_drawn_to_one_scale(name: str) -> None:
 
 
 @pytest.mark.slow
-def test_matplotlib_is_loaded_only_to_draw_and_its_absence_is_one_line(tmp_path: Path) -> None:
+def test_matplotlib_is_loaded_only_to_draw_and_its_absence_is_one_line(
+    tmp_path: Path,
+) -> None:
     code = (
         "import sys, fourbar.show.plot, fourbar.show.animate\n"
         "assert 'matplotlib' not in sys.modules\n"
@@ -473,9 +627,15 @@ def test_matplotlib_is_loaded_only_to_draw_and_its_absence_is_one_line(tmp_path:
         "    print(error)\n"
     )
     done = subprocess.run(
-        [sys.executable, "-c", code, str(tmp_path / "a.png")], capture_output=True, text=True, check=True
+        [sys.executable, "-c", code, str(tmp_path / "a.png")],
+        capture_output=True,
+        text=True,
+        check=True,
     )
-    assert done.stdout.strip() == 'drawing needs matplotlib: pip install ".[plot]" in the checkout'
+    assert (
+        done.stdout.strip()
+        == 'drawing needs matplotlib: pip install ".[plot]" in the checkout'
+    )
     assert issubclass(DependencyError, fourbar.FourBarError)
 
 
@@ -502,15 +662,25 @@ def test_units_get_the_prefix_that_suits() -> None:
 
 BOTTOM, SIDE = SpringEnd(1, 0.25, math.radians(-160.0)), SpringEnd(2, 0.09, 0.17)
 COMMANDS = {
-    r"$\theta_3$ (°)": fourbar.Motion(theta_3=fourbar.Sweep(1.25, 0.67, 40), omega_3=-2.0),
-    r"$\theta_4$ (°)": fourbar.Motion(theta_4=fourbar.Sweep(1.95, 2.78, 40), omega_4=4.0),
-    "stroke (mm)": fourbar.Motion(stroke=fourbar.Sweep(0.2, 0.32, 40), stroke_speed=0.2, side="left"),
+    r"$\theta_3$ (°)": fourbar.Motion(
+        theta_3=fourbar.Sweep(1.25, 0.67, 40), omega_3=-2.0
+    ),
+    r"$\theta_4$ (°)": fourbar.Motion(
+        theta_4=fourbar.Sweep(1.95, 2.78, 40), omega_4=4.0
+    ),
+    "stroke (mm)": fourbar.Motion(
+        stroke=fourbar.Sweep(0.2, 0.32, 40), stroke_speed=0.2, side="left"
+    ),
 }
 """Each command and the name of the axis that curves are drawn over."""
 
 
 def commanding(motion: fourbar.Motion) -> fourbar.Scene:
-    return crank_rocker(motion=motion, drive=fourbar.LinearDrive(BOTTOM, SIDE), effects=(fourbar.Gravity(),))
+    return crank_rocker(
+        motion=motion,
+        drive=fourbar.LinearDrive(BOTTOM, SIDE),
+        effects=(fourbar.Gravity(),),
+    )
 
 
 @pytest.mark.slow
@@ -519,34 +689,62 @@ def test_curves_are_drawn_over_what_is_commanded(label: str) -> None:
     scene = commanding(COMMANDS[label])
     s, name = fourbar.solve(scene), scene.motion.commanded
     over = getattr(s, name) * (1000.0 if name == "stroke" else 180.0 / math.pi)
-    panels = [axes for axes in composed(scene, "overview").axes if axes.get_xlabel() != "$x$ (mm)"]
+    panels = [
+        axes
+        for axes in composed(scene, "overview").axes
+        if axes.get_xlabel() != "$x$ (mm)"
+    ]
     assert len(panels) == 7 and {axes.get_xlabel() for axes in panels} == {label}
     for axes in panels:
         assert axes.get_xlim() == pytest.approx((over.min(), over.max()))
-    (drive,) = (axes for axes in panels if axes.get_title(loc="left") == "Force of the drive")
-    line, order = max(drive.lines, key=lambda line: len(line.get_xdata())), np.argsort(over)
-    drawn_at = np.interp(over[order], *(np.array(data)[np.isfinite(line.get_ydata())] for data in line.get_data()))
+    (drive,) = (
+        axes for axes in panels if axes.get_title(loc="left") == "Force of the drive"
+    )
+    line, order = (
+        max(drive.lines, key=lambda line: len(line.get_xdata())),
+        np.argsort(over),
+    )
+    drawn_at = np.interp(
+        over[order],
+        *(np.array(data)[np.isfinite(line.get_ydata())] for data in line.get_data()),
+    )
     usual = np.abs(s.drive_force[order]) < np.percentile(np.abs(s.drive_force), 80.0)
-    np.testing.assert_allclose(drawn_at[usual], s.drive_force[order][usual], rtol=2e-2, atol=2e-2)
+    np.testing.assert_allclose(
+        drawn_at[usual], s.drive_force[order][usual], rtol=2e-2, atol=2e-2
+    )
     (linkage,) = composed(scene, "linkage").axes
     place = getattr(make_view(scene).here, name)[0]
-    stated = f"stroke = {1000.0 * place:.4g} mm" if name == "stroke" else f"θ₄ = {math.degrees(place):.4g}°"
+    stated = (
+        f"stroke = {1000.0 * place:.4g} mm"
+        if name == "stroke"
+        else f"θ₄ = {math.degrees(place):.4g}°"
+    )
     assert stated in linkage.get_title(loc="left").replace("θ₃", "θ₄")
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("label", COMMANDS)
-@pytest.mark.parametrize("figure", ["freebody", "hodograph", "transmission", "kinematics", "sensitivity"])
+@pytest.mark.parametrize(
+    "figure", ["freebody", "hodograph", "transmission", "kinematics", "sensitivity"]
+)
 def test_every_figure_takes_every_command(label: str, figure: str) -> None:
     assert not clashes(composed(commanding(COMMANDS[label]), figure))
 
 
-@pytest.mark.parametrize("scene", (thesis(), *map(commanding, COMMANDS.values())), ids=("thesis", *COMMANDS))
+@pytest.mark.parametrize(
+    "scene", (thesis(), *map(commanding, COMMANDS.values())), ids=("thesis", *COMMANDS)
+)
 def test_a_film_of_what_swings_goes_there_and_back(scene: fourbar.Scene) -> None:
     shown = make_view(scene)
     order, closes = choose_frames(shown, 40), np.flatnonzero(shown.sweep.assembled)
-    assert (np.diff(shown.sweep.at.places) > 0.0).all() and shown.sweep.assembled[order].all()
-    assert len(order) == 38 and (order[0], order[19]) == (closes[0], closes[-1]) and order[-1] > order[0]
+    assert (np.diff(shown.sweep.at.places) > 0.0).all() and shown.sweep.assembled[
+        order
+    ].all()
+    assert (
+        len(order) == 38
+        and (order[0], order[19]) == (closes[0], closes[-1])
+        and order[-1] > order[0]
+    )
     assert (np.diff(order[:20]) > 0).all() and (np.diff(order[19:]) < 0).all()
 
 
@@ -559,10 +757,18 @@ def test_one_position_of_another_command_stands_in_its_range() -> None:
     shown = make_view(commanding(single))
     triangle = 0.34, 0.16  # the cylinder's longest and shortest stroke
     places = shown.sweep.at.places
-    assert shown.at == "stroke = 300 mm" and shown.here.stroke[0] == pytest.approx(0.3, rel=1e-14)
-    assert places.max() < triangle[0] and places.min() > triangle[1] and len(places) == 362
+    assert shown.at == "stroke = 300 mm" and shown.here.stroke[0] == pytest.approx(
+        0.3, rel=1e-14
+    )
+    assert (
+        places.max() < triangle[0] and places.min() > triangle[1] and len(places) == 362
+    )
     shown = make_view(commanding(fourbar.Motion(theta_4=2.0, omega_4=1.0)))
-    (low, high), *_ = (ends for ends in find_intervals(CRANK_ROCKER.linkage, 4) if ends[0] < 2.0 + math.tau < ends[1])
+    (low, high), *_ = (
+        ends
+        for ends in find_intervals(CRANK_ROCKER.linkage, 4)
+        if ends[0] < 2.0 + math.tau < ends[1]
+    )
     assert shown.sweep.theta_4.min() > low and shown.sweep.theta_4.max() < high
     assert shown.at == "θ₄ = 114.6°"
 
@@ -570,11 +776,19 @@ def test_one_position_of_another_command_stands_in_its_range() -> None:
 def test_dead_centres_stand_where_the_bars_are_in_line_on_every_axis() -> None:
     """Bars 2 and 3 stretched: cosine rule for O2, B, O4, where theta_3 = theta_2."""
     d, a, b, c = CRANK_ROCKER.linkage.lengths
-    stretched = CRANK_ROCKER.linkage.ground_angle + math.acos(((a + b) ** 2 + d * d - c * c) / (2.0 * (a + b) * d))
+    stretched = CRANK_ROCKER.linkage.ground_angle + math.acos(
+        ((a + b) ** 2 + d * d - c * c) / (2.0 * (a + b) * d)
+    )
     for name in ("theta_2", "theta_3"):
-        motion = fourbar.Motion(**{name: fourbar.Sweep(0.7, 1.25, 40), name.replace("theta", "omega"): 1.0})
+        motion = fourbar.Motion(
+            **{name: fourbar.Sweep(0.7, 1.25, 40), name.replace("theta", "omega"): 1.0}
+        )
         (axes,) = composed(commanding(motion), "transmission").axes
-        (mark,) = (line for line in axes.lines if line.get_label() == "dead centre: bars 2, 3 in line")
+        (mark,) = (
+            line
+            for line in axes.lines
+            if line.get_label() == "dead centre: bars 2, 3 in line"
+        )
         assert mark.get_xdata() == pytest.approx([math.degrees(stretched)])
 
 
@@ -586,16 +800,30 @@ def test_a_cylinder_keeps_its_barrel_and_its_rod_comes_out() -> None:
     for index in (0, 20, 40):
         axes = Figure().subplots()
         draw_mechanism(axes, shown, shown.sweep, index, Labels())
-        (barrel,) = (line for line in axes.lines if line.get_linewidth() == 4.5 and line.get_color() == INK)
+        (barrel,) = (
+            line
+            for line in axes.lines
+            if line.get_linewidth() == 4.5 and line.get_color() == INK
+        )
         lengths.append(np.hypot(*np.ptp(np.array(barrel.get_data()), axis=1)))
-    assert np.ptp(lengths) < 1e-9 * lengths[0] and lengths[0] < 1000.0 * shown.sweep.stroke.min()
+    assert (
+        np.ptp(lengths) < 1e-9 * lengths[0]
+        and lengths[0] < 1000.0 * shown.sweep.stroke.min()
+    )
 
 
 def test_the_stroke_is_a_figure_where_it_is_not_the_axis() -> None:
     scene = commanding(COMMANDS[r"$\theta_4$ (°)"])
     (axes,) = composed(scene, "stroke").axes
-    curve, s = max(axes.lines, key=lambda line: len(line.get_xdata())), fourbar.solve(scene)
-    np.testing.assert_allclose(np.interp(np.degrees(s.theta_4), *curve.get_data()), 1000.0 * s.stroke, rtol=1e-14)
+    curve, s = (
+        max(axes.lines, key=lambda line: len(line.get_xdata())),
+        fourbar.solve(scene),
+    )
+    np.testing.assert_allclose(
+        np.interp(np.degrees(s.theta_4), *curve.get_data()),
+        1000.0 * s.stroke,
+        rtol=1e-14,
+    )
     for refused in (CRANK_ROCKER, commanding(COMMANDS["stroke (mm)"])):
         with pytest.raises(InputError, match="needs a linear drive"):
             draw_figure(refused, "stroke")

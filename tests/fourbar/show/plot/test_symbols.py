@@ -58,53 +58,101 @@ def test_symbols_stand_where_the_formulas_let_them_act(everything: Scene) -> Non
     for index in (5, 30):
         place = symbols.place_of(everything.linkage, solution, index, 1.0)
         drawn = {
-            s.name: symbols.draw(axes, s, place, 0.01) for s in list_acting(everything) if s.kind in ("force", "spring")
+            s.name: symbols.draw(axes, s, place, 0.01)
+            for s in list_acting(everything)
+            if s.kind in ("force", "spring")
         }
         theta_3, theta_4 = solution.theta_3[index], solution.theta_4[index]
         tail, tip = (complex(*point) for point in drawn["load 1"].lines[0])
         expected = complex(*solution.G3[index]) + cmath.rect(0.03, 1.0 + theta_3)
-        assert abs(tail - expected) < 1e-15 and abs(cmath.phase((tip - tail) / cmath.rect(1.0, 0.5 + theta_3))) < 1e-12
+        assert (
+            abs(tail - expected) < 1e-15
+            and abs(cmath.phase((tip - tail) / cmath.rect(1.0, 0.5 + theta_3))) < 1e-12
+        )
         tail, tip = (complex(*point) for point in drawn["load 2"].lines[0])
         factor = float(TABLED.table.at(solution.theta_2[index]))  # type: ignore[union-attr]
         assert abs(tail - complex(*solution.G4[index])) < 1e-15
-        assert abs(cmath.phase((tip - tail) / cmath.rect(math.copysign(1.0, factor), 0.2))) < 1e-12
+        assert (
+            abs(cmath.phase((tip - tail) / cmath.rect(math.copysign(1.0, factor), 0.2)))
+            < 1e-12
+        )
         line = drawn["spring"].lines[0]
         O4 = cmath.rect(everything.linkage.ground, everything.linkage.ground_angle)
-        assert abs(complex(*line[0]) - cmath.rect(0.1, everything.linkage.ground_angle - 0.5 * math.pi)) < 1e-15
+        assert (
+            abs(
+                complex(*line[0])
+                - cmath.rect(0.1, everything.linkage.ground_angle - 0.5 * math.pi)
+            )
+            < 1e-15
+        )
         assert abs(complex(*line[-1]) - O4 - cmath.rect(0.08, theta_4)) < 1e-15
 
 
-def test_nothing_at_a_pin_hides_a_bar_and_what_lies_off_a_bar_is_joined_to_it(everything: Scene) -> None:
+def test_nothing_at_a_pin_hides_a_bar_and_what_lies_off_a_bar_is_joined_to_it(
+    everything: Scene,
+) -> None:
     """Rings stay within a crank of a twelfth of the coupler; a plate goes from pin to point to pin."""
     lengths = {"input": 0.02, "coupler": 0.25, "output": 0.22}
     short = replace(
-        everything.linkage, **{k: replace(getattr(everything.linkage, k), length=v) for k, v in lengths.items()}
+        everything.linkage,
+        **{
+            k: replace(getattr(everything.linkage, k), length=v)
+            for k, v in lengths.items()
+        },
     )
-    shown = make_view(replace(everything, linkage=short, points=(fourbar.Point("P", 3, (0.15, 0.7)),)))
+    shown = make_view(
+        replace(everything, linkage=short, points=(fourbar.Point("P", 3, (0.15, 0.7)),))
+    )
     factor, *_ = scale_of(shown)
     axes = Figure().subplots()
     draw_mechanism(axes, shown, shown.here, 0, Labels())
     bars = [line for line in axes.lines if line.get_linewidth() == 4.5]
     rings = [line for line in axes.lines if len(line.get_xdata()) > 30]
-    assert len(rings) >= 5 and all(line.get_zorder() < min(bar.get_zorder() for bar in bars) for line in rings)
+    assert len(rings) >= 5 and all(
+        line.get_zorder() < min(bar.get_zorder() for bar in bars) for line in rings
+    )
     pins = [np.zeros(2), factor * shown.here.A[0]]
-    closed = [line.get_xydata()[:-1] for line in rings if np.allclose(line.get_xydata()[0], line.get_xydata()[-1])]
-    at_crank = [ring for ring in closed if any(np.allclose(ring.mean(axis=0), pin, atol=1e-6) for pin in pins)]
+    closed = [
+        line.get_xydata()[:-1]
+        for line in rings
+        if np.allclose(line.get_xydata()[0], line.get_xydata()[-1])
+    ]
+    at_crank = [
+        ring
+        for ring in closed
+        if any(np.allclose(ring.mean(axis=0), pin, atol=1e-6) for pin in pins)
+    ]
     assert len(at_crank) >= 2
-    assert all(np.ptp(ring, axis=0).max() < 2.0 * factor * short.input.length for ring in at_crank)
-    plates = [patch.get_xy() for patch in axes.patches if patch.get_linestyle() in (":", "dotted")]
-    places = {name: factor * getattr(shown.here, name)[0] for name in ("A", "B", "G3", "G4")}
+    assert all(
+        np.ptp(ring, axis=0).max() < 2.0 * factor * short.input.length
+        for ring in at_crank
+    )
+    plates = [
+        patch.get_xy()
+        for patch in axes.patches
+        if patch.get_linestyle() in (":", "dotted")
+    ]
+    places = {
+        name: factor * getattr(shown.here, name)[0] for name in ("A", "B", "G3", "G4")
+    }
     assert any(
-        np.allclose(corners, [places["A"], factor * shown.here.points["P"][0], places["B"]]) for corners in plates
+        np.allclose(
+            corners, [places["A"], factor * shown.here.points["P"][0], places["B"]]
+        )
+        for corners in plates
     )
     angle = 1.0 + shown.here.theta_3[0]
     load = places["G3"] + factor * 0.03 * np.array([math.cos(angle), math.sin(angle)])
-    assert any(np.allclose(corners, [places["A"], load, places["B"]]) for corners in plates)
+    assert any(
+        np.allclose(corners, [places["A"], load, places["B"]]) for corners in plates
+    )
 
 
 def test_the_page_is_given_the_same_symbols(everything: Scene) -> None:
     data = embedded(animate.write_page(everything))
-    assert [one["kind"] for one in data["acting"]] == [symbol.kind for symbol in list_acting(everything)]
+    assert [one["kind"] for one in data["acting"]] == [
+        symbol.kind for symbol in list_acting(everything)
+    ]
     factors = next(one["factor"] for one in data["acting"] if one["name"] == "load 2")
     assert np.allclose(factors, TABLED.table.at(np.array(data["theta_2"])), rtol=1e-15)  # type: ignore[union-attr]
 
@@ -114,25 +162,47 @@ def test_the_points_of_a_scene_are_drawn_where_they_are() -> None:
     """Path, speed and mark in the plot, place and columns in the page."""
     scene = crank_rocker(points=(fourbar.Point("P", 3, (0.15, 0.7)),))
     solution = locate_between(scene, fourbar.solve(scene)).solution
-    panels = draw_figure(scene, "points", units=fourbar.units("m m/s m/s^2")).figure.subfigs[0].axes
+    panels = (
+        draw_figure(scene, "points", units=fourbar.units("m m/s m/s^2"))
+        .figure.subfigs[0]
+        .axes
+    )
     path = next(line for line in panels[0].lines if line.get_label() == "path of P")
-    assert {f"path of $G_{bar}$" for bar in (2, 4)} <= {line.get_label() for line in panels[0].lines}
+    assert {f"path of $G_{bar}$" for bar in (2, 4)} <= {
+        line.get_label() for line in panels[0].lines
+    }
     assert np.allclose(path.get_xydata(), solution.points["P"], rtol=0.0, atol=1e-15)
-    for panel, of_points in zip(panels[1:], (solution.velocity, solution.acceleration), strict=True):
+    for panel, of_points in zip(
+        panels[1:], (solution.velocity, solution.acceleration), strict=True
+    ):
         line = next(line for line in panel.lines if line.get_label() == "P")
         assert np.allclose(line.get_ydata(), np.hypot(*of_points["P"].T), rtol=1e-15)
     data = collect_page_data(scene, {})
-    assert data["points"][0]["name"] == "P" and abs(complex(*data["points"][0]["at"]) - cmath.rect(0.15, 0.7)) < 1e-15
+    assert (
+        data["points"][0]["name"] == "P"
+        and abs(complex(*data["points"][0]["at"]) - cmath.rect(0.15, 0.7)) < 1e-15
+    )
 
 
 @pytest.mark.slow
-def test_no_text_covers_another_where_much_acts_and_numbers_are_long(everything: Scene) -> None:
-    pins = fourbar.Viscous((("O2", 0.01), ("A", 0.01))), fourbar.Friction((("O2", 0.05), ("A", 0.05)))
+def test_no_text_covers_another_where_much_acts_and_numbers_are_long(
+    everything: Scene,
+) -> None:
+    pins = (
+        fourbar.Viscous((("O2", 0.01), ("A", 0.01))),
+        fourbar.Friction((("O2", 0.05), ("A", 0.05))),
+    )
     loads = (*everything.loads, Load(2, moment=0.1), Load(2, (15.0, 0.0)))
-    kept = [effect for effect in everything.effects if effect.key not in ("viscous", "friction")]
+    kept = [
+        effect
+        for effect in everything.effects
+        if effect.key not in ("viscous", "friction")
+    ]
     scene = replace(everything, loads=loads, effects=(*kept, *pins), drive_bar=2)
     assert not clashes(composed(scene, "freebody"))
-    pump = fourbar.load(Path(__file__).parents[4] / "models" / "gallery" / "pump_jack.toml")
+    pump = fourbar.load(
+        Path(__file__).parents[4] / "models" / "gallery" / "pump_jack.toml"
+    )
     assert not clashes(composed(pump, "overview", units="imperial"))
 
 
@@ -145,14 +215,32 @@ def test_a_film_names_and_moves_what_the_plot_does(everything: Scene) -> None:
         figure.draw_without_rendering()
     (axes,) = figure.axes
     texts = {text.get_text() for text in axes.texts}
-    assert texts >= {"$O_2$", "$A$", "2", "3", "4", "$G_2$", "$G_3$", "$G_4$", "P", "load 1", "viscous", "pin friction"}
+    assert texts >= {
+        "$O_2$",
+        "$A$",
+        "2",
+        "3",
+        "4",
+        "$G_2$",
+        "$G_3$",
+        "$G_4$",
+        "P",
+        "load 1",
+        "viscous",
+        "pin friction",
+    }
     assert axes.title.get_window_extent().y0 > axes.get_legend().get_window_extent().y1
     solution = fourbar.solve(scene)
     for arrows, name, of_points in zip(
-        axes.collections[-2:], ("v_A", "a_A"), (solution.velocity, solution.acceleration), strict=True
+        axes.collections[-2:],
+        ("v_A", "a_A"),
+        (solution.velocity, solution.acceleration),
+        strict=True,
     ):
         shafts = np.column_stack([arrows.U, arrows.V])
         scale = np.hypot(*shafts[0]) / np.hypot(*getattr(solution, name)[7])
         assert np.allclose(
-            shafts[[0, -1]], scale * np.array([getattr(solution, name)[7], of_points["P"][7]]), rtol=1e-12
+            shafts[[0, -1]],
+            scale * np.array([getattr(solution, name)[7], of_points["P"][7]]),
+            rtol=1e-12,
         )

@@ -24,25 +24,45 @@ from fourbar_validation.run.judge import judge
 from fourbar_validation.scenes.random import DrawnType, draw_random_scene
 from tests.support.scenes import crank_rocker
 
-ROCKER, TRIPLE, CHANGE = (0.3, 0.1, 0.25, 0.22), (0.22, 0.2, 0.32, 0.18), (0.3, 0.1, 0.3, 0.1)
+ROCKER, TRIPLE, CHANGE = (
+    (0.3, 0.1, 0.25, 0.22),
+    (0.22, 0.2, 0.32, 0.18),
+    (0.3, 0.1, 0.3, 0.1),
+)
 LENGTHS = [
     *(ROCKER, TRIPLE, CHANGE),
     *((0.3, 0.24, 0.1, 0.22), (0.08, 0.24, 0.2, 0.26), (0.25, 0.22, 0.3, 0.1)),
-    *((0.1, 0.3, 0.3, 0.1), (0.3, 0.3, 0.1, 0.1), (0.2, 0.2, 0.2, 0.2), (3.0, 1.0, 2.0, 2.0), (1.0, 1.0, 0.4, 0.4)),
+    *(
+        (0.1, 0.3, 0.3, 0.1),
+        (0.3, 0.3, 0.1, 0.1),
+        (0.2, 0.2, 0.2, 0.2),
+        (3.0, 1.0, 2.0, 2.0),
+        (1.0, 1.0, 0.4, 0.4),
+    ),
 ]
 SEEN = 1e-9
 """rad. An error of a limit, an extreme or a ratio of this size must be seen."""
 
 
 def judged(
-    lengths: tuple[float, ...], engine: Callable[[], Exact] = PinocchioInverse, theta_1: float = 0.4
+    lengths: tuple[float, ...],
+    engine: Callable[[], Exact] = PinocchioInverse,
+    theta_1: float = 0.4,
 ) -> dict[str, Row]:
     bars = uniform(*lengths)
-    linkage = fourbar.FourBar(bars.ground, bars.input, bars.coupler, bars.output, theta_1)
+    linkage = fourbar.FourBar(
+        bars.ground, bars.input, bars.coupler, bars.output, theta_1
+    )
     low, high = mobility.choose_range(linkage)
-    scene = Scene(linkage, fourbar.Motion(fourbar.Sweep(low + 0.01, high - 0.01, 7), 2.0), drive_bar=4)
+    scene = Scene(
+        linkage,
+        fourbar.Motion(fourbar.Sweep(low + 0.01, high - 0.01, 7), 2.0),
+        drive_bar=4,
+    )
     adapter = engine()
-    rows = check_statements("scene", scene, adapter, adapter.answer(scene, command(scene)))
+    rows = check_statements(
+        "scene", scene, adapter, adapter.answer(scene, command(scene))
+    )
     return {row.quantity: row for row in rows}
 
 
@@ -58,7 +78,9 @@ def test_what_is_stated_holds_of_random_linkages() -> None:
     for index in range(20):
         scene = draw_random_scene(1, index, tuple(DrawnType))
         engine = PinocchioInverse()
-        rows = check_statements("scene", scene, engine, engine.answer(scene, command(scene)))
+        rows = check_statements(
+            "scene", scene, engine, engine.answer(scene, command(scene))
+        )
         assert all(row.passed for row in rows), rows
 
 
@@ -74,32 +96,60 @@ def changed(
     return plant
 
 
-def moved(limits: tuple[mobility.LimitPosition, ...], field: str) -> tuple[mobility.LimitPosition, ...]:
-    return tuple(limit._replace(**{field: getattr(limit, field) + SEEN}) for limit in limits)
+def moved(
+    limits: tuple[mobility.LimitPosition, ...], field: str
+) -> tuple[mobility.LimitPosition, ...]:
+    return tuple(
+        limit._replace(**{field: getattr(limit, field) + SEEN}) for limit in limits
+    )
 
 
 FAULTS = {
-    "a limit missing": (TRIPLE, "range", changed("limit_positions", lambda limits: limits[:-1])),
+    "a limit missing": (
+        TRIPLE,
+        "range",
+        changed("limit_positions", lambda limits: limits[:-1]),
+    ),
     "interval begins late": (
         TRIPLE,
         "range",
-        changed("find_intervals", lambda intervals: tuple((low + SEEN, high) for low, high in intervals)),
+        changed(
+            "find_intervals",
+            lambda intervals: tuple((low + SEEN, high) for low, high in intervals),
+        ),
     ),
     "the complement of the range": (
         TRIPLE,
         "range",
-        changed("find_intervals", lambda intervals: tuple((high, low + 2 * math.pi) for low, high in intervals)),
+        changed(
+            "find_intervals",
+            lambda intervals: tuple(
+                (high, low + 2 * math.pi) for low, high in intervals
+            ),
+        ),
     ),
     "turns fully": (TRIPLE, "range", changed("turns_fully", lambda turns: True)),
-    "a full turn denied": (ROCKER, "range", changed("turns_fully", lambda turns: False)),
+    "a full turn denied": (
+        ROCKER,
+        "range",
+        changed("turns_fully", lambda turns: False),
+    ),
     "sweep leaves the range": (
         TRIPLE,
         "range",
         changed("choose_range", lambda interval: (interval[0] - 0.1, interval[1])),
     ),
     "swing": (ROCKER, "range", changed("swing", lambda angle: angle + SEEN)),
-    "change point": (CHANGE, "range", changed("change_points", lambda angles: angles[:1])),
-    "a change point that is none": (ROCKER, "range", changed("change_points", lambda angles: (0.4,))),
+    "change point": (
+        CHANGE,
+        "range",
+        changed("change_points", lambda angles: angles[:1]),
+    ),
+    "a change point that is none": (
+        ROCKER,
+        "range",
+        changed("change_points", lambda angles: (0.4,)),
+    ),
     "theta_2 of a dead centre": (
         ROCKER,
         "limit_positions",
@@ -113,27 +163,46 @@ FAULTS = {
     "branch of a dead centre": (
         ROCKER,
         "limit_positions",
-        changed("limit_positions", lambda limits: tuple(limit._replace(branch=-limit.branch) for limit in limits)),
+        changed(
+            "limit_positions",
+            lambda limits: tuple(
+                limit._replace(branch=-limit.branch) for limit in limits
+            ),
+        ),
     ),
     "no branch of a dead centre": (
         ROCKER,
         "limit_positions",
-        changed("limit_positions", lambda limits: tuple(limit._replace(branch=0) for limit in limits)),
+        changed(
+            "limit_positions",
+            lambda limits: tuple(limit._replace(branch=0) for limit in limits),
+        ),
     ),
     "stretched for folded": (
         TRIPLE,
         "limit_positions",
-        changed("limit_positions", lambda limits: tuple(limit._replace(stretched=False) for limit in limits)),
+        changed(
+            "limit_positions",
+            lambda limits: tuple(limit._replace(stretched=False) for limit in limits),
+        ),
     ),
     "least angle at B": (
         ROCKER,
         "transmission",
-        changed("transmission_extremes", lambda ends: ends._replace(least=ends.least + SEEN), transmission),
+        changed(
+            "transmission_extremes",
+            lambda ends: ends._replace(least=ends.least + SEEN),
+            transmission,
+        ),
     ),
     "where the angle at B is greatest": (
         ROCKER,
         "transmission",
-        changed("transmission_extremes", lambda ends: ends._replace(theta_2_greatest=0.4), transmission),
+        changed(
+            "transmission_extremes",
+            lambda ends: ends._replace(theta_2_greatest=0.4),
+            transmission,
+        ),
     ),
     "transmission angle": (
         ROCKER,
@@ -143,7 +212,11 @@ FAULTS = {
     "drive condition": (
         ROCKER,
         "transmission",
-        changed("drive_sine", lambda sine: sine * (1.0 + SEEN), fourbar_validation.compare.statements.transmission),
+        changed(
+            "drive_sine",
+            lambda sine: sine * (1.0 + SEEN),
+            fourbar_validation.compare.statements.transmission,
+        ),
     ),
     "mechanical advantage": (
         ROCKER,
@@ -155,14 +228,28 @@ FAULTS = {
         "transmission",
         changed("distance_to_singular", lambda distance: distance + SEEN, transmission),
     ),
-    "time ratio": (ROCKER, "transmission", changed("time_ratio", lambda ratio: 1.0 / ratio)),
-    "no time ratio": (ROCKER, "transmission", changed("time_ratio", lambda ratio: None)),
-    "branch through a change point": (CHANGE, "through", changed("follow_smooth_path", np.negative)),
+    "time ratio": (
+        ROCKER,
+        "transmission",
+        changed("time_ratio", lambda ratio: 1.0 / ratio),
+    ),
+    "no time ratio": (
+        ROCKER,
+        "transmission",
+        changed("time_ratio", lambda ratio: None),
+    ),
+    "branch through a change point": (
+        CHANGE,
+        "through",
+        changed("follow_smooth_path", np.negative),
+    ),
 }
 
 
 @pytest.mark.parametrize("fault", FAULTS)
-def test_each_error_in_a_statement_is_seen(fault: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_each_error_in_a_statement_is_seen(
+    fault: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     lengths, quantity, plant = FAULTS[fault]
     plant(monkeypatch)
     row = judged(lengths)[quantity]
@@ -170,12 +257,17 @@ def test_each_error_in_a_statement_is_seen(fault: str, monkeypatch: pytest.Monke
     assert row.reason
 
 
-def test_an_engine_that_does_not_answer_agrees_with_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_engine_that_does_not_answer_agrees_with_nothing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     true = Exact.answer
 
     def silent(self: Exact, scene: Scene, command: fourbar.scene.Command) -> Any:
         answer = true(self, scene, command)
-        answer.quantities = {name: np.full_like(value, np.nan) for name, value in answer.quantities.items()}
+        answer.quantities = {
+            name: np.full_like(value, np.nan)
+            for name, value in answer.quantities.items()
+        }
         return answer
 
     monkeypatch.setattr(Exact, "answer", silent)
@@ -197,7 +289,9 @@ class Shy:
         )
 
 
-def test_an_engine_that_refuses_the_positions_of_the_statements_refuses_them_in_a_row() -> None:
+def test_an_engine_that_refuses_the_positions_of_the_statements_refuses_them_in_a_row() -> (
+    None
+):
     rows = judge("scene", crank_rocker(), [Engine("shy", Shy, EQUIVALENCE)]).rows
     (row,) = (row for row in rows if row.setting == "statements of the linkage")
     assert (row.verdict, row.reason) == (REFUSES, "too near a limit")

@@ -9,7 +9,12 @@ import pytest
 import fourbar
 from fourbar.mjcf import write_mjcf
 from fourbar.mjcf.model import compute_frame
-from fourbar_validation.engines.mujoco.picture import HEIGHT, MOST, WIDTH, render_pictures
+from fourbar_validation.engines.mujoco.picture import (
+    HEIGHT,
+    MOST,
+    WIDTH,
+    render_pictures,
+)
 from tests.support.scenes import crank_rocker, thesis
 
 HUES = {2: (0.0, 0.5, 1.0), 3: (1.0, 0.6, 0.0), 4: (0.1, 0.9, 0.2)}
@@ -31,17 +36,25 @@ def test_the_bars_are_seen_where_the_formulas_put_them() -> None:
     seen = compute_frame(scene.linkage)
     s = fourbar.solve(scene)
     O4 = scene.linkage.ground * np.exp(1j * scene.linkage.ground_angle)
-    ends = {2: (np.zeros(2), s.A[0]), 3: (s.A[0], s.B[0]), 4: (np.array([O4.real, O4.imag]), s.B[0])}
+    ends = {
+        2: (np.zeros(2), s.A[0]),
+        3: (s.A[0], s.B[0]),
+        4: (np.array([O4.real, O4.imag]), s.B[0]),
+    }
     for number, (start, end) in ends.items():
         middle = start + 0.4 * (end - start)  # at 0.5 lies the site of a load
         x = WIDTH / 2 + (middle[0] - seen.x) / seen.half_height * HEIGHT / 2
         y = HEIGHT / 2 - (middle[1] - seen.y) / seen.half_height * HEIGHT / 2
-        around = image[round(y) - 2 : round(y) + 3, round(x) - 2 : round(x) + 3].reshape(-1, 3)
+        around = image[
+            round(y) - 2 : round(y) + 3, round(x) - 2 : round(x) + 3
+        ].reshape(-1, 3)
         assert np.linalg.norm(around - HUES[number], axis=1).min() < NEAR, number
     assert image[3, 3].min() > 0.85  # a light background
 
 
-@pytest.mark.parametrize("scene", [thesis(), crank_rocker()], ids=["thesis", "crank-rocker"])
+@pytest.mark.parametrize(
+    "scene", [thesis(), crank_rocker()], ids=["thesis", "crank-rocker"]
+)
 def test_no_position_leaves_the_frame(scene: fourbar.Scene) -> None:
     seen = compute_frame(scene.linkage)
     linkage = scene.linkage
@@ -50,7 +63,10 @@ def test_no_position_leaves_the_frame(scene: fourbar.Scene) -> None:
         s = fourbar.solve(fourbar.Scene(linkage, motion))
         for points in (s.A, s.B):
             offset = np.abs(points[s.assembled] - (seen.x, seen.y)).max(axis=0)
-            assert offset[1] < seen.half_height and offset[0] < seen.half_height * WIDTH / HEIGHT
+            assert (
+                offset[1] < seen.half_height
+                and offset[0] < seen.half_height * WIDTH / HEIGHT
+            )
 
 
 @pytest.mark.slow

@@ -24,13 +24,28 @@ KINK = 1e-5
 """rad; where the cubic pieces of a law meet within a step of RK4 the motion errs by h^2: measured 3e-6 here."""
 SIMULATED = [replace(engine, order=None) for engine in ENGINES if engine.through_time]
 LAWS = {
-    "periodic": Law((0.0, 0.2, 0.5, 1.0), (0.0, 1.0, 3.5, 2.0 * math.pi), 24, "periodic"),
-    "from rest to rest, turning back between": Law((0.0, 0.2, 0.5, 1.0), (0.0, 1.0, 0.2, 2.0), 24, "rest"),
-    "backwards, time not from 0": Law((1.0, 1.2, 1.5, 2.0, 2.2), (0.0, -1.0, -2.2, -2.5, -2.6), 24, "free"),
+    "periodic": Law(
+        (0.0, 0.2, 0.5, 1.0), (0.0, 1.0, 3.5, 2.0 * math.pi), 24, "periodic"
+    ),
+    "from rest to rest, turning back between": Law(
+        (0.0, 0.2, 0.5, 1.0), (0.0, 1.0, 0.2, 2.0), 24, "rest"
+    ),
+    "backwards, time not from 0": Law(
+        (1.0, 1.2, 1.5, 2.0, 2.2), (0.0, -1.0, -2.2, -2.5, -2.6), 24, "free"
+    ),
     "at constant speed": Law((0.0, 0.1, 0.2, 0.3), (0.0, 1.0, 2.0, 3.0), 12, "free"),
 }
-PART_OF_A_TURN = Load(4, (3.0, 0.7), (0.05, 1.0), 0.2, "bar", Table((0.1, 1.0, 2.0), (2.0, -5.0, 2.0)))
-WHOLE_TURN = Load(3, (4.0, 0.7), (0.05, 1.0), 0.2, "world", Table((0.0, 1.0, 2.5, 2 * np.pi), (0.0, 1.0, -0.5, 0.0)))
+PART_OF_A_TURN = Load(
+    4, (3.0, 0.7), (0.05, 1.0), 0.2, "bar", Table((0.1, 1.0, 2.0), (2.0, -5.0, 2.0))
+)
+WHOLE_TURN = Load(
+    3,
+    (4.0, 0.7),
+    (0.05, 1.0),
+    0.2,
+    "world",
+    Table((0.0, 1.0, 2.5, 2 * np.pi), (0.0, 1.0, -0.5, 0.0)),
+)
 
 
 def simulated(posed: Scene) -> list[Row]:
@@ -49,25 +64,46 @@ def failing(posed: Scene) -> set[str]:
 def test_a_motion_law_is_run_through(name: str, drive: int) -> None:
     """The whole scene at once: a table of a load too, gravity, and dry friction whose sense changes with the law's."""
     effects = (Gravity(), Friction.at(O2=0.02, O4=0.03))
-    posed = crank_rocker(motion=fourbar.Motion(law=LAWS[name]), loads=(WHOLE_TURN,), effects=effects, drive_bar=drive)
+    posed = crank_rocker(
+        motion=fourbar.Motion(law=LAWS[name]),
+        loads=(WHOLE_TURN,),
+        effects=effects,
+        drive_bar=drive,
+    )
     rows = simulated(posed)
     assert [row for row in rows if not row.passed] == []
     assert {"theta_4", "alpha_4", "F32", "torque"} <= {row.quantity for row in rows}
 
 
 def test_the_law_is_followed_at_its_own_times() -> None:
-    posed = crank_rocker(motion=fourbar.Motion(law=LAWS["periodic"]), loads=(), effects=())
+    posed = crank_rocker(
+        motion=fourbar.Motion(law=LAWS["periodic"]), loads=(), effects=()
+    )
     command = fourbar.command(posed)
     answer = simulate.MujocoSimulated().answer(posed, command)
-    assert answer.at is not None and command.omega_2 is not None and answer.at.omega_2 is not None
+    assert (
+        answer.at is not None
+        and command.omega_2 is not None
+        and answer.at.omega_2 is not None
+    )
     assert np.abs(answer.at.theta_2 - command.theta_2).max() < KINK
-    assert np.abs(answer.at.omega_2 - command.omega_2).max() < 1e-5 * np.abs(command.omega_2).max()
+    assert (
+        np.abs(answer.at.omega_2 - command.omega_2).max()
+        < 1e-5 * np.abs(command.omega_2).max()
+    )
 
 
 @pytest.mark.parametrize("omega", [10.0, -10.0])
 def test_a_table_that_ends_where_the_sweep_does(omega: float) -> None:
     motion = fourbar.Motion(fourbar.Sweep(0.1, 2.0, 12), omega)
-    assert failing(crank_rocker(motion=motion, loads=(PART_OF_A_TURN, Load(2, moment=-0.2)), effects=())) == set()
+    assert (
+        failing(
+            crank_rocker(
+                motion=motion, loads=(PART_OF_A_TURN, Load(2, moment=-0.2)), effects=()
+            )
+        )
+        == set()
+    )
 
 
 def test_an_overrun_is_put_back_only_if_it_is_a_rounding() -> None:
@@ -83,29 +119,47 @@ def changed(right: Callable[..., Any], factor: float) -> Callable[..., Any]:
     return lambda *arguments: factor * right(*arguments)
 
 
-@pytest.mark.parametrize("factor", [-1.0, 2.0, 0.0], ids=["wrong sign", "applied twice", "missing"])
-def test_a_fault_in_a_table_fails_the_run(factor: float, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(
+    "factor", [-1.0, 2.0, 0.0], ids=["wrong sign", "applied twice", "missing"]
+)
+def test_a_fault_in_a_table_fails_the_run(
+    factor: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
     right = simulate.evaluate_loads
     monkeypatch.setattr(
         simulate,
         "evaluate_loads",
-        lambda scene: {name: changed(of_load, factor) for name, of_load in right(scene).items()},
+        lambda scene: {
+            name: changed(of_load, factor) for name, of_load in right(scene).items()
+        },
     )
     motion = fourbar.Motion(fourbar.Sweep(0.13, 0.13 + 2 * math.pi, 12), 10.0)
-    assert "torque" in failing(crank_rocker(motion=motion, loads=(WHOLE_TURN,), effects=()))
+    assert "torque" in failing(
+        crank_rocker(motion=motion, loads=(WHOLE_TURN,), effects=())
+    )
 
 
-@pytest.mark.parametrize("factor", [-1.0, 1.001, 0.0], ids=["wrong sign", "a thousandth more", "missing"])
-def test_a_drive_that_does_not_follow_the_law_fails_the_run(factor: float, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(
+    "factor", [-1.0, 1.001, 0.0], ids=["wrong sign", "a thousandth more", "missing"]
+)
+def test_a_drive_that_does_not_follow_the_law_fails_the_run(
+    factor: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The engine is judged at the motion it made; that it is not the law's, its own speed says."""
     monkeypatch.setattr(runner.Lawful, "alpha", changed(runner.Lawful.alpha, factor))
-    posed = crank_rocker(motion=fourbar.Motion(law=LAWS["periodic"]), loads=(), effects=())
+    posed = crank_rocker(
+        motion=fourbar.Motion(law=LAWS["periodic"]), loads=(), effects=()
+    )
     failed = [row for row in simulated(posed) if not row.passed]
     assert any("does not turn as commanded" in row.reason for row in failed)
 
 
 def test_the_callback_ends_with_the_run() -> None:
-    simulated(crank_rocker(motion=fourbar.Motion(law=LAWS["at constant speed"]), loads=(WHOLE_TURN,)))
+    simulated(
+        crank_rocker(
+            motion=fourbar.Motion(law=LAWS["at constant speed"]), loads=(WHOLE_TURN,)
+        )
+    )
     assert mujoco.get_mjcb_act_bias() is None
 
 
@@ -116,5 +170,7 @@ def test_dry_friction_is_simulated_at_any_speed(omega: float, torque: float) -> 
     motion = fourbar.Motion(fourbar.Sweep(0.13, 0.13 + 2 * math.pi, 12), omega)
     effects = (Friction.at(O2=torque, A=torque, B=torque, O4=torque),)
     rows = simulated(crank_rocker(motion=motion, loads=(), effects=effects))
-    forces = [row for row in rows if row.quantity in ("torque", "F12", "F32", "F43", "F14")]
+    forces = [
+        row for row in rows if row.quantity in ("torque", "F12", "F32", "F43", "F14")
+    ]
     assert len(forces) == 5 and all(row.error < 1e-6 for row in forces), forces

@@ -32,11 +32,17 @@ TURN = fourbar.Sweep(0.1, 0.1 + 2 * math.pi, 90)
 
 
 def scene(
-    lengths: tuple[float, float, float, float], sweep: fourbar.Sweep, omega: float, **parts: object
+    lengths: tuple[float, float, float, float],
+    sweep: fourbar.Sweep,
+    omega: float,
+    **parts: object,
 ) -> fourbar.Scene:
     """Offset mass centres, gravity, loads in both frames."""
     d, a, b, c = lengths
-    bars = [fourbar.Bar(x, 0.4, None, (0.55 * x, turn)) for x, turn in ((a, 0.2), (b, 0.3), (c, -0.2))]
+    bars = [
+        fourbar.Bar(x, 0.4, None, (0.55 * x, turn))
+        for x, turn in ((a, 0.2), (b, 0.3), (c, -0.2))
+    ]
     loads = (
         fourbar.Load(4, (3.0, 0.7), (0.05, 1.0)),
         fourbar.Load(3, (2.0, 0.3), (0.03, 0.2), frame="bar"),
@@ -51,7 +57,11 @@ def scene(
     return fourbar.Scene(**{**expected, **parts})  # type: ignore[arg-type]
 
 
-DRAG, ROCKER, TRIPLE = (0.1, 0.3, 0.25, 0.28), (0.3, 0.25, 0.1, 0.28), (0.35, 0.25, 0.2, 0.25)
+DRAG, ROCKER, TRIPLE = (
+    (0.1, 0.3, 0.25, 0.28),
+    (0.3, 0.25, 0.1, 0.28),
+    (0.35, 0.25, 0.2, 0.25),
+)
 EVERY_PIN = {"O2": 0.02, "A": 0.03, "B": 0.04, "O4": 0.05}
 SCENES = {
     "crank-rocker": crank_rocker(motion=fourbar.Motion(TURN, 10.0, 5.0)),
@@ -60,16 +70,24 @@ SCENES = {
     "drive on bar 4": crank_rocker(motion=fourbar.Motion(TURN, 10.0, 3.0), drive_bar=4),
     "drag link": scene(DRAG, TURN, 10.0),
     "drag link, drive on bar 3": scene(DRAG, TURN, 10.0, drive_bar=3),
-    "double rocker": scene(ROCKER, fourbar.Sweep(0.2 + math.radians(38), 0.2 + math.radians(85), 90), 10.0),
-    "triple rocker": scene(TRIPLE, fourbar.Sweep(0.2 - math.radians(94), 0.2 + math.radians(94), 90), 10.0),
+    "double rocker": scene(
+        ROCKER, fourbar.Sweep(0.2 + math.radians(38), 0.2 + math.radians(85), 90), 10.0
+    ),
+    "triple rocker": scene(
+        TRIPLE, fourbar.Sweep(0.2 - math.radians(94), 0.2 + math.radians(94), 90), 10.0
+    ),
     "thesis": thesis(fourbar.Sweep(math.radians(86.618), math.radians(363.382), 180)),
-    "viscous": crank_rocker(motion=fourbar.Motion(TURN, 10.0), effects=(fourbar.Viscous.at(**EVERY_PIN),)),
+    "viscous": crank_rocker(
+        motion=fourbar.Motion(TURN, 10.0), effects=(fourbar.Viscous.at(**EVERY_PIN),)
+    ),
 }
 
 
 def compared(posed: fourbar.Scene, answer: Answer) -> list[Row]:
     """Rows of the simulation against the formulas at the motion that it made."""
-    return Comparison("", posed, answer, fourbar.solve(posed, at=answer.at), Held(SIMULATED, UNKNOWNS)).rows()
+    return Comparison(
+        "", posed, answer, fourbar.solve(posed, at=answer.at), Held(SIMULATED, UNKNOWNS)
+    ).rows()
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -88,14 +106,20 @@ def test_within_1e_5_of_the_scale(name: str) -> None:
 def test_slow_linkages_hold_as_well(loaded: bool, index: int) -> None:
     """One pass of Newton's method is all they get; under loads the closure must be the stiffer for it."""
     drawn = draw_random_scene(7, index, tuple(DrawnType))
-    slow = replace(drawn, motion=drawn.motion.replace(speed=0.001 if loaded else 0.01, acceleration=0.0), drive_bar=2)
+    slow = replace(
+        drawn,
+        motion=drawn.motion.replace(speed=0.001 if loaded else 0.01, acceleration=0.0),
+        drive_bar=2,
+    )
     posed = slow if loaded else replace(slow, loads=(), effects=())
     answer = MujocoSimulated().answer(posed, fourbar.command(posed))
     rows = compared(posed, answer)
     assert all(row.passed for row in rows), [row for row in rows if not row.passed]
 
 
-def test_an_input_that_speeds_up_covers_the_end_of_its_window_in_as_many_steps() -> None:
+def test_an_input_that_speeds_up_covers_the_end_of_its_window_in_as_many_steps() -> (
+    None
+):
     run = WindowMotion(0.0, 3.0, 0.01, 5.0)
     assert run.fastest * run.timestep(RECIPE) <= 3.0 / RECIPE.steps_per_window
 
@@ -105,13 +129,17 @@ def test_it_is_run_near_the_requested_positions() -> None:
     command = fourbar.command(posed)
     moved = MujocoSimulated().answer(posed, command).at
     assert moved is not None
-    assert np.abs(moved.theta_2 - command.theta_2).max() <= math.pi / 600  # half a step of some 628 a turn
+    assert (
+        np.abs(moved.theta_2 - command.theta_2).max() <= math.pi / 600
+    )  # half a step of some 628 a turn
 
 
 def test_a_wrong_load_is_seen() -> None:
     posed = SCENES["crank-rocker"]
     answer = MujocoSimulated().answer(posed, fourbar.command(posed))
-    on_coupler = replace(posed, loads=(replace(posed.loads[0], bar=3), *posed.loads[1:]))
+    on_coupler = replace(
+        posed, loads=(replace(posed.loads[0], bar=3), *posed.loads[1:])
+    )
     assert {row.quantity for row in compared(on_coupler, answer) if not row.passed} >= {
         "F12",
         "F32",
@@ -125,7 +153,9 @@ def test_positions_outside_the_range_are_not_assembled() -> None:
     posed = scene(TRIPLE, fourbar.Sweep(0.2 - math.pi, 0.2 + math.pi, 72), 10.0)
     command = fourbar.command(posed)
     answer = MujocoSimulated().answer(posed, command)
-    inside = np.abs(command.theta_2 - 0.2) < math.radians(95.739)  # cosine rule at b + c
+    inside = np.abs(command.theta_2 - 0.2) < math.radians(
+        95.739
+    )  # cosine rule at b + c
     assert answer.assembled is not None and np.array_equal(answer.assembled, inside)
     assert np.isfinite(answer.quantities["F43"]).all(axis=1).tolist() == inside.tolist()
 
@@ -162,39 +192,64 @@ def test_error_falls_with_the_fourth_power_of_the_timestep() -> None:
     posed = crank_rocker(motion=fourbar.Motion(TURN, 10.0))
 
     def error(answer: Answer) -> float:
-        return float(np.abs(answer.quantities["F43"] - fourbar.solve(posed, at=answer.at).F43).max())  # type: ignore[operator]
+        return float(
+            np.abs(
+                answer.quantities["F43"] - fourbar.solve(posed, at=answer.at).F43
+            ).max()
+        )  # type: ignore[operator]
 
     coarse, fine, order = observe_order(posed, fourbar.command(posed), error)
     assert fine < coarse and 3.0 < order < 6.0, (coarse, fine, order)
 
 
-def test_a_residual_that_is_no_number_raises_its_alarm(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(ResidualMonitor, "evidence", lambda self: {"force_gap": math.nan})
+def test_a_residual_that_is_no_number_raises_its_alarm(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(
+        ResidualMonitor, "evidence", lambda self: {"force_gap": math.nan}
+    )
     monkeypatch.setattr(ClosedLoop, "gap", lambda self, right=ClosedLoop.gap: (right(self)[0], math.nan)
                         if self.data.time else right(self))  # fmt: skip
     posed = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.1, 0.4, 3), 10.0))
     alarms = MujocoSimulated().answer(posed, fourbar.command(posed)).alarms
-    assert {alarm.partition(" = ")[0] for alarm in alarms} == {"force_gap", "closure_gap"}
+    assert {alarm.partition(" = ")[0] for alarm in alarms} == {
+        "force_gap",
+        "closure_gap",
+    }
 
 
 def test_without_an_error_there_is_no_order(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(MujocoSimulated, "answer", lambda *_: Answer("", ""))
-    assert math.isnan(observe_order(crank_rocker(), fourbar.command(crank_rocker()), lambda _: 0.0)[2])
+    assert math.isnan(
+        observe_order(crank_rocker(), fourbar.command(crank_rocker()), lambda _: 0.0)[2]
+    )
 
 
 def hood(links: float, output: float | None = None) -> fourbar.Scene:
     """14.5 kg that reach far out on light links, slowly."""
     coupler = fourbar.Bar(0.08, 14.5, 5.0, (1.0, 0.2))
-    bars = (fourbar.Bar(0.10, links), coupler, fourbar.Bar(0.12, links if output is None else output))
+    bars = (
+        fourbar.Bar(0.10, links),
+        coupler,
+        fourbar.Bar(0.12, links if output is None else output),
+    )
     motion = fourbar.Motion(fourbar.Sweep(0.8, 1.8, 12), 0.5)
-    return fourbar.Scene(fourbar.FourBar(0.11, *bars), motion, effects=(fourbar.Gravity(),), title="hood")
+    return fourbar.Scene(
+        fourbar.FourBar(0.11, *bars), motion, effects=(fourbar.Gravity(),), title="hood"
+    )
 
 
-SIMULATION = [replace(engine, order=None) for engine in ENGINES if engine.name == "mujoco-simulated"]
+SIMULATION = [
+    replace(engine, order=None)
+    for engine in ENGINES
+    if engine.name == "mujoco-simulated"
+]
 
 
 @pytest.mark.parametrize("links", [1e-2, 1e-8])
-def test_the_closure_is_as_stiff_as_the_lightest_bar_that_it_joins_needs(links: float) -> None:
+def test_the_closure_is_as_stiff_as_the_lightest_bar_that_it_joins_needs(
+    links: float,
+) -> None:
     """With pads for bars of one size the inertial torque was 3e-5 wrong at 10 g, 3e-3 at 1 g."""
     record = judge("hood", hood(links), SIMULATION)
     assert {row.verdict for row in record.rows} == {AGREES}
@@ -203,16 +258,33 @@ def test_the_closure_is_as_stiff_as_the_lightest_bar_that_it_joins_needs(links: 
     assert inertia.error < 1e-6
 
 
-def test_a_simulation_that_fails_names_the_ratio_of_masses(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("fourbar.mjcf.document.compute_mass_ratio", lambda linkage: 1.0)  # pads for bars of one size
-    (failed,) = (row for row in judge("hood", hood(1e-3), SIMULATION).rows if row.verdict == FAILS)
+def test_a_simulation_that_fails_names_the_ratio_of_masses(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(
+        "fourbar.mjcf.document.compute_mass_ratio", lambda linkage: 1.0
+    )  # pads for bars of one size
+    (failed,) = (
+        row
+        for row in judge("hood", hood(1e-3), SIMULATION).rows
+        if row.verdict == FAILS
+    )
     assert failed.quantity == "torque_inertia"
-    assert failed.reason == "modelling + integration; of coupler and output one is 9.1e+06 times lighter"
+    assert (
+        failed.reason
+        == "modelling + integration; of coupler and output one is 9.1e+06 times lighter"
+    )
 
 
 @pytest.mark.parametrize(("links", "output"), [(0.0, None), (0.01, 0.0)])
-def test_the_mass_that_a_massless_bar_is_advised_to_have_leads_to_a_pass(links: float, output: float | None) -> None:
-    (refused,) = (row for row in judge("hood", hood(links, output), SIMULATION).rows if row.quantity == "all")
+def test_the_mass_that_a_massless_bar_is_advised_to_have_leads_to_a_pass(
+    links: float, output: float | None
+) -> None:
+    (refused,) = (
+        row
+        for row in judge("hood", hood(links, output), SIMULATION).rows
+        if row.quantity == "all"
+    )
     advised = re.search('with mass = "(.*) kg"', refused.reason)
     assert refused.verdict == REFUSES and advised is not None
     mass = float(advised[1])
@@ -221,7 +293,11 @@ def test_the_mass_that_a_massless_bar_is_advised_to_have_leads_to_a_pass(links: 
 
 
 def by_quantity(scene: fourbar.Scene) -> dict[str, Row]:
-    return {row.quantity: row for row in judge("", scene, SIMULATION).rows if row.engine == "mujoco-simulated"}
+    return {
+        row.quantity: row
+        for row in judge("", scene, SIMULATION).rows
+        if row.engine == "mujoco-simulated"
+    }
 
 
 @pytest.mark.slow
@@ -230,29 +306,60 @@ def test_its_own_actuator_between_two_sites_gives_the_force_of_a_cylinder(
     one: int, other: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     drive = fourbar.LinearDrive(SpringEnd(one, 0.17, -1.1), SpringEnd(other, 0.09, 0.7))
-    scene = crank_rocker(motion=fourbar.Motion(TURN, 10.0, 5.0), drive=drive, effects=(fourbar.Gravity(),))
+    scene = crank_rocker(
+        motion=fourbar.Motion(TURN, 10.0, 5.0),
+        drive=drive,
+        effects=(fourbar.Gravity(),),
+    )
     rows = by_quantity(scene)
     assert {row.verdict for row in rows.values()} == {AGREES}
-    assert {"drive_force", "drive_force_inertia", "stroke", "stroke_speed", "F12", "F43", "as shipped"} <= rows.keys()
-    assert max(rows[name].error for name in ("drive_force", "F12", "F32", "F43", "F14")) < 1e-6
+    assert {
+        "drive_force",
+        "drive_force_inertia",
+        "stroke",
+        "stroke_speed",
+        "F12",
+        "F43",
+        "as shipped",
+    } <= rows.keys()
+    assert (
+        max(rows[name].error for name in ("drive_force", "F12", "F32", "F43", "F14"))
+        < 1e-6
+    )
     right = ClosedLoop.work
-    monkeypatch.setattr(ClosedLoop, "work", lambda self, bar, size, *rest: right(self, bar, 1.01 * size, *rest))
+    monkeypatch.setattr(
+        ClosedLoop,
+        "work",
+        lambda self, bar, size, *rest: right(self, bar, 1.01 * size, *rest),
+    )
     rows = by_quantity(scene)
     assert rows["drive_force"].verdict == FAILS
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("what", ["theta_3", "theta_4", "stroke of bar 2", "stroke of bar 4"])
-def test_the_input_is_led_so_that_what_is_commanded_moves_as_told(what: str, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(
+    "what", ["theta_3", "theta_4", "stroke of bar 2", "stroke of bar 4"]
+)
+def test_the_input_is_led_so_that_what_is_commanded_moves_as_told(
+    what: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     (simulated,) = SIMULATION
     for branch in (1, -1):
         scene = commanded(what, branch)
         question = Question("", scene, fourbar.command(scene))
         answer = question.answer(simulated)
-        assert {row.verdict for row in compare_answer(question, simulated, answer)} == {AGREES}
-        assert answer.at is not None and answer.at.speed is not None and len(answer.alarms) == 0
+        assert {row.verdict for row in compare_answer(question, simulated, answer)} == {
+            AGREES
+        }
+        assert (
+            answer.at is not None
+            and answer.at.speed is not None
+            and len(answer.alarms) == 0
+        )
         assert answer.at.bar == question.at.bar and (answer.at.branch == branch).all()
-        speeds = answer.quantities["stroke_speed"] if "stroke" in what else answer.at.speed
+        speeds = (
+            answer.quantities["stroke_speed"] if "stroke" in what else answer.at.speed
+        )
         passed = answer.quantities["stroke"] if "stroke" in what else answer.at.angle
         speed, growth = (0.2, 0.1) if "stroke" in what else (3.0, -2.0)
         closes = answer.assembled
@@ -266,10 +373,16 @@ def test_the_input_is_led_so_that_what_is_commanded_moves_as_told(what: str, mon
 
 
 def test_an_input_that_must_hurry_is_not_led() -> None:
-    near = float(fourbar.formulas.mobility.find_limit_angles(crank_rocker().linkage, 4)[0])
+    near = float(
+        fourbar.formulas.mobility.find_limit_angles(crank_rocker().linkage, 4)[0]
+    )
     motion = fourbar.Motion(theta_4=near + np.linspace(0.3, 1e-6, 20), omega_4=-1.0)
     rows = judge("", crank_rocker(motion=motion), SIMULATION).rows
-    assert [row.reason for row in rows if row.verdict == REFUSES and "as fast as on the mean" in row.reason]
+    assert [
+        row.reason
+        for row in rows
+        if row.verdict == REFUSES and "as fast as on the mean" in row.reason
+    ]
 
 
 def test_near_a_pole_of_the_drive_on_the_coupler_no_simulation_is_accused() -> None:

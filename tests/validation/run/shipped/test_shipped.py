@@ -22,12 +22,26 @@ from tests.support.scenes import crank_rocker
 
 SHIPPED = FAULT_SCENES["shipped"]
 CHECKS = [check.make_rows for check in judge.CHECKS if check.shipped]
-ENGINES = {"study", "sensitivity", "internal_forces", "extremes", "tolerances", "equilibria", "sdf", "usd"}
+ENGINES = {
+    "study",
+    "sensitivity",
+    "internal_forces",
+    "extremes",
+    "tolerances",
+    "equilibria",
+    "sdf",
+    "usd",
+}
 
 
 def rows_of(scene: Scene, engine: str = "") -> list[Row]:
     question = Question("", scene, command(scene))
-    return [row for check in CHECKS if engine in ("", check.__name__) for row in check(question)]
+    return [
+        row
+        for check in CHECKS
+        if engine in ("", check.__name__)
+        for row in check(question)
+    ]
 
 
 def failing(rows: list[Row]) -> set[str]:
@@ -37,11 +51,15 @@ def failing(rows: list[Row]) -> set[str]:
 def test_every_engine_compares_and_holds() -> None:
     rows = rows_of(SHIPPED)
     compared = {row.engine for row in rows if row.compared}
-    assert compared == ENGINES == {check.__name__ for check in CHECKS} == set(SHIPPED_ROWS)
+    assert (
+        compared == ENGINES == {check.__name__ for check in CHECKS} == set(SHIPPED_ROWS)
+    )
     assert not failing(rows)
 
 
-def altered(call: Callable[..., Any], change: Callable[[Any], None]) -> Callable[..., Any]:
+def altered(
+    call: Callable[..., Any], change: Callable[[Any], None]
+) -> Callable[..., Any]:
     def wrong(*arguments: Any, **options: Any) -> Any:
         answer = call(*arguments, **options)
         change(answer)
@@ -76,15 +94,23 @@ def narrower(answer: Any) -> None:
     ],
 )
 def test_a_public_call_that_errs_fails(
-    monkeypatch: pytest.MonkeyPatch, engine: str, call: str, change: Callable[[Any], None], quantity: str
+    monkeypatch: pytest.MonkeyPatch,
+    engine: str,
+    call: str,
+    change: Callable[[Any], None],
+    quantity: str,
 ) -> None:
     question = Question("", SHIPPED, command(SHIPPED))
     monkeypatch.setattr(fourbar, call, altered(getattr(fourbar, call), change))
-    assert quantity in failing(next(check for check in CHECKS if check.__name__ == engine)(question))
+    assert quantity in failing(
+        next(check for check in CHECKS if check.__name__ == engine)(question)
+    )
 
 
 def changed(**numbers: Any) -> Callable[[Any], Any]:
-    return lambda answer: answer._replace(found=(answer.found[0]._replace(**numbers), *answer.found[1:]))
+    return lambda answer: answer._replace(
+        found=(answer.found[0]._replace(**numbers), *answer.found[1:])
+    )
 
 
 def turned(answer: Any) -> Any:
@@ -98,7 +124,10 @@ def turned(answer: Any) -> Any:
         (lambda answer: answer._replace(found=answer.found[1:]), {"missed"}),
         (turned, {"torque"}),
         (lambda answer: changed(slope=-answer.found[0].slope)(answer), {"slope"}),
-        (lambda answer: changed(inertia=1.000001 * answer.found[0].inertia)(answer), {"inertia"}),
+        (
+            lambda answer: changed(inertia=1.000001 * answer.found[0].inertia)(answer),
+            {"inertia"},
+        ),
         (changed(frequency=3.0), {"frequency"}),
     ],
 )
@@ -112,18 +141,28 @@ def test_equilibria_that_err_fail(
 
 @pytest.mark.parametrize("gravity", [-0.7, 2.1])
 def test_equilibria_near_a_limit_are_compared_too(gravity: float) -> None:
-    scene = replace(FAULT_SCENES["shipped, limited"], effects=(fourbar.Gravity(9.81, gravity),))
+    scene = replace(
+        FAULT_SCENES["shipped, limited"], effects=(fourbar.Gravity(9.81, gravity),)
+    )
     rows = rows_of(scene, "equilibria")
-    assert {row.reason for row in rows if row.quantity in ("torque", "slope")} == {"rest: 2 of 2 equilibria"}
+    assert {row.reason for row in rows if row.quantity in ("torque", "slope")} == {
+        "rest: 2 of 2 equilibria"
+    }
     assert not failing(rows)
 
 
-NEARLY_MEET = fourbar.Spring(SpringEnd(1, 0.05, 0.0), SpringEnd(2, 0.05005, 0.0), 2e4, 0.1, 3e3)
+NEARLY_MEET = fourbar.Spring(
+    SpringEnd(1, 0.05, 0.0), SpringEnd(2, 0.05005, 0.0), 2e4, 0.1, 3e3
+)
 """Its ends come within 0.05 mm of each other: there its line turns by half a turn within 1 mrad of the input."""
-MASSLESS = {bar: fourbar.Bar(length) for bar, length in (("input", 0.3), ("coupler", 0.25), ("output", 0.15))}
+MASSLESS = {
+    bar: fourbar.Bar(length)
+    for bar, length in (("input", 0.3), ("coupler", 0.25), ("output", 0.15))
+}
 HARD_AT_REST = {
     "a stiff spring whose line turns within a milliradian": crank_rocker(
-        motion=fourbar.Motion(1.0, 2.0, 0.5), effects=(fourbar.Gravity(), fourbar.Springs((NEARLY_MEET,)))
+        motion=fourbar.Motion(1.0, 2.0, 0.5),
+        effects=(fourbar.Gravity(), fourbar.Springs((NEARLY_MEET,))),
     ),
     "a flywheel alone, at a limit of the input": fourbar.Scene(
         fourbar.FourBar(0.4, **MASSLESS),
@@ -132,12 +171,20 @@ HARD_AT_REST = {
         effects=(fourbar.Flywheel(0.3, 2),),
     ),
     "a sweep that begins on one circuit and goes on on another": fourbar.Scene(
-        fourbar.FourBar(3.15, fourbar.Bar(2.66, 2.0), fourbar.Bar(2.1, 1.0), fourbar.Bar(2.7, 1.0), ground_angle=-0.19),
+        fourbar.FourBar(
+            3.15,
+            fourbar.Bar(2.66, 2.0),
+            fourbar.Bar(2.1, 1.0),
+            fourbar.Bar(2.7, 1.0),
+            ground_angle=-0.19,
+        ),
         fourbar.Motion(fourbar.Sweep(-0.3667, 2.037, 36), 7.4, 1.8),
         effects=(fourbar.Gravity(9.81, -2.0),),
     ),
     "an equilibrium 1e-6 rad beside a limit, where rounding moves the slope by 1e-10 of itself": replace(
-        FAULT_SCENES["shipped, limited"], loads=(), effects=(fourbar.Gravity(9.81, 2.1920361095494605),)
+        FAULT_SCENES["shipped, limited"],
+        loads=(),
+        effects=(fourbar.Gravity(9.81, 2.1920361095494605),),
     ),
 }
 
@@ -153,13 +200,20 @@ def test_right_equilibria_hold_where_they_are_hard_to_judge(name: str) -> None:
 @pytest.mark.parametrize("engine", ["equilibria", "study", "sensitivity"])
 def test_where_nothing_assembles_nothing_is_asked(engine: str) -> None:
     scene = FAULT_SCENES["shipped, limited"]
-    scene = replace(scene, motion=scene.motion.replace(angle=fourbar.Sweep(3.0, 3.1, 4)))
+    scene = replace(
+        scene, motion=scene.motion.replace(angle=fourbar.Sweep(3.0, 3.1, 4))
+    )
     with pytest.raises(NotAskedError):
         rows_of(scene, engine)
 
 
 BARELY = {
-    "study": (0.11238507634792622, 0.4082212569087814, 0.018629148731677116, 0.27731711941435316),
+    "study": (
+        0.11238507634792622,
+        0.4082212569087814,
+        0.018629148731677116,
+        0.27731711941435316,
+    ),
     "sensitivity": (1.00049, 0.3, 5e-4, 0.7),
     "tolerances": (0.99991, 0.3, 3e-4, 0.7),
 }
@@ -170,20 +224,32 @@ BARELY = {
 def test_a_changed_linkage_that_hardly_assembles_is_no_failure(engine: str) -> None:
     d, *moving = BARELY[engine]
     linkage = fourbar.FourBar(d, *(fourbar.Bar(length, 1.0) for length in moving))
-    scene = fourbar.Scene(linkage, fourbar.Motion(None, 2.0, 0.5), effects=(fourbar.Gravity(),))
+    scene = fourbar.Scene(
+        linkage, fourbar.Motion(None, 2.0, 0.5), effects=(fourbar.Gravity(),)
+    )
     assert not failing(rows_of(scene, engine))
 
 
 COMMANDS = {
-    "theta_3": fourbar.Motion(theta_3=fourbar.Sweep(0.67, 1.25, 20), omega_3=2.0, alpha_3=1.0, branch=-1),
-    "theta_4": fourbar.Motion(theta_4=fourbar.Sweep(2.0, 2.75, 20), omega_4=2.0, alpha_4=1.0),
-    "stroke": fourbar.Motion(stroke=fourbar.Sweep(0.2, 0.3, 20), stroke_speed=0.2, side="left"),
+    "theta_3": fourbar.Motion(
+        theta_3=fourbar.Sweep(0.67, 1.25, 20), omega_3=2.0, alpha_3=1.0, branch=-1
+    ),
+    "theta_4": fourbar.Motion(
+        theta_4=fourbar.Sweep(2.0, 2.75, 20), omega_4=2.0, alpha_4=1.0
+    ),
+    "stroke": fourbar.Motion(
+        stroke=fourbar.Sweep(0.2, 0.3, 20), stroke_speed=0.2, side="left"
+    ),
 }
 
 
 def commanding(name: str) -> Scene:
     ends = SpringEnd(1, 0.25, -2.8), SpringEnd(2, 0.09, 0.17)
-    return crank_rocker(motion=COMMANDS[name], drive=fourbar.LinearDrive(*ends), effects=(fourbar.Gravity(),))
+    return crank_rocker(
+        motion=COMMANDS[name],
+        drive=fourbar.LinearDrive(*ends),
+        effects=(fourbar.Gravity(),),
+    )
 
 
 @pytest.mark.slow
@@ -192,16 +258,30 @@ def test_other_commands_are_judged_too_and_what_is_not_is_named(name: str) -> No
     record = judge.judge("", commanding(name), (), order=False, shipped=True)
     assert not [row for row in record.rows if row.failed]
     compared = {row.engine for row in record.rows if row.compared}
-    assert compared >= ENGINES - {"extremes", "sdf", "usd"} and {"status", "blocks"} <= {
-        r.quantity for r in record.rows
-    }
-    left_out = [line.split(":")[0] for line in record.left_out if line.endswith(f"; {name} is commanded")]
-    wanted = ["error bars", "reversals of dry friction", "statements of the linkage", "MJCF as shipped", "sdf", "usd"]
+    assert compared >= ENGINES - {"extremes", "sdf", "usd"} and {
+        "status",
+        "blocks",
+    } <= {r.quantity for r in record.rows}
+    left_out = [
+        line.split(":")[0]
+        for line in record.left_out
+        if line.endswith(f"; {name} is commanded")
+    ]
+    wanted = [
+        "error bars",
+        "reversals of dry friction",
+        "statements of the linkage",
+        "MJCF as shipped",
+        "sdf",
+        "usd",
+    ]
     assert left_out == wanted
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_a_study_of_another_command_that_errs_fails(monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+def test_a_study_of_another_command_that_errs_fails(
+    monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
     scene, call = commanding(name), fourbar.solve
 
     def wrong(subject: Any, *arguments: Any, **options: Any) -> Any:
@@ -216,7 +296,9 @@ def test_a_study_of_another_command_that_errs_fails(monkeypatch: pytest.MonkeyPa
 
 @pytest.mark.slow
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_bounds_that_are_narrower_fail(monkeypatch: pytest.MonkeyPatch, sign: float) -> None:
+def test_bounds_that_are_narrower_fail(
+    monkeypatch: pytest.MonkeyPatch, sign: float
+) -> None:
     call = fourbar.extremes
 
     def narrow(*arguments: Any) -> Any:
@@ -224,22 +306,33 @@ def test_bounds_that_are_narrower_fail(monkeypatch: pytest.MonkeyPatch, sign: fl
         ends = answer.greatest if sign > 0 else answer.least
         end = ends["torque"]
         off = 1e-3 * abs(end.high)
-        ends["torque"] = end._replace(high=end.high - off) if sign > 0 else end._replace(low=end.low + off)
+        ends["torque"] = (
+            end._replace(high=end.high - off)
+            if sign > 0
+            else end._replace(low=end.low + off)
+        )
         return answer
 
     monkeypatch.setattr(fourbar, "extremes", narrow)
     assert failing(rows_of(SHIPPED, "extremes")) == {"torque"}
 
 
-@pytest.mark.parametrize(("engine", "number"), [("sdf", "0.2"), ("sdf", "0.25"), ("usd", "0.2")])
-def test_a_file_with_another_number_fails(monkeypatch: pytest.MonkeyPatch, engine: str, number: str) -> None:
+@pytest.mark.parametrize(
+    ("engine", "number"), [("sdf", "0.2"), ("sdf", "0.25"), ("usd", "0.2")]
+)
+def test_a_file_with_another_number_fails(
+    monkeypatch: pytest.MonkeyPatch, engine: str, number: str
+) -> None:
     """0.2 kg is the mass of the input, 0.25 m the length of the coupler."""
     text = getattr(files, f"{engine}_text")
 
     def wrong(scene: Scene) -> str:
         written: str = text(scene)
         for before, after in ((">", "<"), (">", " "), ("= ", "\n"), ("(", ",")):
-            written = written.replace(f"{before}{number}{after}", f"{before}{float(number) * 1.000001!r}{after}")
+            written = written.replace(
+                f"{before}{number}{after}",
+                f"{before}{float(number) * 1.000001!r}{after}",
+            )
         return written
 
     monkeypatch.setattr(files, f"{engine}_text", wrong)
@@ -247,7 +340,9 @@ def test_a_file_with_another_number_fails(monkeypatch: pytest.MonkeyPatch, engin
 
 
 @pytest.mark.slow
-def test_what_breaks_down_costs_its_own_rows_and_what_is_missing_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_breaks_down_costs_its_own_rows_and_what_is_missing_is_named(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     def broken(*_: object) -> None:
         raise RuntimeError("lost")
 
@@ -263,23 +358,34 @@ def test_what_a_file_cannot_hold_is_refused() -> None:
     assert row.verdict == REFUSES and "pin_friction" in row.reason
 
 
-@pytest.mark.parametrize("name", ["crank-rocker", "damped", "sprung", "flywheel", "sliding pins", "table"])
+@pytest.mark.parametrize(
+    "name", ["crank-rocker", "damped", "sprung", "flywheel", "sliding pins", "table"]
+)
 def test_every_number_that_a_scene_states_is_found_in_its_file(name: str) -> None:
     scene = FAULT_SCENES[name]
     keys = read_numbers(scene).keys()
     stated = SceneFile(scene).find_stated(keys)
-    assert stated.keys() >= keys - {key for key in keys if ".centre." in key or ".inertia" in key}
+    assert stated.keys() >= keys - {
+        key for key in keys if ".centre." in key or ".inertia" in key
+    }
     changed = SceneFile(scene).move({"lengths.coupler": 0.01})
     assert changed.linkage.coupler.length == scene.linkage.coupler.length + 0.01
     assert np.array_equal(command(changed).theta_2, command(scene).theta_2)
 
 
-def test_a_check_that_raises_costs_its_own_rows_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_check_that_raises_costs_its_own_rows_alone(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     def check_nothing(_: Question) -> list[Row]:
         raise ArithmeticError("lost")
 
     all_rows = judge.judge("", SHIPPED, ()).rows
     monkeypatch.setattr(judge, "CHECKS", (judge.Check(check_nothing), *judge.CHECKS))
     (row,) = (row for row in judge.judge("", SHIPPED, ()).rows if row not in all_rows)
-    assert (row.engine, row.setting, row.quantity, row.verdict) == ("formulas", "check_nothing", "all", FAILS)
+    assert (row.engine, row.setting, row.quantity, row.verdict) == (
+        "formulas",
+        "check_nothing",
+        "all",
+        FAILS,
+    )
     assert len(all_rows) > 3

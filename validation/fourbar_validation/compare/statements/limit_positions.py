@@ -53,9 +53,14 @@ class Finding(NamedTuple):
     what: str
 
 
-def make_worst_row(name: str, answer: Answer, quantity: str, findings: Sequence[Finding]) -> Row:
+def make_worst_row(
+    name: str, answer: Answer, quantity: str, findings: Sequence[Finding]
+) -> Row:
     """Make the row of a quantity of the finding that exceeds what it is allowed by most."""
-    error, allowed, theta_2 = (np.array(column) for column in zip(*(finding[:3] for finding in findings), strict=True))
+    error, allowed, theta_2 = (
+        np.array(column)
+        for column in zip(*(finding[:3] for finding in findings), strict=True)
+    )
     worst = findings[int(np.argmax(find_used(error, allowed)))]
     condition = EQUIVALENCE.factor / np.maximum(allowed, EQUIVALENCE.factor)
     who = (name, answer.engine, answer.setting)
@@ -69,11 +74,21 @@ def look(engine: Adapter, linkage: FourBar, places: Iterable[Place]) -> Seen:
     if not ordered:
         return {}
     bars = uniform(*linkage.lengths)
-    scene = Scene(FourBar(bars.ground, bars.input, bars.coupler, bars.output, linkage.ground_angle), Motion(0.0, 1.0))
+    scene = Scene(
+        FourBar(
+            bars.ground, bars.input, bars.coupler, bars.output, linkage.ground_angle
+        ),
+        Motion(0.0, 1.0),
+    )
     theta_2, branch = (np.array(column) for column in zip(*ordered, strict=True))
-    answer = require_answer(engine, scene, Command(theta_2, branch.astype(np.int8), 1.0, 0.0)).quantities
+    answer = require_answer(
+        engine, scene, Command(theta_2, branch.astype(np.int8), 1.0, 0.0)
+    ).quantities
     names = [name for name in OF_BARS if name in answer]
-    return {place: {name: float(answer[name][i]) for name in names} for i, place in enumerate(ordered)}
+    return {
+        place: {name: float(answer[name][i]) for name in names}
+        for i, place in enumerate(ordered)
+    }
 
 
 def require_answer(engine: Adapter, scene: Scene, command: Command) -> Answer:
@@ -84,14 +99,21 @@ def require_answer(engine: Adapter, scene: Scene, command: Command) -> Answer:
     return answer
 
 
-def compare_angles(what: str, stated: Sequence[float], answered: Sequence[float], linkage: FourBar) -> Finding:
+def compare_angles(
+    what: str, stated: Sequence[float], answered: Sequence[float], linkage: FourBar
+) -> Finding:
     """Compare lists of angles, modulo 2 pi in any order: the largest distance of one from the nearest of the other."""
     if not stated or not answered:
-        return Finding(0.0 if len(stated) == len(answered) else math.inf, 0.0, 0.0, what)
+        return Finding(
+            0.0 if len(stated) == len(answered) else math.inf, 0.0, 0.0, what
+        )
     apart = np.abs(wrap_angle(np.subtract.outer(np.array(stated), np.array(answered))))
     error = float(max(apart.min(axis=0).max(), apart.min(axis=1).max()))
     return Finding(
-        error, EQUIVALENCE.factor * count_half_turns(linkage.ground_angle, np.array(stated)), stated[0], what
+        error,
+        EQUIVALENCE.factor * count_half_turns(linkage.ground_angle, np.array(stated)),
+        stated[0],
+        what,
     )
 
 
@@ -114,10 +136,14 @@ def _compare_change_points(linkage: FourBar) -> Finding:
     for psi, gap in missing.items():
         part, angle = float(gap / (d + a + b + c)), linkage.ground_angle + psi
         allowed = EQUIVALENCE.factor * max(1.0, abs(angle))
-        here = any(abs(math.remainder(point - angle, TURN)) <= allowed for point in stated)
+        here = any(
+            abs(math.remainder(point - angle, TURN)) <= allowed for point in stated
+        )
         decided += here
         wrong += part > LENGTHS_ROUNDED[1] if here else part < LENGTHS_ROUNDED[0]
-    return Finding(float(wrong + len(stated) - decided), 0.0, linkage.ground_angle, "change points")
+    return Finding(
+        float(wrong + len(stated) - decided), 0.0, linkage.ground_angle, "change points"
+    )
 
 
 def compute_step_beyond(linkage: FourBar, theta_2: float) -> float:
@@ -148,28 +174,61 @@ class _Trial(NamedTuple):
 
 def _try_bar(linkage: FourBar, bar: int) -> _Trial:
     second, third = (linkage.bar(k) for k in MOVING_BARS if k != bar)
-    first = FourBar(linkage.ground, linkage.bar(bar), second, third, linkage.ground_angle)
+    first = FourBar(
+        linkage.ground, linkage.bar(bar), second, third, linkage.ground_angle
+    )
     shift = math.pi if bar == 4 else 0.0  # the loop runs along bar 4 from B to O4
-    spans, full = mobility.find_intervals(linkage, bar), mobility.turns_fully(linkage, bar)
+    spans, full = (
+        mobility.find_intervals(linkage, bar),
+        mobility.turns_fully(linkage, bar),
+    )
     expected = [((start + stop) / 2.0, True) for start, stop in spans]
     # that the loop closes up to its limits is seen where the limit positions themselves are examined
     for i, (start, stop) in enumerate(() if full else spans):
-        before, after = (start - spans[i - 1][1]) % TURN, (spans[i + 1 - len(spans)][0] - stop) % TURN
-        expected.append((start - min(compute_step_beyond(first, start + shift), 0.5 * before), False))
-        expected.append((stop + min(compute_step_beyond(first, stop + shift), 0.5 * after), False))
-    along = [linkage.ground_angle + angle - shift for angle in (0.0, math.pi)]  # the ground, in both directions
-    within = [any((angle - start) % TURN < stop - start for start, stop in spans) for angle in along]
+        before, after = (
+            (start - spans[i - 1][1]) % TURN,
+            (spans[i + 1 - len(spans)][0] - stop) % TURN,
+        )
+        expected.append(
+            (
+                start - min(compute_step_beyond(first, start + shift), 0.5 * before),
+                False,
+            )
+        )
+        expected.append(
+            (stop + min(compute_step_beyond(first, stop + shift), 0.5 * after), False)
+        )
+    along = [
+        linkage.ground_angle + angle - shift for angle in (0.0, math.pi)
+    ]  # the ground, in both directions
+    within = [
+        any((angle - start) % TURN < stop - start for start, stop in spans)
+        for angle in along
+    ]
     expected += zip(along, within, strict=True)
     if bar == 2:
         expected += [(angle, True) for angle in mobility.choose_range(linkage)]
     angles, inside = (np.array(column) for column in zip(*expected, strict=True))
-    limits = [limit[MOVING_BARS.index(bar)] for limit in mobility.limit_positions(linkage, bar)]
+    limits = [
+        limit[MOVING_BARS.index(bar)]
+        for limit in mobility.limit_positions(linkage, bar)
+    ]
     findings = (
         compare_angles(
-            f"limits of bar {bar}", limits, [] if full else [end for span in spans for end in span], linkage
+            f"limits of bar {bar}",
+            limits,
+            [] if full else [end for span in spans for end in span],
+            linkage,
         ),
-        compare_angles(f"swing of bar {bar}", [mobility.swing(linkage, bar)], [spans[0][1] - spans[0][0]], linkage),
-        Finding(float(full != all(within)), 0.0, along[0], f"whether bar {bar} turns fully"),
+        compare_angles(
+            f"swing of bar {bar}",
+            [mobility.swing(linkage, bar)],
+            [spans[0][1] - spans[0][0]],
+            linkage,
+        ),
+        Finding(
+            float(full != all(within)), 0.0, along[0], f"whether bar {bar} turns fully"
+        ),
     )
     decidable = np.abs(find_margin(first, angles + shift)) > TOUCHING_MARGIN
     command = Command(angles + shift, np.ones(len(angles), np.int8), None, 0.0)
@@ -185,8 +244,13 @@ def _compute_inwards(linkage: FourBar, theta_2: float) -> float:
 
 def _mark_collinear(linkage: FourBar, bar: int) -> list[bool]:
     """Return for each limit of a bar whether all bars are collinear there, apart from rounding."""
-    angles = np.array([limit.theta_2 for limit in mobility.limit_positions(linkage, bar)])
-    return [bool(touches) for touches in np.abs(find_margin(linkage, angles)) <= TOUCHING_MARGIN]
+    angles = np.array(
+        [limit.theta_2 for limit in mobility.limit_positions(linkage, bar)]
+    )
+    return [
+        bool(touches)
+        for touches in np.abs(find_margin(linkage, angles)) <= TOUCHING_MARGIN
+    ]
 
 
 class Stated(NamedTuple):
@@ -203,14 +267,28 @@ class Stated(NamedTuple):
     @classmethod
     def of(cls, linkage: FourBar) -> "Stated":
         """Evaluate the formulas."""
-        inside = [(limit, _compute_inwards(linkage, limit.theta_2)) for limit in mobility.limit_positions(linkage)]
+        inside = [
+            (limit, _compute_inwards(linkage, limit.theta_2))
+            for limit in mobility.limit_positions(linkage)
+        ]
         trials = {bar: _try_bar(linkage, bar) for bar in MOVING_BARS}
-        return cls(linkage, trials, inside, {bar: _mark_collinear(linkage, bar) for bar in (3, 4)})
+        return cls(
+            linkage,
+            trials,
+            inside,
+            {bar: _mark_collinear(linkage, bar) for bar in (3, 4)},
+        )
 
     def dead_centres(self, bar: int) -> list[mobility.LimitPosition]:
         """Select the limits of a bar that are of one branch, as they should be."""
-        limits = zip(mobility.limit_positions(self.linkage, bar), self.collinear[bar], strict=True)
-        return [limit for limit, collinear in limits if not collinear and limit.branch != 0]
+        limits = zip(
+            mobility.limit_positions(self.linkage, bar),
+            self.collinear[bar],
+            strict=True,
+        )
+        return [
+            limit for limit, collinear in limits if not collinear and limit.branch != 0
+        ]
 
 
 def compare_ranges(stated: Stated, engine: Adapter) -> Iterator[Finding]:
@@ -220,7 +298,11 @@ def compare_ranges(stated: Stated, engine: Adapter) -> Iterator[Finding]:
         assert closes is not None
         wrong = tried.decidable & (closes != tried.inside)
         angle = float(tried.angles[int(np.argmax(wrong))])
-        what = f"bar {bar} at {angle!r} rad: the engine finds the opposite" if wrong.any() else "closes where stated"
+        what = (
+            f"bar {bar} at {angle!r} rad: the engine finds the opposite"
+            if wrong.any()
+            else "closes where stated"
+        )
         yield Finding(float(np.count_nonzero(wrong)), 0.0, angle, what)
         yield from tried.findings
     yield _compare_change_points(stated.linkage)
@@ -228,8 +310,16 @@ def compare_ranges(stated: Stated, engine: Adapter) -> Iterator[Finding]:
 
 def choose_places(stated: Stated) -> list[Place]:
     """Return the places where an engine is evaluated to check these statements."""
-    inside = [(limit.theta_2 + step, branch) for limit, step in stated.inside for branch in (1, -1)]
-    return inside + [(limit.theta_2, limit.branch) for bar in (3, 4) for limit in stated.dead_centres(bar)]
+    inside = [
+        (limit.theta_2 + step, branch)
+        for limit, step in stated.inside
+        for branch in (1, -1)
+    ]
+    return inside + [
+        (limit.theta_2, limit.branch)
+        for bar in (3, 4)
+        for limit in stated.dead_centres(bar)
+    ]
 
 
 def compare_limit_positions(stated: Stated, seen: Seen) -> Iterator[Finding]:
@@ -246,21 +336,36 @@ def _check_input(stated: Stated, seen: Seen) -> Iterator[Finding]:
     d, a, *_ = linkage.lengths
     for limit, step in stated.inside:
         open_, crossed = (
-            {name: seen[(limit.theta_2 + step, branch)][name] for name in ("theta_3", "theta_4")} for branch in (1, -1)
+            {
+                name: seen[(limit.theta_2 + step, branch)][name]
+                for name in ("theta_3", "theta_4")
+            }
+            for branch in (1, -1)
         )
-        yield Finding(float(limit.branch != 0), 0.0, limit.theta_2, "both branches meet at a limit of bar 2")
-        digits = find_lever(linkage) * abs(math.sin(open_["theta_4"] - open_["theta_3"]))
+        yield Finding(
+            float(limit.branch != 0),
+            0.0,
+            limit.theta_2,
+            "both branches meet at a limit of bar 2",
+        )
+        digits = find_lever(linkage) * abs(
+            math.sin(open_["theta_4"] - open_["theta_3"])
+        )
         if digits * NOTHING_TO_TELL <= EPS:
             continue
         e = abs(d - a * np.exp(1j * (limit.theta_2 - linkage.ground_angle)))
-        allowed = find_roundoff(linkage) / digits + a / e * (abs(step) + _compute_moved(linkage, 2, limit))
+        allowed = find_roundoff(linkage) / digits + a / e * (
+            abs(step) + _compute_moved(linkage, 2, limit)
+        )
         middle = {}
         for name, angle in (("theta_3", limit.theta_3), ("theta_4", limit.theta_4)):
             middle[name] = open_[name] + 0.5 * wrap_angle(crossed[name] - open_[name])
             error = abs(wrap_angle(middle[name] - angle))
             yield Finding(error, allowed, limit.theta_2, f"{name} at a limit of bar 2")
         aligned = math.cos(middle["theta_4"] - middle["theta_3"]) < 0.0
-        yield Finding(float(aligned != limit.stretched), 0.0, limit.theta_2, "stretched or folded")
+        yield Finding(
+            float(aligned != limit.stretched), 0.0, limit.theta_2, "stretched or folded"
+        )
 
 
 def _compute_moved(linkage: FourBar, bar: int, limit: mobility.LimitPosition) -> float:
@@ -274,26 +379,57 @@ def _compute_moved(linkage: FourBar, bar: int, limit: mobility.LimitPosition) ->
 def _check_dead_centres(stated: Stated, bar: int, seen: Seen) -> Iterator[Finding]:
     """Check that the other two bars are in one line there, and the bar is at rest."""
     linkage = stated.linkage
-    for limit, collinear in zip(mobility.limit_positions(linkage, bar), stated.collinear[bar], strict=True):
-        signs = (0, 1, -1) if collinear else (1, -1)  # all bars collinear: rounding decides
-        yield Finding(float(limit.branch not in signs), 0.0, limit.theta_2, f"branch of a limit of bar {bar}")
+    for limit, collinear in zip(
+        mobility.limit_positions(linkage, bar), stated.collinear[bar], strict=True
+    ):
+        signs = (
+            (0, 1, -1) if collinear else (1, -1)
+        )  # all bars collinear: rounding decides
+        yield Finding(
+            float(limit.branch not in signs),
+            0.0,
+            limit.theta_2,
+            f"branch of a limit of bar {bar}",
+        )
     for limit in stated.dead_centres(bar):
-        what, place = f"bar {bar} at theta_2 = {limit.theta_2!r}", (limit.theta_2, limit.branch)
-        theta_3, theta_4, omega_3, omega_4 = (seen[place][q] for q in ("theta_3", "theta_4", "omega_3", "omega_4"))
-        sine, speed = abs(math.sin(theta_4 - theta_3)), max(1.0, abs(omega_3), abs(omega_4))
+        what, place = (
+            f"bar {bar} at theta_2 = {limit.theta_2!r}",
+            (limit.theta_2, limit.branch),
+        )
+        theta_3, theta_4, omega_3, omega_4 = (
+            seen[place][q] for q in ("theta_3", "theta_4", "omega_3", "omega_4")
+        )
+        sine, speed = (
+            abs(math.sin(theta_4 - theta_3)),
+            max(1.0, abs(omega_3), abs(omega_4)),
+        )
         digits = find_lever(linkage) * sine
         if digits * NOTHING_TO_TELL <= EPS:
             continue
         moved = _compute_moved(linkage, bar, limit)
         for angle, of_formula in ((theta_3, limit.theta_3), (theta_4, limit.theta_4)):
             error = abs(wrap_angle(angle - of_formula))
-            yield Finding(error, find_roundoff(linkage) / digits + moved * speed, limit.theta_2, what)
+            yield Finding(
+                error,
+                find_roundoff(linkage) / digits + moved * speed,
+                limit.theta_2,
+                what,
+            )
         # the loop runs along bar 4 from B to O4
-        aligned = math.cos({3: theta_4 + math.pi, 4: theta_3}[bar] - limit.theta_2) > 0.0
-        yield Finding(float(aligned != limit.stretched), 0.0, limit.theta_2, "stretched or folded")
+        aligned = (
+            math.cos({3: theta_4 + math.pi, 4: theta_3}[bar] - limit.theta_2) > 0.0
+        )
+        yield Finding(
+            float(aligned != limit.stretched), 0.0, limit.theta_2, "stretched or folded"
+        )
         slowing = abs(seen[place][f"alpha_{bar}"])
         at_rest = find_roundoff(linkage) * speed / (digits * sine) + slowing * moved
-        yield Finding(abs({3: omega_3, 4: omega_4}[bar]), at_rest, limit.theta_2, f"{what}: at rest")
+        yield Finding(
+            abs({3: omega_3, 4: omega_4}[bar]),
+            at_rest,
+            limit.theta_2,
+            f"{what}: at rest",
+        )
 
 
 def check_through(linkage: FourBar, engine: Adapter) -> Iterator[Finding]:
@@ -305,12 +441,32 @@ def check_through(linkage: FourBar, engine: Adapter) -> Iterator[Finding]:
         for sense in (1.0, -1.0):
             for start in (1, -1):
                 angles = point + sense * np.array([-FAR, -PAST, PAST, FAR])
-                places = [(float(angles[1]), start), (float(angles[2]), 1), (float(angles[2]), -1)]
+                places = [
+                    (float(angles[1]), start),
+                    (float(angles[2]), 1),
+                    (float(angles[2]), -1),
+                ]
                 seen = look(engine, linkage, places)
-                rates = np.array([[seen[place][name] for place in places] for name in ("omega_3", "omega_4")])
-                goes_on = (1, -1)[int(np.argmin(np.abs(rates[:, 1:] - rates[:, :1]).max(axis=0)))]
+                rates = np.array(
+                    [
+                        [seen[place][name] for place in places]
+                        for name in ("omega_3", "omega_4")
+                    ]
+                )
+                goes_on = (1, -1)[
+                    int(np.argmin(np.abs(rates[:, 1:] - rates[:, :1]).max(axis=0)))
+                ]
                 expected = [start, start, goes_on, goes_on]
                 stated = mobility.follow_smooth_path(linkage, angles, start)
-                on_it = mobility.follow_smooth_path(linkage, np.insert(angles, 2, point), start)
-                wrong = np.count_nonzero(stated != expected) + np.count_nonzero(np.delete(on_it, 2) != expected)
-                yield Finding(float(wrong), 0.0, float(point), f"from branch {start:+d} at {point!r} rad")
+                on_it = mobility.follow_smooth_path(
+                    linkage, np.insert(angles, 2, point), start
+                )
+                wrong = np.count_nonzero(stated != expected) + np.count_nonzero(
+                    np.delete(on_it, 2) != expected
+                )
+                yield Finding(
+                    float(wrong),
+                    0.0,
+                    float(point),
+                    f"from branch {start:+d} at {point!r} rad",
+                )

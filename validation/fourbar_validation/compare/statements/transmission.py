@@ -37,11 +37,19 @@ RADII = (0.2, 0.3)
 def choose_places(linkage: FourBar) -> list[Place]:
     """Return the places where an engine is evaluated: the extremes that are no limits, and both strokes of bar 4."""
     strokes = _find_strokes(linkage)
-    inner = [(theta_2, 1) for value, theta_2, collinear in _find_ends(linkage) if value != collinear]
-    return inner + ([] if strokes is None else [(theta_2, -1) for theta_2 in strokes[1]])
+    inner = [
+        (theta_2, 1)
+        for value, theta_2, collinear in _find_ends(linkage)
+        if value != collinear
+    ]
+    return inner + (
+        [] if strokes is None else [(theta_2, -1) for theta_2 in strokes[1]]
+    )
 
 
-def compare_transmission(scene: Scene, seen: Seen, answer: Answer, predicted: Predicted | None) -> Iterator[Finding]:
+def compare_transmission(
+    scene: Scene, seen: Seen, answer: Answer, predicted: Predicted | None
+) -> Iterator[Finding]:
     """Compare over the scene's own motion, if it is one, at the stated extremes, and between bar 4's stated limits."""
     if answer.at is not None and answer.at.omega_2 is not None:
         yield from _compare_over(scene, answer, predicted)
@@ -60,7 +68,9 @@ class _Claim(NamedTuple):
     """True if it follows from the speeds, otherwise from the angles."""
 
 
-def _compare_over(scene: Scene, answer: Answer, predicted: Predicted | None) -> Iterator[Finding]:
+def _compare_over(
+    scene: Scene, answer: Answer, predicted: Predicted | None
+) -> Iterator[Finding]:
     """Compare the worst position of each statement over the scene's own motion."""
     command = answer.at
     assert command is not None
@@ -69,60 +79,122 @@ def _compare_over(scene: Scene, answer: Answer, predicted: Predicted | None) -> 
         beyond = mask & ~(claim.error <= allowed)
         if predicted is not None and beyond.any():
             if claim.rates:
-                lost = predicted("omega_4", beyond) / np.abs(answer.quantities["omega_4"])
+                lost = predicted("omega_4", beyond) / np.abs(
+                    answer.quantities["omega_4"]
+                )
             else:
                 lost = predicted("theta_3", beyond) + predicted("theta_4", beyond)
             allowed = np.where(beyond, np.fmax(allowed, DEGRADED * lost), allowed)
             mask = mask & ~(allowed >= NOTHING_TO_TELL)
         if mask.any():
-            most = np.flatnonzero(mask)[find_worst(find_used(claim.error[mask], allowed[mask]))]
-            yield Finding(float(claim.error[most]), float(allowed[most]), float(command.theta_2[most]), claim.what)
+            most = np.flatnonzero(mask)[
+                find_worst(find_used(claim.error[mask], allowed[mask]))
+            ]
+            yield Finding(
+                float(claim.error[most]),
+                float(allowed[most]),
+                float(command.theta_2[most]),
+                claim.what,
+            )
     yield _compare_distance(scene, command)
 
 
 def _list_claims(scene: Scene, answer: Answer) -> Iterator[_Claim]:
     """List what the formulas state at each position, against the engine's angles and speeds."""
     command, linkage = answer.at, scene.linkage
-    assert command is not None and command.omega_2 is not None and answer.assembled is not None
+    assert (
+        command is not None
+        and command.omega_2 is not None
+        and answer.assembled is not None
+    )
     state = state_of(linkage, command.theta_2, command.branch)
     drive = scene.drive_bar or 2  # the leverage of a line is a quantity
-    theta = {2: command.theta_2, **{bar: answer.quantities[f"theta_{bar}"] for bar in (3, 4)}}
+    theta = {
+        2: command.theta_2,
+        **{bar: answer.quantities[f"theta_{bar}"] for bar in (3, 4)},
+    }
     first, second = (theta[bar] for bar in MOVING_BARS if bar != drive)
     angle = np.abs(wrap_angle(theta[4] - theta[3]))
     sine = np.abs(np.sin(angle))
-    half = state.position.half  # a row of its own compares whether both say that the loop closes
-    closed = answer.assembled & (half.outer >= 0.0) & (half.inner >= 0.0) & ~find_singular(state.position)
+    half = (
+        state.position.half
+    )  # a row of its own compares whether both say that the loop closes
+    closed = (
+        answer.assembled
+        & (half.outer >= 0.0)
+        & (half.inner >= 0.0)
+        & ~find_singular(state.position)
+    )
     extremes = transmission.transmission_extremes(linkage)
     with np.errstate(divide="ignore", invalid="ignore"):
         half_turns = count_half_turns(linkage.ground_angle, command.theta_2)
         allowed = EQUIVALENCE.factor * half_turns / (find_lever(linkage) * sine)
         ratio = answer.quantities["omega_4"] / command.omega_2
-        gained = transmission.mechanical_advantage(state, *RADII) * ratio * (RADII[1] / RADII[0]) - 1.0
-        largest = np.maximum(1.0, np.maximum(np.abs(ratio), np.abs(answer.quantities["omega_3"] / command.omega_2)))
+        gained = (
+            transmission.mechanical_advantage(state, *RADII)
+            * ratio
+            * (RADII[1] / RADII[0])
+            - 1.0
+        )
+        largest = np.maximum(
+            1.0,
+            np.maximum(
+                np.abs(ratio), np.abs(answer.quantities["omega_3"] / command.omega_2)
+            ),
+        )
         allowed_gain = allowed / sine * largest / np.abs(ratio)
     # the divisor of every tolerance must not come from the formulas alone
-    yield _Claim("condition", np.abs(state.position.sin_mu - np.sin(theta[4] - theta[3])), allowed, closed)
-    drive_condition = np.abs(np.abs(drive_sine(state.position, drive)) - np.abs(np.sin(second - first)))
+    yield _Claim(
+        "condition",
+        np.abs(state.position.sin_mu - np.sin(theta[4] - theta[3])),
+        allowed,
+        closed,
+    )
+    drive_condition = np.abs(
+        np.abs(drive_sine(state.position, drive)) - np.abs(np.sin(second - first))
+    )
     yield _Claim("drive condition", drive_condition, allowed, closed)
     acute = np.minimum(angle, math.pi - angle)
-    yield _Claim("transmission angle", np.abs(transmission.transmission_angle(state) - acute), allowed, closed)
-    outside = np.maximum(np.maximum(extremes.least - angle, angle - extremes.greatest), 0.0)
+    yield _Claim(
+        "transmission angle",
+        np.abs(transmission.transmission_angle(state) - acute),
+        allowed,
+        closed,
+    )
+    outside = np.maximum(
+        np.maximum(extremes.least - angle, angle - extremes.greatest), 0.0
+    )
     yield _Claim("beyond the extremes", outside, allowed, closed)
-    moving = closed & (command.omega_2 != 0.0) & ~(allowed >= NOTHING_TO_TELL)  # a missing number is none that holds
-    yield _Claim("mechanical advantage", np.abs(gained), allowed_gain, moving, rates=True)
+    moving = (
+        closed & (command.omega_2 != 0.0) & ~(allowed >= NOTHING_TO_TELL)
+    )  # a missing number is none that holds
+    yield _Claim(
+        "mechanical advantage", np.abs(gained), allowed_gain, moving, rates=True
+    )
 
 
 def _compare_distance(scene: Scene, command: Command) -> Finding:
     """Compare how far it is to a singular position with the limits and dead centres that are stated."""
     branch, drive = command.branch.astype(float), scene.drive_bar or 2
-    ours = transmission.distance_to_singular(scene.linkage, command.theta_2, drive, branch)
+    ours = transmission.distance_to_singular(
+        scene.linkage, command.theta_2, drive, branch
+    )
     theirs = _compute_to_singular(scene, command.theta_2, branch)
     error = np.where(np.isinf(ours) == np.isinf(theirs), 0.0, math.inf)
     finite = np.isfinite(ours) & np.isfinite(theirs)
     error[finite] = np.abs(ours[finite] - theirs[finite])
     most = int(np.argmax(error))
-    allowed = EPS * 8.0 * (abs(command.theta_2[most]) + abs(scene.linkage.ground_angle) + TURN)
-    return Finding(float(error[most]), float(allowed), float(command.theta_2[most]), "distance to a singular position")
+    allowed = (
+        EPS
+        * 8.0
+        * (abs(command.theta_2[most]) + abs(scene.linkage.ground_angle) + TURN)
+    )
+    return Finding(
+        float(error[most]),
+        float(allowed),
+        float(command.theta_2[most]),
+        "distance to a singular position",
+    )
 
 
 def _find_collinear(linkage: FourBar) -> list[float]:
@@ -136,31 +208,63 @@ def _compute_to_singular(scene: Scene, theta_2: Array, branch: Array) -> Array:
     drive, always = scene.drive_bar or 2, _find_collinear(scene.linkage)
     dead = mobility.limit_positions(scene.linkage, drive) if drive != 2 else ()
     nearest = np.full(theta_2.shape, math.inf)
-    for point, side in [*((point, 0) for point in always), *((limit.theta_2, limit.branch) for limit in dead)]:
+    for point, side in [
+        *((point, 0) for point in always),
+        *((limit.theta_2, limit.branch) for limit in dead),
+    ]:
         apart = np.abs(np.angle(np.exp(1j * (theta_2 - point))))
-        nearest = np.where((branch == side) | (side == 0), np.minimum(nearest, apart), nearest)
+        nearest = np.where(
+            (branch == side) | (side == 0), np.minimum(nearest, apart), nearest
+        )
     return nearest
 
 
 def _find_ends(linkage: FourBar) -> tuple[tuple[float, float, float], ...]:
     """Find the least and greatest angle between bars 3 and 4, theta_2 there, and the angle where they are collinear."""
     extremes = transmission.transmission_extremes(linkage)
-    return (extremes.least, extremes.theta_2_least, 0.0), (extremes.greatest, extremes.theta_2_greatest, math.pi)
+    return (extremes.least, extremes.theta_2_least, 0.0), (
+        extremes.greatest,
+        extremes.theta_2_greatest,
+        math.pi,
+    )
 
 
 def _compare_extremes(linkage: FourBar, seen: Seen) -> Iterator[Finding]:
     for value, theta_2, collinear in _find_ends(linkage):
         if value == collinear:
-            error = min((abs(wrap_angle(theta_2 - point)) for point in _find_collinear(linkage)), default=math.inf)
-            yield Finding(error, EQUIVALENCE.factor * count_half_turns(0.0, theta_2), theta_2, "extreme at a limit")
+            error = min(
+                (
+                    abs(wrap_angle(theta_2 - point))
+                    for point in _find_collinear(linkage)
+                ),
+                default=math.inf,
+            )
+            yield Finding(
+                error,
+                EQUIVALENCE.factor * count_half_turns(0.0, theta_2),
+                theta_2,
+                "extreme at a limit",
+            )
             continue
-        angle = abs(wrap_angle(seen[(theta_2, 1)]["theta_4"] - seen[(theta_2, 1)]["theta_3"]))
+        angle = abs(
+            wrap_angle(seen[(theta_2, 1)]["theta_4"] - seen[(theta_2, 1)]["theta_3"])
+        )
         digits = find_lever(linkage) * math.sin(angle)
         if not digits * NOTHING_TO_TELL <= EPS:
-            yield Finding(abs(angle - value), find_roundoff(linkage) / digits, theta_2, "extreme of the angle at B")
+            yield Finding(
+                abs(angle - value),
+                find_roundoff(linkage) / digits,
+                theta_2,
+                "extreme of the angle at B",
+            )
     extremes = transmission.transmission_extremes(linkage)
     smallest = min(extremes.least, math.pi - extremes.greatest)
-    yield Finding(abs(extremes.worst - smallest), EPS, extremes.theta_2_least, "smallest transmission angle")
+    yield Finding(
+        abs(extremes.worst - smallest),
+        EPS,
+        extremes.theta_2_least,
+        "smallest transmission angle",
+    )
 
 
 def _find_strokes(linkage: FourBar) -> tuple[float, tuple[float, float]] | None:
@@ -168,24 +272,41 @@ def _find_strokes(linkage: FourBar) -> tuple[float, tuple[float, float]] | None:
 
     Bar 4 turns in the other sense for the rest of the turn.
     """
-    dead = [limit.theta_2 for limit in mobility.limit_positions(linkage, 4) if limit.branch == -1]
-    if len(dead) != 2 or not mobility.turns_fully(linkage) or mobility.change_points(linkage):
+    dead = [
+        limit.theta_2
+        for limit in mobility.limit_positions(linkage, 4)
+        if limit.branch == -1
+    ]
+    if (
+        len(dead) != 2
+        or not mobility.turns_fully(linkage)
+        or mobility.change_points(linkage)
+    ):
         return None
     stroke = (dead[1] - dead[0]) % TURN
     return stroke, (dead[0] + stroke / 2.0, dead[1] + (TURN - stroke) / 2.0)
 
 
 def _compare_time_ratio(linkage: FourBar, seen: Seen) -> Iterator[Finding]:
-    ratio, strokes, theta_1 = mobility.time_ratio(linkage), _find_strokes(linkage), linkage.ground_angle
+    ratio, strokes, theta_1 = (
+        mobility.time_ratio(linkage),
+        _find_strokes(linkage),
+        linkage.ground_angle,
+    )
     agree = (strokes is None) == (ratio is None)
     yield Finding(float(not agree), 0.0, theta_1, "whether there is a time ratio")
     if strokes is not None and ratio is not None:
         stroke, middles = strokes
         one, second = (seen[(theta_2, -1)]["omega_4"] for theta_2 in middles)
         place = middles[0]
-        yield Finding(float(not one * second < 0.0), 0.0, place, "bar 4 turns in both senses")
+        yield Finding(
+            float(not one * second < 0.0), 0.0, place, "bar 4 turns in both senses"
+        )
         shorter, longer = sorted((stroke, TURN - stroke))
         # both angles are differences of two that were rounded
         yield Finding(
-            abs(ratio / (longer / shorter) - 1.0), find_roundoff(linkage) * TURN / shorter, place, "time ratio"
+            abs(ratio / (longer / shorter) - 1.0),
+            find_roundoff(linkage) * TURN / shorter,
+            place,
+            "time ratio",
         )

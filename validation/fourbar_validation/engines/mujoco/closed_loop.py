@@ -11,24 +11,36 @@ from fourbar_validation.compare.answer import Array
 from fourbar_validation.engines.loaded import Assembled
 from fourbar_validation.engines.tree import solve_closed
 
-CARRIED_BY = {"input": ("input",), "coupler": ("coupler", "input"), "output": ("output",)}
+CARRIED_BY = {
+    "input": ("input",),
+    "coupler": ("coupler", "input"),
+    "output": ("output",),
+}
 """The bodies whose parent bears what acts on a body."""
 O2, A, O4 = 0, 1, 2
 """Degrees of freedom, in the order of the bodies."""
 TURNED_BY = {2: [O2], 3: [O2, A], 4: [O4]}
 """Joints whose angles a bar's rotation is the sum of."""
-COLUMN_OF = {bar: np.isin((O2, A, O4), joints).astype(float) for bar, joints in TURNED_BY.items()}
+COLUMN_OF = {
+    bar: np.isin((O2, A, O4), joints).astype(float) for bar, joints in TURNED_BY.items()
+}
 """Derivative of each bar's rotation by the joint angles."""
 ENDS = (f"{CYLINDER}_start", f"{CYLINDER}_end")
 """Sites of the cylinder."""
-WARNINGS = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC)
+WARNINGS = (
+    mujoco.mjtWarning.mjWARN_BADQPOS,
+    mujoco.mjtWarning.mjWARN_BADQVEL,
+    mujoco.mjtWarning.mjWARN_BADQACC,
+)
 
 
 def load_force(model: mujoco.MjModel, data: mujoco.MjData, actuator: int) -> Array:
     """Return the world force of an actuator on a site, (3,): MuJoCo counts it into the force of the parent."""
     site, frame = model.actuator_trnid[actuator]
     axes = data.site_xmat[frame if frame >= 0 else site].reshape(3, 3)
-    return np.asarray(axes @ model.actuator_gear[actuator, :3] * data.actuator_force[actuator])
+    return np.asarray(
+        axes @ model.actuator_gear[actuator, :3] * data.actuator_force[actuator]
+    )
 
 
 def open_model(text: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
@@ -51,10 +63,20 @@ class ClosedLoop(Assembled):
     def __init__(self, mjcf: str) -> None:
         self.model = mujoco.MjModel.from_xml_string(mjcf)
         self.data = mujoco.MjData(self.model)
-        self.site = {self.model.site(number).name: number for number in range(self.model.nsite)}
-        self.body = {name: self.model.body(name).id for name in ("input", "coupler", "output")}
-        loads = [i for i in range(self.model.nu) if self.model.actuator(i).name.startswith("load_")]
-        self.loads = [(i, self.model.site_bodyid[self.model.actuator_trnid[i, 0]]) for i in loads]
+        self.site = {
+            self.model.site(number).name: number for number in range(self.model.nsite)
+        }
+        self.body = {
+            name: self.model.body(name).id for name in ("input", "coupler", "output")
+        }
+        loads = [
+            i
+            for i in range(self.model.nu)
+            if self.model.actuator(i).name.startswith("load_")
+        ]
+        self.loads = [
+            (i, self.model.site_bodyid[self.model.actuator_trnid[i, 0]]) for i in loads
+        ]
         actuators = {self.model.actuator(i).name: i for i in range(self.model.nu)}
         self.drive, self.ram = actuators.get("drive"), actuators.get(CYLINDER)
         self._jac = np.zeros((3, self.model.nv))
@@ -97,7 +119,9 @@ class ClosedLoop(Assembled):
         """Start from own joint angles at the speed of a bar or of the stroke, with the gap kept closed."""
         mujoco.mj_resetData(self.model, self.data)
         self.place(q)
-        self.data.qvel[:3] = solve_closed(self.jacobian()[:, :3], speed, self.drive_column(bar))
+        self.data.qvel[:3] = solve_closed(
+            self.jacobian()[:, :3], speed, self.drive_column(bar)
+        )
 
     def forward(self) -> None:
         """Evaluate the present state: after a Runge-Kutta step some fields are still of the step before."""
@@ -108,7 +132,12 @@ class ClosedLoop(Assembled):
         """Read the pin forces of the state that was last forwarded, world axes, N."""
         on = self.carried()
         closure = self.data.efc_force[:2].copy()
-        return {"F12": on["input"], "F32": -on["coupler"], "F43": closure, "F14": on["output"]}
+        return {
+            "F12": on["input"],
+            "F32": -on["coupler"],
+            "F43": closure,
+            "F14": on["output"],
+        }
 
     def carried(self) -> dict[str, Array]:
         """Read the force of the parent on each bar and all that the bar carries, world axes, N.
@@ -125,7 +154,13 @@ class ClosedLoop(Assembled):
 
     def given(self) -> float:
         """Return the acceleration that the flywheel's motor is given, rad/s^2."""
-        return 0.0 if self.drive is None else float(self.data.actuator_force[self.drive] / self.model.dof_armature[O2])
+        return (
+            0.0
+            if self.drive is None
+            else float(
+                self.data.actuator_force[self.drive] / self.model.dof_armature[O2]
+            )
+        )
 
     def crank_torque(self) -> float:
         """Return T2: what the flywheel gives the crank, and the motor next to it, N m."""
@@ -138,7 +173,11 @@ class ClosedLoop(Assembled):
         if drive_bar is not None:
             return COLUMN_OF[drive_bar]
         start, end = ENDS
-        return np.asarray(self.line() / self.stroke() @ (self.jacobian_at(end) - self.jacobian_at(start)))
+        return np.asarray(
+            self.line()
+            / self.stroke()
+            @ (self.jacobian_at(end) - self.jacobian_at(start))
+        )
 
     def angle(self, bar: int) -> float:
         """Sum of the joint angles that a bar's direction is, rad."""
@@ -160,20 +199,28 @@ class ClosedLoop(Assembled):
         (start, end), line, stroke, v = ENDS, self.line(), self.stroke(), self.data.qvel
         x, y = (self.jacobian_at(end) - self.jacobian_at(start)) @ v
         across = (line[0] * y - line[1] * x) / stroke
-        return float(line / stroke @ (self.rate_at(end) - self.rate_at(start)) @ v + across * across / stroke)
+        return float(
+            line / stroke @ (self.rate_at(end) - self.rate_at(start)) @ v
+            + across * across / stroke
+        )
 
     def rate_at(self, site: str) -> Array:
         """Return the rate of `jacobian_at` at the present speeds, (2, nv)."""
         dot, number = np.zeros((3, self.model.nv)), self.site[site]
         body = self.model.site_bodyid[number]
-        mujoco.mj_jacDot(self.model, self.data, dot, None, self.data.site_xpos[number], body)
+        mujoco.mj_jacDot(
+            self.model, self.data, dot, None, self.data.site_xpos[number], body
+        )
         return dot[:2]
 
     def cylinder(self, bar: int) -> tuple[complex, complex]:
         """Measure from the ground pin of a bar, at angle 0, to the cylinder's end on it and that on the ground, m."""
         self.place((0.0, 0.0, 0.0))
         ground = self.model.body("ground").id
-        ends = sorted((self.site[end] for end in ENDS), key=lambda site: self.model.site_bodyid[site] == ground)
+        ends = sorted(
+            (self.site[end] for end in ENDS),
+            key=lambda site: self.model.site_bodyid[site] == ground,
+        )
         pivot = self.data.site_xpos[self.site["O4"]] if bar == 4 else np.zeros(3)
         x, y = (complex(*(self.data.site_xpos[site] - pivot)[:2]) for site in ends)
         return x, y
@@ -214,7 +261,11 @@ class ClosedLoop(Assembled):
 
 
 def solve_couple_elsewhere(
-    loop: ClosedLoop, light: ClosedLoop, drive_bar: int | None, alpha_2: float, crank_torque: float
+    loop: ClosedLoop,
+    light: ClosedLoop,
+    drive_bar: int | None,
+    alpha_2: float,
+    crank_torque: float,
 ) -> float | None:
     """Solve for what accelerates the crank as before; None where it does not move the crank.
 
@@ -225,7 +276,10 @@ def solve_couple_elsewhere(
     `alpha_2`: what the flywheel's motor was given, rad/s^2.
     """
     d = light.data
-    d.qpos[:], d.qvel[:] = loop.data.qpos[: d.qpos.size], loop.data.qvel[: d.qvel.size]  # a drive may have its own
+    d.qpos[:], d.qvel[:] = (
+        loop.data.qpos[: d.qpos.size],
+        loop.data.qvel[: d.qvel.size],
+    )  # a drive may have its own
     d.time = loop.data.time
     happened = loop.data.qacc[O2]
     # the light flywheel's motor gives it alpha_2 as commanded; this gives it what the crank really had
@@ -237,7 +291,11 @@ def solve_couple_elsewhere(
 
 
 def solve_couple(
-    acceleration: Callable[[float], float], wanted: float, low: float, high: float, refinements: int = 0
+    acceleration: Callable[[float], float],
+    wanted: float,
+    low: float,
+    high: float,
+    refinements: int = 0,
 ) -> float | None:
     """Solve for the couple under which an acceleration, linear in it, is the wanted one, and which was evaluated last.
 

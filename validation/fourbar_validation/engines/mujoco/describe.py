@@ -36,11 +36,24 @@ TENDON = {
     "solimp_fri": "solimpfriction",
 }
 OPTIONS = (
-    *("timestep", "integrator", "solver", "tolerance", "iterations", "ls_iterations", "noslip_iterations"),
+    *(
+        "timestep",
+        "integrator",
+        "solver",
+        "tolerance",
+        "iterations",
+        "ls_iterations",
+        "noslip_iterations",
+    ),
     *("density", "viscosity", "wind"),
 )
 KINDS = {"integrator": mujoco.mjtIntegrator, "solver": mujoco.mjtSolver}
-WORDS = {"EULER": "Euler", "IMPLICIT": "implicit", "IMPLICITFAST": "implicitfast", "NEWTON": "Newton"}
+WORDS = {
+    "EULER": "Euler",
+    "IMPLICIT": "implicit",
+    "IMPLICITFAST": "implicitfast",
+    "NEWTON": "Newton",
+}
 """Integrators and solvers as MJCF spells them, where MuJoCo spells them otherwise."""
 SOFTEST, STIFFEST = 1e-4, 0.9999
 """Impedances between which MuJoCo keeps that of a constraint."""
@@ -58,27 +71,46 @@ def describe_model(topology: Topology) -> Described:
     gravity = model.opt.gravity * _is_on(model, "gravity")
     for axis, size in zip("xy", topology.in_plane(gravity), strict=True):
         described[f"gravity.{axis}"] = ModelEntry(float(size), "option", "gravity")
-    described["gravity.across"] = ModelEntry(float(gravity @ topology.normal), "option", "gravity")
+    described["gravity.across"] = ModelEntry(
+        float(gravity @ topology.normal), "option", "gravity"
+    )
     for pin in PINS:
         described |= _describe_pin(topology, pin)
-    described |= _describe_closure(topology) | _describe_loads(topology) | _describe_tendons(topology)
+    described |= (
+        _describe_closure(topology)
+        | _describe_loads(topology)
+        | _describe_tendons(topology)
+    )
     for name in OPTIONS:
         setting = getattr(model.opt, name)
         kind = KINDS[name](setting).name.partition("_")[2] if name in KINDS else ""
-        described[f"option.{name}"] = ModelEntry(WORDS.get(kind, kind) or _read_numbers(setting), "option", name)
-    touching = model.npair or (model.geom_contype.any() and model.geom_conaffinity.any())
-    described["contacts"] = ModelEntry("possible" if touching and _is_on(model, "contact") else "off")
+        described[f"option.{name}"] = ModelEntry(
+            WORDS.get(kind, kind) or _read_numbers(setting), "option", name
+        )
+    touching = model.npair or (
+        model.geom_contype.any() and model.geom_conaffinity.any()
+    )
+    described["contacts"] = ModelEntry(
+        "possible" if touching and _is_on(model, "contact") else "off"
+    )
     return described
 
 
 def _is_on(model: mujoco.MjModel, *flags: str) -> bool:
     """Return whether no flag switches a feature off; a flag that this MuJoCo does not have switches nothing."""
-    bits = (int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{flag.upper()}", 0)) for flag in flags)
+    bits = (
+        int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{flag.upper()}", 0))
+        for flag in flags
+    )
     return not any(model.opt.disableflags & bit for bit in bits)
 
 
 def _read_numbers(entry: object) -> Value:
-    return float(entry) if np.ndim(entry) == 0 else tuple(np.asarray(entry, dtype=float).tolist())  # type: ignore[arg-type]
+    return (
+        float(entry)  # type: ignore[arg-type]
+        if np.ndim(entry) == 0  # type: ignore[arg-type]
+        else tuple(np.asarray(entry, dtype=float).tolist())
+    )
 
 
 def _name_element(tag: str, name: str, number: int) -> str:
@@ -96,13 +128,31 @@ def _describe_bar(topology: Topology, bar: int) -> Described:
     inertia = 0.0
     for part, part_mass, place in zip(parts, masses, places, strict=True):
         across = data.ximat[part].reshape(3, 3).T @ topology.normal
-        inertia += float(across**2 @ model.body_inertia[part] + part_mass * (place - centre) @ (place - centre))
+        inertia += float(
+            across**2 @ model.body_inertia[part]
+            + part_mass * (place - centre) @ (place - centre)
+        )
     arm = centre - topology.in_plane(topology.world(data, bar, FIRST_PIN[bar]))
     x, y = topology.line(data, bar)
-    angle = math.remainder(math.atan2(arm[1], arm[0]) - math.atan2(y, x), math.tau) if arm.any() else 0.0
-    key, element = f"bars.{BAR_NAMES[bar]}", f'body "{model.body(topology.root[bar]).name}"'
-    values = {"mass": mass, "inertia": inertia, "centre.distance": math.hypot(*arm), "centre.angle": angle}
-    return {f"{key}.{name}": ModelEntry(value, element, "inertial") for name, value in values.items()}
+    angle = (
+        math.remainder(math.atan2(arm[1], arm[0]) - math.atan2(y, x), math.tau)
+        if arm.any()
+        else 0.0
+    )
+    key, element = (
+        f"bars.{BAR_NAMES[bar]}",
+        f'body "{model.body(topology.root[bar]).name}"',
+    )
+    values = {
+        "mass": mass,
+        "inertia": inertia,
+        "centre.distance": math.hypot(*arm),
+        "centre.angle": angle,
+    }
+    return {
+        f"{key}.{name}": ModelEntry(value, element, "inertial")
+        for name, value in values.items()
+    }
 
 
 def _describe_pin(topology: Topology, pin: str) -> Described:
@@ -110,20 +160,33 @@ def _describe_pin(topology: Topology, pin: str) -> Described:
     model, key = topology.model, f"pins.{pin}"
     joint = topology.hinge.get(pin)
     if joint is None:
-        return {f"{key}.{name}": ModelEntry(0.0) for name in PIN} | {f"{key}.range": ModelEntry("free")}
-    dof, element = int(model.jnt_dofadr[joint]), _name_element("joint", model.joint(joint).name, joint)
+        return {f"{key}.{name}": ModelEntry(0.0) for name in PIN} | {
+            f"{key}.range": ModelEntry("free")
+        }
+    dof, element = (
+        int(model.jnt_dofadr[joint]),
+        _name_element("joint", model.joint(joint).name, joint),
+    )
     described = {}
     for name, (field, attribute, flag) in PIN.items():
         size = float(getattr(model, field)[joint if field.startswith("jnt") else dof])
-        acts = not flag or _is_on(model, flag, *(("passive",) if flag in ("spring", "damper") else ()))
+        acts = not flag or _is_on(
+            model, flag, *(("passive",) if flag in ("spring", "damper") else ())
+        )
         described[f"{key}.{name}"] = ModelEntry(size * acts, element, attribute)
     if described[f"{key}.friction"].value:
         for field, attribute in FRICTION.items():
-            described[f"{key}.{attribute}"] = ModelEntry(_read_numbers(getattr(model, field)[dof]), element, attribute)
+            described[f"{key}.{attribute}"] = ModelEntry(
+                _read_numbers(getattr(model, field)[dof]), element, attribute
+            )
     if described[f"{key}.stiffness"].value:
         address = model.jnt_qposadr[joint]
-        turned = topology.sense[pin] * float(model.qpos_spring[address] - model.qpos0[address])
-        described[f"{key}.spring angle"] = ModelEntry(topology.rest_angle(pin) + turned, element, "springref")
+        turned = topology.sense[pin] * float(
+            model.qpos_spring[address] - model.qpos0[address]
+        )
+        described[f"{key}.spring angle"] = ModelEntry(
+            topology.rest_angle(pin) + turned, element, "springref"
+        )
     limited = model.jnt_limited[joint] and _is_on(model, "limit")
     described[f"{key}.range"] = ModelEntry(
         _read_numbers(model.jnt_range[joint]) if limited else "free", element, "range"
@@ -134,19 +197,32 @@ def _describe_pin(topology: Topology, pin: str) -> Described:
 
 def _describe_closure(topology: Topology) -> Described:
     model, number = topology.model, topology.closure
-    described = {"closure.pin": ModelEntry(topology.cut), "closure.by": ModelEntry(topology.closed_by)}
-    ends = [topology.world(topology.data, bar, topology.cut) for bar in PINS[topology.cut]]
-    described["closure.out of plane"] = ModelEntry(abs(float((ends[0] - ends[1]) @ topology.normal)))
+    described = {
+        "closure.pin": ModelEntry(topology.cut),
+        "closure.by": ModelEntry(topology.closed_by),
+    }
+    ends = [
+        topology.world(topology.data, bar, topology.cut) for bar in PINS[topology.cut]
+    ]
+    described["closure.out of plane"] = ModelEntry(
+        abs(float((ends[0] - ends[1]) @ topology.normal))
+    )
     others = [i for i in range(model.neq) if i != number and model.eq_active0[i]]
     names = [model.equality(i).name or f"(unnamed {i})" for i in others]
     described["other equalities"] = ModelEntry(", ".join(names) or NONE)
     if number is None:
         return described
-    element = _name_element(topology.closed_by.partition(" ")[0], model.equality(number).name, number)
+    element = _name_element(
+        topology.closed_by.partition(" ")[0], model.equality(number).name, number
+    )
     impedance = float(np.clip(model.eq_solimp[number, 0], SOFTEST, STIFFEST))
     softness = (1.0 - impedance) / impedance * _sum_inverse_weights(topology, number)
-    described["closure.solref"] = ModelEntry(_read_numbers(model.eq_solref[number]), element, "solref")
-    described["closure.solimp"] = ModelEntry(_read_numbers(model.eq_solimp[number]), element, "solimp")
+    described["closure.solref"] = ModelEntry(
+        _read_numbers(model.eq_solref[number]), element, "solref"
+    )
+    described["closure.solimp"] = ModelEntry(
+        _read_numbers(model.eq_solimp[number]), element, "solimp"
+    )
     return described | {"closure.softness": ModelEntry(softness, element, "solimp")}
 
 
@@ -177,37 +253,70 @@ def _describe_loads(topology: Topology) -> Described:
         element = _name_element("actuator", model.actuator(i).name, i)
         if kind == mujoco.mjtTrn.mjTRN_JOINT:
             pin = next(pin for pin, joint in topology.hinge.items() if joint == number)
-            described[f"pins.{pin}.motor"] = ModelEntry(_read_numbers(topology.sense[pin] * gear[0] * bias), element)
+            described[f"pins.{pin}.motor"] = ModelEntry(
+                _read_numbers(topology.sense[pin] * gear[0] * bias), element
+            )
         elif kind == mujoco.mjtTrn.mjTRN_TENDON:
-            described[f"{_name_tendon(topology, number)}.tension"] = ModelEntry(_read_numbers(gear[0] * bias), element)
-        elif kind == mujoco.mjtTrn.mjTRN_SITE and (bar := topology.bar(model.site_bodyid[number])) in MOVING_BARS:
-            bearer = topology.bar(model.site_bodyid[frame if frame >= 0 else number]) or 1
+            described[f"{_name_tendon(topology, number)}.tension"] = ModelEntry(
+                _read_numbers(gear[0] * bias), element
+            )
+        elif (
+            kind == mujoco.mjtTrn.mjTRN_SITE
+            and (bar := topology.bar(model.site_bodyid[number])) in MOVING_BARS
+        ):
+            bearer = (
+                topology.bar(model.site_bodyid[frame if frame >= 0 else number]) or 1
+            )
             axes = data.site_xmat[frame if frame >= 0 else number].reshape(3, 3)
             force, couple = (axes @ part * bias[0] for part in (gear[:3], gear[3:]))
             turns = bearer in MOVING_BARS
-            fx, fy = topology.turned_back(bearer, force) if turns else topology.in_plane(force)
+            fx, fy = (
+                topology.turned_back(bearer, force)
+                if turns
+                else topology.in_plane(force)
+            )
             x, y = topology.along_bar(bar, data.site_xpos[number])
             key = f"loads.{BAR_NAMES[bar]}, {f'axes of the {BAR_NAMES[bearer]}' if turns else 'world axes'}"
-            load = (fx, fy, float(couple @ topology.normal), x * fy - y * fx, x * fx + y * fy)
+            load = (
+                fx,
+                fy,
+                float(couple @ topology.normal),
+                x * fy - y * fx,
+                x * fx + y * fy,
+            )
             sums[key] = sums.get(key, np.zeros(5)) + load
         else:
-            described[f"actuators.{model.actuator(i).name or i}"] = ModelEntry("acts on no pin, bar or tendon", element)
+            described[f"actuators.{model.actuator(i).name or i}"] = ModelEntry(
+                "acts on no pin, bar or tendon", element
+            )
     for key, (fx, fy, couple, turning, along) in sums.items():
         squared = fx * fx + fy * fy
         point = (
-            ((fx * along + fy * turning) / squared, (fy * along - fx * turning) / squared) if squared else (0.0, 0.0)
+            (
+                (fx * along + fy * turning) / squared,
+                (fy * along - fx * turning) / squared,
+            )
+            if squared
+            else (0.0, 0.0)
         )
         described[f"{key}.force"] = ModelEntry((float(fx), float(fy)))
         described[f"{key}.point"] = ModelEntry((float(point[0]), float(point[1])))
-        described[f"{key}.couple"] = ModelEntry(float(couple) if squared else float(couple + turning))
+        described[f"{key}.couple"] = ModelEntry(
+            float(couple) if squared else float(couple + turning)
+        )
     return described
 
 
 def _name_tendon(topology: Topology, number: int) -> str:
     """Name a tendon by the pins that it runs over, or by the bars that it runs between."""
-    model, joints = topology.model, {joint: pin for pin, joint in topology.hinge.items()}
+    model, joints = (
+        topology.model,
+        {joint: pin for pin, joint in topology.hinge.items()},
+    )
     parts = []
-    for wrap in range(model.tendon_adr[number], model.tendon_adr[number] + model.tendon_num[number]):
+    for wrap in range(
+        model.tendon_adr[number], model.tendon_adr[number] + model.tendon_num[number]
+    ):
         kind, index = mujoco.mjtWrap(model.wrap_type[wrap]), int(model.wrap_objid[wrap])
         if kind == mujoco.mjtWrap.mjWRAP_JOINT:
             parts.append(joints[index])
@@ -221,42 +330,72 @@ def _name_tendon(topology: Topology, number: int) -> str:
 
 def _describe_tendons(topology: Topology) -> Described:
     """Describe every tendon: its path, and what it does. Their paths tell several between the same bars apart."""
-    model, data, tendons = topology.model, topology.data, list[tuple[str, tuple[float, ...], int]]()
+    model, data, tendons = (
+        topology.model,
+        topology.data,
+        list[tuple[str, tuple[float, ...], int]](),
+    )
     rest: dict[int, float] = {}
     for i in range(model.ntendon):
         path = []
-        for wrap in range(model.tendon_adr[i], model.tendon_adr[i] + model.tendon_num[i]):
+        for wrap in range(
+            model.tendon_adr[i], model.tendon_adr[i] + model.tendon_num[i]
+        ):
             index = int(model.wrap_objid[wrap])
             if model.wrap_type[wrap] == mujoco.mjtWrap.mjWRAP_JOINT:
-                pin = next(pin for pin, joint in topology.hinge.items() if joint == index)
+                pin = next(
+                    pin for pin, joint in topology.hinge.items() if joint == index
+                )
                 coefficient = topology.sense[pin] * float(model.wrap_prm[wrap])
                 path.append((pin, coefficient))
-                rest[i] = rest.get(i, -float(model.tendon_length0[i])) + coefficient * topology.rest_angle(pin)
+                rest[i] = rest.get(
+                    i, -float(model.tendon_length0[i])
+                ) + coefficient * topology.rest_angle(pin)
             elif model.wrap_type[wrap] == mujoco.mjtWrap.mjWRAP_SITE:
                 bar = topology.bar(model.site_bodyid[index])
-                path.append((str(bar), *(() if bar is None else topology.along_bar(bar, data.site_xpos[index]))))
+                path.append(
+                    (
+                        str(bar),
+                        *(
+                            ()
+                            if bar is None
+                            else topology.along_bar(bar, data.site_xpos[index])
+                        ),
+                    )
+                )
         numbers = tuple(number for _, *place in sorted(path) for number in place)
         tendons.append((_name_tendon(topology, i), numbers, i))
     described: Described = {}
     for name, numbers, i in sorted(tendons):
-        key = next(key for key in (name, *(f"{name} ({n})" for n in range(2, 99))) if key not in described)
+        key = next(
+            key
+            for key in (name, *(f"{name} ({n})" for n in range(2, 99)))
+            if key not in described
+        )
         element = _name_element("tendon", model.tendon(i).name, i)
         described[key] = ModelEntry("present", element)
         described[f"{key}.path"] = ModelEntry(numbers, element)
         for attribute, written in TENDON.items():
             described[f"{key}.{written}"] = ModelEntry(
-                _read_numbers(getattr(model, f"tendon_{attribute}")[i]), element, written
+                _read_numbers(getattr(model, f"tendon_{attribute}")[i]),
+                element,
+                written,
             )
         if model.tendon_stiffness[i]:
             end = ".springlength angle" if i in rest else ".springlength"
-            lengths = tuple(float(length) + rest.get(i, 0.0) for length in model.tendon_lengthspring[i])
+            lengths = tuple(
+                float(length) + rest.get(i, 0.0)
+                for length in model.tendon_lengthspring[i]
+            )
             described[key + end] = ModelEntry(lengths, element, "springlength")
         if not model.tendon_frictionloss[i]:
             del described[f"{key}.solreffriction"], described[f"{key}.solimpfriction"]
     return described
 
 
-def set_entry(text: str, generated: Mapping[str, ModelEntry], key: str, value: Value | None) -> str | None:
+def set_entry(
+    text: str, generated: Mapping[str, ModelEntry], key: str, value: Value | None
+) -> str | None:
     """Set one entry of the generated file, all others as they are; None where it cannot be set alone.
 
     `generated`: its description. `value`: None for what is not there.
@@ -278,7 +417,11 @@ def set_entry(text: str, generated: Mapping[str, ModelEntry], key: str, value: V
             _find(root, generated[key].element).clear()
         else:
             _set_attribute(root, generated[key], key, value)
-    except (KeyError, TypeError, ValueError):  # an entry of another kind, or of an element that is not there
+    except (
+        KeyError,
+        TypeError,
+        ValueError,
+    ):  # an entry of another kind, or of an element that is not there
         return None
     return ET.tostring(root, encoding="unicode")
 
@@ -303,12 +446,22 @@ def _set_attribute(root: ET.Element, entry: ModelEntry, key: str, value: Value) 
         field = [float(number) for number in element.attrib["gravity"].split()]
         field["xy".find(key[-1]) if key[-1] in "xy" else 2] = float(value)  # type: ignore[arg-type]
         value = tuple(field)
-    elif entry.attribute in ("springref", "springlength"):  # described from the bars' lines
-        stated, described = float(element.attrib[entry.attribute]), np.atleast_1d(entry.value)[0]
+    elif entry.attribute in (
+        "springref",
+        "springlength",
+    ):  # described from the bars' lines
+        stated, described = (
+            float(element.attrib[entry.attribute]),
+            np.atleast_1d(entry.value)[0],
+        )
         value = stated + float(np.atleast_1d(value)[0]) - float(described)
     element.set(entry.attribute, _write_value(value))
-    flags = {"range": "limit"} | {attribute: flag for _, attribute, flag in PIN.values()}
-    if (flag := flags.get(entry.attribute)) and (switches := root.find("option/flag")) is not None:
+    flags = {"range": "limit"} | {
+        attribute: flag for _, attribute, flag in PIN.values()
+    }
+    if (flag := flags.get(entry.attribute)) and (
+        switches := root.find("option/flag")
+    ) is not None:
         switches.attrib.pop(flag, None)
 
 
@@ -316,22 +469,40 @@ def _write_value(value: Value) -> str:
     if isinstance(value, str):
         return value
     numbers = value if isinstance(value, tuple) else (value,)
-    return " ".join(repr(int(number)) if number == int(number) else repr(number) for number in numbers)
+    return " ".join(
+        repr(int(number)) if number == int(number) else repr(number)
+        for number in numbers
+    )
 
 
-def _set_length(root: ET.Element, generated: Mapping[str, ModelEntry], bar: str, value: float) -> None:
+def _set_length(
+    root: ET.Element, generated: Mapping[str, ModelEntry], bar: str, value: float
+) -> None:
     """Move the pin at the end of a bar along its line; the ground's is that of the output."""
     if bar in ("ground", "ground_angle"):
-        length, angle = (float(generated[f"lengths.{name}"].value) for name in ("ground", "ground_angle"))  # type: ignore[arg-type]
+        length, angle = (
+            float(generated[f"lengths.{name}"].value)  # type: ignore[arg-type]
+            for name in ("ground", "ground_angle")
+        )
         length, angle = (value, angle) if bar == "ground" else (length, value)
         place = (length * math.cos(angle), length * math.sin(angle), 0.0)
         _find(root, 'body "output"').set("pos", _write_value(place))
     else:
-        element = {"input": 'body "coupler"', "coupler": 'site "B3"', "output": 'site "B4"'}[bar]
+        element = {
+            "input": 'body "coupler"',
+            "coupler": 'site "B3"',
+            "output": 'site "B4"',
+        }[bar]
         _find(root, element).set("pos", _write_value((value, 0.0, 0.0)))
 
 
-def _set_inertial(root: ET.Element, generated: Mapping[str, ModelEntry], bar: str, name: str, value: float) -> None:
+def _set_inertial(
+    root: ET.Element,
+    generated: Mapping[str, ModelEntry],
+    bar: str,
+    name: str,
+    value: float,
+) -> None:
     """Set mass, inertia or mass centre of a bar, the others kept."""
     inertial = _find(root, f'body "{bar}"').find("inertial")
     if inertial is None:
@@ -341,9 +512,15 @@ def _set_inertial(root: ET.Element, generated: Mapping[str, ModelEntry], bar: st
     elif name == "inertia":
         inertial.set("diaginertia", _write_value((value, value, value)))
     else:
-        polar = {part: float(generated[f"bars.{bar}.{part}"].value) for part in ("centre.distance", "centre.angle")}  # type: ignore[arg-type]
+        polar = {
+            part: float(generated[f"bars.{bar}.{part}"].value)  # type: ignore[arg-type]
+            for part in ("centre.distance", "centre.angle")
+        }
         distance, angle = (polar | {name: value}).values()
-        inertial.set("pos", _write_value((distance * math.cos(angle), distance * math.sin(angle), 0.0)))
+        inertial.set(
+            "pos",
+            _write_value((distance * math.cos(angle), distance * math.sin(angle), 0.0)),
+        )
 
 
 def _set_softness(root: ET.Element, entry: ModelEntry, value: float) -> None:
@@ -355,18 +532,37 @@ def _set_softness(root: ET.Element, entry: ModelEntry, value: float) -> None:
     closure.set("solimp", " ".join((impedance, impedance, *opening[1:])))
 
 
-def _set_load(root: ET.Element, generated: Mapping[str, ModelEntry], key: str, name: str, value: Value | None) -> None:
+def _set_load(
+    root: ET.Element,
+    generated: Mapping[str, ModelEntry],
+    key: str,
+    name: str,
+    value: Value | None,
+) -> None:
     """Add what a load lacks of another: the sum of the two is the load with this one entry, the others kept."""
     bar, axes = key.split(", ")
     if axes not in ("world axes", f"axes of the {bar}"):
         raise KeyError(axes)
-    load = {part: generated.get(f"loads.{key}.{part}") for part in ("force", "point", "couple")}
-    was = {part: np.atleast_1d((0.0, 0.0, 0.0) if entry is None else entry.value) for part, entry in load.items()}
+    load = {
+        part: generated.get(f"loads.{key}.{part}")
+        for part in ("force", "point", "couple")
+    }
+    was = {
+        part: np.atleast_1d((0.0, 0.0, 0.0) if entry is None else entry.value)
+        for part, entry in load.items()
+    }
     wanted = was | {name: np.atleast_1d(0.0 if value is None else value)}
     body, actuators = _find(root, f'body "{bar}"'), ET.SubElement(root, "actuator")
     for number, (parts, sign) in enumerate(((was, -1.0), (wanted, 1.0))):
-        (fx, fy), (x, y) = (np.resize(parts[part], 2) * 1.0 for part in ("force", "point"))
-        ET.SubElement(body, "site", name=f"changed_{number}", pos=_write_value((float(x), float(y), 0.0)))
+        (fx, fy), (x, y) = (
+            np.resize(parts[part], 2) * 1.0 for part in ("force", "point")
+        )
+        ET.SubElement(
+            body,
+            "site",
+            name=f"changed_{number}",
+            pos=_write_value((float(x), float(y), 0.0)),
+        )
         gear = sign * np.array((fx, fy, 0.0, 0.0, 0.0, parts["couple"][0]))
         frame = {"refsite": "O2"} if axes == "world axes" else {}
         ET.SubElement(

@@ -39,7 +39,9 @@ class Driven(ClosedLoop):
         self.flywheel = float(crank.attrib.pop("armature"))
         self.add_drive(root)
         super().__init__(ET.tostring(root, encoding="unicode"))
-        drive = [i for i in range(self.model.nu) if self.model.actuator(i).name == "servo"]
+        drive = [
+            i for i in range(self.model.nu) if self.model.actuator(i).name == "servo"
+        ]
         self.servo = drive[0] if drive else None
 
     def add_drive(self, root: ET.Element) -> None:
@@ -58,18 +60,30 @@ class Actuated(Driven):
     `velocity`: kv per (inertia omega).
     """
 
-    def __init__(self, mjcf: str, omega: float, position: float, velocity: float) -> None:
+    def __init__(
+        self, mjcf: str, omega: float, position: float, velocity: float
+    ) -> None:
         self.kp, self.kv = position, velocity
         super().__init__(mjcf, omega)
 
     def add_drive(self, root: ET.Element) -> None:
         """Add kp (act - theta_2) + kv (omega - omega_2), act integrating omega."""
-        kp, kv = self.kp * self.flywheel * self.omega**2, self.kv * self.flywheel * abs(self.omega)
+        kp, kv = (
+            self.kp * self.flywheel * self.omega**2,
+            self.kv * self.flywheel * abs(self.omega),
+        )
         actuators = root.find("actuator")
         actuators = ET.SubElement(root, "actuator") if actuators is None else actuators
         servo = {"dyntype": "integrator"} if kp else {}
         servo |= {"gaintype": "fixed", "gainprm": numbers(kp), "biastype": "affine"}
-        ET.SubElement(actuators, "general", servo, biasprm=numbers(kv * self.omega, -kp, -kv), name="servo", joint="O2")
+        ET.SubElement(
+            actuators,
+            "general",
+            servo,
+            biasprm=numbers(kv * self.omega, -kp, -kv),
+            name="servo",
+            joint="O2",
+        )
 
     def set_state(self, q: Sequence[float], speed: float, bar: int | None = 2) -> None:
         """Start the target where the crank is."""
@@ -101,11 +115,24 @@ class WheelEquality(Driven):
         assert ground is not None and equality is not None
         wheel = ET.SubElement(ground, "body", name="wheel")
         ET.SubElement(wheel, "inertial", pos="0 0 0", mass="1", diaginertia="1 1 1")
-        ET.SubElement(wheel, "joint", name="wheel", axis="0 0 1", armature=numbers(WHEEL * self.flywheel))
+        ET.SubElement(
+            wheel,
+            "joint",
+            name="wheel",
+            axis="0 0 1",
+            armature=numbers(WHEEL * self.flywheel),
+        )
         closure = equality.find("connect")
         assert closure is not None
         softness = {key: closure.attrib[key] for key in ("solref", "solimp")}
-        ET.SubElement(equality, "joint", softness, joint1="O2", joint2="wheel", polycoef="0 1 0 0 0")
+        ET.SubElement(
+            equality,
+            "joint",
+            softness,
+            joint1="O2",
+            joint2="wheel",
+            polycoef="0 1 0 0 0",
+        )
 
     def place(self, q: Sequence[float]) -> None:
         """Place the wheel where the crank is."""
@@ -140,6 +167,10 @@ def restore_defaults(mjcf: str, _: float = 0.0) -> ClosedLoop:
     """Leave solref, solimp and the solver to MuJoCo: 0.02 s, impedance 0.9 to 0.95, Newton to 1e-8."""
     return ClosedLoop(
         remove_attributes(
-            mjcf, {"option": ("solver", "tolerance", "iterations"), "equality/connect": ("solref", "solimp")}
+            mjcf,
+            {
+                "option": ("solver", "tolerance", "iterations"),
+                "equality/connect": ("solref", "solimp"),
+            },
         )
     )

@@ -31,7 +31,10 @@ RELEASED, ONE_STATE = "mujoco-forward", "mujoco-one-state"
 TIME_CONSTANT_STEPS = 2.0
 """Time constant of the loop's closure, in timesteps. Through change points the closure takes energy out: 1e-6 of it in
 ten seconds at 1 ms with 2, three hundred times as much with 10."""
-FRICTION = (mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF, mujoco.mjtConstraint.mjCNSTR_FRICTION_TENDON)
+FRICTION = (
+    mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF,
+    mujoco.mjtConstraint.mjCNSTR_FRICTION_TENDON,
+)
 
 
 class MujocoForward:
@@ -45,9 +48,17 @@ class MujocoForward:
     def release(self, scene: Scene, times: Array) -> ReleasedAnswer:
         """Integrate the motion at the given times, rising from 0 (s)."""
         setting, start = f"RK4 {self.step:g} s", command_of(scene)
-        interval = float(times[1] - times[0])  # the times are evenly spaced; the step divides the interval
+        interval = float(
+            times[1] - times[0]
+        )  # the times are evenly spaced; the step divides the interval
         timestep = interval / math.ceil(interval / self.step - 1e-6)
-        settings = replace(RECIPE, flywheel=0.0, timestep=timestep, time_constant_steps=TIME_CONSTANT_STEPS, pad=None)
+        settings = replace(
+            RECIPE,
+            flywheel=0.0,
+            timestep=timestep,
+            time_constant_steps=TIME_CONSTANT_STEPS,
+            pad=None,
+        )
         bare = replace(scene, motion=scene.motion.replace(free=None, acceleration=0.0))
         try:
             loop = ClosedLoop(write_mjcf(bare, settings, keyframe=False))
@@ -55,11 +66,16 @@ class MujocoForward:
             return ReleasedAnswer.refused(RELEASED, setting, str(error))
         q_0 = Assembler(loop).find(float(start.theta_2[0]), int(start.branch[0]))
         if q_0 is None:
-            return ReleasedAnswer.refused(RELEASED, setting, "the loop does not close at the start")
+            return ReleasedAnswer.refused(
+                RELEASED, setting, "the loop does not close at the start"
+            )
         loop.model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY
         loop.set_state(q_0, scene.motion.omega_2 or 0.0)
         rows, q, detector = [], loop.data.qpos, LimitDetector(int(start.branch[0]))
-        stepper, work = Stepper(loop.model, loop.data, timestep), _Work(loop.model, loop.data, timestep)
+        stepper, work = (
+            Stepper(loop.model, loop.data, timestep),
+            _Work(loop.model, loop.data, timestep),
+        )
 
         def look(now: float) -> None:
             detector.look(now, q[O2] + q[A], q[O4])
@@ -69,15 +85,26 @@ class MujocoForward:
             stepper.to(float(t), look)
             mujoco.mj_forward(loop.model, loop.data)
             terms = np.array([*loop.data.energy, -work.done])
-            rows.append((loop.data.qpos[O2], loop.data.qvel[O2], terms.sum(), np.abs(terms).sum()))
+            rows.append(
+                (
+                    loop.data.qpos[O2],
+                    loop.data.qvel[O2],
+                    terms.sum(),
+                    np.abs(terms).sum(),
+                )
+            )
         theta_2, omega, energy, terms = np.array(rows).T
-        return ReleasedAnswer(RELEASED, setting, theta_2, omega, energy, terms, detector.stopped_at)
+        return ReleasedAnswer(
+            RELEASED, setting, theta_2, omega, energy, terms, detector.stopped_at
+        )
 
 
 class _Work:
     """Work of loads, damping and dry friction on the bars, by MuJoCo's own powers at the ends of each step, J."""
 
-    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, timestep: float) -> None:
+    def __init__(
+        self, model: mujoco.MjModel, data: mujoco.MjData, timestep: float
+    ) -> None:
         self.model, self.data, self.timestep, self.done = model, data, timestep, 0.0
         damped = model.dof_damping.any() or model.tendon_damping.any()
         dry = model.dof_frictionloss.any() or model.tendon_frictionloss.any()
@@ -114,12 +141,19 @@ class MujocoOneState:
     def answer(self, scene: Scene, command: Command) -> Answer:
         """Answer, or refuse a bar that MuJoCo cannot hold."""
         began = time.perf_counter()
-        setting = "extrapolated" if len(self.impedances) > 1 else f"d = {self.impedances[0]:g}"
+        setting = (
+            "extrapolated"
+            if len(self.impedances) > 1
+            else f"d = {self.impedances[0]:g}"
+        )
         try:
             rungs = [_compute_at_impedance(scene, command, d) for d in self.impedances]
         except InputError as error:
             return Answer(ONE_STATE, setting, refusal=str(error))
-        values, assembled = extrapolate(self.impedances, [rung for rung, _ in rungs]), rungs[0][1]
+        values, assembled = (
+            extrapolate(self.impedances, [rung for rung, _ in rungs]),
+            rungs[0][1],
+        )
         return Answer(
             ONE_STATE,
             setting,
@@ -132,18 +166,31 @@ class MujocoOneState:
         )
 
 
-def extrapolate(impedances: tuple[float, ...], rungs: list[dict[str, Array]]) -> dict[str, Array]:
+def extrapolate(
+    impedances: tuple[float, ...], rungs: list[dict[str, Array]]
+) -> dict[str, Array]:
     """Extrapolate to x = 0 the polynomial in x = (1-d)/d through the rungs (Lagrange)."""
     x = np.array([(1.0 - d) / d for d in impedances])
-    weights = [float(np.prod([xj / (xj - xi) for j, xj in enumerate(x) if j != i])) for i, xi in enumerate(x)]
-    return {name: sum(w * rung[name] for w, rung in zip(weights, rungs, strict=True)) for name in rungs[0]}  # type: ignore[misc]
+    weights = [
+        float(np.prod([xj / (xj - xi) for j, xj in enumerate(x) if j != i]))
+        for i, xi in enumerate(x)
+    ]
+    return {
+        name: sum(w * rung[name] for w, rung in zip(weights, rungs, strict=True))  # type: ignore[misc]
+        for name in rungs[0]
+    }
 
 
-def _compute_at_impedance(scene: Scene, command: Command, d: float) -> tuple[dict[str, Array], NDArray[np.bool_]]:
+def _compute_at_impedance(
+    scene: Scene, command: Command, d: float
+) -> tuple[dict[str, Array], NDArray[np.bool_]]:
     """Compute torque and pin forces at every position that assembles."""
     # no flywheel: the torque is on the driven bar itself
     settings = Settings(timestep=1e-3, impedance=d, pad=None, flywheel=0.0)
-    loop, drive = ClosedLoop(write_mjcf(scene, settings, keyframe=False)), name_driving(scene)
+    loop, drive = (
+        ClosedLoop(write_mjcf(scene, settings, keyframe=False)),
+        name_driving(scene),
+    )
 
     def read(q: Angles, omega_2: float, alpha_2: float) -> Values:
         loop.set_state(unwind(scene, q), omega_2)

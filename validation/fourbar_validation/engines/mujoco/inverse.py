@@ -35,13 +35,25 @@ class MujocoTree(Tree):
 
     def __init__(self, scene: Scene, data: mujoco.MjData | None = None) -> None:
         spec = mujoco.MjSpec()
-        spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT | mujoco.mjtDisableBit.mjDSBL_CONTACT
+        spec.option.disableflags |= (
+            mujoco.mjtDisableBit.mjDSBL_CONSTRAINT | mujoco.mjtDisableBit.mjDSBL_CONTACT
+        )
         bodies: dict[int, Any] = {1: spec.worldbody}
         for part in list_parts(scene.linkage):
-            body = bodies[part.bar] = bodies[part.bearer].add_body(name=f"bar{part.bar}", pos=[*part.first_pin, 0.0])
+            body = bodies[part.bar] = bodies[part.bearer].add_body(
+                name=f"bar{part.bar}", pos=[*part.first_pin, 0.0]
+            )
             body.explicitinertial = True
-            body.mass, body.ipos, body.inertia = part.mass, [*part.centre, 0.0], [part.inertia] * 3
-            body.add_joint(name=FIRST_PIN[part.bar], type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0.0, 0.0, 1.0])
+            body.mass, body.ipos, body.inertia = (
+                part.mass,
+                [*part.centre, 0.0],
+                [part.inertia] * 3,
+            )
+            body.add_joint(
+                name=FIRST_PIN[part.bar],
+                type=mujoco.mjtJoint.mjJNT_HINGE,
+                axis=[0.0, 0.0, 1.0],
+            )
             for name, place in part.points.items():
                 body.add_site(name=name, pos=[*place, 0.0])
         with warnings.catch_warnings():
@@ -56,10 +68,19 @@ class MujocoTree(Tree):
         mujoco.mj_resetData(model, self.data)
         self.body = {bar: model.body(f"bar{bar}").id for bar in FIRST_PIN}
         self.site = {model.site(number).name: number for number in range(model.nsite)}
-        assert [int(model.joint(pin).dofadr[0]) for pin in FIRST_PIN.values()] == [0, 1, 2]  # depth first
+        assert [int(model.joint(pin).dofadr[0]) for pin in FIRST_PIN.values()] == [
+            0,
+            1,
+            2,
+        ]  # depth first
         # the engine's own memory, read in place
-        self.at = {name: self.data.site_xpos[site, :2] for name, site in self.site.items()}
-        self.turned_to = {bar: self.data.xmat[body].reshape(3, 3)[:2, :2] for bar, body in self.body.items()}
+        self.at = {
+            name: self.data.site_xpos[site, :2] for name, site in self.site.items()
+        }
+        self.turned_to = {
+            bar: self.data.xmat[body].reshape(3, 3)[:2, :2]
+            for bar, body in self.body.items()
+        }
         self._jac, self._dot = np.zeros((3, 3)), np.zeros((3, 3))
         self.ready(scene, list_acting(scene, self))
 
@@ -96,28 +117,58 @@ class MujocoTree(Tree):
         """Return J a + (dJ/dt) v of a site."""
         site, body = self.site[name], self.body[int(name[-1])]
         mujoco.mj_jacSite(self.model, self.data, self._jac, None, site)
-        mujoco.mj_jacDot(self.model, self.data, self._dot, None, self.data.site_xpos[site], body)
+        mujoco.mj_jacDot(
+            self.model, self.data, self._dot, None, self.data.site_xpos[site], body
+        )
         return np.asarray((self._jac @ self.a + self._dot @ self.v)[:2])
 
-    def needed(self, field: tuple[float, float], wrenches: dict[int, list[float]]) -> Array:
+    def needed(
+        self, field: tuple[float, float], wrenches: dict[int, list[float]]
+    ) -> Array:
         """Return the result of mj_inverse less what loads and effects do on the coordinates."""
         self.model.opt.gravity[:] = (*field, 0.0)
         self.data.xfrc_applied[:] = 0.0
         mujoco.mj_inverse(self.model, self.data)
         applied = np.zeros(3)
-        for bar, (x, y, moment) in ((bar, wrench) for bar, wrench in wrenches.items() if any(wrench)):
-            force, couple, body = np.array([x, y, 0.0]), np.array([0.0, 0.0, moment]), self.body[bar]
-            mujoco.mj_applyFT(self.model, self.data, force, couple, self.data.xpos[body], body, applied)
+        for bar, (x, y, moment) in (
+            (bar, wrench) for bar, wrench in wrenches.items() if any(wrench)
+        ):
+            force, couple, body = (
+                np.array([x, y, 0.0]),
+                np.array([0.0, 0.0, moment]),
+                self.body[bar],
+            )
+            mujoco.mj_applyFT(
+                self.model,
+                self.data,
+                force,
+                couple,
+                self.data.xpos[body],
+                body,
+                applied,
+            )
         return np.asarray(self.data.qfrc_inverse - applied)
 
     def carried(self) -> dict[int, Array]:
         """Return cfrc_int, the force of the parent on each body."""
         for bar, (x, y, moment) in self.wrenches.items():
             body = self.body[bar]
-            to_x, to_y = (self.data.xipos[body] - self.data.xpos[body])[:2]  # xfrc_applied acts at the mass centre
-            self.data.xfrc_applied[body] = (x, y, 0.0, 0.0, 0.0, moment - (to_x * y - to_y * x))
+            to_x, to_y = (self.data.xipos[body] - self.data.xpos[body])[
+                :2
+            ]  # xfrc_applied acts at the mass centre
+            self.data.xfrc_applied[body] = (
+                x,
+                y,
+                0.0,
+                0.0,
+                0.0,
+                moment - (to_x * y - to_y * x),
+            )
         mujoco.mj_rnePostConstraint(self.model, self.data)
-        return {bar: np.array(self.data.cfrc_int[body, 3:5]) for bar, body in self.body.items()}
+        return {
+            bar: np.array(self.data.cfrc_int[body, 3:5])
+            for bar, body in self.body.items()
+        }
 
 
 class MujocoInverse(Exact):

@@ -34,23 +34,31 @@ class ResidualLimit:
 
 LIMITS = {
     "acceleration_gap": ResidualLimit(
-        1e-3, "of the greatest a_B: healthy runs have 1e-7..1e-4, a step that errs by 98 % has 4"
+        1e-3,
+        "of the greatest a_B: healthy runs have 1e-7..1e-4, a step that errs by 98 % has 4",
     ),
     "power_gap": ResidualLimit(
-        1e-4, "of the greatest power: healthy runs have 1e-8..1e-5, that step 4e-2, a stopped solver 1"
+        1e-4,
+        "of the greatest power: healthy runs have 1e-8..1e-5, that step 4e-2, a stopped solver 1",
     ),
     "force_gap": ResidualLimit(
-        1e-3, "of the greatest joint torque: the solver did not converge; healthy runs have 1e-8..1e-4"
+        1e-3,
+        "of the greatest joint torque: the solver did not converge; healthy runs have 1e-8..1e-4",
     ),
 }
 """Residuals of motion and forces that `ResidualMonitor` measures."""
 EXCUSED = 1e-3
 """A solver's residual excuses an error of this part of a force, not more."""
 OF_THE_DATA = {
-    "bad_states": ResidualLimit(0.0, "MuJoCo warned of a bad position, velocity or acceleration, and reset its data"),
+    "bad_states": ResidualLimit(
+        0.0,
+        "MuJoCo warned of a bad position, velocity or acceleration, and reset its data",
+    ),
     "time_went_back": ResidualLimit(0.0, "the time ran backwards: the data were reset"),
     "closure_gap": ResidualLimit(1e-5, "of the sum of the lengths: the loop is open"),
-    "speed_error": ResidualLimit(1e-4, "of the greatest speed: the crank does not turn as commanded"),
+    "speed_error": ResidualLimit(
+        1e-4, "of the greatest speed: the crank does not turn as commanded"
+    ),
 }
 """Limits of the residuals that the data of the simulation state directly."""
 
@@ -104,40 +112,65 @@ class ResidualMonitor:
         self.worst = dict.fromkeys(LIMITS, 0.0)
         self._most = dict.fromkeys(LIMITS, 0.0)
 
-    def look(self, loop: ClosedLoop, torque: float, loop_force: Array) -> dict[str, float]:
+    def look(
+        self, loop: ClosedLoop, torque: float, loop_force: Array
+    ) -> dict[str, float]:
         """Take in a forwarded state, the drive's torque and F43 as read; the error to expect of each quantity."""
-        q, v, a = (np.array(field) for field in (loop.data.qpos, loop.data.qvel, loop.data.qacc))
+        q, v, a = (
+            np.array(field)
+            for field in (loop.data.qpos, loop.data.qvel, loop.data.qacc)
+        )
         seen = self._motion(q, v, a)
         power = torque * float(seen.drive @ v)
-        self._keep("acceleration_gap", float(np.hypot(*seen.jerk)), float(np.hypot(*seen.a_B)))
+        self._keep(
+            "acceleration_gap", float(np.hypot(*seen.jerk)), float(np.hypot(*seen.a_B))
+        )
         # at a pole of T3 or T4 the speed of the driven bar, which vanishes, is as uncertain as the others
         lever = float(np.abs(seen.drive).max())
-        terms = abs(torque) * lever * float(np.abs(v).max()) + float(np.abs(seen.needed * v).sum())
+        terms = abs(torque) * lever * float(np.abs(v).max()) + float(
+            np.abs(seen.needed * v).sum()
+        )
         self._keep("power_gap", abs(power - float(seen.needed @ v)), terms)
         carried = seen.jacobian.T @ loop_force
         unbalanced = float(np.linalg.norm(seen.needed - carried - seen.drive * torque))
-        self._keep("force_gap", unbalanced, float(np.linalg.norm(seen.needed) + np.linalg.norm(carried)))
+        self._keep(
+            "force_gap",
+            unbalanced,
+            float(np.linalg.norm(seen.needed) + np.linalg.norm(carried)),
+        )
         try:
             closed = self._close(q, v, a, seen)
-        except np.linalg.LinAlgError:  # exactly at a limit position nothing closes the loop
+        except (
+            np.linalg.LinAlgError
+        ):  # exactly at a limit position nothing closes the loop
             return dict.fromkeys(seen.answer, math.inf)
-        expected = {name: float(np.linalg.norm(value - closed.answer[name])) for name, value in seen.answer.items()}
+        expected = {
+            name: float(np.linalg.norm(value - closed.answer[name]))
+            for name, value in seen.answer.items()
+        }
         # remainder of the solver: the pin forces differ by as much as F43
         remaining = {self.drive: abs(torque - float(seen.answer[self.drive]))}
-        remaining |= dict.fromkeys(PIN_FORCES, float(np.linalg.norm(loop_force - seen.answer["F43"])))
+        remaining |= dict.fromkeys(
+            PIN_FORCES, float(np.linalg.norm(loop_force - seen.answer["F43"]))
+        )
         for name, error in remaining.items():
             size = seen.needed if name == COUPLE.value else seen.answer[name]
             expected[name] += min(error, EXCUSED * float(np.linalg.norm(size)))
         return expected
 
     def _keep(self, name: str, value: float, size: float) -> None:
-        self.worst[name] = max(self.worst[name], value) if math.isfinite(value) else math.inf
+        self.worst[name] = (
+            max(self.worst[name], value) if math.isfinite(value) else math.inf
+        )
         self._most[name] = max(self._most[name], size)
 
     def evidence(self) -> dict[str, float]:
         """Return the worst of each residual, by the largest term that it is a residual of."""
         most = self._most
-        return {name: worst / most[name] if most[name] else worst for name, worst in self.worst.items()}
+        return {
+            name: worst / most[name] if most[name] else worst
+            for name, worst in self.worst.items()
+        }
 
     def _motion(self, q: Array, v: Array, a: Array) -> _Motion:
         bars, d = self.bars, self.bars.data
@@ -146,7 +179,10 @@ class ResidualMonitor:
         mujoco.mj_fwdActuation(bars.model, d)
         jacobian, gap = bars.jacobian(), np.array(bars.gap())
         rate_3, rate_4 = bars.rate_at("B3"), bars.rate_at("B4")
-        needed, drive = d.qfrc_inverse - d.qfrc_actuator, bars.drive_column(self.drive_bar)
+        needed, drive = (
+            d.qfrc_inverse - d.qfrc_actuator,
+            bars.drive_column(self.drive_bar),
+        )
         answer: dict[str, Array] = {}
         for name, x in (("theta", q), ("omega", v), ("alpha", a)):
             answer[f"{name}_3"], answer[f"{name}_4"] = x[O2] + x[A], x[O4]
@@ -169,7 +205,11 @@ class ResidualMonitor:
             d.ctrl[bars.ram] = 0.0
         mujoco.mj_rnePostConstraint(bars.model, d)
         on = bars.carried()
-        return {"F14": on["output"] + loop_force, "F32": -(on["coupler"] - loop_force), "F12": on["input"] - loop_force}
+        return {
+            "F14": on["output"] + loop_force,
+            "F32": -(on["coupler"] - loop_force),
+            "F12": on["input"] - loop_force,
+        }
 
     def _close(self, q: Array, v: Array, a: Array, seen: _Motion) -> _Motion:
         """Close the loop at the same theta_2, omega_2, alpha_2 in position, velocity and acceleration."""

@@ -66,4 +66,6 @@ def draw(texts: dict[str, str]) -> dict[str, str]:
 if __name__ == "__main__":
     json.dump(draw(json.load(sys.stdin)), sys.stdout)
     sys.stdout.flush()
-    os._exit(0)  # some drivers crash while Python takes them down, when the pictures are long drawn
+    os._exit(
+        0
+    )  # some drivers crash while Python takes them down, when the pictures are long drawn

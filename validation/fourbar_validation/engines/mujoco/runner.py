@@ -35,7 +35,11 @@ from fourbar_validation.engines.effects import look_up
 from fourbar_validation.engines.free_body_closure import find_angle
 from fourbar_validation.engines.limits import compute_least_sine
 from fourbar_validation.engines.loop import Assembler
-from fourbar_validation.engines.mujoco.closed_loop import O2, ClosedLoop, solve_couple_elsewhere
+from fourbar_validation.engines.mujoco.closed_loop import (
+    O2,
+    ClosedLoop,
+    solve_couple_elsewhere,
+)
 from fourbar_validation.engines.tree import solve_closed
 
 LOOKED_AT = 2000
@@ -52,7 +56,9 @@ class Steady:
     bar: int | None = 2
     """Number of the bar that moves so; None for the stroke."""
 
-    def __init__(self, theta_2: Array, segment: Sequence[int], omega: float, alpha: float) -> None:
+    def __init__(
+        self, theta_2: Array, segment: Sequence[int], omega: float, alpha: float
+    ) -> None:
         self.theta_2 = theta_2
         commanded = theta_2[list(segment)]
         self.run = choose_run(commanded, omega, alpha)
@@ -81,7 +87,10 @@ class Lawful:
     def __init__(self, law: Law, command: Command, segment: Sequence[int]) -> None:
         assert command.time is not None
         self.law, self.time = law, command.time
-        self.began, ends = float(command.time[segment[0]]), float(command.time[segment[-1]])
+        self.began, ends = (
+            float(command.time[segment[0]]),
+            float(command.time[segment[-1]]),
+        )
         self.intervals, self.duration = len(segment) - 1, ends - self.began
         self.omega = float(law.at(np.array([self.began]))[1][0])
         self.knots = list(law.time)
@@ -128,7 +137,9 @@ def find_extremes(law: Law) -> tuple[float, float]:
 
 def order_in_time(values: Array, time: Array | None, speed: float) -> NDArray[np.intp]:
     """Order the positions as they are passed, by what is commanded or by the times of a law, as indices."""
-    return np.argsort(time if time is not None else values if speed > 0.0 else -values, kind="stable")
+    return np.argsort(
+        time if time is not None else values if speed > 0.0 else -values, kind="stable"
+    )
 
 
 LIGHT_FLYWHEEL = 1e4
@@ -141,7 +152,9 @@ Found = tuple[float, float, float] | None
 class Stepper:
     """Counts the steps of a model from its present state on."""
 
-    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, timestep: float) -> None:
+    def __init__(
+        self, model: mujoco.MjModel, data: mujoco.MjData, timestep: float
+    ) -> None:
         self.model, self.data, self.timestep, self.done = model, data, timestep, 0
 
     def to(self, seconds: float, each: Callable[[float], None] | None = None) -> None:
@@ -179,7 +192,12 @@ class SimulatedRun:
         start: tuple[float, float, float],
         timestep: float,
     ) -> None:
-        self.scene, self.loop, self.light, self.motion_segment = scene, loop, light, motion_segment
+        self.scene, self.loop, self.light, self.motion_segment = (
+            scene,
+            loop,
+            light,
+            motion_segment,
+        )
         wound = unwind(scene, start)
         self.turns = wound[O2] - start[O2]
         """Whole turns by which MuJoCo's theta_2 is ahead: springs at pins count them, rad."""
@@ -189,7 +207,11 @@ class SimulatedRun:
 
     def progress(self) -> float:
         """Return the angle or stroke of what moves as commanded."""
-        return self.loop.stroke() if (bar := self.motion_segment.bar) is None else self.loop.angle(bar)
+        return (
+            self.loop.stroke()
+            if (bar := self.motion_segment.bar) is None
+            else self.loop.angle(bar)
+        )
 
     def to(self, index: int) -> None:
         """Step on to the step nearest to a position."""
@@ -203,20 +225,28 @@ class SimulatedRun:
         torque = self.loop.crank_torque()
         if self.light is None:
             return torque, self.loop.forces()
-        couple = solve_couple_elsewhere(self.loop, self.light, self.scene.drive_bar, self.loop.given(), torque)
+        couple = solve_couple_elsewhere(
+            self.loop, self.light, self.scene.drive_bar, self.loop.given(), torque
+        )
         return couple, self.light.forces()
 
 
-def find_assembled(position: Assembler, command: Command, order: Iterable[int]) -> list[Found]:
+def find_assembled(
+    position: Assembler, command: Command, order: Iterable[int]
+) -> list[Found]:
     """Own joint angles of every commanded position, found one after the other in an order."""
     assembled: list[Found] = [None] * len(command.angle)
     for index in order:
-        assembled[index] = position.find(float(command.angle[index]), int(command.branch[index]))
+        assembled[index] = position.find(
+            float(command.angle[index]), int(command.branch[index])
+        )
     return assembled
 
 
 def split_segments(
-    assembled: list[Found], order: Iterable[int], joined: Callable[[int, int], bool] = lambda one, other: True
+    assembled: list[Found],
+    order: Iterable[int],
+    joined: Callable[[int, int], bool] = lambda one, other: True,
 ) -> list[list[int]]:
     """Split the positions, in order of time, where the loop does not close, or two neighbours are not joined."""
     split: list[list[int]] = [[]]
@@ -239,16 +269,28 @@ class Lead:
     def __init__(self, scene: Scene, command: Command) -> None:
         motion = scene.motion
         if motion.law is not None:
-            raise LimitError("a motion law of another bar than the input is not run through time here")
+            raise LimitError(
+                "a motion law of another bar than the input is not run through time here"
+            )
         still = replace(take_full_size(scene), motion=Motion(0.0, 1.0))
-        self.loop = loop = ClosedLoop(write_mjcf(still, replace(RECIPE, timestep=1e-3), keyframe=False))
+        self.loop = loop = ClosedLoop(
+            write_mjcf(still, replace(RECIPE, timestep=1e-3), keyframe=False)
+        )
         self.bar = None if command.stroke is not None else command.bar
         """Number of the commanded bar; None if the stroke is commanded."""
         if command.stroke is not None:
             command = find_angle(command, motion, *loop.cylinder(command.bar))
-        self.command, self.values = command, command.angle if command.stroke is None else command.stroke
-        self.speed, self.acceleration = float(np.max(motion.speed or 0.0)), float(np.max(motion.acceleration))
-        assembled = find_assembled(Assembler(loop, command.bar), command, range(len(self.values)))
+        self.command, self.values = (
+            command,
+            command.angle if command.stroke is None else command.stroke,
+        )
+        self.speed, self.acceleration = (
+            float(np.max(motion.speed or 0.0)),
+            float(np.max(motion.acceleration)),
+        )
+        assembled = find_assembled(
+            Assembler(loop, command.bar), command, range(len(self.values))
+        )
         self.closes = np.array([q is not None for q in assembled])
         if not self.closes.any():
             raise LimitError("the loop closes at none of the positions")
@@ -259,14 +301,23 @@ class Lead:
                 try:
                     loop.set_state(q, self.speed, self.bar)
                 except np.linalg.LinAlgError:
-                    raise LimitError("the commanded motion stands at a limit of its own") from None
+                    raise LimitError(
+                        "the commanded motion stands at a limit of its own"
+                    ) from None
                 mujoco.mj_forward(loop.model, loop.data)
-                self.input[:, index] = q[O2], loop.data.qvel[O2], self.alpha_2(loop.model, loop.data)
+                self.input[:, index] = (
+                    q[O2],
+                    loop.data.qvel[O2],
+                    self.alpha_2(loop.model, loop.data),
+                )
                 branch[index] = loop.branch()
         self.input[0, self.closes] = np.unwrap(self.input[0, self.closes])
         theta_2, omega_2, alpha_2 = self.input[:, self.closes]
         # greatest speed and acceleration, as for a law: flywheel and closure are sized by them
-        most = float(np.abs(omega_2).max()), float(np.abs(alpha_2).max()) or np.finfo(float).tiny
+        most = (
+            float(np.abs(omega_2).max()),
+            float(np.abs(alpha_2).max()) or np.finfo(float).tiny,
+        )
         self.scene = replace(scene, motion=Motion(theta_2, *most))
         self.of_input = Command(theta_2, branch[self.closes], *most)
 
@@ -276,14 +327,20 @@ class Lead:
         loop.model, loop.data = model, data
         drift = (loop.rate_at("B3") - loop.rate_at("B4")) @ data.qvel
         due = self.acceleration - loop.drive_drift(self.bar)
-        return float(solve_closed(loop.jacobian(), due, loop.drive_column(self.bar), *drift.tolist())[O2])
+        return float(
+            solve_closed(
+                loop.jacobian(), due, loop.drive_column(self.bar), *drift.tolist()
+            )[O2]
+        )
 
     def least_sine(self) -> float:
         """Compute the least |sin(theta_4 - theta_3)| on the way; 0 where it changes its sign."""
         if np.ptp(self.of_input.branch):
             return 0.0
         return compute_least_sine(
-            self.scene.linkage, self.of_input.theta_2, np.ones(len(self.of_input.theta_2), dtype=bool)
+            self.scene.linkage,
+            self.of_input.theta_2,
+            np.ones(len(self.of_input.theta_2), dtype=bool),
         )
 
 
@@ -308,7 +365,9 @@ class Led(Steady):
         steps = duration * self.turning / (2.0 * np.pi) * settings.steps_per_revolution
         if 0.0 < self.turned < FULL_TURN:
             steps = max(steps, settings.steps_per_window * uneven)
-        return float(duration / max(np.ceil(steps), self.width) * settings.timestep_scale)
+        return float(
+            duration / max(np.ceil(steps), self.width) * settings.timestep_scale
+        )
 
 
 OVERRUN = 1e-7
@@ -347,7 +406,11 @@ def evaluate_loads(scene: Scene) -> dict[str, ActuatorForce]:
 
         return factor
 
-    return {f"load_{index}": force_of(load) for index, load in enumerate(scene.loads, 1) if load.table is not None}
+    return {
+        f"load_{index}": force_of(load)
+        for index, load in enumerate(scene.loads, 1)
+        if load.table is not None
+    }
 
 
 def clip_angles(scene: Scene, theta_2: Array) -> Array:
@@ -361,7 +424,9 @@ def clip_angles(scene: Scene, theta_2: Array) -> Array:
         over, under = angle - last, first + math.tau - angle
         outside = over > 0.0
         if not (~outside | (np.minimum(over, under) < OVERRUN)).all():
-            raise LimitError(f"the motion leaves the table of a load, which covers {first:g} to {last:g} rad")
+            raise LimitError(
+                f"the motion leaves the table of a load, which covers {first:g} to {last:g} rad"
+            )
         inside = inside + np.where(outside, np.where(over < under, -over, under), 0.0)
     return inside
 
@@ -381,7 +446,9 @@ def supply_forces(supplied: dict[str, ActuatorForce]) -> Iterator[None]:
         yield
         return
     before = mujoco.get_mjcb_act_bias()
-    mujoco.set_mjcb_act_bias(lambda m, d, number: supplied[m.actuator(number).name](m, d))
+    mujoco.set_mjcb_act_bias(
+        lambda m, d, number: supplied[m.actuator(number).name](m, d)
+    )
     try:
         yield
     finally:

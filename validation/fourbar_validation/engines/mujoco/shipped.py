@@ -11,7 +11,11 @@ from fourbar.scene import Command, Scene
 from fourbar.scene.motion import BRANCH_NAMES
 from fourbar_validation.compare.rows import FAILS, UNDECIDED, Row
 from fourbar_validation.compare.tolerance import EPS, SIMULATED, K
-from fourbar_validation.engines.limits import FASTEST, NEAREST_TOGGLE, compute_least_sine
+from fourbar_validation.engines.limits import (
+    FASTEST,
+    NEAREST_TOGGLE,
+    compute_least_sine,
+)
 from fourbar_validation.engines.mujoco.closed_loop import O2, ClosedLoop
 
 NAME = "mujoco-simulated"
@@ -32,50 +36,111 @@ def compare_shipped(name: str, scene: Scene, command: Command) -> Row | None:
         return None
     try:
         loop = ClosedLoop(write_mjcf(scene))
-    except (InputError, LimitError, NotAssembledError):  # no file is shipped; the simulation's own row says why
+    except (
+        InputError,
+        LimitError,
+        NotAssembledError,
+    ):  # no file is shipped; the simulation's own row says why
         return None
     d, size = loop.data, math.fsum(scene.linkage.lengths)
     errors: list[tuple[float, str]] = []
 
     def closed(what: str) -> None:
         mujoco.mj_forward(loop.model, d)
-        errors.append((math.hypot(*loop.gap()) / (OPEN * size), f"{what}: the loop is open"))
-        wrong_branch = float(loop.branch() != command.branch[0]) if scene.motion.through == "sign" else 0.0
-        errors.append((math.inf if wrong_branch else 0.0, f"{what}: not {BRANCH_NAMES[int(command.branch[0])]}"))
+        errors.append(
+            (math.hypot(*loop.gap()) / (OPEN * size), f"{what}: the loop is open")
+        )
+        wrong_branch = (
+            float(loop.branch() != command.branch[0])
+            if scene.motion.through == "sign"
+            else 0.0
+        )
+        errors.append(
+            (
+                math.inf if wrong_branch else 0.0,
+                f"{what}: not {BRANCH_NAMES[int(command.branch[0])]}",
+            )
+        )
 
     mujoco.mj_resetData(loop.model, d)
     closed("as it opens")
     mujoco.mj_resetDataKeyframe(loop.model, d, 0)
     closed("keyframe")
-    first = command.theta_2[np.argmin(np.abs(np.angle(np.exp(1j * (command.theta_2 - d.qpos[O2])))))]
+    first = command.theta_2[
+        np.argmin(np.abs(np.angle(np.exp(1j * (command.theta_2 - d.qpos[O2])))))
+    ]
     apart = abs(math.remainder(float(first - d.qpos[O2]), math.tau))
-    errors.append((apart / (K * EPS * max(1.0, abs(float(first)))), "keyframe: theta_2 is none of the scene's"))
-    errors.append((abs(float(d.qvel[O2]) / omega - 1.0) / (K * EPS), "keyframe: omega_2"))
+    errors.append(
+        (
+            apart / (K * EPS * max(1.0, abs(float(first)))),
+            "keyframe: theta_2 is none of the scene's",
+        )
+    )
+    errors.append(
+        (abs(float(d.qvel[O2]) / omega - 1.0) / (K * EPS), "keyframe: omega_2")
+    )
     slip = float(np.hypot(*(loop.jacobian() @ d.qvel[:3])))
-    errors.append((slip / (OPEN * size * float(np.abs(d.qvel).max())), "keyframe: the bars' speeds open the loop"))
+    errors.append(
+        (
+            slip / (OPEN * size * float(np.abs(d.qvel).max())),
+            "keyframe: the bars' speeds open the loop",
+        )
+    )
     moving = 0.0
     if scene.motion.alpha_2 == 0.0:  # a servo; from rest as the file opens
         mujoco.mj_resetData(loop.model, d)
         moving = omega
     else:  # a motor: on from the keyframe
         moving = omega + scene.motion.alpha_2 * STEPS * loop.model.opt.timestep
-    if (beyond := _find_not_driven(scene, omega, float(d.qpos[O2]), STEPS * loop.model.opt.timestep)) is not None:
+    if (
+        beyond := _find_not_driven(
+            scene, omega, float(d.qpos[O2]), STEPS * loop.model.opt.timestep
+        )
+    ) is not None:
         error, reason = _find_worst(errors)
-        verdict, reason = (FAILS, reason) if error > 1.0 else (UNDECIDED, f"the drive is not run: {beyond}")
-        return Row(name, NAME, "shipped", QUANTITY, error, 1.0, verdict, reason, float(d.qpos[O2]), 1.0)
+        verdict, reason = (
+            (FAILS, reason)
+            if error > 1.0
+            else (UNDECIDED, f"the drive is not run: {beyond}")
+        )
+        return Row(
+            name,
+            NAME,
+            "shipped",
+            QUANTITY,
+            error,
+            1.0,
+            verdict,
+            reason,
+            float(d.qpos[O2]),
+            1.0,
+        )
     mujoco.mj_step(loop.model, d, STEPS)
     lost = d.time < 0.5 * STEPS * loop.model.opt.timestep
-    speed = math.inf if lost else abs(float(d.qvel[O2]) - moving) / (SPEED * max(abs(omega), abs(moving)))
-    errors.append((speed, f"after {STEPS} steps the input turns at {d.qvel[O2]:.6g} of {moving:.6g} rad/s"))
+    speed = (
+        math.inf
+        if lost
+        else abs(float(d.qvel[O2]) - moving) / (SPEED * max(abs(omega), abs(moving)))
+    )
+    errors.append(
+        (
+            speed,
+            f"after {STEPS} steps the input turns at {d.qvel[O2]:.6g} of {moving:.6g} rad/s",
+        )
+    )
     error, reason = _find_worst(errors)
-    return Row.judged((name, NAME, "shipped"), QUANTITY, error, 1.0, reason, float(d.qpos[O2]))
+    return Row.judged(
+        (name, NAME, "shipped"), QUANTITY, error, 1.0, reason, float(d.qpos[O2])
+    )
 
 
 def _find_worst(errors: list[tuple[float, str]]) -> tuple[float, str]:
     return max(errors, key=lambda each: math.inf if math.isnan(each[0]) else each[0])
 
 
-def _find_not_driven(scene: Scene, omega_2: float, theta_2: float, seconds: float) -> str | None:
+def _find_not_driven(
+    scene: Scene, omega_2: float, theta_2: float, seconds: float
+) -> str | None:
     """Name the declared limit of the simulation that the first steps meet, if any."""
     if abs(omega_2) > FASTEST.boundary:
         return FASTEST.reason

@@ -16,8 +16,16 @@ from fourbar.mjcf.model import CYLINDER
 from fourbar.scene import Command, Scene
 from fourbar.scene.motion import COMMANDS, Motion
 from fourbar_validation.compare.answer import Answer
-from fourbar_validation.engines.description import list_speeds, list_unknowns, name_driving
-from fourbar_validation.engines.limits import NEAREST_TOGGLE, compute_least_sine, find_exceeded
+from fourbar_validation.engines.description import (
+    list_speeds,
+    list_unknowns,
+    name_driving,
+)
+from fourbar_validation.engines.limits import (
+    NEAREST_TOGGLE,
+    compute_least_sine,
+    find_exceeded,
+)
 from fourbar_validation.engines.loaded import Values
 from fourbar_validation.engines.loop import MADE, Assembler, make_blank
 from fourbar_validation.engines.mujoco.closed_loop import O2, O4, A, ClosedLoop
@@ -53,7 +61,14 @@ COLLINEAR = 1e-9
 """Part of the sum of the lengths, and of half a turn: below what the time step itself can resolve."""
 OF_TENDON = ("stroke", "stroke_speed")
 """Quantities of a cylinder that MuJoCo has."""
-RESIDUALS = ("closure_gap_m", "speed_error", "time_went_back", "bad_states", "solver_iterations", "steps")
+RESIDUALS = (
+    "closure_gap_m",
+    "speed_error",
+    "time_went_back",
+    "bad_states",
+    "solver_iterations",
+    "steps",
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +81,11 @@ class MujocoSimulated:
 
     def at_setting(self, steps_per_turn: int) -> "MujocoSimulated":
         """Return the engine that makes so many steps in a turn."""
-        settings = replace(self.settings, steps_per_revolution=float(steps_per_turn), steps_per_window=1)
+        settings = replace(
+            self.settings,
+            steps_per_revolution=float(steps_per_turn),
+            steps_per_window=1,
+        )
         return replace(self, settings=settings)
 
     def answer(self, scene: Scene, command: Command) -> Answer:
@@ -76,15 +95,24 @@ class MujocoSimulated:
             if scene.motion.free is not None:
                 raise LimitError("a free motion has no commanded sweep")
             if command.speed is None or not np.any(command.speed):
-                raise LimitError(f"{scene.motion.names[1]} is 0 or not stated: nothing to simulate through time")
+                raise LimitError(
+                    f"{scene.motion.names[1]} is 0 or not stated: nothing to simulate through time"
+                )
             if command.bar != 2 or command.stroke is not None:
                 lead = Lead(scene, command)
                 scene, command = lead.scene, lead.command
             _require_run(scene, command if lead is None else lead.of_input)
             answer = _Simulation(self.settings, scene, command, lead).answer()
-        except (LimitError, InputError) as error:  # anything else is a failure, not a declared limit
+        except (
+            LimitError,
+            InputError,
+        ) as error:  # anything else is a failure, not a declared limit
             answer = Answer(self.name, self.settings.integrator, refusal=str(error))
-        answer.shared, answer.own, answer.seconds = SHARED, OWN, time.perf_counter() - began
+        answer.shared, answer.own, answer.seconds = (
+            SHARED,
+            OWN,
+            time.perf_counter() - began,
+        )
         return answer
 
 
@@ -92,7 +120,9 @@ def _require_run(scene: Scene, command: Command) -> None:
     """Raise LimitError where this motion of the input is not simulated."""
     law = scene.motion.law if command.time is not None else None
     if law is None and any(np.ptp(values) != 0.0 for values in list_speeds(command)):
-        raise LimitError("omega_2 or alpha_2 differs from position to position: that is no one motion through time")
+        raise LimitError(
+            "omega_2 or alpha_2 differs from position to position: that is no one motion through time"
+        )
     if np.ptp(command.theta_2) == 0.0:
         raise LimitError("one position: nothing to run through")
     run = make_run_scene(scene, command)
@@ -106,10 +136,18 @@ def _require_run(scene: Scene, command: Command) -> None:
 def _passes_change_point(scene: Scene, command: Command) -> bool:
     """Tell whether all four bars come to lie along the ground within the sweep: +-a +-b +-c = d."""
     d, a, b, c = scene.linkage.lengths
-    least, most = (float(x) - scene.linkage.ground_angle for x in (command.theta_2.min(), command.theta_2.max()))
-    for half_turn in range(math.ceil(least / math.pi - COLLINEAR), math.floor(most / math.pi + COLLINEAR) + 1):
+    least, most = (
+        float(x) - scene.linkage.ground_angle
+        for x in (command.theta_2.min(), command.theta_2.max())
+    )
+    for half_turn in range(
+        math.ceil(least / math.pi - COLLINEAR),
+        math.floor(most / math.pi + COLLINEAR) + 1,
+    ):
         diagonal = abs(d - a if half_turn % 2 == 0 else d + a)
-        if min(abs(diagonal - abs(b - c)), abs(diagonal - (b + c))) <= COLLINEAR * (a + b + c + d):
+        if min(abs(diagonal - abs(b - c)), abs(diagonal - (b + c))) <= COLLINEAR * (
+            a + b + c + d
+        ):
             return True
     return False
 
@@ -118,17 +156,30 @@ def make_run_scene(scene: Scene, command: Command) -> Scene:
     """Make the scene whose MJCF is run through, a law by its greatest speed and acceleration."""
     if scene.motion.law is not None:
         omega, alpha = find_extremes(scene.motion.law)
-        motion = Motion(command.theta_2, omega, alpha, scene.motion.branch, scene.motion.through)
+        motion = Motion(
+            command.theta_2, omega, alpha, scene.motion.branch, scene.motion.through
+        )
         return replace(scene, motion=motion)
     omega, alpha = float(np.max(command.omega_2)), float(np.max(command.alpha_2))  # type: ignore[arg-type]
-    return replace(scene, motion=scene.motion.replace(angle=command.theta_2, speed=omega, acceleration=alpha))
+    return replace(
+        scene,
+        motion=scene.motion.replace(
+            angle=command.theta_2, speed=omega, acceleration=alpha
+        ),
+    )
 
 
 class _Simulation:
     """One scene: its own assembly, then each segment of positions that assembles, run through in time."""
 
     def __init__(
-        self, settings: Settings, scene: Scene, command: Command, lead: Lead | None = None, *, bounded: bool = True
+        self,
+        settings: Settings,
+        scene: Scene,
+        command: Command,
+        lead: Lead | None = None,
+        *,
+        bounded: bool = True,
     ) -> None:
         self.bounded, self.lead = bounded, lead
         self.settings, self.command, self.law = settings, command, scene.motion.law
@@ -136,36 +187,65 @@ class _Simulation:
         self.scene = make_run_scene(scene, command) if lead is None else scene
         self.supplied = evaluate_loads(scene)
         n = len(command.angle)
-        values, speed = (command.angle, self.scene.motion.omega_2) if lead is None else (lead.values, lead.speed)
-        self.order = order_in_time(values, command.time if self.law else None, speed or 0.0)
-        self.out = make_blank(n, [*MADE, *list_unknowns(scene), *(OF_TENDON if scene.drive else ())])
+        values, speed = (
+            (command.angle, self.scene.motion.omega_2)
+            if lead is None
+            else (lead.values, lead.speed)
+        )
+        self.order = order_in_time(
+            values, command.time if self.law else None, speed or 0.0
+        )
+        self.out = make_blank(
+            n, [*MADE, *list_unknowns(scene), *(OF_TENDON if scene.drive else ())]
+        )
         self.branch = command.branch.copy()
-        self.evidence = dict.fromkeys(RESIDUALS, 0.0) | {"mass_ratio": compute_mass_ratio(scene.linkage)}
+        self.evidence = dict.fromkeys(RESIDUALS, 0.0) | {
+            "mass_ratio": compute_mass_ratio(scene.linkage)
+        }
         self.steps_per_revolution = 0.0
         self.predicted = {name: np.zeros(n) for name in list_unknowns(scene)}
 
     def answer(self) -> Answer:
         """Answer over all positions."""
         bar, linkage = self.command.bar, self.scene.linkage
-        position = Assembler(ClosedLoop(self._write_text(1e-3)), bar)  # kinematics alone: the timestep plays no part
+        position = Assembler(
+            ClosedLoop(self._write_text(1e-3)), bar
+        )  # kinematics alone: the timestep plays no part
         assembled = find_assembled(position, self.command, self.order)
         closes = np.array([angles is not None for angles in assembled])
         least = (
-            compute_least_sine(linkage, self.command.theta_2, closes) if self.lead is None else self.lead.least_sine()
+            compute_least_sine(linkage, self.command.theta_2, closes)
+            if self.lead is None
+            else self.lead.least_sine()
         )
         if self.bounded and least < NEAREST_TOGGLE.boundary:
-            raise LimitError(f"|sin(theta_4 - theta_3)| falls to {least:.1e}; {NEAREST_TOGGLE.reason}")
-        for segment in split_segments(assembled, self.order, partial(self._closes_between, position)):
+            raise LimitError(
+                f"|sin(theta_4 - theta_3)| falls to {least:.1e}; {NEAREST_TOGGLE.reason}"
+            )
+        for segment in split_segments(
+            assembled, self.order, partial(self._closes_between, position)
+        ):
             start = assembled[segment[0]]
             assert start is not None
             self._run(segment, start)
         self.out["theta_2"] = clip_angles(self.scene, self.out["theta_2"])
         # the command stands for the motion where nothing moved
-        commanded = zip(COMMANDS[bar], (self.command.angle, *list_speeds(self.command)), strict=True)
-        motion_made = [np.where(np.isnan(self.out[name]), x, self.out[name]) for name, x in commanded]
-        motion_made[0] = motion_made[0] + 2.0 * np.pi * np.round((self.command.angle - motion_made[0]) / (2.0 * np.pi))
-        motion = Command(motion_made[0], self.branch, motion_made[1], motion_made[2], bar=bar)
-        values = {name: x for name, x in self.out.items() if bar != 2 or name not in MADE}
+        commanded = zip(
+            COMMANDS[bar], (self.command.angle, *list_speeds(self.command)), strict=True
+        )
+        motion_made = [
+            np.where(np.isnan(self.out[name]), x, self.out[name])
+            for name, x in commanded
+        ]
+        motion_made[0] = motion_made[0] + 2.0 * np.pi * np.round(
+            (self.command.angle - motion_made[0]) / (2.0 * np.pi)
+        )
+        motion = Command(
+            motion_made[0], self.branch, motion_made[1], motion_made[2], bar=bar
+        )
+        values = {
+            name: x for name, x in self.out.items() if bar != 2 or name not in MADE
+        }
         setting = f"{self.settings.integrator} {self.steps_per_revolution:.0f}/rev"
         return Answer(
             "mujoco-simulated",
@@ -185,18 +265,27 @@ class _Simulation:
         if self.lead is not None:
             return Led(self.lead, segment)
         motion = self.scene.motion
-        return Steady(self.command.theta_2, segment, motion.omega_2 or 0.0, motion.alpha_2)
+        return Steady(
+            self.command.theta_2, segment, motion.omega_2 or 0.0, motion.alpha_2
+        )
 
     def _compile_loop(
-        self, timestep: float, supplied: dict[str, ActuatorForce], flywheel: float | None = None
+        self,
+        timestep: float,
+        supplied: dict[str, ActuatorForce],
+        flywheel: float | None = None,
     ) -> ClosedLoop:
         """Compile a model that takes from `supply_forces` what its text cannot say."""
-        return receive_forces(ClosedLoop(self._write_text(timestep, flywheel)), supplied)
+        return receive_forces(
+            ClosedLoop(self._write_text(timestep, flywheel)), supplied
+        )
 
     def _write_text(self, timestep: float, flywheel: float | None = None) -> str:
         """Write the generated MJCF without its keyframe."""
         heavy = self.settings.flywheel if flywheel is None else flywheel
-        settings = replace(self.settings, timestep=timestep, timestep_scale=1.0, flywheel=heavy)
+        settings = replace(
+            self.settings, timestep=timestep, timestep_scale=1.0, flywheel=heavy
+        )
         return write_mjcf(take_full_size(self.scene), settings, keyframe=False)
 
     def _closes_between(self, position: Assembler, one: int, second: int) -> bool:
@@ -205,7 +294,8 @@ class _Simulation:
         pieces = int(np.ceil(abs(stop - start) / FINE))
         branch = int(self.command.branch[one])
         return all(
-            position.find(float(theta_2), branch) is not None for theta_2 in np.linspace(start, stop, pieces + 1)[1:-1]
+            position.find(float(theta_2), branch) is not None
+            for theta_2 in np.linspace(start, stop, pieces + 1)[1:-1]
         )
 
     def _run(self, segment: list[int], start: tuple[float, float, float]) -> None:
@@ -217,13 +307,25 @@ class _Simulation:
             self.steps_per_revolution = max(self.steps_per_revolution, turn / timestep)
         supplied = self.supplied
         if isinstance(motion_segment, Lawful):
-            supplied = {**supplied, "drive": lambda m, d: m.dof_armature[O2] * motion_segment.alpha(d.time)}
+            supplied = {
+                **supplied,
+                "drive": lambda m, d: m.dof_armature[O2] * motion_segment.alpha(d.time),
+            }
         elif (lead := self.lead) is not None:
-            supplied = {**supplied, "drive": lambda m, d: m.dof_armature[O2] * lead.alpha_2(m, d)}
+            supplied = {
+                **supplied,
+                "drive": lambda m, d: m.dof_armature[O2] * lead.alpha_2(m, d),
+            }
         with supply_forces(supplied):
             loop = self._compile_loop(timestep, supplied)
-            light = None if self.scene.drive_bar == 2 else self._compile_loop(timestep, supplied, LIGHT_FLYWHEEL)
-            monitor = ResidualMonitor(self._compile_loop(timestep, supplied), self.scene.drive_bar)
+            light = (
+                None
+                if self.scene.drive_bar == 2
+                else self._compile_loop(timestep, supplied, LIGHT_FLYWHEEL)
+            )
+            monitor = ResidualMonitor(
+                self._compile_loop(timestep, supplied), self.scene.drive_bar
+            )
             run = SimulatedRun(self.scene, loop, light, motion_segment, start, timestep)
             for index in segment:
                 run.to(index)
@@ -239,18 +341,35 @@ class _Simulation:
         self._keep_worst(run)
         q = (float(d.qpos[O2]), float(d.qpos[A]), float(d.qpos[O4]))
         if unwind(self.scene, q) != q:
-            raise LimitError("a torsion spring is wound by more than half a turn from its rest")
+            raise LimitError(
+                "a torsion spring is wound by more than half a turn from its rest"
+            )
         self.branch[index] = loop.branch(self.command.bar)
         torque, pins = run.read()
         if torque is None:
-            drive = "the cylinder" if self.scene.drive else f"the couple on bar {self.scene.drive_bar}"
+            drive = (
+                "the cylinder"
+                if self.scene.drive
+                else f"the couple on bar {self.scene.drive_bar}"
+            )
             raise LimitError(f"{drive} does not move the input: a pole of its size")
         values: Values = {name_driving(self.scene): torque, **pins}
         if self.scene.drive is not None:
             tendon = loop.model.tendon(CYLINDER).id
-            values |= {"stroke": d.ten_length[tendon], "stroke_speed": d.ten_velocity[tendon]}
-        for name, x, ahead in (("theta", d.qpos, turns), ("omega", d.qvel, 0.0), ("alpha", d.qacc, 0.0)):
-            values |= {f"{name}_2": x[O2] - ahead, f"{name}_3": x[O2] + x[A] - ahead, f"{name}_4": x[O4]}
+            values |= {
+                "stroke": d.ten_length[tendon],
+                "stroke_speed": d.ten_velocity[tendon],
+            }
+        for name, x, ahead in (
+            ("theta", d.qpos, turns),
+            ("omega", d.qvel, 0.0),
+            ("alpha", d.qacc, 0.0),
+        ):
+            values |= {
+                f"{name}_2": x[O2] - ahead,
+                f"{name}_3": x[O2] + x[A] - ahead,
+                f"{name}_4": x[O4],
+            }
         for name, value in values.items():
             self.out[name][index] = value
         for name, error in monitor.look(loop, torque, pins["F43"]).items():
@@ -263,7 +382,9 @@ class _Simulation:
         speed = float(loop.drive_column(run.motion_segment.bar) @ d.qvel)
         worst = {
             "closure_gap_m": float(np.hypot(*loop.gap())),
-            "speed_error": float(abs(abs(speed) - due) / (run.motion_segment.fastest or 1.0)),
+            "speed_error": float(
+                abs(abs(speed) - due) / (run.motion_segment.fastest or 1.0)
+            ),
             "solver_iterations": float(d.solver_niter.max()),
             "bad_states": float(loop.bad()),
             "time_went_back": float(run.stepper.lost()),
@@ -272,18 +393,24 @@ class _Simulation:
             seen[name] = float(np.maximum(seen[name], value))
 
 
-def observe_order(scene: Scene, command: Command, error: Callable[[Answer], float]) -> tuple[float, float, float]:
+def observe_order(
+    scene: Scene, command: Command, error: Callable[[Answer], float]
+) -> tuple[float, float, float]:
     """Return errors at 4h and 2h with the closure's time constant held in seconds, and log2 of their ratio.
 
     At the recipe's own h the softness is already of the size of the truncation; the order shows above it.
     """
     errors = [
         error(
-            MujocoSimulated(replace(RECIPE, timestep_scale=scale, time_constant_steps=80.0 / scale)).answer(
-                scene, command
-            )
+            MujocoSimulated(
+                replace(RECIPE, timestep_scale=scale, time_constant_steps=80.0 / scale)
+            ).answer(scene, command)
         )
         for scale in (4.0, 2.0)
     ]
     ratio = errors[0] / errors[1] if errors[1] else math.inf
-    return errors[0], errors[1], math.log2(ratio) if 0.0 < ratio < math.inf else math.nan
+    return (
+        errors[0],
+        errors[1],
+        math.log2(ratio) if 0.0 < ratio < math.inf else math.nan,
+    )

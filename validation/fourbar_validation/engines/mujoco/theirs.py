@@ -23,10 +23,30 @@ from fourbar.scene import command as command_of
 from fourbar_validation.compare.answer import Answer, Array
 from fourbar_validation.engines.description import Value, list_unknowns, name_driving
 from fourbar_validation.engines.loaded import Assembled, Values
-from fourbar_validation.engines.loop import MADE, Angles, Assembler, make_blank, read_each, split_answer
-from fourbar_validation.engines.mujoco.closed_loop import WARNINGS, load_force, solve_couple
-from fourbar_validation.engines.mujoco.describe import Described, describe_model, set_entry
-from fourbar_validation.engines.mujoco.runner import Stepper, find_assembled, order_in_time, split_segments
+from fourbar_validation.engines.loop import (
+    MADE,
+    Angles,
+    Assembler,
+    make_blank,
+    read_each,
+    split_answer,
+)
+from fourbar_validation.engines.mujoco.closed_loop import (
+    WARNINGS,
+    load_force,
+    solve_couple,
+)
+from fourbar_validation.engines.mujoco.describe import (
+    Described,
+    describe_model,
+    set_entry,
+)
+from fourbar_validation.engines.mujoco.runner import (
+    Stepper,
+    find_assembled,
+    order_in_time,
+    split_segments,
+)
 from fourbar_validation.engines.mujoco.topology import Topology, find_topology
 from fourbar_validation.engines.tree import solve_closed
 
@@ -62,14 +82,24 @@ def compile_text(text: str) -> mujoco.MjModel:
     try:
         keyframes = mujoco.MjSpec.from_string(text).nkey
         if keyframes > MOST_KEYFRAMES:
-            raise InputError("MJCF", None, f"asks for {keyframes} keyframes; up to {MOST_KEYFRAMES} are read")
+            raise InputError(
+                "MJCF",
+                None,
+                f"asks for {keyframes} keyframes; up to {MOST_KEYFRAMES} are read",
+            )
         model = mujoco.MjModel.from_xml_string(text)
     except ValueError as error:
-        raise InputError("MJCF", None, " ".join(f"MuJoCo does not compile it: {error}".split())) from None
+        raise InputError(
+            "MJCF", None, " ".join(f"MuJoCo does not compile it: {error}".split())
+        ) from None
     except RuntimeError:  # "unknown exception": a size that no memory holds
-        raise InputError("MJCF", None, "MuJoCo breaks down over it; is a size in it too large?") from None
+        raise InputError(
+            "MJCF", None, "MuJoCo breaks down over it; is a size in it too large?"
+        ) from None
     if not 0.0 < model.opt.timestep < math.inf:
-        raise InputError("MJCF", None, f"its timestep of {model.opt.timestep:g} s must be above 0")
+        raise InputError(
+            "MJCF", None, f"its timestep of {model.opt.timestep:g} s must be above 0"
+        )
     return model
 
 
@@ -81,25 +111,37 @@ def examine(scene: Scene, text: str | None, names: Mapping[str, str]) -> Examine
     described = describe_model(topology)
     for key, (value, *_) in described.items():
         if key.startswith(("bars.", "lengths.")) and not math.isfinite(value):  # type: ignore[arg-type]
-            raise InputError("MJCF", None, f"{key} is beyond the range of doubles: {value}")
+            raise InputError(
+                "MJCF", None, f"{key} is beyond the range of doubles: {value}"
+            )
     answers = _list_answers(loop, scene)
     return Examined(described, answers, [*guessed, *loop.notes], topology.names)
 
 
-def examine_changed(scene: Scene, changes: Sequence[tuple[str, Value | None]]) -> list[list[Answer] | None]:
+def examine_changed(
+    scene: Scene, changes: Sequence[tuple[str, Value | None]]
+) -> list[list[Answer] | None]:
     """Answer with the generated file, without a drive, as it is; then with each entry alone changed in it.
 
     None stands for an entry that cannot be set alone. After PRICING seconds the rest are not evaluated either.
     """
-    text, start, answered = write_mjcf(scene, drive="none"), time.perf_counter(), list[list[Answer] | None]()
+    text, start, answered = (
+        write_mjcf(scene, drive="none"),
+        time.perf_counter(),
+        list[list[Answer] | None](),
+    )
     generated = describe_model(Topology(compile_text(text), {}))
     texts = (set_entry(text, generated, key, value) for key, value in changes)
     for changed in chain([text], texts):
         answers = None
         if time.perf_counter() - start < PRICING and changed is not None:
             try:
-                answers = _list_answers(UserLoop(Topology(compile_text(changed), {}), scene), scene)
-            except FourBarError:  # with this entry it is no four-bar, or does not compile
+                answers = _list_answers(
+                    UserLoop(Topology(compile_text(changed), {}), scene), scene
+                )
+            except (
+                FourBarError
+            ):  # with this entry it is no four-bar, or does not compile
                 answers = None
         answered.append(answers)
     return answered
@@ -108,8 +150,14 @@ def examine_changed(scene: Scene, changes: Sequence[tuple[str, Value | None]]) -
 def _list_answers(loop: "UserLoop", scene: Scene) -> list[Answer]:
     command = _choose_positions(command_of(scene))
     answers = [_answer(ONE_STATE, scene, lambda: answer_one_state(loop, command))]
-    if command.omega_2 is not None and np.any(command.omega_2) and np.ptp(command.theta_2) > 0.0:
-        answers.append(_answer(THROUGH_TIME, scene, lambda: answer_through_time(loop, command)))
+    if (
+        command.omega_2 is not None
+        and np.any(command.omega_2)
+        and np.ptp(command.theta_2) > 0.0
+    ):
+        answers.append(
+            _answer(THROUGH_TIME, scene, lambda: answer_through_time(loop, command))
+        )
     return answers
 
 
@@ -117,9 +165,15 @@ def _choose_positions(command: Command) -> Command:
     """Choose at most so many of the positions, spread evenly."""
     n = len(command.theta_2)
     if command.omega_2 is None:
-        raise InputError("motion.omega_2", None, "is needed: without a speed there is no torque to compare")
+        raise InputError(
+            "motion.omega_2",
+            None,
+            "is needed: without a speed there is no torque to compare",
+        )
     if np.ptp(command.omega_2) != 0.0 or np.ptp(command.alpha_2) != 0.0:
-        raise LimitError("omega_2 or alpha_2 differs from position to position: that is no one motion through time")
+        raise LimitError(
+            "omega_2 or alpha_2 differs from position to position: that is no one motion through time"
+        )
     keep = np.unique(np.linspace(0, n - 1, min(n, POSITIONS)).round().astype(int))
     omega_2, alpha_2 = float(np.max(command.omega_2)), float(np.max(command.alpha_2))
     return Command(command.theta_2[keep], command.branch[keep], omega_2, alpha_2)
@@ -144,33 +198,64 @@ class UserLoop(Assembled):
         self.topology, self.scene, self.model = topology, scene, topology.model
         self.data = mujoco.MjData(self.model)
         self.notes: list[str] = []
-        self.to_joints, self.from_joints = topology.to_joints, np.linalg.inv(topology.to_joints)
-        self.crank = None if topology.cut == "O2" else int(self.model.jnt_dofadr[topology.hinge["O2"]])
-        self.armature = 0.0 if self.crank is None else float(self.model.dof_armature[self.crank])
+        self.to_joints, self.from_joints = (
+            topology.to_joints,
+            np.linalg.inv(topology.to_joints),
+        )
+        self.crank = (
+            None
+            if topology.cut == "O2"
+            else int(self.model.jnt_dofadr[topology.hinge["O2"]])
+        )
+        self.armature = (
+            0.0 if self.crank is None else float(self.model.dof_armature[self.crank])
+        )
         self._take_off_the_drive()
-        self._loads = [i for i in range(self.model.nu) if self.model.actuator_trntype[i] == mujoco.mjtTrn.mjTRN_SITE]
+        self._loads = [
+            i
+            for i in range(self.model.nu)
+            if self.model.actuator_trntype[i] == mujoco.mjtTrn.mjTRN_SITE
+        ]
         self._jac = np.zeros((3, self.model.nv))
 
     def _take_off_the_drive(self) -> None:
         model = self.model
         for i in self.topology.drives():
             model.actuator_gainprm[i], model.actuator_biasprm[i] = 0.0, 0.0
-            self.notes.append(f"its drive {model.actuator(i).name!r} on pin O2 is taken off: the torque is solved for")
+            self.notes.append(
+                f"its drive {model.actuator(i).name!r} on pin O2 is taken off: the torque is solved for"
+            )
         cylinders = self.topology.cylinders() if self.scene.drive is not None else []
         if self.scene.drive is not None and len(cylinders) != 1:
             counted = f"{len(cylinders)} actuators with a control on tendons"
-            raise InputError("MJCF", counted, "the scene's drive is a cylinder: must be one")
+            raise InputError(
+                "MJCF", counted, "the scene's drive is a cylinder: must be one"
+            )
         for i in cylinders:  # takes the force itself as its control
-            model.actuator_gaintype[i], model.actuator_biastype[i] = mujoco.mjtGain.mjGAIN_FIXED, NO_BIAS
-            model.actuator_gainprm[i], model.actuator_dyntype[i] = 0.0, mujoco.mjtDyn.mjDYN_NONE
+            model.actuator_gaintype[i], model.actuator_biastype[i] = (
+                mujoco.mjtGain.mjGAIN_FIXED,
+                NO_BIAS,
+            )
+            model.actuator_gainprm[i], model.actuator_dyntype[i] = (
+                0.0,
+                mujoco.mjtDyn.mjDYN_NONE,
+            )
             model.actuator_gainprm[i, 0] = 1.0 / model.actuator_gear[i, 0]
             model.actuator_ctrllimited[i] = model.actuator_forcelimited[i] = False
-            self.notes.append(f"its actuator {model.actuator(i).name!r} gives the cylinder's force that is solved for")
+            self.notes.append(
+                f"its actuator {model.actuator(i).name!r} gives the cylinder's force that is solved for"
+            )
         self.cylinder = next(iter(cylinders), None)
         for i in range(model.neq):
-            if i != self.topology.closure and model.eq_active0[i] and self.topology.closed_by != "tendon":
+            if (
+                i != self.topology.closure
+                and model.eq_active0[i]
+                and self.topology.closed_by != "tendon"
+            ):
                 self.data.eq_active[i] = 0
-                self.notes.append(f"its equality {model.equality(i).name or i!r} is switched off: it is no pin")
+                self.notes.append(
+                    f"its equality {model.equality(i).name or i!r} is switched off: it is no pin"
+                )
 
     # methods that `Assembler` needs of a tree
     def place(self, x: Sequence[float]) -> None:
@@ -181,7 +266,10 @@ class UserLoop(Assembled):
 
     def gap(self) -> tuple[float, float]:
         """Return the opening of the cut pin, m: for any pin +-(A + b e^{i theta_3} - O4 - c e^{i theta_4})."""
-        first, second = (self.topology.world(self.data, bar, self.topology.cut) for bar in PINS[self.topology.cut])
+        first, second = (
+            self.topology.world(self.data, bar, self.topology.cut)
+            for bar in PINS[self.topology.cut]
+        )
         x, y = self.topology.in_plane(first - second).tolist()
         return x, y
 
@@ -189,7 +277,10 @@ class UserLoop(Assembled):
         """Return the derivative of the gap by x, (2, 3)."""
         rows = []
         for bar in PINS[self.topology.cut]:
-            body, place = self.topology.root[bar], self.topology.world(self.data, bar, self.topology.cut)
+            body, place = (
+                self.topology.root[bar],
+                self.topology.world(self.data, bar, self.topology.cut),
+            )
             mujoco.mj_jac(self.model, self.data, self._jac, None, place, body)
             rows.append(self._jac[list(self.topology.axes)] @ self.to_joints)
         return np.asarray(rows[0] - rows[1])
@@ -197,7 +288,12 @@ class UserLoop(Assembled):
     def positions(self) -> dict[str, Array]:
         """Locate A, B, O4, and the end of bar 4, laid off bar by bar from O2, (2,), m."""
         line = {bar: self.topology.line(self.data, bar) for bar in (1, 2, 3, 4)}
-        return {"A": line[2], "B": line[2] + line[3], "O4": line[1], "B4": line[1] + line[4]}
+        return {
+            "A": line[2],
+            "B": line[2] + line[3],
+            "O4": line[1],
+            "B4": line[1] + line[4],
+        }
 
     def speeds(self, omega_2: float) -> Array:
         """Compute the joint speeds that keep the gap closed where the model is placed, (3,)."""
@@ -210,27 +306,45 @@ class UserLoop(Assembled):
         mujoco.mj_resetData(self.model, data)
         data.eq_active[:] = active
         data.qpos[:], data.qvel[:] = q, v
-        if self.crank is not None:  # the torque of its own armature belongs to the drive
-            data.qfrc_applied[self.crank] = self.armature * self.topology.sense["O2"] * alpha_2
+        if (
+            self.crank is not None
+        ):  # the torque of its own armature belongs to the drive
+            data.qfrc_applied[self.crank] = (
+                self.armature * self.topology.sense["O2"] * alpha_2
+            )
 
         def acceleration(couple: float) -> float:
             if self.cylinder is None:
-                data.xfrc_applied[self.topology.root[drive], 3:] = couple * self.topology.normal
+                data.xfrc_applied[self.topology.root[drive], 3:] = (
+                    couple * self.topology.normal
+                )
             else:
                 data.ctrl[self.cylinder] = couple
             mujoco.mj_forward(self.model, data)
             return float((self.from_joints @ data.qacc)[0])
 
         inertia = float(self.model.dof_M0.sum())
-        trial = inertia * max(abs(alpha_2 - acceleration(0.0)), np.finfo(float).tiny / np.finfo(float).eps)
+        trial = inertia * max(
+            abs(alpha_2 - acceleration(0.0)), np.finfo(float).tiny / np.finfo(float).eps
+        )
         couple = solve_couple(acceleration, alpha_2, 0.0, trial, REFINEMENTS)
         if couple is None:
-            what = "its cylinder" if self.cylinder is not None else f"a couple on bar {drive}"
+            what = (
+                "its cylinder"
+                if self.cylinder is not None
+                else f"a couple on bar {drive}"
+            )
             raise LimitError(f"{what} does not move the crank of this model")
         mujoco.mj_rnePostConstraint(self.model, data)
         values: Values = {name_driving(self.scene): couple}
-        turned = (self.topology.angles(data), self.from_joints @ data.qvel, self.from_joints @ data.qacc)
-        for name, (two, three, four) in zip(("theta", "omega", "alpha"), turned, strict=True):
+        turned = (
+            self.topology.angles(data),
+            self.from_joints @ data.qvel,
+            self.from_joints @ data.qacc,
+        )
+        for name, (two, three, four) in zip(
+            ("theta", "omega", "alpha"), turned, strict=True
+        ):
             values |= {f"{name}_2": two, f"{name}_3": two + three, f"{name}_4": four}
         return values | self._read_forces()
 
@@ -242,14 +356,18 @@ class UserLoop(Assembled):
             child, parent = topology.turning(pin)
             force = data.cfrc_int[topology.root[child], 3:].copy()
             for load in self._loads:
-                if self._is_carried(topology.root[child], self.model.site_bodyid[self.model.actuator_trnid[load, 0]]):
+                if self._is_carried(
+                    topology.root[child],
+                    self.model.site_bodyid[self.model.actuator_trnid[load, 0]],
+                ):
                     force -= load_force(self.model, data, load)
             on[parent, child] = topology.in_plane(force)
         bars = PINS[topology.cut]
         force = np.full(2, np.nan)
         if topology.closure is not None:
             rows = np.flatnonzero(
-                (data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY) & (data.efc_id == topology.closure)
+                (data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY)
+                & (data.efc_id == topology.closure)
             )
             force = topology.in_plane(data.efc_force[rows[:3]]) if len(rows) else force
             if topology.first == bars[0]:
@@ -259,7 +377,10 @@ class UserLoop(Assembled):
         else:
             on[bars] = force
         wanted = {"F12": (1, 2), "F32": (3, 2), "F43": (4, 3), "F14": (1, 4)}
-        return {name: on[i, j] if (i, j) in on else -on[j, i] for name, (i, j) in wanted.items()}
+        return {
+            name: on[i, j] if (i, j) in on else -on[j, i]
+            for name, (i, j) in wanted.items()
+        }
 
     def _is_carried(self, bearer: int, body: int) -> bool:
         """Tell whether a body hangs, however far down, on another."""
@@ -282,9 +403,13 @@ def answer_one_state(loop: UserLoop, command: Command) -> Answer:
         contacts = max(contacts, int(loop.data.ncon))
         return values
 
-    out, assembled, gap = read_each(loop, command, [*list_unknowns(loop.scene), *MADE], read)
+    out, assembled, gap = read_each(
+        loop, command, [*list_unknowns(loop.scene), *MADE], read
+    )
     if contacts:
-        loop.notes.append(f"{contacts} contacts at a position where nothing but pins should touch")
+        loop.notes.append(
+            f"{contacts} contacts at a position where nothing but pins should touch"
+        )
     evidence = {"closure_gap_m": gap, "contacts": float(contacts)}
     return Answer(ONE_STATE, "as compiled", command, assembled, out, evidence=evidence)
 
@@ -294,11 +419,17 @@ def answer_through_time(loop: UserLoop, command: Command) -> Answer:
     model, data = loop.model, mujoco.MjData(loop.model)
     data.eq_active[:] = loop.data.eq_active
     if loop.crank is None:
-        raise LimitError("pin O2 is not a hinge in this file: nothing can keep its crank at a speed")
+        raise LimitError(
+            "pin O2 is not a hinge in this file: nothing can keep its crank at a speed"
+        )
     assert isinstance(command.omega_2, float) and isinstance(command.alpha_2, float)
     position = Assembler(loop)
     order = order_in_time(command.theta_2, None, command.omega_2)
-    segment = max(split_segments(find_assembled(position, command, order), order), key=len, default=[])
+    segment = max(
+        split_segments(find_assembled(position, command, order), order),
+        key=len,
+        default=[],
+    )
     if len(segment) < 2:
         raise LimitError("nowhere do two neighbouring positions assemble in this file")
     run = choose_run(command.theta_2[segment], command.omega_2, command.alpha_2)
@@ -312,7 +443,10 @@ def answer_through_time(loop: UserLoop, command: Command) -> Answer:
     data.qpos[:], data.qvel[:] = loop.data.qpos, loop.speeds(command.omega_2)
     heavy = max(loop.armature, size_flywheel(loop.scene))
     names = [*list_unknowns(loop.scene), *MADE]
-    out, seen = make_blank(len(segment), names), {"closure_gap_m": 0.0, "speed_error": 0.0}
+    out, seen = (
+        make_blank(len(segment), names),
+        {"closure_gap_m": 0.0, "speed_error": 0.0},
+    )
     alarms: list[str] = []
     stepper = Stepper(model, data, timestep)
     for i, index in enumerate(segment):
@@ -327,7 +461,9 @@ def answer_through_time(loop: UserLoop, command: Command) -> Answer:
         model.dof_armature[loop.crank] = loop.armature
         values = loop.ask(data.qpos.copy(), data.qvel.copy(), alpha_2)
         seen["closure_gap_m"] = max(seen["closure_gap_m"], float(np.hypot(*loop.gap())))
-        seen["speed_error"] = max(seen["speed_error"], abs(float(values["omega_2"]) / command.omega_2 - 1.0))
+        seen["speed_error"] = max(
+            seen["speed_error"], abs(float(values["omega_2"]) / command.omega_2 - 1.0)
+        )
         for name, array in out.items():
             array[i] = values[name]
     model.dof_armature[loop.crank] = loop.armature
@@ -335,4 +471,12 @@ def answer_through_time(loop: UserLoop, command: Command) -> Answer:
     out = {name: array[finite] for name, array in out.items()}
     motion, _ = split_answer(out, command.branch[segment][finite])
     setting = f"{mujoco.mjtIntegrator(model.opt.integrator).name.removeprefix('mjINT_')} {timestep:g} s"
-    return Answer(THROUGH_TIME, setting, motion, np.ones(finite.sum(), dtype=bool), out, evidence=seen, alarms=alarms)
+    return Answer(
+        THROUGH_TIME,
+        setting,
+        motion,
+        np.ones(finite.sum(), dtype=bool),
+        out,
+        evidence=seen,
+        alarms=alarms,
+    )

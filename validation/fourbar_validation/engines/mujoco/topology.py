@@ -39,7 +39,9 @@ def find_body(model: mujoco.MjModel, name: str) -> int | None:
 
 def list_bodies(model: mujoco.MjModel) -> str:
     """List the bodies of a file by name, for a message."""
-    return ", ".join(model.body(i).name or f"(unnamed {i})" for i in range(1, model.nbody))
+    return ", ".join(
+        model.body(i).name or f"(unnamed {i})" for i in range(1, model.nbody)
+    )
 
 
 def find_stated_body(model: mujoco.MjModel, names: Mapping[str, str], role: str) -> int:
@@ -47,7 +49,11 @@ def find_stated_body(model: mujoco.MjModel, names: Mapping[str, str], role: str)
     name = names.get(role, role)
     body = find_body(model, name)
     if body is None:
-        raise InputError("--name", f"{role}={name}", f"no such body; the file has: {list_bodies(model)}")
+        raise InputError(
+            "--name",
+            f"{role}={name}",
+            f"no such body; the file has: {list_bodies(model)}",
+        )
     return body
 
 
@@ -58,10 +64,16 @@ class Topology:
         self.model, self.data, self.names = model, mujoco.MjData(model), dict(names)
         mujoco.mj_kinematics(model, self.data)
         mujoco.mj_comPos(model, self.data)
-        self.root = {1: 0} | {bar: find_stated_body(model, names, BAR_NAMES[bar]) for bar in MOVING_BARS}
+        self.root = {1: 0} | {
+            bar: find_stated_body(model, names, BAR_NAMES[bar]) for bar in MOVING_BARS
+        }
         self.bar_of_root = {body: bar for bar, body in self.root.items()}
         if len(self.bar_of_root) < len(self.root):
-            raise InputError("--name", dict(names), "input, coupler and output must be three bodies that move")
+            raise InputError(
+                "--name",
+                dict(names),
+                "input, coupler and output must be three bodies that move",
+            )
         self.point: dict[tuple[int, str], Array] = {}
         """(bar, pin): where the pin is in the frame of the bar's body, (3,), m."""
         self.hinge: dict[str, int] = {}
@@ -70,7 +82,11 @@ class Topology:
         for joint in range(model.njnt):
             self._add_hinge(joint)
         if len(self.hinge) != 3:
-            raise InputError("MJCF", sorted(self.hinge), "must have hinges at three of the pins O2, A, B, O4")
+            raise InputError(
+                "MJCF",
+                sorted(self.hinge),
+                "must have hinges at three of the pins O2, A, B, O4",
+            )
         (self.cut,) = PINS.keys() - self.hinge.keys()
         self.closure: int | None = None
         self.closed_by = "nothing"
@@ -78,20 +94,26 @@ class Topology:
         lines = {bar: self.line(self.data, bar) for bar in ENDS}
         self._line = {bar: math.atan2(y, x) for bar, (x, y) in lines.items()}
         self._rest = self.data.qpos.copy()
-        self._rest_angles = np.array((self._line[2], self._line[3] - self._line[2], self._line[4]))
+        self._rest_angles = np.array(
+            (self._line[2], self._line[3] - self._line[2], self._line[4])
+        )
         self.to_joints = self._convert_to_joints()
         """Joint speeds from those of (theta_2, theta_3 - theta_2, theta_4), (3, 3)."""
 
     def drives(self) -> list[int]:
         """List the actuators that turn pin O2."""
         model, joint = self.model, self.hinge.get("O2")
-        on_joints = np.flatnonzero(model.actuator_trntype == mujoco.mjtTrn.mjTRN_JOINT).tolist()
+        on_joints = np.flatnonzero(
+            model.actuator_trntype == mujoco.mjtTrn.mjTRN_JOINT
+        ).tolist()
         return [i for i in on_joints if model.actuator_trnid[i, 0] == joint]
 
     def cylinders(self) -> list[int]:
         """List the actuators along a tendon that take a control: without one a spring is such an actuator too."""
         model = self.model
-        on_tendons = np.flatnonzero(model.actuator_trntype == mujoco.mjtTrn.mjTRN_TENDON).tolist()
+        on_tendons = np.flatnonzero(
+            model.actuator_trntype == mujoco.mjtTrn.mjTRN_TENDON
+        ).tolist()
         return [i for i in on_tendons if model.actuator_gainprm[i].any()]
 
     def bar(self, body: int) -> int | None:
@@ -101,7 +123,9 @@ class Topology:
     def _find_plane(self) -> None:
         hinges = self.model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE
         if not hinges.any():
-            raise InputError("MJCF", None, "must have hinges at three of the pins O2, A, B, O4")
+            raise InputError(
+                "MJCF", None, "must have hinges at three of the pins O2, A, B, O4"
+            )
         across = int(np.argmax(np.abs(self.data.xaxis[np.argmax(hinges)])))
         self.plane, self.axes = PLANES[across]
         e = np.eye(3)
@@ -114,14 +138,22 @@ class Topology:
         kind = mujoco.mjtJoint(model.jnt_type[joint])
         if kind != mujoco.mjtJoint.mjJNT_HINGE or None in bars:
             raise InputError(
-                "MJCF", name, "every joint must be a hinge of the input, coupler or output; name the bodies by --name"
+                "MJCF",
+                name,
+                "every joint must be a hinge of the input, coupler or output; name the bodies by --name",
             )
         pin = PIN_OF.get(frozenset(bars))  # type: ignore[arg-type]
         if pin is None or pin in self.hinge:
-            raise InputError("MJCF", name, "joins bars that have no pin in common, or have one already")
+            raise InputError(
+                "MJCF",
+                name,
+                "joins bars that have no pin in common, or have one already",
+            )
         along = float(self.data.xaxis[joint] @ self.normal)
         if abs(along) < 1.0 - STRAIGHT**2:
-            raise InputError("MJCF", name, f"the hinge must be normal to the {self.plane} plane")
+            raise InputError(
+                "MJCF", name, f"the hinge must be normal to the {self.plane} plane"
+            )
         self.hinge[pin], self.sense[pin] = joint, math.copysign(1.0, along)
         for bar in bars:
             assert bar is not None
@@ -129,17 +161,24 @@ class Topology:
 
     def _find_in_bar(self, bar: int, world: Array) -> Array:
         body = self.root[bar]
-        return np.asarray(self.data.xmat[body].reshape(3, 3).T @ (world - self.data.xpos[body]))
+        return np.asarray(
+            self.data.xmat[body].reshape(3, 3).T @ (world - self.data.xpos[body])
+        )
 
     def _on(self, body: int, local: Array) -> Array:
-        return np.asarray(self.data.xpos[body] + self.data.xmat[body].reshape(3, 3) @ local)
+        return np.asarray(
+            self.data.xpos[body] + self.data.xmat[body].reshape(3, 3) @ local
+        )
 
     def _find_closure(self, names: Mapping[str, str]) -> None:
         """Find the equality between the two bars of the cut pin, or two sites that mark it."""
         model, kinds = self.model, mujoco.mjtEq
         for number in range(model.neq):
             kind = kinds(model.eq_type[number])
-            if kind not in (kinds.mjEQ_CONNECT, kinds.mjEQ_WELD) or not model.eq_active0[number]:
+            if (
+                kind not in (kinds.mjEQ_CONNECT, kinds.mjEQ_WELD)
+                or not model.eq_active0[number]
+            ):
                 continue
             ends = self._find_ends(number, kind)
             bars = [self.bar(body) for body, _ in ends]
@@ -172,11 +211,17 @@ class Topology:
         model = self.model
         objects = (int(model.eq_obj1id[number]), int(model.eq_obj2id[number]))
         if model.eq_objtype[number] == mujoco.mjtObj.mjOBJ_SITE:
-            return [(int(model.site_bodyid[site]), self.data.site_xpos[site].copy()) for site in objects]
+            return [
+                (int(model.site_bodyid[site]), self.data.site_xpos[site].copy())
+                for site in objects
+            ]
         anchors = [model.eq_data[number, 0:3], model.eq_data[number, 3:6]]
         if kind == mujoco.mjtEq.mjEQ_WELD:  # it keeps the second body's anchor first
             anchors.reverse()
-        return [(body, self._on(body, anchor)) for body, anchor in zip(objects, anchors, strict=True)]
+        return [
+            (body, self._on(body, anchor))
+            for body, anchor in zip(objects, anchors, strict=True)
+        ]
 
     def in_plane(self, vector: Array) -> Array:
         """Project on the linkage's plane, (2,)."""
@@ -185,7 +230,9 @@ class Topology:
     def world(self, data: mujoco.MjData, bar: int, pin: str) -> Array:
         """Locate a bar's pin, world axes, (3,)."""
         body = self.root[bar]
-        return np.asarray(data.xpos[body] + data.xmat[body].reshape(3, 3) @ self.point[bar, pin])
+        return np.asarray(
+            data.xpos[body] + data.xmat[body].reshape(3, 3) @ self.point[bar, pin]
+        )
 
     def line(self, data: mujoco.MjData, bar: int) -> Array:
         """Return a bar's line from its first pin to its second, in the plane, (2,), m."""
@@ -217,11 +264,18 @@ class Topology:
         return float(cos * x + sin * y), float(cos * y - sin * x)
 
     def _convert_to_joints(self) -> Array:
-        turns = {1: np.zeros(3), 2: np.array([1.0, 0, 0]), 3: np.array([1.0, 1.0, 0]), 4: np.array([0, 0, 1.0])}
+        turns = {
+            1: np.zeros(3),
+            2: np.array([1.0, 0, 0]),
+            3: np.array([1.0, 1.0, 0]),
+            4: np.array([0, 0, 1.0]),
+        }
         matrix = np.zeros((self.model.nv, 3))
         for pin, joint in self.hinge.items():
             child, parent = self.turning(pin)
-            matrix[self.model.jnt_dofadr[joint]] = self.sense[pin] * (turns[child] - turns[parent])
+            matrix[self.model.jnt_dofadr[joint]] = self.sense[pin] * (
+                turns[child] - turns[parent]
+            )
         return matrix
 
     def turning(self, pin: str) -> tuple[int, int]:
@@ -245,7 +299,9 @@ class Topology:
         moved = np.empty(3)
         for joint in self.hinge.values():
             address = self.model.jnt_qposadr[joint]
-            moved[self.model.jnt_dofadr[joint]] = data.qpos[address] - self._rest[address]
+            moved[self.model.jnt_dofadr[joint]] = (
+                data.qpos[address] - self._rest[address]
+            )
         return np.asarray(np.linalg.solve(self.to_joints, moved) + self._rest_angles)
 
 
@@ -259,16 +315,30 @@ def find_topology(
     Raises InputError in one line: why no three bodies fit.
     """
     roles = {role: names.get(role, role) for role in (*ROLES, *SITES)}
-    bodies = [find_stated_body(model, names, role) if role in names else find_body(model, role) for role in ROLES]
-    if None not in bodies and (_find_site(model, roles["B3"]) or names.keys() & {*SITES} or not _open_sites(model)):
+    bodies = [
+        find_stated_body(model, names, role)
+        if role in names
+        else find_body(model, role)
+        for role in ROLES
+    ]
+    if None not in bodies and (
+        _find_site(model, roles["B3"])
+        or names.keys() & {*SITES}
+        or not _open_sites(model)
+    ):
         return Topology(model, names), []
-    candidates = sorted({int(model.body_weldid[model.jnt_bodyid[joint]]) for joint in range(model.njnt)})
+    candidates = sorted(
+        {int(model.body_weldid[model.jnt_bodyid[joint]]) for joint in range(model.njnt)}
+    )
     free = [body for body in candidates if body not in bodies]
     missing = [role for role, body in zip(ROLES, bodies, strict=True) if body is None]
     guesses: list[tuple[float, bool, Topology, dict[str, str]]] = []
     refused: list[str] = []
     for chosen in permutations(free[:MOST_BODIES], len(missing)):
-        guess = {role: model.body(body).name for role, body in zip(missing, chosen, strict=True)}
+        guess = {
+            role: model.body(body).name
+            for role, body in zip(missing, chosen, strict=True)
+        }
         if not all(guess.values()):
             refused.append("a body without a name, which --name cannot state either")
             continue
@@ -276,7 +346,12 @@ def find_topology(
             try:
                 topology = Topology(model, {**names, **guess, **sites})
                 guesses.append(
-                    (_measure_misfit(topology, lengths), not topology.drives(), topology, {**guess, **sites})
+                    (
+                        _measure_misfit(topology, lengths),
+                        not topology.drives(),
+                        topology,
+                        {**guess, **sites},
+                    )
                 )
             except InputError as error:
                 refused.append(error.allowed)
@@ -288,13 +363,20 @@ def find_topology(
         )
         why = refused[0] if refused else few
         nowhere = f"no body is named {', '.join(missing) or 'B3, B4'}, and no guess makes a four-bar ({why})"
-        raise InputError("MJCF", list_bodies(model), f"{nowhere}; say which is which: --name input=BODY, and so on")
+        raise InputError(
+            "MJCF",
+            list_bodies(model),
+            f"{nowhere}; say which is which: --name input=BODY, and so on",
+        )
     best = min(misfit[0] for misfit in guesses)
     _, _, topology, guessed = min(
-        (misfit for misfit in guesses if misfit[0] <= best + ALIKE), key=lambda misfit: misfit[1]
+        (misfit for misfit in guesses if misfit[0] <= best + ALIKE),
+        key=lambda misfit: misfit[1],
     )
     pairs = ", ".join(f"{role}={name}" for role, name in guessed.items())
-    return topology, [f"guessed from what hangs together and from the lengths: {pairs} (--name states it otherwise)"]
+    return topology, [
+        f"guessed from what hangs together and from the lengths: {pairs} (--name states it otherwise)"
+    ]
 
 
 def _find_site(model: mujoco.MjModel, name: str) -> bool:
@@ -304,17 +386,27 @@ def _find_site(model: mujoco.MjModel, name: str) -> bool:
 def _open_sites(model: mujoco.MjModel) -> bool:
     """Tell whether only sites can say where the loop closes."""
     kinds = mujoco.mjtEq
-    return not any(kinds(kind) in (kinds.mjEQ_CONNECT, kinds.mjEQ_WELD) for kind in model.eq_type)
+    return not any(
+        kinds(kind) in (kinds.mjEQ_CONNECT, kinds.mjEQ_WELD) for kind in model.eq_type
+    )
 
 
-def _list_sites(model: mujoco.MjModel, roles: Mapping[str, str], names: Mapping[str, str]) -> list[dict[str, str]]:
+def _list_sites(
+    model: mujoco.MjModel, roles: Mapping[str, str], names: Mapping[str, str]
+) -> list[dict[str, str]]:
     """List pairs of sites that may mark pin B; none need be given where a connect or a weld closes the loop."""
-    if not _open_sites(model) or names.keys() & {*SITES} or _find_site(model, roles["B3"]):
+    if (
+        not _open_sites(model)
+        or names.keys() & {*SITES}
+        or _find_site(model, roles["B3"])
+    ):
         return [{}]
     on = {role: [model.site(i).name for i in range(model.nsite) if model.site(i).name
                  and int(model.body_weldid[model.site_bodyid[i]]) == find_body(model, roles[role])]
           for role in ("coupler", "output")}  # fmt: skip
-    return [{"B3": three, "B4": four} for three in on["coupler"] for four in on["output"]]
+    return [
+        {"B3": three, "B4": four} for three in on["coupler"] for four in on["output"]
+    ]
 
 
 def _measure_misfit(topology: Topology, lengths: Sequence[float]) -> float:
@@ -322,4 +414,6 @@ def _measure_misfit(topology: Topology, lengths: Sequence[float]) -> float:
     theirs = [topology.length(bar) for bar in BAR_NAMES]
     if min(theirs) <= 0.0:
         return math.inf
-    return sum(abs(math.log(one / ours)) for one, ours in zip(theirs, lengths, strict=True))
+    return sum(
+        abs(math.log(one / ours)) for one, ours in zip(theirs, lengths, strict=True)
+    )

@@ -112,26 +112,55 @@ class TrialSetup:
     """
 
     def __init__(self, scene: Scene, command: Command) -> None:
-        if scene.motion.free is not None or not np.any(command.omega_2) or np.ptp(command.theta_2) == 0.0:
-            raise LimitError("nothing to run through in time: a sweep of theta_2 at omega_2 is needed")
+        if (
+            scene.motion.free is not None
+            or not np.any(command.omega_2)
+            or np.ptp(command.theta_2) == 0.0
+        ):
+            raise LimitError(
+                "nothing to run through in time: a sweep of theta_2 at omega_2 is needed"
+            )
         if scene.motion.law is not None:
-            raise LimitError("settings are tried at a constant alpha_2, not along a motion law")
+            raise LimitError(
+                "settings are tried at a constant alpha_2, not along a motion law"
+            )
         if scene.drive is not None:
-            raise LimitError("settings are tried for a couple on a bar, not for a linear drive (drive.from, drive.to)")
-        self.omega, self.alpha = float(np.max(command.omega_2)), float(np.max(command.alpha_2))  # type: ignore[arg-type]
-        motion = scene.motion.replace(angle=command.theta_2, speed=self.omega, acceleration=self.alpha)
+            raise LimitError(
+                "settings are tried for a couple on a bar, not for a linear drive (drive.from, drive.to)"
+            )
+        self.omega, self.alpha = (
+            float(np.max(command.omega_2)),  # type: ignore[arg-type]
+            float(np.max(command.alpha_2)),
+        )
+        motion = scene.motion.replace(
+            angle=command.theta_2, speed=self.omega, acceleration=self.alpha
+        )
         self.scene, self.command = replace(scene, motion=motion), command
         order = order_in_time(command.theta_2, None, self.omega)
-        position = Assembler(ClosedLoop(write_mjcf(self.scene, Settings(timestep=1e-3), keyframe=False)))
+        position = Assembler(
+            ClosedLoop(write_mjcf(self.scene, Settings(timestep=1e-3), keyframe=False))
+        )
         assembled = find_assembled(position, command, order)
-        self.segments = [segment for segment in split_segments(assembled, order) if len(segment) > 1]
-        self.start = {index: angles for index, angles in enumerate(assembled) if angles is not None}
+        self.segments = [
+            segment for segment in split_segments(assembled, order) if len(segment) > 1
+        ]
+        self.start = {
+            index: angles
+            for index, angles in enumerate(assembled)
+            if angles is not None
+        }
         if not self.segments:
-            raise LimitError("the loop closes at no two neighbouring positions: nothing to run through in time")
+            raise LimitError(
+                "the loop closes at no two neighbouring positions: nothing to run through in time"
+            )
 
     def text(self, settings: Settings, timestep: float) -> str:
         """Write the generated MJCF, without its keyframe."""
-        return write_mjcf(self.scene, replace(settings, timestep=timestep, timestep_scale=1.0), keyframe=False)
+        return write_mjcf(
+            self.scene,
+            replace(settings, timestep=timestep, timestep_scale=1.0),
+            keyframe=False,
+        )
 
     def motion_segment(self, segment: list[int]) -> Steady:
         """Choose how the input moves through a segment."""
@@ -141,7 +170,9 @@ class TrialSetup:
         """Count the steps of one run, without making it."""
         total = 0
         for segment in self.segments:
-            run = self.motion_segment(segment).run  # a whole number of steps over the segment
+            run = self.motion_segment(
+                segment
+            ).run  # a whole number of steps over the segment
             total += round(run.time(run.stop) / run.timestep(settings))
         return total
 
@@ -152,7 +183,13 @@ class TrialSetup:
         with silence():
             for segment in self.segments:
                 before, rows = trial.steps, slice(first, first + len(segment))
-                self._run(segment, settings, build or _keep_text, {name: x[rows] for name, x in out.items()}, trial)
+                self._run(
+                    segment,
+                    settings,
+                    build or _keep_text,
+                    {name: x[rows] for name, x in out.items()},
+                    trial,
+                )
                 trial.segments += ((rows, trial.steps - before),)
                 first = rows.stop
                 if trial.broken:
@@ -160,14 +197,25 @@ class TrialSetup:
         trial.at, trial.quantities = split_answer(out, self.command.branch[samples])
         return trial
 
-    def _run(self, segment: list[int], settings: Settings, build: Build, out: dict[str, Array], trial: Trial) -> None:
+    def _run(
+        self,
+        segment: list[int],
+        settings: Settings,
+        build: Build,
+        out: dict[str, Array],
+        trial: Trial,
+    ) -> None:
         motion_segment = self.motion_segment(segment)
         timestep = motion_segment.run.timestep(settings)
         loop = build(self.text(settings, timestep), self.omega)
         light = None
         if self.scene.drive_bar != 2:
-            light = ClosedLoop(self.text(replace(settings, flywheel=LIGHT_FLYWHEEL), timestep))
-        run = SimulatedRun(self.scene, loop, light, motion_segment, self.start[segment[0]], timestep)
+            light = ClosedLoop(
+                self.text(replace(settings, flywheel=LIGHT_FLYWHEEL), timestep)
+            )
+        run = SimulatedRun(
+            self.scene, loop, light, motion_segment, self.start[segment[0]], timestep
+        )
         for row, index in enumerate(segment):
             began = time.process_time()
             run.to(index)
@@ -175,18 +223,30 @@ class TrialSetup:
             loop.forward()
             d = loop.data
             if run.stepper.lost() or loop.bad() or not np.isfinite(d.qacc).all():
-                trial.broken = "MuJoCo lost the motion: a value not finite, or too large"
+                trial.broken = (
+                    "MuJoCo lost the motion: a value not finite, or too large"
+                )
                 break
             torque, pins = run.read()
-            motion = {"theta_2": d.qpos[O2] - run.turns, "omega_2": d.qvel[O2], "alpha_2": d.qacc[O2]}
-            for name, value in (motion | pins | {"torque": np.nan if torque is None else torque}).items():
+            motion = {
+                "theta_2": d.qpos[O2] - run.turns,
+                "omega_2": d.qvel[O2],
+                "alpha_2": d.qacc[O2],
+            }
+            for name, value in (
+                motion | pins | {"torque": np.nan if torque is None else torque}
+            ).items():
                 out[name][row] = value
             trial.stepping += stepped - began
             trial.reading += time.process_time() - stepped
         trial.steps += run.stepper.done
-        trial.steps_per_revolution = max(trial.steps_per_revolution, 2.0 * np.pi / motion_segment.fastest / timestep)
+        trial.steps_per_revolution = max(
+            trial.steps_per_revolution, 2.0 * np.pi / motion_segment.fastest / timestep
+        )
 
-    def seconds_per_step(self, settings: Settings, build: Build | None = None) -> Callable[[int], float]:
+    def seconds_per_step(
+        self, settings: Settings, build: Build | None = None
+    ) -> Callable[[int], float]:
         """Measure CPU seconds of steps from the start of the longest segment, where each call starts again."""
         segment = max(self.segments, key=len)
         timestep = self.motion_segment(segment).run.timestep(settings)
@@ -237,7 +297,9 @@ class SimulatedToError:
             growth = ratio ** (1.0 / ORDER) if np.isfinite(ratio) else MOST_GROWTH
             growth = min(max(growth, LEAST_GROWTH), MOST_GROWTH)
             # a run has at least as many steps as it has positions to read
-            steps_made = float(answer.setting.rpartition(" ")[2].removesuffix("/rev"))  # of "RK4 628/rev"
+            steps_made = float(
+                answer.setting.rpartition(" ")[2].removesuffix("/rev")
+            )  # of "RK4 628/rev"
             steps = max(steps, steps_made) * growth
             tc = min(tc * growth, LONGEST)
         answer.evidence |= {"wanted_error": self.error, "expected_error": expected}
@@ -252,10 +314,16 @@ def compute_expected_error(scene: Scene, answer: Answer) -> float:
         if name not in COMPARED:
             continue
         values = answer.quantities[name]
-        sizes = np.where(np.isfinite(values), 1.0, np.nan) if name.startswith("theta") else magnitude(values)
+        sizes = (
+            np.where(np.isfinite(values), 1.0, np.nan)
+            if name.startswith("theta")
+            else magnitude(values)
+        )
         finite = np.isfinite(sizes)
         if name == "torque" and scene.drive_bar != 2:
             finite &= mark_turning(answer.quantities[f"omega_{scene.drive_bar}"])
         if finite.any() and sizes[finite].max() > 0.0:
-            worst = float(np.maximum(worst, divide(predicted[finite].max(), sizes[finite].max())))  # NaN stays NaN
+            worst = float(
+                np.maximum(worst, divide(predicted[finite].max(), sizes[finite].max()))
+            )  # NaN stays NaN
     return worst if np.isfinite(worst) else float("inf")

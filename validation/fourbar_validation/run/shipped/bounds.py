@@ -41,21 +41,44 @@ def extremes(question: Question) -> list[Row]:
     _require_conditioned(scene)
     drive = name_driving(scene)
     if not scene.tolerances:
-        lengths = {name: getattr(scene.linkage, name).length for name in ("input", "coupler")}
+        lengths = {
+            name: getattr(scene.linkage, name).length for name in ("input", "coupler")
+        }
         scene = replace(
-            scene, tolerances=tuple(fourbar.Tolerance(f"lengths.{k}", GIVEN * x) for k, x in lengths.items())
+            scene,
+            tolerances=tuple(
+                fourbar.Tolerance(f"lengths.{k}", GIVEN * x) for k, x in lengths.items()
+            ),
         )
     try:
         proven = fourbar.extremes(scene, [drive])
     except (InputError, LimitError) as limit:
-        return [Row.unmeasured(question.name, "extremes", "exact", drive, REFUSES, str(limit))]
+        return [
+            Row.unmeasured(
+                question.name, "extremes", "exact", drive, REFUSES, str(limit)
+            )
+        ]
     assert proven.nominal is not None
-    bounds = [of[drive] for of in (proven.least, proven.greatest, proven.nominal.least, proven.nominal.greatest)]
+    bounds = [
+        of[drive]
+        for of in (
+            proven.least,
+            proven.greatest,
+            proven.nominal.least,
+            proven.nominal.greatest,
+        )
+    ]
     in_interval = [np.linspace(low, high, POSITIONS) for low, high in proven.parts]
     theta_2 = np.concatenate([*in_interval, [bound.theta_2 for bound in bounds]])
-    linkages = _list_corners(replace(scene, motion=scene.motion.replace(angle=theta_2, through="sign")))
-    values = np.array([ask_free_bodies(linkage).quantities[drive] for linkage in linkages])
-    every_corner = len(scene.tolerances) <= MOST  # otherwise the bounds need not be reached at one of those tried
+    linkages = _list_corners(
+        replace(scene, motion=scene.motion.replace(angle=theta_2, through="sign"))
+    )
+    values = np.array(
+        [ask_free_bodies(linkage).quantities[drive] for linkage in linkages]
+    )
+    every_corner = (
+        len(scene.tolerances) <= MOST
+    )  # otherwise the bounds need not be reached at one of those tried
     error = np.max(
         [
             _find_beyond(theta_2, values, bounds[0], -1.0, reached=every_corner),
@@ -68,7 +91,9 @@ def extremes(question: Question) -> list[Row]:
     )
     size = max(abs(end) for bound in bounds for end in bound[:2])
     reason = f"{len(values)} linkages at {len(theta_2)} positions"
-    return [make_row(question, "extremes", drive, error / size, BOUNDS, theta_2, reason)]
+    return [
+        make_row(question, "extremes", drive, error / size, BOUNDS, theta_2, reason)
+    ]
 
 
 def _list_corners(scene: Scene) -> list[Scene]:
@@ -76,17 +101,24 @@ def _list_corners(scene: Scene) -> list[Scene]:
     reach = {tolerance.key: tolerance.reach for tolerance in scene.tolerances[:MOST]}
     file = SceneFile(replace(scene, tolerances=()))
     corners = product((-INSIDE, INSIDE), repeat=len(reach))
-    moves = [{key: sign * reach[key] for key, sign in zip(reach, signs, strict=True)} for signs in corners]
+    moves = [
+        {key: sign * reach[key] for key, sign in zip(reach, signs, strict=True)}
+        for signs in corners
+    ]
     return [file.move(move) for move in ({}, *moves)]
 
 
-def _find_beyond(theta_2: Array, values: Array, bound: Extreme, sign: float, *, reached: bool = True) -> Array:
+def _find_beyond(
+    theta_2: Array, values: Array, bound: Extreme, sign: float, *, reached: bool = True
+) -> Array:
     """Compute by how much values, one line for each linkage, lie beyond a greatest value (sign 1) or a least (-1).
 
     `reached`: whether one of them must come as far as the bound says that the extreme does, at its position.
     """
     most, least = (bound.high, bound.low) if sign > 0 else (-bound.low, -bound.high)
-    beyond = np.asarray((sign * values).max(axis=0) - most)  # NaN where a linkage has no torque: nothing holds there
+    beyond = np.asarray(
+        (sign * values).max(axis=0) - most
+    )  # NaN where a linkage has no torque: nothing holds there
     if reached:
         i = int(np.flatnonzero(theta_2 == bound.theta_2)[0])
         beyond[i] = max(beyond[i], least - float((sign * values[:, i]).max()))
@@ -96,9 +128,17 @@ def _find_beyond(theta_2: Array, values: Array, bound: Extreme, sign: float, *, 
 def _require_conditioned(scene: Scene) -> None:
     """Raise NotAskedError where bars 3 and 4 come near to one line within the interval, not at its ends."""
     around = np.linspace(0.0, 2.0 * np.pi, POSITIONS)
-    answer = ask_free_bodies(replace(scene, motion=Motion(around, None, branch=scene.motion.branch), tolerances=()))
+    answer = ask_free_bodies(
+        replace(
+            scene,
+            motion=Motion(around, None, branch=scene.motion.branch),
+            tolerances=(),
+        )
+    )
     assert answer.assembled is not None
-    inside = answer.assembled & np.roll(answer.assembled, 1) & np.roll(answer.assembled, -1)
+    inside = (
+        answer.assembled & np.roll(answer.assembled, 1) & np.roll(answer.assembled, -1)
+    )
     sine = np.abs(answer.quantities["sin_mu"][inside])
     if not len(sine) or sine.min() < LEAST_CONDITION:
         raise NotAskedError(

@@ -55,20 +55,35 @@ def internal_forces(question: Question) -> list[Row]:
         forces = fourbar.internal_forces(scene, solution, bar, cuts)
         for name, ours in (("N", forces.N), ("V", forces.V), ("M", forces.M)):
             theirs = np.stack([getattr(piece, name) for piece in pieces], axis=1)
-            size = np.stack([piece.turning if name == "M" else piece.pushing for piece in pieces], axis=1)
+            size = np.stack(
+                [piece.turning if name == "M" else piece.pushing for piece in pieces],
+                axis=1,
+            )
             error = divide(np.abs(ours - theirs), size).max(axis=1)
             if name == "M":
                 beyond = np.abs(theirs).max(axis=1) - np.abs(forces.largest.moment)
                 error = np.maximum(error, divide(beyond, size.max(axis=1)))
             reason = f"bar {bar} cut at {len(cuts)} places, at {len(error)} positions"
-            rows.append(make_row(question, "internal_forces", f"{name}{bar}", error, CUT, solution.theta_2, reason))
+            rows.append(
+                make_row(
+                    question,
+                    "internal_forces",
+                    f"{name}{bar}",
+                    error,
+                    CUT,
+                    solution.theta_2,
+                    reason,
+                )
+            )
     return rows
 
 
 def _move(scene: Scene, command: Command, answer: Answer) -> BodyMotion:
     """Move the bars as the free bodies have them."""
     theta = [answer.quantities[f"theta_{bar}"] for bar in MOVING_BARS]
-    omega, alpha = (answer.quantities[f"{name}_{command.bar}"] for name in ("omega", "alpha"))
+    omega, alpha = (
+        answer.quantities[f"{name}_{command.bar}"] for name in ("omega", "alpha")
+    )
     return move(scene.linkage, theta[0], omega, alpha, theta[1], theta[2], command.bar)
 
 
@@ -93,11 +108,17 @@ class _Piece(BodyWrenches):
         """Add a force, world axes, at an arm from the bar's first pin, to the piece on which its foot lies."""
         if bar != self.bar:
             return
-        turned, lever = (np.conj(self.motion.unit[bar]) * vector for vector in (force, arm))
+        turned, lever = (
+            np.conj(self.motion.unit[bar]) * vector for vector in (force, arm)
+        )
         beyond = lever.real > self.cut
         self.N += np.where(beyond, turned.real, 0.0)
         self.V -= np.where(beyond, turned.imag, 0.0)
-        self.M += np.where(beyond, (lever.real - self.cut) * turned.imag - lever.imag * turned.real, 0.0)
+        self.M += np.where(
+            beyond,
+            (lever.real - self.cut) * turned.imag - lever.imag * turned.real,
+            0.0,
+        )
         self.pushing += np.abs(turned)
         self.turning += np.abs(turned) * (np.abs(lever) + abs(self.cut))
 
@@ -116,7 +137,9 @@ class _Piece(BodyWrenches):
             self.place = 0.0
 
 
-def _free(scene: Scene, motion: BodyMotion, answer: Answer, bar: int, cut: float) -> _Piece:
+def _free(
+    scene: Scene, motion: BodyMotion, answer: Answer, bar: int, cut: float
+) -> _Piece:
     """Free the piece of a bar beyond a cut."""
     described = scene.linkage.bar(bar)
     piece, length = _Piece(bar, cut, motion), described.length
@@ -125,7 +148,9 @@ def _free(scene: Scene, motion: BodyMotion, answer: Answer, bar: int, cut: float
         name = PIN_FORCE[pin]
         force = answer.quantities[name] @ np.array([1.0, 1.0j])
         along = 0.0 if ENDS[bar][0] == pin else length
-        piece.push(bar, force if name.endswith(str(bar)) else -force, along * motion.unit[bar])
+        piece.push(
+            bar, force if name.endswith(str(bar)) else -force, along * motion.unit[bar]
+        )
     _push_drive(scene, motion, answer, piece)
     for load in scene.loads:
         if load.bar == bar:
@@ -141,11 +166,22 @@ def _free(scene: Scene, motion: BodyMotion, answer: Answer, bar: int, cut: float
         else:
             WRENCH_OF[effect.key](effect, motion, piece)
     for pin, radius in list_sliding_pins(scene).items():
-        piece.twist_at(pin, -motion.sense(pin) * radius * np.hypot(*answer.quantities[PIN_FORCE[pin]].T))
+        piece.twist_at(
+            pin,
+            -motion.sense(pin)
+            * radius
+            * np.hypot(*answer.quantities[PIN_FORCE[pin]].T),
+        )
     a_pin: Any = motion.swing(2, motion.first_pin[3]) if bar == 3 else 0.0
     if uniform:
         for start, end in ((0.0, cut), (cut, length)):
-            _push_rigid(piece, described.mass * (end - start) / length, (start, end), a_pin, gravity)
+            _push_rigid(
+                piece,
+                described.mass * (end - start) / length,
+                (start, end),
+                a_pin,
+                gravity,
+            )
     else:
         centre = make_vector(find_centre(described))
         to_G = motion.unit[bar] * centre
@@ -155,7 +191,9 @@ def _free(scene: Scene, motion: BodyMotion, answer: Answer, bar: int, cut: float
     return piece
 
 
-def _push_rigid(piece: _Piece, mass: float, ends: tuple[float, float], a_pin: Any, gravity: Any) -> None:
+def _push_rigid(
+    piece: _Piece, mass: float, ends: tuple[float, float], a_pin: Any, gravity: Any
+) -> None:
     """Put weight and inertia of a piece of a uniform bar on it, as of a rigid bar between two places."""
     start, end = ends
     middle, bar = 0.5 * (start + end), piece.bar
@@ -166,7 +204,9 @@ def _push_rigid(piece: _Piece, mass: float, ends: tuple[float, float], a_pin: An
     piece.place = 0.0
 
 
-def _push_drive(scene: Scene, motion: BodyMotion, answer: Answer, piece: _Piece) -> None:
+def _push_drive(
+    scene: Scene, motion: BodyMotion, answer: Answer, piece: _Piece
+) -> None:
     """Put the couple of the drive at the first pin of its bar, or its force at the ends of its line."""
     if scene.drive is None:
         if scene.drive_bar == piece.bar:
@@ -175,5 +215,7 @@ def _push_drive(scene: Scene, motion: BodyMotion, answer: Answer, piece: _Piece)
     theta = {bar: np.angle(motion.unit[bar]) for bar in MOVING_BARS}
     line = place_line(scene.linkage, scene.drive, theta)
     force: Array = answer.quantities["drive_force"]
-    for sense, point, arm in zip((-1.0, 1.0), (line.drive.start, line.drive.end), line.arms, strict=True):
+    for sense, point, arm in zip(
+        (-1.0, 1.0), (line.drive.start, line.drive.end), line.arms, strict=True
+    ):
         piece.push(point.bar, sense * force * line.unit, arm)

@@ -20,7 +20,13 @@ from fourbar.scene.motion import Motion, Sweep
 from fourbar.studies.equilibrium import Equilibrium
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.compare.rows import Row
-from fourbar_validation.compare.tolerance import EPS, ROUNDINGS, WELL_CONDITIONED, ErrorBound, K
+from fourbar_validation.compare.tolerance import (
+    EPS,
+    ROUNDINGS,
+    WELL_CONDITIONED,
+    ErrorBound,
+    K,
+)
 from fourbar_validation.engines.description import find_centre, find_inertia
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.prediction import FIRST_ORDER
@@ -76,9 +82,15 @@ def equilibria(question: Question) -> Iterator[Row]:
         ]
         missed += _count_missed(scene, branch, theta_2, torque, places)
     reason = f"{len(answer.found)} equilibria; {SAMPLES} positions of a turn held by free bodies"
-    yield Row.judged((question.name, "equilibria", "exact"), "missed", missed, 0.0, reason)
+    yield Row.judged(
+        (question.name, "equilibria", "exact"), "missed", missed, 0.0, reason
+    )
     for name in ("torque", "slope", "inertia", "frequency"):
-        errors_at = [(equilibrium.place.theta_2, errors[name]) for equilibrium, (_, errors) in judged if name in errors]
+        errors_at = [
+            (equilibrium.place.theta_2, errors[name])
+            for equilibrium, (_, errors) in judged
+            if name in errors
+        ]
         if errors_at:
             angles, error = np.array(errors_at).T
             compared = f"{len(errors_at)} of {len(answer.found)} equilibria"
@@ -88,34 +100,62 @@ def equilibria(question: Question) -> Iterator[Row]:
 def _at_rest(scene: Scene) -> Scene:
     """Leave out dry friction, which has equilibria of its own, and the drive."""
     if scene.counts_turns:
-        raise NotAskedError("how far its torsion springs are wound depends on the motion")
+        raise NotAskedError(
+            "how far its torsion springs are wound depends on the motion"
+        )
     effects = tuple(effect for effect in scene.effects if not effect.dry_pins)
     if not scene.loads and not effects:
         raise NotAskedError("nothing acts")
-    return replace(scene, motion=Motion(), effects=effects, drive=None, drive_bar=2, points=(), tolerances=())
+    return replace(
+        scene,
+        motion=Motion(),
+        effects=effects,
+        drive=None,
+        drive_bar=2,
+        points=(),
+        tolerances=(),
+    )
 
 
 def _list_samples(question: Question) -> Array:
     """List the input's angles at which it is held: all that it reaches from the first one, of a sweep those in it."""
-    solution, motion, linkage = question.solution, question.scene.motion, question.scene.linkage
+    solution, motion, linkage = (
+        question.solution,
+        question.scene.motion,
+        question.scene.linkage,
+    )
     swept, turn = solution.theta_2[solution.assembled], 2.0 * math.pi
     if not len(swept):
         raise NotAskedError("the linkage assembles at none of its positions")
     first, away = float(swept[0]), math.inf
-    for start, stop in find_intervals(linkage):  # at an end of one it is in it but for rounding
+    for start, stop in find_intervals(
+        linkage
+    ):  # at an end of one it is in it but for rounding
         middle = first - math.remainder(first - 0.5 * (start + stop), turn)
         if (outside := abs(first - middle) - 0.5 * (stop - start)) < away:
-            low, high, away = middle - 0.5 * (stop - start), middle + 0.5 * (stop - start), outside
+            low, high, away = (
+                middle - 0.5 * (stop - start),
+                middle + 0.5 * (stop - start),
+                outside,
+            )
     if isinstance(motion.angle, Sweep) or motion.law is not None:
         if turns_fully(linkage):
             low, high = first - 2.0 * turn, first + 2.0 * turn
-        low, high = max(low, float(swept.min())), min(high, float(swept.max()), float(swept.min()) + turn)
+        low, high = (
+            max(low, float(swept.min())),
+            min(high, float(swept.max()), float(swept.min()) + turn),
+        )
     return np.arange(low + OFF_GRID * turn / SAMPLES, high, turn / SAMPLES)
 
 
 def _hold(scene: Scene, angle: Array, branch: int) -> Array:
     """Ask the free bodies for the torque on the input at rest; NaN where it is ill-conditioned or does not assemble."""
-    command = Command(angle, np.full(angle.shape, branch, dtype=np.int8), np.zeros(angle.shape), np.zeros(angle.shape))
+    command = Command(
+        angle,
+        np.full(angle.shape, branch, dtype=np.int8),
+        np.zeros(angle.shape),
+        np.zeros(angle.shape),
+    )
     with np.errstate(all="ignore"):
         answer = FreeBody().answer(scene, command)
         if answer.refusal is not None:
@@ -127,28 +167,47 @@ def _hold(scene: Scene, angle: Array, branch: int) -> Array:
     return np.where(sound, answer.quantities["torque"], np.nan)
 
 
-def _count_missed(scene: Scene, branch: int, theta_2: Array, torque: Array, places: list[tuple[float, float]]) -> int:
+def _count_missed(
+    scene: Scene,
+    branch: int,
+    theta_2: Array,
+    torque: Array,
+    places: list[tuple[float, float]],
+) -> int:
     """Count the steps in which the torque changes its sign and no equilibrium was found, or the reverse.
 
     `places`: angles of the equilibria on the branch, and how far off each may be: a step that one may be in or not is
     not counted, nor one at an end of which 320 bits find another sign than the free bodies, or none.
     """
-    counted, open_steps = np.zeros(len(torque) - 1, dtype=int), ~np.isfinite(torque[:-1] * torque[1:])
+    counted, open_steps = (
+        np.zeros(len(torque) - 1, dtype=int),
+        ~np.isfinite(torque[:-1] * torque[1:]),
+    )
     for angle, off in places:
         turned = theta_2[0] + np.remainder(angle - theta_2[0], 2.0 * np.pi)
         index = int(np.searchsorted(theta_2, turned)) - 1
         if 0 <= index < len(counted):
             counted[index] += 1
-        first, last = (int(np.searchsorted(theta_2, end)) - 1 for end in (turned - off, turned + off))
+        first, last = (
+            int(np.searchsorted(theta_2, end)) - 1
+            for end in (turned - off, turned + off)
+        )
         if first != last:
             open_steps[max(first, 0) : max(last + 1, 0)] = True
     differing = ~open_steps & ((torque[:-1] * torque[1:] < 0.0) != (counted % 2 == 1))
 
     def is_certain(index: int) -> bool:
         held = _derive(scene, 2, float(theta_2[index]), branch)
-        return held is not None and held[0].value * torque[index] > 0.0 and abs(held[0].value) > K * EPS * held[0].size
+        return (
+            held is not None
+            and held[0].value * torque[index] > 0.0
+            and abs(held[0].value) > K * EPS * held[0].size
+        )
 
-    return sum(is_certain(index) and is_certain(index + 1) for index in np.flatnonzero(differing).tolist())
+    return sum(
+        is_certain(index) and is_certain(index + 1)
+        for index in np.flatnonzero(differing).tolist()
+    )
 
 
 def _judge(scene: Scene, equilibrium: Equilibrium) -> tuple[float, dict[str, float]]:
@@ -168,15 +227,24 @@ def _judge(scene: Scene, equilibrium: Equilibrium) -> tuple[float, dict[str, flo
         "slope": _divide(slope.value + equilibrium.slope, slope.size),
     }
     errors["inertia"] = _divide(inertia.value - equilibrium.inertia, inertia.size)
-    part = [K * EPS * x.size / abs(x.value) if x.value else math.inf for x in (slope, inertia)]
+    part = [
+        K * EPS * x.size / abs(x.value) if x.value else math.inf
+        for x in (slope, inertia)
+    ]
     off = K * EPS * torque.size / abs(slope.value) if part[0] < 1.0 else math.inf
     if part[0] < FIRST_ORDER:
         stable = slope.value > 0.0
-        if (equilibrium.stability == "stable") != stable or (equilibrium.frequency is not None and not stable):
+        if (equilibrium.stability == "stable") != stable or (
+            equilibrium.frequency is not None and not stable
+        ):
             errors["frequency"] = math.inf
         elif stable and part[1] < FIRST_ORDER:
             frequency = math.sqrt(slope.value / inertia.value) / (2.0 * math.pi)
-            apart = math.inf if equilibrium.frequency is None else abs(equilibrium.frequency - frequency)
+            apart = (
+                math.inf
+                if equilibrium.frequency is None
+                else abs(equilibrium.frequency - frequency)
+            )
             errors["frequency"] = apart / frequency / (0.5 * sum(part)) * K * EPS
     return off, errors
 
@@ -185,7 +253,9 @@ def _divide(apart: float, size: float) -> float:
     return abs(apart) / size if size else (0.0 if apart == 0.0 else math.inf)
 
 
-def _derive(scene: Scene, bar: int, angle: float, branch: int) -> tuple[Derived, Derived, Derived] | None:
+def _derive(
+    scene: Scene, bar: int, angle: float, branch: int
+) -> tuple[Derived, Derived, Derived] | None:
     """Derive the torque on a bar held at rest, its slope over the bar's angle, and the bar's inertia.
 
     None where there are none, or where the rounding of the inputs decides the angles of the others. The bar's angle
@@ -193,29 +263,48 @@ def _derive(scene: Scene, bar: int, angle: float, branch: int) -> tuple[Derived,
     """
     from flint import arb
 
-    from fourbar_validation.engines.balls import OF_PIECE, STEP_BITS, compute_outputs, make_balls
+    from fourbar_validation.engines.balls import (
+        OF_PIECE,
+        STEP_BITS,
+        compute_outputs,
+        make_balls,
+    )
 
     commanded_motion: Any = {f"theta_{bar}": angle, f"omega_{bar}": 0.0}
     scene = replace(scene, motion=Motion(**commanded_motion), drive_bar=bar)
     x = make_balls(scene, angle)
-    x |= {f"{name}_{k}": arb(1) for k, load in enumerate(scene.loads) if load.table for name in OF_PIECE}
+    x |= {
+        f"{name}_{k}": arb(1)
+        for k, load in enumerate(scene.loads)
+        if load.table
+        for name in OF_PIECE
+    }
     step, commanded = arb(2) ** -STEP_BITS, f"theta_{bar}"
 
     def derive(**changed: Any) -> tuple[list[Any], dict[str, Any], Any] | None:
         """Return torque, slope, inertia and angles; all outputs; and the change of theta_2 per rad of the bar."""
         base_inputs = x | changed
-        turned = [base_inputs | {commanded: base_inputs[commanded] + side * step} for side in (1, -1)]
+        turned = [
+            base_inputs | {commanded: base_inputs[commanded] + side * step}
+            for side in (1, -1)
+        ]
         answers = [
             compute_outputs(scene, branch, inputs)
             for inputs in (base_inputs, *turned, base_inputs | {f"alpha_{bar}": arb(1)})
         ]
-        held, ahead, behind, pushed = (answer if answer and "torque" in answer else None for answer in answers)
+        held, ahead, behind, pushed = (
+            answer if answer and "torque" in answer else None for answer in answers
+        )
         if held is None or ahead is None or behind is None or pushed is None:
             return None
         slope = (ahead["torque"] - behind["torque"]) / (2 * step)
         angles = [held.get(f"theta_{k}", base_inputs[commanded]) for k in MOVING_BARS]
         numbers = [held["torque"], slope, pushed["torque"] - held["torque"], *angles]
-        return numbers, held, (ahead.get("theta_2", step) - held.get("theta_2", 0)) / step
+        return (
+            numbers,
+            held,
+            (ahead.get("theta_2", step) - held.get("theta_2", 0)) / step,
+        )
 
     base = derive()
     if base is None:
@@ -225,17 +314,30 @@ def _derive(scene: Scene, bar: int, angle: float, branch: int) -> tuple[Derived,
     for name, value in x.items():
         weight = max(abs(float(value)), float(any(part in name for part in ANGLES)))
         if name == commanded:
-            weight = max(weight, min(AT_LIMIT, 1.0 / max(abs(float(rate.mid())), 1.0 / AT_LIMIT)))
-        moved = next((m for side in (1, -1) if weight and (m := derive(**{name: value + side * weight * step}))), None)
+            weight = max(
+                weight, min(AT_LIMIT, 1.0 / max(abs(float(rate.mid())), 1.0 / AT_LIMIT))
+            )
+        moved = next(
+            (
+                m
+                for side in (1, -1)
+                if weight and (m := derive(**{name: value + side * weight * step}))
+            ),
+            None,
+        )
         if moved is not None:
             sizes += [
-                abs(float(((after - before) / step).mid())) for after, before in zip(moved[0], numbers, strict=True)
+                abs(float(((after - before) / step).mid()))
+                for after, before in zip(moved[0], numbers, strict=True)
             ]
-    if not np.isfinite(sizes).all() or ROUNDINGS * EPS * sizes[3:].max() >= FIRST_ORDER * float(outputs["condition"]):
+    if not np.isfinite(sizes).all() or ROUNDINGS * EPS * sizes[
+        3:
+    ].max() >= FIRST_ORDER * float(outputs["condition"]):
         return None
     sizes[2] = max(sizes[2], _sum_inertias(scene))
     torque, slope, inertia = (
-        Derived(float(x.mid()), float(size)) for x, size in zip(numbers[:3], sizes[:3], strict=True)
+        Derived(float(x.mid()), float(size))
+        for x, size in zip(numbers[:3], sizes[:3], strict=True)
     )
     return torque, slope, inertia
 
@@ -245,5 +347,9 @@ def _sum_inertias(scene: Scene) -> float:
     linkage: FourBar = scene.linkage
     bars = [linkage.bar(number) for number in MOVING_BARS]
     reach = max(linkage.lengths) + max(abs(find_centre(bar)[0]) for bar in bars)
-    wheels = (getattr(effect, "inertia", 0.0) for effect in scene.effects if effect.key == "flywheel")
+    wheels = (
+        getattr(effect, "inertia", 0.0)
+        for effect in scene.effects
+        if effect.key == "flywheel"
+    )
     return sum(bar.mass * reach**2 + find_inertia(bar) for bar in bars) + sum(wheels)

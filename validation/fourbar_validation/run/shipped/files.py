@@ -20,7 +20,12 @@ from fourbar.solve import solve
 from fourbar_validation.compare.rows import REFUSES, Row
 from fourbar_validation.compare.tolerance import EPS, K
 from fourbar_validation.run.question import Question
-from fourbar_validation.run.shipped.variants import ask_free_bodies, hold_to, keep_worst, take_few
+from fourbar_validation.run.shipped.variants import (
+    ask_free_bodies,
+    hold_to,
+    keep_worst,
+    take_few,
+)
 
 NUMBER = r"[-+.\deE]+"
 BARS = {BAR_NAMES[number]: number for number in MOVING_BARS}
@@ -60,7 +65,9 @@ def usd(question: Question) -> list[Row]:
     return _judge_file(question, "usd", lambda scene: _read_usd(usd_text(scene)))
 
 
-def _judge_file(question: Question, engine: str, read: Callable[[Scene], Contents]) -> list[Row]:
+def _judge_file(
+    question: Question, engine: str, read: Callable[[Scene], Contents]
+) -> list[Row]:
     """Compare a file at its own position and at some more; loads are what a simulator adds."""
     scene = replace(take_few(question), loads=(), points=())
     theta_2 = np.asarray(scene.motion.theta_2)
@@ -68,24 +75,45 @@ def _judge_file(question: Question, engine: str, read: Callable[[Scene], Content
     try:
         held = read(opened)
     except (LimitError, InputError) as limit:
-        return [Row.unmeasured(question.name, engine, "exact", "all", REFUSES, str(limit))]
+        return [
+            Row.unmeasured(question.name, engine, "exact", "all", REFUSES, str(limit))
+        ]
     theirs, rows = build_scene(held, opened), []
     with np.errstate(all="ignore"):
         for turns in held.turns:
-            answer = ask_free_bodies(replace(theirs, motion=scene.motion.replace(angle=np.array([turns["input"]]))))
-            answer.quantities |= {f"theta_{BARS[bar]}": np.array([turns[bar]]) for bar in ("coupler", "output")}
+            answer = ask_free_bodies(
+                replace(
+                    theirs,
+                    motion=scene.motion.replace(angle=np.array([turns["input"]])),
+                )
+            )
+            answer.quantities |= {
+                f"theta_{BARS[bar]}": np.array([turns[bar]])
+                for bar in ("coupler", "output")
+            }
             rows += hold_to(question, engine, opened, solve(opened), answer)
         more = ask_free_bodies(replace(theirs, motion=scene.motion))
-        return keep_worst([*rows, *hold_to(question, engine, scene, solve(scene), more)])
+        return keep_worst(
+            [*rows, *hold_to(question, engine, scene, solve(scene), more)]
+        )
 
 
 def build_scene(held: Contents, scene: Scene) -> Scene:
     """Build the scene that a file describes, in the motion and with the drive of another."""
     bodies, pins = held.bodies, held.pins
     span = pins["O4"] - pins["O2"]
-    ends = {"input": pins["A"] - pins["O2"], "coupler": pins["B"] - pins["A"], "output": pins["B"] - pins["O4"]}
+    ends = {
+        "input": pins["A"] - pins["O2"],
+        "coupler": pins["B"] - pins["A"],
+        "output": pins["B"] - pins["O4"],
+    }
     two, three, four = (
-        Bar(abs(end), bodies[name].mass, bodies[name].inertia, cmath.polar(bodies[name].centre))
+        Bar(
+            abs(end),
+            bodies[name].mass,
+            bodies[name].inertia,
+            cmath.polar(bodies[name].centre),
+        )
         for name, end in ends.items()
     )
     effects: tuple[Effect, ...] = (Gravity(*cmath.polar(held.gravity)),)
@@ -93,7 +121,11 @@ def build_scene(held: Contents, scene: Scene) -> Scene:
         effects += (Viscous.at(**held.damping),)
     if held.friction:
         effects += (Friction.at(**held.friction),)
-    return replace(scene, linkage=FourBar(abs(span), two, three, four, cmath.phase(span)), effects=effects)
+    return replace(
+        scene,
+        linkage=FourBar(abs(span), two, three, four, cmath.phase(span)),
+        effects=effects,
+    )
 
 
 def _read_sdf(text: str) -> Contents:
@@ -106,48 +138,78 @@ def _read_sdf(text: str) -> Contents:
     for link in root.iter("link"):
         x, y, _, _, _, turn = numbers(link, "pose")
         centre = complex(*numbers(link, "inertial/pose")[:2])
-        (mass,), (inertia,) = numbers(link, "inertial/mass"), numbers(link, "inertial/inertia/izz")
-        bodies[link.get("name", "")] = FileBody(complex(x, y), turn, mass, inertia, centre)
+        (mass,), (inertia,) = (
+            numbers(link, "inertial/mass"),
+            numbers(link, "inertial/inertia/izz"),
+        )
+        bodies[link.get("name", "")] = FileBody(
+            complex(x, y), turn, mass, inertia, centre
+        )
     pins: dict[str, complex] = {}
     dynamics: dict[str, dict[str, float]] = {"damping": {}, "friction": {}}
     for joint in root.iter("joint"):
         pin, child = joint.get("name", ""), bodies[joint.findtext("child", "")]
-        pose = complex(*numbers(joint, "pose")[:2]) if joint.find("pose") is not None else 0j
+        pose = (
+            complex(*numbers(joint, "pose")[:2])
+            if joint.find("pose") is not None
+            else 0j
+        )
         pins[pin] = child.place + pose * cmath.rect(1.0, child.turn)
         for name, at_pins in dynamics.items():
             if joint.find(f"axis/dynamics/{name}") is not None:
                 at_pins[pin] = numbers(joint, f"axis/dynamics/{name}")[0]
     gravity = complex(*numbers(next(root.iter("world")), "gravity")[:2])
-    return Contents(bodies, pins, [_read_turns(bodies), _read_noted(text)], gravity, **dynamics)
+    return Contents(
+        bodies, pins, [_read_turns(bodies), _read_noted(text)], gravity, **dynamics
+    )
 
 
 def _read_usd(text: str) -> Contents:
     def numbers(block: str, key: str) -> list[float]:
         match = re.search(rf"{re.escape(key)} = (.*)", block)
-        return [float(number) for number in re.findall(NUMBER, match[1])] if match else [math.nan] * 4
+        return (
+            [float(number) for number in re.findall(NUMBER, match[1])]
+            if match
+            else [math.nan] * 4
+        )
 
     def turn(block: str, key: str) -> float:
         w, _, _, z = numbers(block, key)
         return 2.0 * math.atan2(z, w)
 
-    blocks = dict(re.findall(r'def (?:Xform|PhysicsRevoluteJoint|PhysicsScene) "(\w+)"[^{]*\{([^{}]*)\}', text))
+    blocks = dict(
+        re.findall(
+            r'def (?:Xform|PhysicsRevoluteJoint|PhysicsScene) "(\w+)"[^{]*\{([^{}]*)\}',
+            text,
+        )
+    )
     bodies = {"ground": FileBody(0j, 0.0, math.nan, math.nan, 0j)}
     for bar in BARS:
         block = blocks[bar]
         place, centre = (
-            complex(*numbers(block, f"{key}")[:2]) for key in ("xformOp:translate", "physics:centerOfMass")
+            complex(*numbers(block, f"{key}")[:2])
+            for key in ("xformOp:translate", "physics:centerOfMass")
         )
-        mass, inertia = numbers(block, "physics:mass")[0], numbers(block, "physics:diagonalInertia")[2]
-        bodies[bar] = FileBody(place, turn(block, "xformOp:orient"), mass, inertia, centre)
+        mass, inertia = (
+            numbers(block, "physics:mass")[0],
+            numbers(block, "physics:diagonalInertia")[2],
+        )
+        bodies[bar] = FileBody(
+            place, turn(block, "xformOp:orient"), mass, inertia, centre
+        )
     size = sum(abs(body.place) + abs(body.centre) for body in bodies.values())
     pins, at_joints = {}, {"ground": 0.0}
     for pin in ("O2", "A", "O4", "B"):
         block = blocks[pin]
-        ends = {end: re.search(rf"physics:body{end} = </four_bar/(\w+)>", block) for end in (0, 1)}
+        ends = {
+            end: re.search(rf"physics:body{end} = </four_bar/(\w+)>", block)
+            for end in (0, 1)
+        }
         names = [match[1] if match else "ground" for match in ends.values()]
         one, second = (
             bodies[bar].place
-            + complex(*numbers(block, f"physics:localPos{end}")[:2]) * cmath.rect(1.0, bodies[bar].turn)
+            + complex(*numbers(block, f"physics:localPos{end}")[:2])
+            * cmath.rect(1.0, bodies[bar].turn)
             for end, bar in enumerate(names)
         )
         pins[pin] = one if abs(one - second) <= K * EPS * size else complex(math.nan)
@@ -157,9 +219,19 @@ def _read_usd(text: str) -> Contents:
         else:
             at_joints[names[1]] = at_joints[names[0]] + between
     closing = at_joints | {"coupler": at_joints["coupler at B"]}
-    (pull,), direction = numbers(blocks["physics"], "physics:gravityMagnitude"), "physics:gravityDirection"
+    (pull,), direction = (
+        numbers(blocks["physics"], "physics:gravityMagnitude"),
+        "physics:gravityDirection",
+    )
     gravity = pull * complex(*numbers(blocks["physics"], direction)[:2])
-    return Contents(bodies, pins, [_read_turns(bodies), at_joints, closing, _read_noted(text)], gravity, {}, {})
+    return Contents(
+        bodies,
+        pins,
+        [_read_turns(bodies), at_joints, closing, _read_noted(text)],
+        gravity,
+        {},
+        {},
+    )
 
 
 def _read_turns(bodies: dict[str, FileBody]) -> dict[str, float]:

@@ -44,14 +44,32 @@ def furnish(scene: Scene, question: Question) -> Scene:
     """Give the scene a point on each bar and a load over a table, as large as its forces, where it has none."""
     coupler, first = scene.linkage.coupler, float(question.solution.theta_2[0])
     if not scene.points:
-        arms = {bar: (0.6 * scene.linkage.bar(bar).length, 0.4 * bar) for bar in (2, 3, 4)}
-        scene = replace(scene, points=tuple(Point(f"P{bar}", bar, arm) for bar, arm in arms.items()))
+        arms = {
+            bar: (0.6 * scene.linkage.bar(bar).length, 0.4 * bar) for bar in (2, 3, 4)
+        }
+        scene = replace(
+            scene, points=tuple(Point(f"P{bar}", bar, arm) for bar, arm in arms.items())
+        )
     assert question.free_body is not None
     size = magnitude(question.free_body.quantities["F12"])
     positive = size[np.isfinite(size) & (size > 0.0)]
-    if not any(load.table for load in scene.loads) and positive.size and scene.motion.law is None:
-        force, table = 0.5 * float(np.median(positive)), Table(tuple(first + x for x in CORNERS), (1.0, -0.5, 2.0, 1.0))
-        load = Load(3, (force, 0.3), (0.2 * coupler.length, 0.5), 0.1 * force * coupler.length, "bar", table)
+    if (
+        not any(load.table for load in scene.loads)
+        and positive.size
+        and scene.motion.law is None
+    ):
+        force, table = (
+            0.5 * float(np.median(positive)),
+            Table(tuple(first + x for x in CORNERS), (1.0, -0.5, 2.0, 1.0)),
+        )
+        load = Load(
+            3,
+            (force, 0.3),
+            (0.2 * coupler.length, 0.5),
+            0.1 * force * coupler.length,
+            "bar",
+            table,
+        )
         scene = replace(scene, loads=(*scene.loads, load))
     return scene
 
@@ -63,20 +81,38 @@ def study(question: Question) -> list[Row]:
     stated = SceneFile(scene).find_stated(fourbar.sensitivity(scene).keys)
     del stated[key]
     values = {
-        key: np.array([x + number * APART * step for number in range(MEMBERS)]) for key, (x, step) in stated.items()
+        key: np.array([x + number * APART * step for number in range(MEMBERS)])
+        for key, (x, step) in stated.items()
     }
     # the places of each member lie within those of the scene: nothing says that a table reaches further
-    positions = np.array([places + APART * number * (places.mean() - places) for number in range(MEMBERS)])
+    positions = np.array(
+        [
+            places + APART * number * (places.mean() - places)
+            for number in range(MEMBERS)
+        ]
+    )
     members: dict[int, Scene] = {}
     for number, member_positions in enumerate(positions):
-        with suppress(NotAskedError):  # the others are judged, beside one that never assembles
-            changes = {name: number * APART * entry.step for name, entry in stated.items()}
-            members[number] = SceneFile(at_places(scene, member_positions)).move(changes)
+        with suppress(
+            NotAskedError
+        ):  # the others are judged, beside one that never assembles
+            changes = {
+                name: number * APART * entry.step for name, entry in stated.items()
+            }
+            members[number] = SceneFile(at_places(scene, member_positions)).move(
+                changes
+            )
     rows = []
     with np.errstate(all="ignore"):
         solved = fourbar.solve(fourbar.vary(scene, values | {key: positions}))
         for number, one in members.items():
-            rows += hold_to(question, "study", one, take_member(solved, number), ask_free_bodies(one))
+            rows += hold_to(
+                question,
+                "study",
+                one,
+                take_member(solved, number),
+                ask_free_bodies(one),
+            )
     return keep_worst(rows)
 
 
@@ -122,27 +158,49 @@ def sensitivity(question: Question) -> list[Row]:
     scene = take_few(question)
     derivatives = fourbar.sensitivity(scene)
     file = SceneFile(scene)
-    directions = {key: step for key, (_, step) in file.find_stated(derivatives.keys).items()}
+    directions = {
+        key: step for key, (_, step) in file.find_stated(derivatives.keys).items()
+    }
     if scene.motion.stroke is None:
         directions[command_key(scene)] = 1.0
 
     def along(part: float) -> dict[str, Array]:
-        return ask_free_bodies(file.move({key: part * STEP * step for key, step in directions.items()})).quantities
+        return ask_free_bodies(
+            file.move({key: part * STEP * step for key, step in directions.items()})
+        ).quantities
 
     near, far = [(along(part), along(-part)) for part in (1.0, 2.0)]
     rows = []
     for name in (name for name in (*UNKNOWNS, LINE.value) if name in derivatives.by):
-        first, second = (_subtract(name, up[name], down[name]) for up, down in (near, far))
+        first, second = (
+            _subtract(name, up[name], down[name]) for up, down in (near, far)
+        )
         slope, coarse = (8.0 * first - second) / (12.0 * STEP), first / (2.0 * STEP)
-        terms = np.array([step * derivatives.of(name, key) for key, step in directions.items()])
-        size = magnitude(derivatives.value(name)) + sum(magnitude(term) for term in terms)
-        comparable = np.array([status == "ok" for status in derivatives.status]) | (name not in FORCES)
+        terms = np.array(
+            [step * derivatives.of(name, key) for key, step in directions.items()]
+        )
+        size = magnitude(derivatives.value(name)) + sum(
+            magnitude(term) for term in terms
+        )
+        comparable = np.array([status == "ok" for status in derivatives.status]) | (
+            name not in FORCES
+        )
         comparable &= divide(magnitude(slope - coarse), size) <= CONVERGED
-        error = np.where(comparable, divide(magnitude(terms.sum(axis=0) - slope), size), 0.0)
+        error = np.where(
+            comparable, divide(magnitude(terms.sum(axis=0) - slope), size), 0.0
+        )
         if comparable.any():
             reason = f"along one direction in {len(directions)} numbers"
             rows.append(
-                make_row(question, "sensitivity", name, error, DIFFERENCES, derivatives.solution.theta_2, reason)
+                make_row(
+                    question,
+                    "sensitivity",
+                    name,
+                    error,
+                    DIFFERENCES,
+                    derivatives.solution.theta_2,
+                    reason,
+                )
             )
     return rows
 
@@ -151,19 +209,32 @@ def tolerances(question: Question) -> list[Row]:
     """Judge the spread that a few tolerances make: the scene's own, or those that the run gives it."""
     scene = take_few(question)
     width, names = GIVEN * min(scene.linkage.lengths), ("input", "coupler", "output")
-    defaults = (fourbar.Tolerance(f"lengths.{name}", width, name == "output") for name in names)
+    defaults = (
+        fourbar.Tolerance(f"lengths.{name}", width, name == "output") for name in names
+    )
     scene = replace(scene, tolerances=(scene.tolerances or tuple(defaults))[:MOST])
     spread, expected = fourbar.tolerances(scene, SAMPLES), _compute_expected(scene)
     errors: dict[str, Array] = {}
     for name in (*UNKNOWNS, LINE.value):
-        parts = [part for part in expected if part in (name, f"{name}_x", f"{name}_y", f"|{name}|")]
+        parts = [
+            part
+            for part in expected
+            if part in (name, f"{name}_x", f"{name}_y", f"|{name}|")
+        ]
         if not parts:
             continue
         slight = SLIGHT * max(float(np.max(expected[part].worst)) for part in parts)
-        errors[name] = np.max([_compute_off(spread.spreads[part], expected[part], slight) for part in parts], axis=0)
+        errors[name] = np.max(
+            [
+                _compute_off(spread.spreads[part], expected[part], slight)
+                for part in parts
+            ],
+            axis=0,
+        )
     reason = ", ".join(tolerance.key for tolerance in scene.tolerances)
     return [
-        make_row(question, "tolerances", name, error, SPREAD, spread.theta_2, reason) for name, error in errors.items()
+        make_row(question, "tolerances", name, error, SPREAD, spread.theta_2, reason)
+        for name, error in errors.items()
     ]
 
 
@@ -190,16 +261,23 @@ def _compute_expected(scene: Scene) -> dict[str, Expected]:
 
     def changed(changes: dict[str, float]) -> dict[str, Array]:
         parts = split_parts(ask_free_bodies(file.move(changes)))
-        return {part: _subtract(part, values, nominal[part]) for part, values in parts.items()}
+        return {
+            part: _subtract(part, values, nominal[part])
+            for part, values in parts.items()
+        }
 
     weights, off = [], []
     nodes = [
-        [(0.0, 1.0 - 2.0 * w), (x, w), (-x, w)] for x, w in (NODES[tolerance.sigma] for tolerance in scene.tolerances)
+        [(0.0, 1.0 - 2.0 * w), (x, w), (-x, w)]
+        for x, w in (NODES[tolerance.sigma] for tolerance in scene.tolerances)
     ]
     for node in product(*nodes):
         off.append(
             changed(
-                {tolerance.key: x * tolerance.width for tolerance, (x, _) in zip(scene.tolerances, node, strict=True)}
+                {
+                    tolerance.key: x * tolerance.width
+                    for tolerance, (x, _) in zip(scene.tolerances, node, strict=True)
+                }
             )
         )
         weights.append(math.prod(w for _, w in node))
@@ -210,15 +288,22 @@ def _compute_expected(scene: Scene) -> dict[str, Expected]:
         slopes.append({part: (up[part] - down[part]) / (2.0 * h) for part in nominal})
     rng, w = np.random.default_rng(0), np.array(weights)[:, None]
     drawn = [
-        rng.normal(size=DRAWN) if tolerance.sigma else rng.uniform(-1.0, 1.0, DRAWN) for tolerance in scene.tolerances
+        rng.normal(size=DRAWN) if tolerance.sigma else rng.uniform(-1.0, 1.0, DRAWN)
+        for tolerance in scene.tolerances
     ]
     samples = np.array(drawn).T
     widths = np.array([[tolerance.width] for tolerance in scene.tolerances])
-    variances = np.array([[1.0 if tolerance.sigma else 1.0 / 3.0] for tolerance in scene.tolerances])
-    reaches = widths * np.array([[3.0 if tolerance.sigma else 1.0] for tolerance in scene.tolerances])
+    variances = np.array(
+        [[1.0 if tolerance.sigma else 1.0 / 3.0] for tolerance in scene.tolerances]
+    )
+    reaches = widths * np.array(
+        [[3.0 if tolerance.sigma else 1.0] for tolerance in scene.tolerances]
+    )
     expected = {}
     for part in nominal:
-        values, slope = (np.array([member[part] for member in members]) for members in (off, slopes))
+        values, slope = (
+            np.array([member[part] for member in members]) for members in (off, slopes)
+        )
         mean = (w * values).sum(axis=0)
         deviation = np.sqrt((w * (values - mean) ** 2).sum(axis=0))
         first_order = np.sqrt((variances * (slope * widths) ** 2).sum(axis=0))
@@ -226,7 +311,9 @@ def _compute_expected(scene: Scene) -> dict[str, Expected]:
         bent = np.maximum(bent, divide(np.abs(mean), deviation) ** 2)
         percentiles, straight = np.full((2, len(mean)), np.nan), bent <= STRAIGHT
         if straight.any():
-            percentiles[:, straight] = np.percentile(samples @ (slope * widths)[:, straight], (1.0, 99.0), axis=0)
+            percentiles[:, straight] = np.percentile(
+                samples @ (slope * widths)[:, straight], (1.0, 99.0), axis=0
+            )
         worst = np.abs(slope * reaches).sum(axis=0)
         expected[part] = Expected(deviation, first_order, worst, bent, *percentiles)
     return expected
@@ -241,10 +328,20 @@ def _compute_off(spread: Spread, expected: Expected, slight: float) -> Array:
         (spread.first_order, expected.first_order, expected.first_order, 1.0, every),
         (spread.deviation, expected.deviation, expected.deviation, 1.0, near),
         (spread.low - spread.nominal, expected.low, expected.deviation, 0.1, straight),
-        (spread.high - spread.nominal, expected.high, expected.deviation, 0.1, straight),
+        (
+            spread.high - spread.nominal,
+            expected.high,
+            expected.deviation,
+            0.1,
+            straight,
+        ),
     ]
     errors = [
-        np.where(judged & (expected.worst > slight), part * divide(np.abs(ours - theirs), size), 0.0)
+        np.where(
+            judged & (expected.worst > slight),
+            part * divide(np.abs(ours - theirs), size),
+            0.0,
+        )
         for ours, theirs, size, part, judged in pairs
     ]
     return np.asarray(np.max(errors, axis=0))
@@ -253,4 +350,6 @@ def _compute_off(spread: Spread, expected: Expected, slight: float) -> Array:
 def _subtract(name: str, one: Array, minus: Array) -> Array:
     """Subtract, angles within half a turn."""
     difference = one - minus
-    return np.asarray(np.angle(np.exp(1j * difference)) if name.startswith("theta") else difference)
+    return np.asarray(
+        np.angle(np.exp(1j * difference)) if name.startswith("theta") else difference
+    )

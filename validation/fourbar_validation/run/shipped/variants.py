@@ -22,7 +22,13 @@ from fourbar_validation.compare.compare import COMPARED, Comparison, Held
 from fourbar_validation.compare.reversals import mark_reversing
 from fourbar_validation.compare.rows import VERDICTS, Row
 from fourbar_validation.compare.scales import make_reference
-from fourbar_validation.compare.tolerance import EQUIVALENCE, WELL_CONDITIONED, ErrorBound, find_used, magnitude
+from fourbar_validation.compare.tolerance import (
+    EQUIVALENCE,
+    WELL_CONDITIONED,
+    ErrorBound,
+    find_used,
+    magnitude,
+)
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.registry import make_prediction
 from fourbar_validation.run.printed import compare_points
@@ -46,22 +52,37 @@ def take_few(question: Question) -> Scene:
     if scene.motion.law is not None:
         raise NotAskedError("a motion law has no positions of its own choice")
     reference = question.reference
-    assert reference is not None and reference.drive_condition is not None and reference.F12 is not None
+    assert (
+        reference is not None
+        and reference.drive_condition is not None
+        and reference.F12 is not None
+    )
     fit = (
         (solution.status_code == OK)
         & (reference.condition >= WELL_CONDITIONED)
         & np.isfinite(reference.F12).all(axis=1)
     )
-    fit &= (reference.drive_condition >= WELL_CONDITIONED) & (command.branch == scene.motion.branch)
-    fit &= ~mark_reversing(scene, solution, NOT_AT_REST) & (np.asarray(command.speed) != 0.0)
+    fit &= (reference.drive_condition >= WELL_CONDITIONED) & (
+        command.branch == scene.motion.branch
+    )
+    fit &= ~mark_reversing(scene, solution, NOT_AT_REST) & (
+        np.asarray(command.speed) != 0.0
+    )
     for load in scene.loads:
         for corner in () if load.table is None else load.table.theta_2:
-            fit &= np.abs(np.angle(np.exp(1j * (solution.theta_2 - corner)))) > FROM_A_CORNER
+            fit &= (
+                np.abs(np.angle(np.exp(1j * (solution.theta_2 - corner))))
+                > FROM_A_CORNER
+            )
     indices = np.flatnonzero(fit)
     if not len(indices):
         raise NotAskedError("no position that is well-conditioned and moves")
-    few = indices[np.unique(np.linspace(0, len(indices) - 1, SAMPLE + 2).astype(int)[1:-1])]
-    return at_places(replace(scene, title="", source="", pictures=()), command.places[few])
+    few = indices[
+        np.unique(np.linspace(0, len(indices) - 1, SAMPLE + 2).astype(int)[1:-1])
+    ]
+    return at_places(
+        replace(scene, title="", source="", pictures=()), command.places[few]
+    )
 
 
 def at_places(scene: Scene, places: Array) -> Scene:
@@ -82,7 +103,9 @@ class SceneFile:
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
         self._document = tomllib.loads(dump(scene))
-        self._lines = {key: _write_line(key, value) for key, value in self._document.items()}
+        self._lines = {
+            key: _write_line(key, value) for key, value in self._document.items()
+        }
 
     def find_stated(self, keys: Iterable[str]) -> dict[str, FileNumber]:
         """Find those of the keys whose numbers the file states; of motion.theta_2 the first."""
@@ -90,10 +113,14 @@ class SceneFile:
         for index, key in enumerate(keys):
             with suppress(KeyError):
                 table, last = _place(self._document, key)
-                number, _, unit = str(table[last][0] if isinstance(table[last], list) else table[last]).partition(" ")
+                number, _, unit = str(
+                    table[last][0] if isinstance(table[last], list) else table[last]
+                ).partition(" ")
                 # no two alike, between 1/2 and 1
                 part = 0.5 + 0.5 * ((index + 1) * GOLDEN % 1.0)
-                stated[key] = FileNumber(float(number), part * (1.0 if unit == "rad" else float(number)))
+                stated[key] = FileNumber(
+                    float(number), part * (1.0 if unit == "rad" else float(number))
+                )
         return stated
 
     def move(self, changes: Mapping[str, float]) -> Scene:
@@ -103,17 +130,30 @@ class SceneFile:
         """
         lengths = [
             length + changes.get(f"lengths.{bar}", 0.0)
-            for bar, length in zip(("ground", "input", "coupler", "output"), self.scene.linkage.lengths, strict=True)
+            for bar, length in zip(
+                ("ground", "input", "coupler", "output"),
+                self.scene.linkage.lengths,
+                strict=True,
+            )
         ]
         if max(lengths) >= 0.5 * math.fsum(lengths):
             raise NotAskedError("a changed linkage can never assemble")
-        tables = {top: deepcopy(self._document[top]) for top in {key.partition(".")[0] for key in changes}}
+        tables = {
+            top: deepcopy(self._document[top])
+            for top in {key.partition(".")[0] for key in changes}
+        }
         for key, change in changes.items():
             table, last = _place(tables, key)
             old = table[last]
-            moved = [_change_entry(entry, change) for entry in old] if isinstance(old, list) else None
+            moved = (
+                [_change_entry(entry, change) for entry in old]
+                if isinstance(old, list)
+                else None
+            )
             table[last] = _change_entry(old, change) if moved is None else moved
-        lines = self._lines | {key: _write_line(key, value) for key, value in tables.items()}
+        lines = self._lines | {
+            key: _write_line(key, value) for key, value in tables.items()
+        }
         return loads("\n".join(lines.values()))
 
 
@@ -139,24 +179,44 @@ def _write_line(key: str, value: Any) -> str:
 def _write_toml(value: Any) -> str:
     if isinstance(value, dict):
         return "{" + ", ".join(_write_line(*entry) for entry in value.items()) + "}"
-    return "[" + ",\n".join(map(_write_toml, value)) + "]" if isinstance(value, list) else json.dumps(value)
+    return (
+        "[" + ",\n".join(map(_write_toml, value)) + "]"
+        if isinstance(value, list)
+        else json.dumps(value)
+    )
 
 
 def ask_free_bodies(scene: Scene, command: Command | None = None) -> Answer:
     """Ask the free bodies at the scene's own positions, or others."""
     with np.errstate(all="ignore"):
-        return ask_at(FreeBody(), scene, command_of(scene) if command is None else command)
+        return ask_at(
+            FreeBody(), scene, command_of(scene) if command is None else command
+        )
 
 
-def hold_to(question: Question, engine: str, scene: Scene, solution: Solution, answer: Answer) -> list[Row]:
+def hold_to(
+    question: Question, engine: str, scene: Scene, solution: Solution, answer: Answer
+) -> list[Row]:
     """Compare a solution that a public call gave for a scene with the answer of the free bodies."""
     answer = replace(answer, engine=engine)
     assert answer.at is not None
     predicted = make_prediction(FREE_BODY, scene, answer.at, answer)
     reference = make_reference(scene, answer)
-    rows = Comparison(question.name, scene, answer, solution, Held(EQUIVALENCE, COMPARED, predicted), reference).rows()
+    rows = Comparison(
+        question.name,
+        scene,
+        answer,
+        solution,
+        Held(EQUIVALENCE, COMPARED, predicted),
+        reference,
+    ).rows()
     if scene.points and reference is not None:
-        rows.append(replace(compare_points(question, scene, solution, reference, WELL_CONDITIONED), engine=engine))
+        rows.append(
+            replace(
+                compare_points(question, scene, solution, reference, WELL_CONDITIONED),
+                engine=engine,
+            )
+        )
     return rows
 
 
@@ -175,11 +235,19 @@ def keep_worst(rows: Iterable[Row]) -> list[Row]:
 
 
 def make_row(
-    question: Question, engine: str, quantity: str, error: Array, tolerance: ErrorBound, theta_2: Array, reason: str
+    question: Question,
+    engine: str,
+    quantity: str,
+    error: Array,
+    tolerance: ErrorBound,
+    theta_2: Array,
+    reason: str,
 ) -> Row:
     """Make the row of a quantity whose errors at some positions are held to one tolerance."""
     who = (question.name, engine, "exact")
-    return Row.judged(who, quantity, error, tolerance.factor, f"{tolerance.name}: {reason}", theta_2)
+    return Row.judged(
+        who, quantity, error, tolerance.factor, f"{tolerance.name}: {reason}", theta_2
+    )
 
 
 def take_member(study: Solution, index: int | NDArray[np.intp]) -> Solution:
@@ -190,7 +258,14 @@ def take_member(study: Solution, index: int | NDArray[np.intp]) -> Solution:
             return {name: values[index] for name, values in value.items()}
         return value[index] if isinstance(value, np.ndarray) else value
 
-    one = replace(study, **{field.name: take(getattr(study, field.name)) for field in fields(study) if field.init})
+    one = replace(
+        study,
+        **{
+            field.name: take(getattr(study, field.name))
+            for field in fields(study)
+            if field.init
+        },
+    )
     one.points, one.velocity, one.acceleration = (
         take(table) for table in (study.points, study.velocity, study.acceleration)
     )
@@ -206,5 +281,9 @@ def split_parts(answer: Answer) -> dict[str, Array]:
         if name in SCALARS:
             parts[name] = values
         else:
-            parts |= {f"{name}_x": values[:, 0], f"{name}_y": values[:, 1], f"|{name}|": magnitude(values)}
+            parts |= {
+                f"{name}_x": values[:, 0],
+                f"{name}_y": values[:, 1],
+                f"|{name}|": magnitude(values),
+            }
     return parts
