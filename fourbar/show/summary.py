@@ -550,8 +550,8 @@ def _find_stroke_limits(scene: Scene, solution: Solution) -> tuple[float, float]
     low = here - ((here - low) % TURN if width < TURN else 0.5 * TURN)
     angles = np.linspace(low + INSET * width, low + (1.0 - INSET) * width, FINE + 1)
     motion = Motion(
-        **{f"theta_{positions.bar}": angles},
-        branch=int(positions.branch[first]),  # type: ignore[arg-type]
+        **{f"theta_{positions.bar}": angles},  # type: ignore[arg-type]
+        branch=int(positions.branch[first]),
     )
     stroke = solve(replace(scene, motion=motion, tolerances=()), "position").stroke
     assert stroke is not None

@@ -365,8 +365,8 @@ def near_pins(rng: np.random.Generator) -> Scene:
     if kind == 1:
         return replace(
             ANYWHERE.draw(rng),
-            drive_bar=None,
-            drive=LinearDrive(start, end),  # type: ignore[arg-type]
+            drive_bar=None,  # type: ignore[arg-type]
+            drive=LinearDrive(start, end),
         )
     stiffness, length = float(rng.uniform(10.0, 1000.0)), float(rng.uniform(0.0, 2.0))
     return replace(scene, effects=(Springs((Spring(start, end, stiffness, length),)),))

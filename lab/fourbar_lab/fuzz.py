@@ -224,8 +224,8 @@ def _list_simpler(lines: list[str], number: int) -> Iterator[list[str]]:
     for digits in DIGITS:
         entries.append(
             NUMBER.sub(
-                lambda match, digits=digits: f"{float(match[0]):.{digits}g}",
-                line,  # type: ignore[misc]
+                lambda match, digits=digits: f"{float(match[0]):.{digits}g}",  # type: ignore[misc]
+                line,
             )
         )
     for entry in entries:

@@ -71,9 +71,9 @@ def find_differences(
 ) -> list[Difference]:
     """Find what differs, in the order of their description."""
     length = max(
-        float(entry.value)
+        float(entry.value)  # type: ignore[arg-type]
         for key, entry in generated.items()
-        if _is_length(key)  # type: ignore[arg-type]
+        if _is_length(key)
     )
     differences = []
     for key in [*theirs, *(key for key in generated if key not in theirs)]:
