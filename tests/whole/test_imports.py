@@ -53,7 +53,7 @@ LAYERS = {
         "compare scenes",
         "engines",
         "report",
-        "engine regression",
+        "engine regression robots",
         "advise check published run",
         "cost",
         "cli",
@@ -124,10 +124,7 @@ def test_each_engine_is_imported_under_its_own_name_alone(path: Path) -> None:
     assert not {name for name in names if name.partition(".")[0] == "tests"}
     for engine, its_name in ENGINES.items():
         if any(name.partition(".")[0] == engine for name in names):
-            assert {"engines", "simulators"} & {
-                path.parent.name,
-                path.parent.parent.name,
-            }
+            assert {"engines", "simulators"} & {*path.relative_to(ROOT).parts}
             assert its_name in path.relative_to(ROOT).as_posix()
 
 

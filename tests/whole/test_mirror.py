@@ -54,8 +54,11 @@ JUDGED_BY = {
     "files variants",
     "validation/run/test_released.py": "validation/engines/mujoco: forward",
     "validation/check/test_check.py": "validation/check: fitted judge mistakes theirs; validation/run: printed",
-    "validation/check/test_mjcf.py": "validation/check: differences screen; "
+    "validation/check/test_mjcf.py": "validation/check: differences screen; validation/robots: guard; "
     "validation/engines/mujoco: describe theirs topology",
+    "validation/engines/mujoco/robots/test_closures.py": "validation/engines/mujoco/robots: ancestry loop",
+    "validation/robots/test_files.py": "validation/engines/mujoco/robots: compiled",
+    "validation/robots/test_command.py": "validation/robots: options",
     "validation/published/test_published.py": "validation/published: comparison figures program textbook "
     "thesis thirteen",
     "validation/regression/test_regression.py": "validation/regression: accept change changes fault "

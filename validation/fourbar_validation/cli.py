@@ -16,6 +16,7 @@ COMMANDS = {
     "accept": "fourbar_validation.regression.accept:accept_command",
     "compare": "fourbar_validation.regression.accept:compare",
     "check": "fourbar_validation.check:check",
+    "loops": "fourbar_validation.robots.command:command",
     "check-mjcf": "fourbar_validation.check.mjcf:command",
     "published": "fourbar_validation.published.comparison:published",
     "cost": "fourbar_validation.cost.cost:cost",

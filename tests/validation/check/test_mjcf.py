@@ -50,6 +50,7 @@ from fourbar_validation.engines.mujoco.theirs import (
     examine_changed,
 )
 from fourbar_validation.engines.processes import WORKER_MEMORY
+from fourbar_validation.robots import guard
 
 CRANK_ROCKER = fourbar.load(Path(__file__).parents[3] / "models" / "crank_rocker.toml")
 GENERATED = write_mjcf(CRANK_ROCKER)
@@ -741,12 +742,12 @@ def test_ctrl_c_does_not_wait_for_the_file() -> None:
     try:
         with (
             pytest.raises(KeyboardInterrupt),
-            mjcf.examine_guarded(Path("mine.xml")) as examined,
+            guard.examine_guarded(Path("mine.xml")) as examined,
         ):
             examined(f"{__name__}:hang", BARE, "<mujoco/>", {})
     finally:
         signal.signal(signal.SIGINT, before)
-    assert time.monotonic() - began < mjcf.SECONDS / 4
+    assert time.monotonic() - began < guard.SECONDS / 4
 
 
 @pytest.mark.slow
@@ -762,11 +763,11 @@ def test_a_file_that_breaks_the_engine_is_one_line(
     what: object, word: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
-        mjcf, "SECONDS", 4.0 if what is hang else 60.0
+        guard, "SECONDS", 4.0 if what is hang else 60.0
     )  # a busy machine starts a process slowly
     with (
         pytest.raises(InputError, match=word),
-        mjcf.examine_guarded(Path("mine.xml")) as examined,
+        guard.examine_guarded(Path("mine.xml")) as examined,
     ):
         examined(f"{__name__}:{what.__name__}", BARE, "<mujoco/>", {})  # type: ignore[attr-defined]
 

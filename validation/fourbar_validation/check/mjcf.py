@@ -4,21 +4,15 @@ The file is somebody's: it is compiled and run in a process of its own, with a l
 """
 
 import math
-import os
-import tempfile
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from pkgutil import resolve_name
-from typing import Any
 
 import click
 
-from fourbar.errors import FourBarError, InputError
+from fourbar.errors import InputError
 from fourbar.quantities import UNKNOWNS
 from fourbar.scene import Scene
-from fourbar.show.tables import show_running
 from fourbar.solve import solve
 from fourbar.writing import write_text
 from fourbar_validation.check.differences import (
@@ -32,13 +26,11 @@ from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.compare import Comparison, Held
 from fourbar_validation.compare.rows import Counts, Row, make_plain, write_results
 from fourbar_validation.compare.tolerance import SIMULATED, ErrorBound, hold_simulated
-from fourbar_validation.engines.processes import WORKER_MEMORY, bound_memory
 from fourbar_validation.report.templating import render, write_number
 from fourbar_validation.report.terminal import make_table
+from fourbar_validation.robots.guard import examine_guarded
 from fourbar_validation.scenes.suites import read_scene_files
 
-SECONDS = 120.0
-"""A four-bar takes less than one."""
 ABOUT_COSTS = (
     "cost: what this one entry, as in the file, adds to the error of the generated file; of torque and pin forces that "
     "which grows most. A dash: this entry cannot be set by itself, or the file holds what it is held to"
@@ -162,54 +154,6 @@ def _list_rows(
             name, scene, answer, formulas, Held(tolerance, UNKNOWNS)
         ).rows()
     return rows
-
-
-@contextmanager
-def examine_guarded(mjcf: Path) -> Iterator[Callable[..., Any]]:
-    """Examine a file, by an adapter and its arguments, in a process that may crash, hang or run out of memory."""
-    from multiprocessing import get_context
-
-    from pebble import ProcessExpired, ProcessPool
-
-    waiting = show_running(f"MuJoCo examines the file, in {SECONDS:g} s at most")
-    with (
-        waiting,
-        ProcessPool(
-            max_workers=1, context=get_context("spawn"), initializer=_confine
-        ) as pool,
-    ):
-
-        def examined(*arguments: object) -> Any:
-            try:
-                return pool.schedule(_examine, args=arguments, timeout=SECONDS).result()
-            except FourBarError as error:
-                if not isinstance(error, InputError) or error.key != "MJCF":
-                    raise
-                raise InputError(
-                    error.key, error.value or mjcf.name, error.allowed, str(mjcf)
-                ) from None
-            except TimeoutError:
-                reason = f"MuJoCo did not come back in {SECONDS:g} s"
-            except MemoryError:
-                reason = f"asks for more than {WORKER_MEMORY // 2**30} GB of memory"
-            except ProcessExpired as error:
-                reason = f"MuJoCo crashed on it (exit code {error.exitcode})"
-            except KeyboardInterrupt:
-                pool.stop()  # type: ignore[no-untyped-call]  # or the pool would wait for the file to its time limit
-                raise
-            raise InputError("MJCF", mjcf.name, reason, str(mjcf))
-
-        yield examined
-
-
-def _confine() -> None:
-    """Bound the memory, and put MuJoCo's log where it is swept away."""
-    os.chdir(tempfile.gettempdir())
-    bound_memory()
-
-
-def _examine(adapter: str, *arguments: object) -> Any:
-    return resolve_name(adapter)(*arguments)
 
 
 def show(report: ModelReport, mjcf: Path, out: Path) -> None:

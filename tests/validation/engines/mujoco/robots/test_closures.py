@@ -1,0 +1,269 @@
+"""Closures of robots: what makes a planar four-bar, and the reason where none is made."""
+
+import math
+from dataclasses import replace
+from itertools import product
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+from fourbar.errors import InputError
+from fourbar_validation.engines.mujoco.robots.closures import (
+    choose_loop,
+    list_closures,
+)
+from fourbar_validation.engines.mujoco.robots.loop import (
+    PoseOptions,
+    RobotClosure,
+    RobotFile,
+    RobotLoop,
+    RobotReport,
+)
+from tests.support.robots import TILT, Planar, rotation
+from tests.whole.test_imports import ROOT
+
+MODELS = ROOT / "models" / "robots"
+
+
+def report_of(text: str, **options: object) -> RobotReport:
+    return list_closures(RobotFile(Path("robot.xml"), text), PoseOptions(**options))
+
+
+def closure_of(text: str, **options: object) -> RobotClosure:
+    return report_of(text, **options).closures[0]
+
+
+def loop_of(text: str, **options: object) -> RobotLoop:
+    closure = closure_of(text, **options)
+    assert closure.loop is not None, closure.reason
+    return closure.loop
+
+
+CUTS = [*product(("A", "B", "O4"), ("anchor", "site")), ("B", "weld")]
+
+
+@pytest.mark.parametrize(("cut", "by"), CUTS)
+def test_a_loop_has_the_lengths_of_its_pins_wherever_it_is_cut(
+    cut: str, by: str
+) -> None:
+    planar = Planar(cut=cut, by=by)
+    loop = loop_of(planar.text())
+    assert np.allclose(loop.lengths, planar.lengths(), rtol=1e-12)
+    assert loop.cut == (None if by == "weld" else cut)
+    names = {"O2", "A", "B", "O4"} - ({cut} if by != "weld" else set())
+    assert set(loop.hinges) == names
+    model = mujoco.MjModel.from_xml_string(planar.text())
+    assert {pin: model.joint(j).name for pin, j in loop.hinges.items()} == {
+        pin: pin for pin in names
+    }
+    assert loop.misaligned == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize(("cut", "by"), CUTS)
+def test_bars_and_pins_are_where_the_file_puts_them(cut: str, by: str) -> None:
+    planar = Planar(cut=cut, by=by)
+    loop = loop_of(planar.text())
+    model = mujoco.MjModel.from_xml_string(planar.text())
+    named = {bar: model.body(bodies[0]).name for bar, bodies in loop.bodies.items()}
+    assert named == {1: "ground", 2: "input", 3: "coupler", 4: "output"}
+    assert len(loop.bodies[3]) == (2 if by == "weld" else 1)
+    turn = rotation(TILT)
+    data = mujoco.MjData(model)
+    data.qpos[:] = loop.qpos
+    mujoco.mj_kinematics(model, data)
+    for (bar, pin), place in loop.points.items():
+        body = loop.bodies[bar][0]
+        world = data.xpos[body] + data.xmat[body].reshape(3, 3) @ place
+        expected = np.array([1.0, 2.0, 3.0]) + turn @ [*planar.pins[pin], 0.0]
+        assert np.allclose(world, expected, atol=1e-12), (bar, pin)
+    axis = data.xmat[loop.bodies[1][0]].reshape(3, 3) @ loop.axis
+    assert np.allclose(axis, turn @ [0.0, 0.0, 1.0])
+
+
+@pytest.mark.parametrize("sign", ["1", "-1"])
+def test_angles_count_from_the_horizontal_and_with_the_driven_joint(sign: str) -> None:
+    planar = Planar(axes={"O2": f"0 0 {sign}", "A": "0 0 -2"})
+    text = planar.text()
+    loop = loop_of(text)
+    # gravity in the plane points down: its angle is -90 deg
+    model = mujoco.MjModel.from_xml_string(text)
+    normal = float(sign) * rotation(TILT)[:, 2]
+    along = rotation(TILT) @ loop.along
+    gravity = model.opt.gravity - (model.opt.gravity @ normal) * normal
+    assert along @ gravity == pytest.approx(0.0, abs=1e-12)
+    assert np.cross(normal, along) @ gravity < 0.0
+    # the angles close the polygon, and turn the other way about the other axis
+    d, a, b, c = loop.lengths
+    one, two, three, four = loop.angles
+    rest = (
+        a * np.exp(1j * two)
+        + b * np.exp(1j * three)
+        - d * np.exp(1j * one)
+        - c * np.exp(1j * four)
+    )
+    assert abs(rest) < 1e-12
+    pins = {pin: complex(*place) for pin, place in planar.pins.items()}
+    between = np.angle((pins["B"] - pins["O4"]) / (pins["B"] - pins["A"]))
+    assert math.remainder(four - three - float(sign) * between, math.tau) == (
+        pytest.approx(0.0, abs=1e-12)
+    )
+    assert loop.senses["O2"] == 1.0
+    assert loop.senses["A"] == -float(sign)
+
+
+def test_bodies_without_joints_are_one_bar_and_what_hangs_on_it_is_held() -> None:
+    plate = (
+        '<body name="plate" pos="0.1 0 0"><geom size="0.01"/>'
+        '<body name="flap"><joint name="flap" axis="0 1 0"/><geom size="0.01"/></body></body>'
+    )
+    loop = loop_of(Planar(on_coupler=plate).text())
+    model = mujoco.MjModel.from_xml_string(Planar(on_coupler=plate).text())
+    held = {model.joint(joint).name for joint in loop.held}
+    assert held == {"", "flap"}  # the free joint has no name
+    assert loop.bodies[3] == (model.body("coupler").id,)
+
+
+FIVE_BAR = """
+<mujoco><worldbody><body name="base">
+<body name="a"><joint name="a" axis="0 1 0"/><geom size="0.01"/>
+ <body name="b" pos="0 0 0.1"><joint name="b" axis="0 1 0"/><geom size="0.01"/></body></body>
+<body name="c" pos="0.05 0 0"><joint name="c" axis="0 1 0"/><geom size="0.01"/>
+ <body name="d" pos="0.02 0 0.12"><joint name="d" axis="0 1 0"/><geom size="0.01"/></body></body>
+</body></worldbody>
+<equality><connect name="tip" body1="b" body2="d" anchor="0.05 0 0.08"/></equality>
+<actuator><motor name="one" joint="a"/>{more}</actuator></mujoco>
+"""
+
+
+def test_five_hinges_are_a_four_bar_once_one_is_held() -> None:
+    text = FIVE_BAR.format(more="")
+    reason = closure_of(text).reason
+    assert "five hinges and two freedoms" in reason
+    assert "--hold b (or c, d)" in reason
+    loop = loop_of(text, held=("d",))
+    model = mujoco.MjModel.from_xml_string(text)
+    assert loop.lengths == pytest.approx(
+        (0.05, 0.1, math.hypot(0.05, 0.08), math.hypot(0.0, 0.18)), abs=1e-12
+    )
+    assert model.joint(loop.joint).name == "a"
+    assert model.joint("d").id in loop.held
+
+
+def test_two_motors_are_named() -> None:
+    text = FIVE_BAR.format(more='<motor name="two" joint="c"/>')
+    assert "driven by 2 motors (one, two)" in closure_of(text).reason
+    remarks = loop_of(text, held=("d",)).remarks
+    assert "motors act on a, c: a is taken as driven" in remarks[0]
+    assert not loop_of(text, held=("d",), drive="c").remarks
+
+
+@pytest.mark.parametrize(
+    ("planar", "words"),
+    [
+        (Planar(axes={"A": "0 0.0524078 1"}), "A and O2 are 3 deg apart"),
+        (Planar(equality='active="false"'), "switched off"),
+        (Planar(by="weld", cut="B", joint='type="slide"'), "slide"),
+        (
+            Planar(
+                more='<equality><connect body1="input" body2="output" anchor="0.1 0.1 0"/></equality>'
+            ),
+            "no freedom is left",
+        ),
+    ],
+)
+def test_the_reason_is_given_where_it_is_no_four_bar(
+    planar: Planar, words: str
+) -> None:
+    closure = closure_of(planar.text())
+    assert closure.loop is None
+    assert words in closure.reason
+
+
+def test_a_weld_of_three_hinges_leaves_no_freedom() -> None:
+    text = Planar().text().replace("<connect", "<weld")
+    assert "a weld that leaves no freedom: three hinges" in closure_of(text).reason
+    pin = text.replace("<weld", '<weld torquescale="0"')
+    assert closure_of(pin).loop is not None
+
+
+def test_axes_that_a_file_rounds_are_parallel_and_measured() -> None:
+    angle = math.radians(0.05)
+    planar = Planar(axes={"A": f"0 {math.tan(angle)!r} 1"})
+    closure = closure_of(planar.text())
+    assert closure.loop is not None
+    assert closure.misaligned == pytest.approx(angle, rel=1e-9)
+    assert np.allclose(closure.loop.lengths, planar.lengths(), rtol=1e-6)
+
+
+def test_a_ball_joint_and_a_floating_body_are_named() -> None:
+    ball = Planar().text().replace('name="A" axis="0 0 1"', 'name="A" type="ball"')
+    assert "A is a ball joint" in closure_of(ball).reason
+    loose = (
+        '<mujoco><worldbody><body name="a"><freejoint name="float"/><geom size="1"/></body>'
+        "</worldbody><equality><connect body1='a' anchor='0 0 0'/></equality></mujoco>"
+    )
+    assert "float floats freely" in closure_of(loose).reason
+
+
+def test_two_connects_along_one_axis_are_one_pin() -> None:
+    second = '<connect body1="coupler" body2="output" anchor="0.22 0.09 0.02"/>'
+    text = Planar().text().replace("</equality>", f"{second}</equality>")
+    report = report_of(text)
+    one, other = report.closures
+    assert (one.name, other.name) == ("coupler-output-1", "coupler-output-2")
+    assert one.loop is not None
+    assert one.loop.closures == (0, 1)
+    assert other.loop is not None
+
+
+def test_a_joint_equality_is_a_mimic() -> None:
+    mimic = '<joint joint1="O4" joint2="O2" polycoef="0.1 0.5 0 0 0"/>'
+    text = Planar().text().replace("</equality>", f"{mimic}</equality>")
+    one, other = report_of(text).closures
+    assert other.kind == "joint"
+    assert other.loop is None
+    assert "O4 follows O2, polycoef 0.1 0.5 0 0 0" in other.reason
+    assert one.loop is not None
+    assert one.loop.other_equalities == (1,)
+
+
+def test_another_hinge_of_the_ground_can_be_the_driven_one() -> None:
+    planar = Planar()
+    loop = loop_of(planar.text(), drive="O4")
+    d, a, b, c = planar.lengths()
+    assert loop.lengths == pytest.approx((d, c, b, a))
+    assert loop.cut == "A"
+    with pytest.raises(InputError, match="drives no four-bar"):
+        loop_of(planar.text(), drive="A")
+    with pytest.raises(InputError, match="no such joint; the file has: O2"):
+        loop_of(planar.text(), drive="wheel")
+
+
+def test_a_loop_is_chosen_by_its_name() -> None:
+    closures = report_of(Planar().text()).closures
+    assert choose_loop(closures, "coupler-output") is closures[0].loop
+    with pytest.raises(InputError, match="the file has: coupler-output"):
+        choose_loop(closures, "knee")
+    spatial = report_of(replace(Planar(), axes={"A": "0 1 1"}).text()).closures
+    with pytest.raises(InputError, match="is no four-bar: the axes"):
+        choose_loop(spatial, "coupler-output")
+
+
+def test_our_robots_have_the_loops_that_they_were_made_with() -> None:
+    gripper = report_of((MODELS / "gripper.xml").read_text())
+    for closure in gripper.closures:
+        assert closure.loop is not None
+        assert closure.loop.lengths == pytest.approx((0.02, 0.06, 0.02, 0.06))
+    foot = closure_of((MODELS / "biped_foot.xml").read_text())
+    assert foot.loop is not None
+    # crank (-0.02, 0.31) on the ground, ankle at the origin, heel (-0.064, -0.006)
+    assert foot.loop.lengths == pytest.approx(
+        (
+            math.hypot(0.02, 0.31),
+            0.045,
+            math.hypot(0.001, 0.316),
+            math.hypot(0.064, 0.006),
+        )
+    )

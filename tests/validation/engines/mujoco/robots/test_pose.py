@@ -1,0 +1,112 @@
+"""Poses of robots: the file's own, stated ones, and the loops closed again around them."""
+
+import math
+
+import mujoco
+import numpy as np
+import pytest
+
+from fourbar.errors import InputError
+from fourbar_validation.engines.mujoco.robots.loop import PoseOptions
+from fourbar_validation.engines.mujoco.robots.pose import pose_robot
+from tests.support.robots import Planar
+from tests.whole.test_imports import ROOT
+
+FOOT = ROOT / "models" / "robots" / "biped_foot.xml"
+
+
+def compiled(text: str) -> mujoco.MjModel:
+    return mujoco.MjModel.from_xml_string(text)
+
+
+def gap(model: mujoco.MjModel, qpos: np.ndarray) -> float:
+    """Distance of the two sites of the first equality, m."""
+    data = mujoco.MjData(model)
+    data.qpos[:] = qpos
+    mujoco.mj_kinematics(model, data)
+    one, two = (data.site_xpos[i[0]] for i in (model.eq_obj1id, model.eq_obj2id))
+    return float(np.linalg.norm(one - two))
+
+
+def test_the_rest_pose_of_a_closed_file_stays() -> None:
+    model = compiled(Planar(by="site").text())
+    posed = pose_robot(model, PoseOptions())
+    assert np.array_equal(posed.data.qpos, model.qpos0)
+    assert not posed.notes
+
+
+def test_a_stated_joint_stays_and_the_loop_closes_around_it() -> None:
+    model = compiled(FOOT.read_text())
+    joints = {"crank": "20deg", "knee": "60 deg"}
+    posed = pose_robot(model, PoseOptions(joints=joints))
+    at = {name: posed.data.qpos[model.joint(name).qposadr[0]] for name in joints}
+    assert at == {
+        "crank": pytest.approx(math.radians(20.0)),
+        "knee": pytest.approx(math.radians(60.0)),
+    }
+    assert gap(model, posed.stated) > 0.01
+    assert gap(model, posed.data.qpos) < 1e-9
+    ankle = posed.data.qpos[model.joint("ankle").qposadr[0]]
+    low, high = model.joint("ankle").range
+    assert low <= ankle <= high
+    still = [
+        0,
+        1,
+        2,
+        3,
+        4,
+        5,
+        6,
+        *(model.joint(n).qposadr[0] for n in ("hip_roll", "toe")),
+    ]
+    assert np.array_equal(posed.data.qpos[still], model.qpos0[still])
+    assert any("rod, ankle moved" in note for note in posed.notes)
+
+
+def test_a_rest_pose_outside_the_ranges_is_closed_inside_them() -> None:
+    text = FOOT.read_text().replace('range="-70 60"', 'range="15 60"')
+    model = compiled(text)
+    posed = pose_robot(model, PoseOptions())
+    crank = posed.data.qpos[model.joint("crank").qposadr[0]]
+    assert math.radians(15.0) - 1e-9 <= crank <= math.radians(60.0)
+    assert gap(model, posed.data.qpos) < 1e-9
+    assert "crank is outside its range in the rest pose" in posed.notes[0]
+
+
+def test_a_keyframe_is_a_pose() -> None:
+    model = compiled(FOOT.read_text())
+    posed = pose_robot(model, PoseOptions(key="crouch"))
+    assert posed.data.qpos[2] == 0.82
+    assert posed.data.qpos[model.joint("knee").qposadr[0]] == 1.0
+    same = pose_robot(model, PoseOptions(key="0"))
+    assert np.array_equal(same.data.qpos, posed.data.qpos)
+    with pytest.raises(InputError, match="no such keyframe; the file has: crouch"):
+        pose_robot(model, PoseOptions(key="jump"))
+
+
+def test_a_pose_that_cannot_close_says_what_is_left() -> None:
+    model = compiled(FOOT.read_text().replace('pos="0.001 -0.316 0"', 'pos="0 -0.6 0"'))
+    posed = pose_robot(model, PoseOptions())
+    assert any("no pose near this one closes all loops" in note for note in posed.notes)
+
+
+@pytest.mark.parametrize(
+    ("joints", "words"),
+    [
+        ({"crank": "20"}, 'did you mean "20deg"'),
+        ({"crank": "20 mm"}, "crank"),
+        ({"wheel": "20deg"}, "no such joint"),
+    ],
+)
+def test_what_is_no_position_is_refused(joints: dict[str, str], words: str) -> None:
+    model = compiled(FOOT.read_text())
+    with pytest.raises(InputError, match=words):
+        pose_robot(model, PoseOptions(joints=joints))
+
+
+def test_held_joints_do_not_close_the_loop() -> None:
+    model = compiled(FOOT.read_text())
+    options = PoseOptions(joints={"crank": "10deg"}, held=("ankle", "rod"))
+    posed = pose_robot(model, options)
+    rod = model.joint("rod").qposadr[0]
+    assert posed.data.qpos[rod] == model.qpos0[rod]

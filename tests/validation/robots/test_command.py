@@ -1,0 +1,46 @@
+"""The command `loops` as it is called."""
+
+import pytest
+from click.testing import CliRunner
+
+from fourbar.errors import InputError
+from fourbar_validation.robots.command import command
+from fourbar_validation.robots.options import read_pose
+from tests.whole.test_imports import ROOT
+
+MODELS = ROOT / "models" / "robots"
+
+
+@pytest.mark.slow
+def test_a_line_for_each_closure() -> None:
+    arguments = [str(MODELS / "gripper.xml")]
+    result = CliRunner().invoke(command, arguments, standalone_mode=False)
+    assert result.exception is None
+    right, left = result.output.splitlines()
+    assert right == (
+        "right_finger-right_follower: connect; ground palm; hinges right_finger, "
+        "right_driver, right_follower; ground 20.00, input 60.00, coupler 20.00, "
+        "output 60.00 mm; axes 0 deg apart; gap 0 mm; solref 0.02 1; "
+        "solimp 0.9 0.95 0.001 0.5 2"
+    )
+    assert left.startswith("left_finger-left_follower: connect; ground palm;")
+
+
+@pytest.mark.slow
+def test_the_gap_is_that_of_the_stated_pose() -> None:
+    arguments = [str(MODELS / "biped_foot.xml"), "--pose", "crank=20deg,knee=30deg"]
+    result = CliRunner().invoke(command, arguments, standalone_mode=False)
+    line, note = result.output.splitlines()
+    assert line.startswith("rod: connect; ground ankle_frame; hinges rod, crank, ankle")
+    # the crank turned by 20 deg carries the rod's end along: 2 . 0.31905 m sin(10 deg)
+    assert "gap 110.8 mm" in line
+    assert note.startswith("note: the loops are closed again by least squares")
+
+
+def test_a_pose_is_read_from_pairs() -> None:
+    options = read_pose(("knee=20deg, hip=1rad", "slide=3mm"), "home", ("a,b",), "c")
+    assert options.joints == {"knee": "20deg", "hip": "1rad", "slide": "3mm"}
+    assert options.held == ("a", "b")
+    assert (options.key, options.drive) == ("home", "c")
+    with pytest.raises(InputError, match="must be like JOINT=20deg"):
+        read_pose(("knee",), None, (), None)

@@ -1,0 +1,146 @@
+"""A robot's file with its includes and meshes: what is read, left out and refused."""
+
+from pathlib import Path
+
+import pytest
+
+from fourbar.errors import InputError
+from fourbar_validation.engines.mujoco.robots.compiled import (
+    compile_robot,
+    require_masses,
+)
+from fourbar_validation.robots.files import read_robot
+
+TETRAHEDRON = (
+    "v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nv 0 0 0.1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+)
+VOLUME = 1e-3 / 6.0
+"""m^3, of the tetrahedron."""
+
+ROBOT = """
+<mujoco>
+  <compiler meshdir="{meshdir}"/>
+  <include file="{include}"/>
+  <asset><texture name="t" type="2d" file="paint.png"/><material name="m" texture="t"/>
+    <mesh file="part.obj"/></asset>
+  <worldbody><body name="arm"><joint name="arm" axis="0 1 0"/>{inertial}
+    <geom type="mesh" mesh="part" material="m" density="1000"/></body></worldbody>
+</mujoco>
+"""
+INERTIAL = '<inertial pos="0 0 0" mass="2" diaginertia="1 1 1"/>'
+
+
+def make(
+    folder: Path,
+    *,
+    meshdir: str = "assets",
+    include: str = "options.xml",
+    inertial: str = "",
+) -> Path:
+    """Write the robot with an include into a folder."""
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / "robot.xml"
+    path.write_text(ROBOT.format(meshdir=meshdir, include=include, inertial=inertial))
+    options = '<mujocoinclude><option timestep="0.004"/></mujocoinclude>'
+    (folder / "options.xml").write_text(options)
+    return path
+
+
+def test_includes_and_meshes_of_its_folder_are_read(tmp_path: Path) -> None:
+    path = make(tmp_path)
+    (tmp_path / "assets").mkdir()
+    (tmp_path / "assets" / "part.obj").write_text(TETRAHEDRON)
+    model = compile_robot(read_robot(path)).model
+    assert model.opt.timestep == 0.004
+    assert model.body("arm").mass[0] == pytest.approx(1000.0 * VOLUME)
+
+
+@pytest.mark.parametrize("where", ["beside", "assets"])
+def test_meshes_beside_it_and_of_the_option_are_read(
+    tmp_path: Path, where: str
+) -> None:
+    path = make(tmp_path / "robot", meshdir="../meshes" if where == "beside" else "")
+    elsewhere = tmp_path / ("meshes" if where == "beside" else "far/away")
+    elsewhere.mkdir(parents=True)
+    (elsewhere / "part.obj").write_text(TETRAHEDRON)
+    file = read_robot(path, None if where == "beside" else elsewhere)
+    assert not file.missing
+    assert compile_robot(file).model.nmesh == 1
+
+
+def test_a_missing_mesh_is_left_out_where_the_inertial_is_stated(
+    tmp_path: Path,
+) -> None:
+    robot = compile_robot(read_robot(make(tmp_path, inertial=INERTIAL)))
+    assert robot.model.body("arm").mass[0] == 2.0
+    assert not robot.unknown_masses
+    assert robot.notes == ("meshes that are missing are left out: part.obj",)
+
+
+def test_a_missing_mesh_that_is_the_mass_is_said(tmp_path: Path) -> None:
+    robot = compile_robot(read_robot(make(tmp_path)))
+    body = robot.model.body("arm").id
+    assert robot.unknown_masses == (body,)
+    assert "masses of arm are unknown" in robot.notes[1]
+    with pytest.raises(InputError, match="--assets DIR"):
+        require_masses(robot, {body})
+    require_masses(robot, set())
+
+
+def test_no_file_outside_is_opened(tmp_path: Path) -> None:
+    home = tmp_path / "a" / "b"
+    (tmp_path / "secret.xml").write_text("<mujocoinclude/>")
+    (tmp_path / "part.obj").write_text(TETRAHEDRON)
+    for name in ("../../secret.xml", str(tmp_path / "secret.xml")):
+        path = make(home, include=name)
+        with pytest.raises(InputError, match="is not there; it must lie in"):
+            read_robot(path)
+    file = read_robot(make(home, meshdir=str(tmp_path)))
+    assert list(file.missing.values()) == ["part.obj"]
+    link = home / "link.obj"
+    link.symlink_to(tmp_path / "part.obj")
+    path = make(home, meshdir="")
+    path.write_text(path.read_text().replace("part.obj", "link.obj"))
+    assert list(read_robot(path).missing.values()) == ["link.obj"]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("<mujoco><include file='robot.xml'/></mujoco>", "nested deeper than 100"),
+        ("<mujoco><extension/></mujoco>", "mj_saveLastXML"),
+        ("<mujoco><asset><model file='x.xml'/></asset></mujoco>", "names a file"),
+        ("<mujoco><option iterations='100000'/></mujoco>", "whole number up to 1000"),
+        ("<!DOCTYPE x><mujoco/>", "no document type"),
+        ("<robot/>", "outermost element is <mujoco>"),
+        ("<mujoco>", "no XML"),
+        ("<mujoco>" + 200 * "<body>" + 200 * "</body>" + "</mujoco>", "deeper"),
+    ],
+)
+def test_what_a_file_may_not_hold_is_one_line(
+    tmp_path: Path, text: str, words: str
+) -> None:
+    path = tmp_path / "robot.xml"
+    path.write_text(text)
+    with pytest.raises(InputError, match=words) as caught:
+        read_robot(path)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_complaint_of_the_compiler_is_one_line(tmp_path: Path) -> None:
+    path = tmp_path / "robot.xml"
+    path.write_text("<mujoco><worldbody><body><joint/></body></worldbody></mujoco>")
+    with pytest.raises(InputError, match="does not compile it") as caught:
+        compile_robot(read_robot(path))
+    assert "\n" not in str(caught.value)
+
+
+def test_height_fields_are_left_out_and_said(tmp_path: Path) -> None:
+    path = tmp_path / "robot.xml"
+    path.write_text(
+        "<mujoco><asset><hfield name='h' file='hills.png' size='1 1 1 1'/></asset><worldbody>"
+        "<geom type='hfield' hfield='h'/></worldbody></mujoco>"
+    )
+    file = read_robot(path)
+    assert file.notes == ("height fields are left out",)
+    assert compile_robot(file).model.ngeom == 0

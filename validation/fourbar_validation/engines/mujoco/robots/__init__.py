@@ -1,0 +1,1 @@
+"""Closed loops in a robot's own MJCF: compiled, posed, recognised and described."""

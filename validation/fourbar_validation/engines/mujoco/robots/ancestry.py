@@ -1,0 +1,63 @@
+"""Bodies of a model and the joints between them."""
+
+import mujoco
+
+
+def find_parent(model: mujoco.MjModel, body: int) -> int:
+    """Return the body that carries another."""
+    return int(model.body_parentid[body])
+
+
+def climb(model: mujoco.MjModel, body: int) -> list[int]:
+    """List a body and its ancestors up to the world."""
+    bodies = [body]
+    while bodies[-1]:
+        bodies.append(find_parent(model, bodies[-1]))
+    return bodies
+
+
+def list_joints(model: mujoco.MjModel, body: int) -> range:
+    """List the joints of a body in the order in which they turn it."""
+    start = int(model.body_jntadr[body])
+    return range(start, start + int(model.body_jntnum[body]))
+
+
+def find_roots(model: mujoco.MjModel, held: set[int]) -> list[int]:
+    """Return for each body the highest one that it is rigidly joined to, if some joints are held."""
+    roots = [0]
+    for body in range(1, model.nbody):
+        moves = any(joint not in held for joint in list_joints(model, body))
+        roots.append(body if moves else roots[find_parent(model, body)])
+    return roots
+
+
+def find_common(model: mujoco.MjModel, first: int, second: int) -> int:
+    """Return the nearest body that carries both of two bodies, or is one of them."""
+    above = set(climb(model, second))
+    return next(body for body in climb(model, first) if body in above)
+
+
+def list_joints_between(model: mujoco.MjModel, first: int, second: int) -> list[int]:
+    """List the joints on the ways from two bodies to their common ancestor."""
+    common = find_common(model, first, second)
+    joints: list[int] = []
+    for end in (first, second):
+        for body in climb(model, end):
+            if body == common:
+                break
+            joints += list_joints(model, body)
+    return joints
+
+
+def find_tied_bodies(model: mujoco.MjModel, equality: int) -> tuple[int, int]:
+    """Return the two bodies of a connect or a weld."""
+    objects = (int(model.eq_obj1id[equality]), int(model.eq_obj2id[equality]))
+    if model.eq_objtype[equality] == mujoco.mjtObj.mjOBJ_SITE:
+        first, second = (int(model.site_bodyid[site]) for site in objects)
+        return first, second
+    return objects
+
+
+def name_joint(model: mujoco.MjModel, joint: int) -> str:
+    """Name a joint: as the file does, or by its number."""
+    return model.joint(joint).name or f"joint {joint}"

@@ -1,0 +1,680 @@
+"""The closures of a robot: from both bodies of each equality to their common ancestor.
+
+A planar four-bar is three hinges with parallel axes on the way and a connect, which is the
+fourth pin; or four hinges and a weld, which joins two halves of a bar. Bodies that no joint
+parts, or a held one, are one bar.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import mujoco
+import numpy as np
+
+from fourbar.errors import InputError
+from fourbar_validation.compare.answer import Array
+from fourbar_validation.engines.mujoco.robots.ancestry import (
+    climb,
+    find_common,
+    find_parent,
+    find_roots,
+    find_tied_bodies,
+    list_joints,
+    name_joint,
+)
+from fourbar_validation.engines.mujoco.robots.compiled import compile_robot
+from fourbar_validation.engines.mujoco.robots.loop import (
+    PAIRS,
+    PoseOptions,
+    RobotClosure,
+    RobotFile,
+    RobotLoop,
+    RobotReport,
+)
+from fourbar_validation.engines.mujoco.robots.pose import (
+    BALL,
+    FREE,
+    HINGE,
+    OPEN,
+    SLIDE,
+    PosedRobot,
+    find_joint,
+    pose_robot,
+)
+
+PARALLEL = math.radians(0.5)
+"""Axes further apart make no planar linkage: forces across the plane reach a hundredth."""
+COINCIDE = 1e-6
+"""Two pins are one where they are nearer than this part of the longest bar."""
+LEVEL = 1e-6
+"""Part of gravity below which a plane is level."""
+PINS_OF_BAR = {1: ("O2", "O4"), 2: ("O2", "A"), 3: ("A", "B"), 4: ("O4", "B")}
+"""Pins at both ends of each bar, that which its angle is counted at first."""
+KINDS = {
+    int(getattr(mujoco.mjtEq, f"mjEQ_{name.upper()}")): name
+    for name in ("connect", "weld", "joint", "tendon")
+}
+NUMBERS = {
+    1: "one hinge",
+    2: "two hinges",
+    3: "three hinges",
+    4: "four hinges",
+    5: "five hinges",
+    6: "six hinges",
+    7: "seven hinges",
+}
+
+
+def list_closures(file: RobotFile, options: PoseOptions) -> RobotReport:
+    """Compile a robot's file, pose it, and describe each of its equalities."""
+    compiled = compile_robot(file)
+    posed = pose_robot(compiled.model, options)
+    return RobotReport(
+        tuple(find_closures(posed, options)), (*compiled.notes, *posed.notes)
+    )
+
+
+def find_closures(posed: PosedRobot, options: PoseOptions) -> list[RobotClosure]:
+    """Describe each equality of a posed robot, in the order of the file.
+
+    Raises
+    ------
+    InputError : a joint that is held or drives is none of the robot's, or drives no loop.
+    """
+    finder = _Finder(posed, options)
+    closures = [finder.describe(number) for number in range(posed.model.neq)]
+    if options.drive is not None:
+        joint = find_joint(posed.model, options.drive, "--drive")
+        loops = [closure.loop for closure in closures if closure.loop is not None]
+        if not any(joint == loop.joint for loop in loops):
+            raise InputError(
+                "--drive",
+                options.drive,
+                "drives no four-bar: it must be a hinge of one, on its ground",
+            )
+    return closures
+
+
+def choose_loop(closures: Sequence[RobotClosure], name: str) -> RobotLoop:
+    """Return the four-bar of a closure by its name, or raise an InputError that says why there is none."""
+    for closure in closures:
+        if closure.name == name:
+            if closure.loop is None:
+                raise InputError("--loop", name, f"is no four-bar: {closure.reason}")
+            return closure.loop
+    names = ", ".join(closure.name for closure in closures)
+    raise InputError(
+        "--loop", name, f"no such closure; the file has: {names or 'none'}"
+    )
+
+
+def describe_closure(posed: PosedRobot, number: int) -> str:
+    """Name an equality: as the file does, or by the two bodies, joints or tendons that it ties."""
+    model = posed.model
+    if model.equality(number).name:
+        return str(model.equality(number).name)
+    kind = KINDS.get(int(model.eq_type[number]))
+    first, second = int(model.eq_obj1id[number]), int(model.eq_obj2id[number])
+    if kind in ("connect", "weld"):
+        names = [name_body(model, end.body) for end in find_ends(posed, number)]
+    elif kind == "joint":
+        names = [name_joint(model, i) for i in (first, second) if i >= 0]
+    else:
+        return f"equality {number}"
+    return "-".join(names)
+
+
+def name_body(model: mujoco.MjModel, body: int) -> str:
+    """Name a body; the world is its own."""
+    return model.body(body).name or f"body {body}"
+
+
+@dataclass(frozen=True, slots=True)
+class ClosureEnd:
+    """One end of a connect or a weld."""
+
+    body: int
+    place: Array
+    """In world axes in the pose, (3,), m."""
+
+
+def find_ends(posed: PosedRobot, number: int) -> tuple[ClosureEnd, ClosureEnd]:
+    """Locate both ends of a connect or a weld."""
+    model, data = posed.model, posed.data
+    bodies = find_tied_bodies(model, number)
+    if model.eq_objtype[number] == mujoco.mjtObj.mjOBJ_SITE:
+        sites = (int(model.eq_obj1id[number]), int(model.eq_obj2id[number]))
+        first, second = (
+            ClosureEnd(body, data.site_xpos[site].copy())
+            for body, site in zip(bodies, sites, strict=True)
+        )
+        return first, second
+    anchors = [model.eq_data[number, 0:3], model.eq_data[number, 3:6]]
+    if model.eq_type[number] == mujoco.mjtEq.mjEQ_WELD:
+        anchors.reverse()  # it keeps the second body's anchor first
+    first, second = (
+        ClosureEnd(body, data.xpos[body] + data.xmat[body].reshape(3, 3) @ anchor)
+        for body, anchor in zip(bodies, anchors, strict=True)
+    )
+    return first, second
+
+
+class _Chain:
+    """Joints from one end of a closure over the common ancestor to the other, and the bars between them."""
+
+    def __init__(self, finder: "_Finder", first: int, second: int) -> None:
+        self.model = finder.model
+        ups = [climb(self.model, body) for body in (first, second)]
+        common = find_common(self.model, first, second)
+        self.ground = finder.root[common]
+        self.ground_name = name_body(self.model, common)
+        self.joints: list[int] = []
+        self.bars: list[int | None] = [finder.root[first]]
+        """One more than joints; None: the joint hangs on another of the same body."""
+        sides = []
+        for up in ups:
+            side = []
+            for body in up[: up.index(common)]:
+                joints = list_joints(self.model, body)
+                moving = [joint for joint in joints if joint not in finder.held]
+                for place, joint in reversed(list(enumerate(moving))):
+                    bearer = (
+                        None if place else finder.root[find_parent(self.model, body)]
+                    )
+                    side.append((joint, finder.root[body], bearer))
+            sides.append(side)
+        for joint, _, bearer in sides[0]:
+            self.joints.append(joint)
+            self.bars.append(bearer)
+        self.up = len(sides[0])
+        downward = list(reversed(sides[1]))
+        for place, (joint, _, _) in enumerate(downward):
+            self.joints.append(joint)
+            deeper = downward[place + 1][2] if place + 1 < len(downward) else None
+            last = place + 1 == len(downward)
+            self.bars.append(finder.root[second] if last else deeper)
+
+    @property
+    def kinds(self) -> list[int]:
+        """Types of the joints."""
+        return [int(self.model.jnt_type[joint]) for joint in self.joints]
+
+
+class _Finder:
+    """Four-bars of one posed model."""
+
+    def __init__(self, posed: PosedRobot, options: PoseOptions) -> None:
+        self.posed, self.options = posed, options
+        self.model, self.data = posed.model, posed.data
+        self.held = {find_joint(self.model, name, "--hold") for name in options.held}
+        self.root = find_roots(self.model, self.held)
+        self.before = mujoco.MjData(self.model)
+        self.before.qpos[:] = posed.stated
+        mujoco.mj_kinematics(self.model, self.before)
+        self.stated = PosedRobot(self.model, self.before, posed.stated, ())
+
+    def describe(self, number: int) -> RobotClosure:
+        """Describe one equality."""
+        model = self.model
+        name = self._name(number)
+        kind = KINDS.get(int(model.eq_type[number]), "flex")
+        solref = tuple(model.eq_solref[number].tolist())
+        solimp = tuple(model.eq_solimp[number].tolist())
+        if kind == "joint":
+            text = self._describe_mimic(number)
+            return RobotClosure(name, kind, None, text, solref=solref, solimp=solimp)
+        if kind not in ("connect", "weld"):
+            text = f"a {kind} equality is no pin"
+            return RobotClosure(name, kind, None, text, solref=solref, solimp=solimp)
+        gap, left = (
+            float(np.linalg.norm(first.place - second.place))
+            for first, second in (
+                find_ends(self.stated, number),
+                find_ends(self.posed, number),
+            )
+        )
+        first, second = find_ends(self.posed, number)
+        chain = _Chain(self, first.body, second.body)
+        hinges = tuple(name_joint(model, j) for j in chain.joints)
+        loop, reason = self._recognise(number, name, chain)
+        is_pin = self._is_pin(number)
+        return RobotClosure(
+            name,
+            kind,
+            loop,
+            reason,
+            chain.ground_name,
+            hinges,
+            self._measure_axes(chain)[0],
+            gap if is_pin else None,
+            left if is_pin else None,
+            solref,
+            solimp,
+        )
+
+    def _name(self, number: int) -> str:
+        """Name an equality so that no other has the same name."""
+        name = describe_closure(self.posed, number)
+        names = [describe_closure(self.posed, other) for other in range(self.model.neq)]
+        same = [other for other, text in enumerate(names) if text == name]
+        return name if len(same) == 1 else f"{name}-{same.index(number) + 1}"
+
+    def _is_pin(self, number: int) -> bool:
+        """Return True for a connect, and for a weld that lets its bodies turn."""
+        if self.model.eq_type[number] == mujoco.mjtEq.mjEQ_CONNECT:
+            return True
+        return bool(self.model.eq_data[number, 10] == 0.0)  # torquescale
+
+    def _describe_mimic(self, number: int) -> str:
+        """Write which joint follows which, by which polynomial."""
+        model = self.model
+        first, second = int(model.eq_obj1id[number]), int(model.eq_obj2id[number])
+        coefficients = " ".join(f"{c:.6g}" for c in model.eq_data[number, :5])
+        follower = name_joint(model, first)
+        if second < 0:
+            return f"{follower} is kept at {coefficients.split()[0]} of its rest"
+        leader = name_joint(model, second)
+        return (
+            f"{follower} follows {leader}, polycoef {coefficients}: no loop is closed"
+        )
+
+    def _recognise(
+        self, number: int, name: str, chain: _Chain
+    ) -> tuple[RobotLoop | None, str]:
+        """Return the four-bar of a closure, or the reason why it is none."""
+        model = self.model
+        if not model.eq_active0[number]:
+            return None, 'it is switched off in the file (active="false")'
+        if not chain.joints:
+            return None, "both ends are on one rigid body"
+        reason = self._find_other_joint(chain) or self._find_skew_axes(chain)
+        if reason:
+            return None, reason
+        is_pin = self._is_pin(number)
+        hinges = len(chain.joints) + is_pin
+        if hinges != 4:
+            return None, self._explain_count(chain, hinges, number, is_pin=is_pin)
+        if None in chain.bars:
+            return None, "two of its hinges are on one body: a bar has no body"
+        return self._make_loop(number, name, chain, is_pin=is_pin)
+
+    def _find_other_joint(self, chain: _Chain) -> str:
+        words = {
+            FREE: "floats freely",
+            BALL: "is a ball joint: the loop is spatial",
+            SLIDE: "is a slide: the loop is a slider-crank or of its kin",
+        }
+        for joint, kind in zip(chain.joints, chain.kinds, strict=True):
+            if kind != HINGE:
+                name = name_joint(self.model, joint)
+                return f"{name} {words[kind]}"
+        return ""
+
+    def _measure_axes(self, chain: _Chain) -> tuple[float | None, str]:
+        """Return the largest angle between two hinges' axes, rad, and which two."""
+        hinges = [
+            joint
+            for joint, kind in zip(chain.joints, chain.kinds, strict=True)
+            if kind == HINGE
+        ]
+        largest: tuple[float, str] | None = None
+        for one, other in combinations(hinges, 2):
+            across = np.cross(self.data.xaxis[one], self.data.xaxis[other])
+            angle = math.asin(min(1.0, float(np.linalg.norm(across))))
+            if largest is None or angle > largest[0]:
+                names = (name_joint(self.model, j) for j in (one, other))
+                largest = (angle, " and ".join(names))
+        return (None, "") if largest is None else largest
+
+    def _find_skew_axes(self, chain: _Chain) -> str:
+        angle, names = self._measure_axes(chain)
+        if angle is None or angle <= PARALLEL:
+            return ""
+        return (
+            f"the axes of {names} are {math.degrees(angle):.3g} deg apart: "
+            "the loop is spatial"
+        )
+
+    def _explain_count(
+        self, chain: _Chain, hinges: int, number: int, *, is_pin: bool
+    ) -> str:
+        """Say what another number of hinges makes, and what would make it a four-bar."""
+        freedoms = hinges - 3
+        names = [name_joint(self.model, j) for j in chain.joints]
+        count = NUMBERS.get(hinges, f"{hinges} hinges")
+        if freedoms <= 0:
+            closer = "" if is_pin else "a weld that leaves no freedom: "
+            return f"{closer}{count} in a plane cannot move"
+        motors = self._list_motors(chain.joints)
+        driven = {joint for joint, _ in motors}
+        candidates = [
+            name
+            for joint, name in zip(chain.joints, names, strict=True)
+            if joint not in driven
+        ] or names
+        shared = self._list_shared(chain, number)
+        also = f"; {shared}" if shared else ""
+        by = (
+            f", driven by {len(motors)} motors "
+            f"({', '.join(self.model.actuator(i).name or str(i) for _, i in motors)})"
+            if len(motors) > 1
+            else ""
+        )
+        if freedoms == 2:
+            which = f"--hold {candidates[0]}"
+            others = candidates[1:]
+            which += f" (or {', '.join(others)})" if others else ""
+            return f"{count} and two freedoms{by}; {which} makes it a four-bar{also}"
+        return (
+            f"{count} and {freedoms} freedoms{by}; {freedoms - 1} of "
+            f"{', '.join(candidates)} held (--hold) make it a four-bar{also}"
+        )
+
+    def _list_shared(self, chain: _Chain, number: int) -> str:
+        """Name other closures that tie bodies of the chain: together they may be a six-bar."""
+        bars = {bar for bar in chain.bars if bar is not None} - {chain.ground}
+        names = []
+        for other in range(self.model.neq):
+            if other == number or KINDS.get(int(self.model.eq_type[other])) not in (
+                "connect",
+                "weld",
+            ):
+                continue
+            ends = find_ends(self.posed, other)
+            carried = {self._find_bar(end.body, bars) for end in ends}
+            if len(carried - {None}) and len(carried) > 1:
+                names.append(self._name(other))
+        return f"{', '.join(names)} ties its bars too" if names else ""
+
+    def _find_bar(self, body: int, bars: set[int]) -> int | None:
+        """Return the bar that carries a body, however far down; None where none does."""
+        while body:
+            if self.root[body] in bars:
+                return self.root[body]
+            body = find_parent(self.model, body)
+        return None
+
+    def _list_motors(self, joints: Sequence[int]) -> list[tuple[int, int]]:
+        """List (joint, actuator) of what takes a control and acts on these joints."""
+        model, transmission = self.model, mujoco.mjtTrn
+        motors = []
+        for number in range(model.nu):
+            kind = transmission(int(model.actuator_trntype[number]))
+            target = int(model.actuator_trnid[number, 0])
+            if not model.actuator_gainprm[number].any():
+                continue  # it takes no control: a load
+            if kind in (transmission.mjTRN_JOINT, transmission.mjTRN_JOINTINPARENT):
+                acted = [target]
+            elif kind == transmission.mjTRN_TENDON:
+                acted = self._list_joints_of_tendon(target)
+            else:
+                acted = []
+            motors += [(joint, number) for joint in acted if joint in joints]
+        return motors
+
+    def _list_joints_of_tendon(self, tendon: int) -> list[int]:
+        start = int(self.model.tendon_adr[tendon])
+        wraps = range(start, start + int(self.model.tendon_num[tendon]))
+        return [
+            int(self.model.wrap_objid[wrap])
+            for wrap in wraps
+            if self.model.wrap_type[wrap] == mujoco.mjtWrap.mjWRAP_JOINT
+        ]
+
+    def _make_loop(
+        self, number: int, name: str, chain: _Chain, *, is_pin: bool
+    ) -> tuple[RobotLoop | None, str]:
+        """Lay a closed chain of four pins out as ground, input, coupler and output."""
+        pins: list[int | None] = [*chain.joints]
+        groups: list[tuple[int, ...]]
+        groups = [(bar,) for bar in chain.bars if bar is not None]
+        if is_pin:
+            pins.append(None)
+        else:  # its halves are one bar
+            halves = {*groups[0], *groups.pop()}
+            groups[0] = tuple(sorted(halves, key=lambda body: body != chain.ground))
+        # bar i lies between pin i - 1 and pin i
+        at_ground = next(i for i, bars in enumerate(groups) if chain.ground in bars)
+        groups = groups[at_ground:] + groups[:at_ground]
+        pins = pins[at_ground:] + pins[:at_ground]
+        motors = self._list_motors(chain.joints)
+        remarks: list[str] = []
+        # the ground lies between the pins at the end and at the beginning
+        driven, text = self._choose_driven(pins[0], pins[-1], motors, chain)
+        remarks += text
+        if driven != pins[0]:
+            groups = [groups[0], *reversed(groups[1:])]
+            pins = list(reversed(pins))
+        by_pin = dict(zip(PAIRS, pins, strict=True))
+        hinges = {pin: joint for pin, joint in by_pin.items() if joint is not None}
+        bodies = dict(zip((1, 2, 3, 4), groups, strict=True))
+        layout = _Layout(self, bodies, hinges, number)
+        cut = next((pin for pin, joint in by_pin.items() if joint is None), None)
+        reason = layout.measure(cut)
+        if reason:
+            return None, reason
+        closures, tied = self._sort_equalities(number, bodies, layout, cut)
+        rigid = [other for other in tied if isinstance(other, str)]
+        if rigid:
+            return None, rigid[0]
+        remarks += layout.remarks
+        moving = set(hinges.values())
+        return (
+            RobotLoop(
+                name=name,
+                equality=number,
+                closures=tuple(closures),
+                cut=cut,
+                bodies=bodies,
+                hinges=hinges,
+                senses=layout.senses,
+                points=layout.points,
+                axis=layout.axis,
+                along=layout.along,
+                misaligned=self._measure_axes(chain)[0] or 0.0,
+                lengths=layout.lengths,
+                angles=layout.angles,
+                qpos=self.data.qpos.copy(),
+                held=tuple(j for j in range(self.model.njnt) if j not in moving),
+                motors=tuple(dict.fromkeys(actuator for _, actuator in motors)),
+                other_equalities=tuple(
+                    other for other in tied if isinstance(other, int)
+                ),
+                remarks=tuple(remarks),
+            ),
+            "",
+        )
+
+    def _choose_driven(
+        self,
+        first: int | None,
+        last: int | None,
+        motors: list[tuple[int, int]],
+        chain: _Chain,
+    ) -> tuple[int, list[str]]:
+        """Choose the driven hinge among those of the ground; say so where no motor decides it."""
+        model = self.model
+        at_ground = [joint for joint in (first, last) if joint is not None]
+        if self.options.drive is not None:
+            stated = find_joint(model, self.options.drive, "--drive")
+            if stated in at_ground:
+                return stated, []
+        driven = [joint for joint, _ in motors]
+        names = ", ".join(dict.fromkeys(name_joint(model, joint) for joint in driven))
+        chosen = next((joint for joint in driven if joint in at_ground), None)
+        if chosen is not None:
+            if len(set(driven)) == 1:
+                return chosen, []
+            text = (
+                f"motors act on {names}: {name_joint(model, chosen)} is taken as driven"
+            )
+            return chosen, [f"{text} (--drive states another)"]
+        chosen = at_ground[0]
+        taken = (
+            f"{name_joint(model, chosen)} is taken as driven (--drive states another)"
+        )
+        if driven:
+            return chosen, [
+                f"the motor on {names} acts between two moving bars: {taken}"
+            ]
+        return chosen, [f"no motor acts on it: {taken}"]
+
+    def _sort_equalities(
+        self,
+        number: int,
+        bodies: dict[int, tuple[int, ...]],
+        layout: "_Layout",
+        cut: str | None,
+    ) -> tuple[list[int], list[int | str]]:
+        """Return the equalities that hold the closing pin, and others that act on the moving bars.
+
+        A text among the others says that one leaves the loop no freedom.
+        """
+        model = self.model
+        bars = {root: bar for bar, roots in bodies.items() for root in roots}
+        moving = {root for root, bar in bars.items() if bar != 1}
+        closures: list[int] = [number]
+        others: list[int | str] = []
+        pins = set(layout.hinges.values())
+        for other in range(model.neq):
+            kind = KINDS.get(int(model.eq_type[other]))
+            if other == number or not model.eq_active0[other]:
+                continue
+            if kind == "joint":
+                tied = {int(model.eq_obj1id[other]), int(model.eq_obj2id[other])}
+                if tied & pins:
+                    others.append(other)
+                continue
+            if kind not in ("connect", "weld"):
+                continue
+            ends = find_ends(self.posed, other)
+            carried = [self._find_bar(end.body, moving) for end in ends]
+            numbers = [1 if root is None else bars[root] for root in carried]
+            if numbers[0] == numbers[1]:
+                continue
+            direct = all(self.root[end.body] in bars for end in ends)
+            if not direct:
+                others.append(other)
+                continue
+            pin = next(
+                (p for p, pair in PAIRS.items() if set(pair) == set(numbers)), None
+            )
+            if pin is not None and self._is_pin(other) and layout.is_at(pin, ends):
+                if pin == cut:
+                    closures.append(other)
+                else:  # a hinge and a connect hold the same pin
+                    others.append(other)
+                continue
+            others.append(
+                f"{self._name(other)} holds two of its bars as well: no freedom is left"
+            )
+        return closures, others
+
+
+class _Layout:
+    """Geometry of a four-bar in its plane, measured in the pose."""
+
+    def __init__(
+        self,
+        finder: _Finder,
+        bodies: dict[int, tuple[int, ...]],
+        hinges: dict[str, int],
+        equality: int,
+    ) -> None:
+        self.finder, self.bodies, self.hinges = finder, bodies, hinges
+        self.model, self.data = finder.model, finder.data
+        self.ends = find_ends(finder.posed, equality)
+        self.remarks: list[str] = []
+        self.senses: dict[str, float] = {}
+        self.points: dict[tuple[int, str], Array] = {}
+        self.places: dict[tuple[int, str], Array] = {}
+        """Pins in world axes by bar and pin, (3,), m."""
+        self.normal = self._find_normal()
+        self.axis = self._to_ground(self.normal)
+
+    def _find_normal(self) -> Array:
+        """Return the mean axis of the hinges in world axes; about it the driven joint turns bar 2 counter-clockwise."""
+        joint = self.hinges["O2"]
+        reference = self.data.xaxis[joint] * self._side("O2", joint)
+        total = np.zeros(3)
+        for hinge in self.hinges.values():
+            axis = self.data.xaxis[hinge]
+            total += math.copysign(1.0, float(axis @ reference)) * axis
+        return np.asarray(total / np.linalg.norm(total))
+
+    def _side(self, pin: str, joint: int) -> float:
+        """Return +1 where the second bar of a pin hangs on its joint, -1 where the first does."""
+        root = self.finder.root[int(self.model.jnt_bodyid[joint])]
+        first, second = PAIRS[pin]
+        if root in self.bodies[second]:
+            return 1.0
+        assert root in self.bodies[first]
+        return -1.0
+
+    def _to_ground(self, vector: Array) -> Array:
+        ground = self.bodies[1][0]
+        return np.asarray(self.data.xmat[ground].reshape(3, 3).T @ vector)
+
+    def measure(self, cut: str | None) -> str:
+        """Measure pins, lengths and angles; return a reason where they make no four-bar."""
+        for pin, joint in self.hinges.items():
+            turned = self.data.xaxis[joint] @ self.normal * self._side(pin, joint)
+            self.senses[pin] = math.copysign(1.0, float(turned))
+            for bar in PAIRS[pin]:
+                self.places[bar, pin] = self.data.xanchor[joint].copy()
+        if cut is not None:
+            for end in self.ends:
+                bar = self._find_bar_of(end.body, cut)
+                self.places[bar, cut] = end.place
+        for (bar, pin), place in self.places.items():
+            body = self.bodies[bar][0]
+            turn = self.data.xmat[body].reshape(3, 3)
+            self.points[bar, pin] = turn.T @ (place - self.data.xpos[body])
+        self.along = self._to_ground(self._choose_along())
+        self.across = np.cross(self.normal, self._choose_along())
+        lines = [self._line(bar) for bar in PINS_OF_BAR]
+        self.lengths = tuple(math.hypot(x, y) for x, y in lines)
+        self.angles = tuple(math.atan2(y, x) for x, y in lines)
+        for length, (one, other) in zip(
+            self.lengths, PINS_OF_BAR.values(), strict=True
+        ):
+            if length <= COINCIDE * max(self.lengths):
+                return f"pins {one} and {other} are in one place: a bar has no length"
+        return ""
+
+    def _find_bar_of(self, body: int, cut: str) -> int:
+        root = self.finder.root[body]
+        return next(bar for bar in PAIRS[cut] if root in self.bodies[bar])
+
+    def _choose_along(self) -> Array:
+        """Return x of the plane in world axes: across gravity where the plane is not level, else from O2 to O4."""
+        gravity = self.model.opt.gravity
+        in_plane = gravity - (gravity @ self.normal) * self.normal
+        size = float(np.linalg.norm(in_plane))
+        if size > LEVEL * float(np.linalg.norm(gravity)) and size > 0.0:
+            return np.asarray(np.cross(-in_plane / size, self.normal))
+        line = self.places[1, "O4"] - self.places[1, "O2"]
+        line = line - (line @ self.normal) * self.normal
+        length = float(np.linalg.norm(line))
+        if length > 0.0:
+            return np.asarray(line / length)
+        return np.asarray(np.linalg.svd(self.normal[None])[2][1])
+
+    def _line(self, bar: int) -> tuple[float, float]:
+        first, second = PINS_OF_BAR[bar]
+        vector = self.places[bar, second] - self.places[bar, first]
+        along = self.data.xmat[self.bodies[1][0]].reshape(3, 3) @ self.along
+        return float(vector @ along), float(vector @ self.across)
+
+    def is_at(self, pin: str, ends: tuple[ClosureEnd, ClosureEnd]) -> bool:
+        """Tell whether both ends of another equality lie on the axis of a pin."""
+        bar = PAIRS[pin][0]
+        for end in ends:
+            apart = end.place - self.places[bar, pin]
+            in_plane = apart - (apart @ self.normal) * self.normal
+            near = max(COINCIDE * max(self.lengths), OPEN)
+            if float(np.linalg.norm(in_plane)) > near:
+                return False
+        return True

@@ -1,0 +1,129 @@
+"""A robot's file compiled as MuJoCo compiles it, without what is missing and moves nothing."""
+
+import math
+from dataclasses import dataclass
+
+import mujoco
+
+from fourbar.errors import InputError
+from fourbar_validation.engines.mujoco.robots.loop import RobotFile
+
+MOST_KEYFRAMES = 100_000
+"""A robot has a few; MuJoCo reserves as many as a file asks for, minutes long."""
+STAND_IN = 0.01
+"""m, radius of the sphere that stands where a mesh is missing and a mass unknown."""
+LIGHT = 1e-3
+"""kg, mass of that sphere: MuJoCo moves no body without one."""
+FROM_GEOMS, AS_STATED = 1, 0
+"""Values of the compiler's `inertiafromgeom`: all bodies, and none; 2 is in between."""
+
+
+@dataclass(frozen=True, slots=True)
+class CompiledRobot:
+    """Compiled model of a robot's file."""
+
+    model: mujoco.MjModel
+    notes: tuple[str, ...]
+    unknown_masses: tuple[int, ...]
+    """Bodies whose mass a missing mesh would have given."""
+
+
+def compile_robot(file: RobotFile) -> CompiledRobot:
+    """Compile a robot's file.
+
+    Geoms whose mesh is missing are left out where the body states its inertia.
+
+    Raises
+    ------
+    InputError : MuJoCo's complaint, or what the file asks too much of, in one line.
+    """
+    try:
+        spec = mujoco.MjSpec.from_string(file.text, assets=dict(file.assets))
+        if spec.nkey > MOST_KEYFRAMES:
+            raise InputError(
+                "MJCF",
+                None,
+                f"asks for {spec.nkey} keyframes; up to {MOST_KEYFRAMES} are read",
+            )
+        left_out, unknown = _take_out_meshes(spec, file)
+        model = spec.compile()
+    except ValueError as error:
+        complaint = " ".join(f"MuJoCo does not compile it: {error}".split())
+        raise InputError("MJCF", None, complaint) from None
+    except RuntimeError:  # "unknown exception": a size that no memory holds
+        raise InputError(
+            "MJCF", None, "MuJoCo breaks down over it; is a size in it too large?"
+        ) from None
+    if not 0.0 < model.opt.timestep < math.inf:
+        raise InputError(
+            "MJCF", None, f"its timestep of {model.opt.timestep:g} s must be above 0"
+        )
+    masses = tuple(
+        number
+        for number in range(model.nbody)
+        if model.body(number).name in unknown and model.body_weldid[number]
+    )
+    notes = list(file.notes)
+    if left_out:
+        files = ", ".join(sorted(left_out))
+        notes.append(f"meshes that are missing are left out: {files}")
+    if masses:
+        names = ", ".join(model.body(number).name for number in masses)
+        notes.append(
+            f"the masses of {names} are unknown: their meshes are missing and no "
+            "inertial is stated; --assets DIR says where the meshes are"
+        )
+    return CompiledRobot(model, tuple(notes), masses)
+
+
+def require_masses(robot: CompiledRobot, bodies: set[int]) -> None:
+    """Raise an InputError if the mass of one of these bodies is unknown."""
+    unknown = [number for number in robot.unknown_masses if number in bodies]
+    if unknown:
+        name = robot.model.body(unknown[0]).name
+        raise InputError(
+            "MJCF",
+            name,
+            "states no inertial and its mesh is missing: its mass is unknown; "
+            "--assets DIR says where the meshes are",
+        )
+
+
+def _take_out_meshes(spec: mujoco.MjSpec, file: RobotFile) -> tuple[set[str], set[str]]:
+    """Take out the missing meshes and their geoms; return files left out, and bodies whose mass they were."""
+    gone = {mesh.name: mesh for mesh in spec.meshes if mesh.file in file.missing}
+    left_out: set[str] = set()
+    unknown: set[str] = set()
+    for number, body in enumerate(spec.bodies):
+        geoms = [geom for geom in body.geoms if geom.meshname in gone]
+        if geoms and _needs_geoms(spec, body, geoms):
+            body.name = body.name or f"body_{number}"
+            unknown.add(body.name)
+        for geom in geoms:
+            left_out.add(file.missing[gone[geom.meshname].file])
+            spec.delete(geom)
+        if body.name in unknown:
+            body.explicitinertial = False
+            size = [STAND_IN, 0.0, 0.0]
+            kind = mujoco.mjtGeom.mjGEOM_SPHERE
+            body.add_geom(type=kind, size=size, mass=LIGHT)
+    if left_out:  # they may name the geoms, and move nothing
+        for element in [*spec.sensors, *spec.pairs]:
+            spec.delete(element)
+    for mesh in gone.values():
+        left_out.add(file.missing[mesh.file])
+        spec.delete(mesh)
+    return left_out, unknown
+
+
+def _needs_geoms(
+    spec: mujoco.MjSpec, body: mujoco.MjsBody, geoms: list[mujoco.MjsGeom]
+) -> bool:
+    """Tell whether the inertia of a body follows from these geoms."""
+    rule = spec.compiler.inertiafromgeom
+    if body.name == "world" or rule == AS_STATED:
+        return False
+    if body.explicitinertial and rule != FROM_GEOMS:
+        return False
+    lowest, highest = spec.compiler.inertiagrouprange
+    return any(geom.mass != 0.0 and lowest <= geom.group <= highest for geom in geoms)

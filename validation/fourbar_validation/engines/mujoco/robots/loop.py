@@ -1,0 +1,132 @@
+"""What is asked of a robot's file, and what is known of its closed loops: plain data, without MuJoCo."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from fourbar.linkage import BAR_NAMES
+from fourbar_validation.compare.answer import Array
+
+PAIRS = {"O2": (1, 2), "A": (2, 3), "B": (3, 4), "O4": (1, 4)}
+"""The two bars that meet at each pin."""
+
+
+@dataclass(frozen=True, slots=True)
+class RobotFile:
+    """Screened text of a robot's file with its includes, and the contents of its meshes."""
+
+    path: Path
+    text: str
+    assets: Mapping[str, bytes] = field(default_factory=dict)
+    """Contents of each mesh file, by its name in the text."""
+    missing: Mapping[str, str] = field(default_factory=dict)
+    """Mesh files that are not there: name in the text, and name in the file."""
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class PoseOptions:
+    """Pose in which a robot is looked at, and the joints that are held or drive there."""
+
+    joints: Mapping[str, str] = field(default_factory=dict)
+    """Position of each joint that is stated, with its unit."""
+    key: str | None = None
+    """Keyframe that the pose is taken from; None: the rest pose of the file."""
+    held: tuple[str, ...] = ()
+    """Joints that are fixed where they stand, as if their bodies were one bar."""
+    drive: str | None = None
+    """Joint that is driven; None: that of a motor."""
+
+
+@dataclass(frozen=True, slots=True)
+class RobotLoop:
+    """Planar four-bar in a robot's model; ids are those of MuJoCo's compiled model.
+
+    Three of the pins are hinges and the equality is the fourth, or all four are
+    hinges and the equality, a weld, joins the two halves of a bar.
+    """
+
+    name: str
+    equality: int
+    """Equality that closes the loop."""
+    closures: tuple[int, ...]
+    """All equalities that hold the closing pin: `equality`, and others along it."""
+    cut: str | None
+    """Pin that the equality is; None where it is a weld within a bar."""
+    bodies: Mapping[int, tuple[int, ...]]
+    """Bodies of each bar, 1 to 4: one, or the two that a weld joins."""
+    hinges: Mapping[str, int]
+    """Joint of each pin that is a hinge."""
+    senses: Mapping[str, float]
+    """+1 where the joint's angle grows as the second bar of the pin turns
+    counter-clockwise against the first; else -1."""
+    points: Mapping[tuple[int, str], Array]
+    """(bar, pin): the pin in the frame of the bar's first body, (3,), m."""
+    axis: Array
+    """Unit normal of the plane in the frame of the ground's first body, (3,)."""
+    along: Array
+    """Unit vector of the plane that angles are counted from, same frame, (3,)."""
+    misaligned: float
+    """Largest angle between two axes, rad."""
+    lengths: tuple[float, ...]
+    """Lengths of ground, input, coupler and output, m."""
+    angles: tuple[float, ...]
+    """theta_1 to theta_4 in the pose, rad."""
+    qpos: Array
+    """Joint positions of the whole model in the pose, (nq,)."""
+    held: tuple[int, ...]
+    """Joints of the model that are no pin of this loop and stay where they are."""
+    motors: tuple[int, ...]
+    """Actuators that act on the loop's hinges."""
+    other_equalities: tuple[int, ...]
+    """Active equalities that act on its moving bars and are no closure of it."""
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def joint(self) -> int:
+        """Joint that is driven; pin O2 is always a hinge."""
+        return self.hinges["O2"]
+
+    def describe_lengths(self) -> str:
+        """Write the four lengths with four significant digits, in mm."""
+        texts = (
+            f"{name} {write_length(length)}"
+            for name, length in zip(BAR_NAMES.values(), self.lengths, strict=True)
+        )
+        return ", ".join(texts) + " mm"
+
+
+@dataclass(frozen=True, slots=True)
+class RobotClosure:
+    """One equality of a robot: the four-bar that it closes, or why it closes none."""
+
+    name: str
+    kind: str
+    """As MJCF calls it: connect, weld, joint, ..."""
+    loop: RobotLoop | None
+    reason: str
+    """Why it is no planar four-bar; empty where it is one."""
+    ground: str = ""
+    hinges: tuple[str, ...] = ()
+    """Joints of the loop by name, from the first body of the equality to the second."""
+    misaligned: float | None = None
+    """Largest angle between two of its hinges' axes, rad; None: fewer than two."""
+    gap: float | None = None
+    """Distance of the two ends in the pose as stated, m; None where it has no ends."""
+    left: float | None = None
+    """The same after the loops were closed, m."""
+    solref: tuple[float, ...] = ()
+    solimp: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class RobotReport:
+    """Closures of a robot, and what was done to the file and its pose to see them."""
+
+    closures: tuple[RobotClosure, ...]
+    notes: tuple[str, ...]
+
+
+def write_length(metres: float) -> str:
+    """Write a length in mm with four significant digits."""
+    return f"{1e3 * metres:#.4g}".rstrip(".")

@@ -1,0 +1,281 @@
+"""The pose in which a robot is looked at: as the file has it, as stated, closed again by least squares.
+
+The residuals are those of MuJoCo's own active equalities, the unknowns the joints that they
+depend on. A step of Gauss and Newton is a linear least-squares problem within the joints'
+ranges; damping keeps the pose near the one that was stated.
+"""
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from fourbar.errors import InputError
+from fourbar.linkage import require
+from fourbar_validation.compare.answer import Array
+from fourbar_validation.engines.mujoco.robots.ancestry import (
+    find_tied_bodies,
+    list_joints_between,
+    name_joint,
+)
+from fourbar_validation.engines.mujoco.robots.loop import PoseOptions
+
+FREE, BALL, SLIDE, HINGE = (
+    int(getattr(mujoco.mjtJoint, f"mjJNT_{name}"))
+    for name in ("FREE", "BALL", "SLIDE", "HINGE")
+)
+UNITS = {HINGE: "rad", SLIDE: "m"}
+CLOSED = 1e-9
+"""m or rad; a smaller residual of the equalities is closed as far as a file can say."""
+OPEN = 1e-5
+"""m or rad; a residual above this after closing is a loop that does not close."""
+MOST_STEPS = 100
+LONGEST_STEP = 0.3
+"""rad or m; longer steps leave the region where the loops are nearly linear."""
+DAMPING = 1e-4
+"""Weight of a step against the residuals: keeps what no equality decides where it is."""
+OUTSIDE = 1e-6
+"""rad or m; a joint is outside its range beyond the rounding of a file."""
+
+
+@dataclass(frozen=True, slots=True)
+class PosedRobot:
+    """A model in its pose."""
+
+    model: mujoco.MjModel
+    data: mujoco.MjData
+    """State in the pose, closed, positions evaluated."""
+    stated: Array
+    """Joint positions before the loops were closed, (nq,)."""
+    notes: tuple[str, ...]
+
+
+def pose_robot(model: mujoco.MjModel, options: PoseOptions) -> PosedRobot:
+    """Bring a robot into the pose of the options and close its loops.
+
+    Raises
+    ------
+    InputError : an unknown joint or keyframe, a position without a unit or of another kind.
+    """
+    stated, origin = _choose_start(model, options)
+    fixed = {find_joint(model, name, "--hold") for name in options.held}
+    for name, text in options.joints.items():
+        joint = find_joint(model, name, "--pose")
+        unit = UNITS.get(int(model.jnt_type[joint]))
+        if unit is None:
+            raise InputError("--pose", f"{name}={text}", "must be a hinge or a slide")
+        stated[model.jnt_qposadr[joint]] = _read_position(name, text, unit)
+        fixed.add(joint)
+    outside = find_outside(model, stated)
+    notes = [f"{name_joint(model, joint)} is outside its range" for joint in outside]
+    notes = [f"{', '.join(notes)} {origin}"] if notes else []
+    closing = _Closing(model, fixed)
+    before = closing.size(stated)
+    if before <= CLOSED and not set(outside) - fixed:
+        return PosedRobot(model, _evaluate(model, stated), stated, tuple(notes))
+    closed = closing.close(stated)
+    after = closing.size(closed)
+    moved = [
+        name_joint(model, joint)
+        for joint in closing.joints
+        if abs(closed[model.jnt_qposadr[joint]] - stated[model.jnt_qposadr[joint]])
+        > OUTSIDE
+    ]
+    if moved and after <= OPEN:
+        notes.append(
+            f"the loops are closed again by least squares: {_list_some(moved)} moved"
+        )
+    elif after > OPEN:
+        notes.append(
+            f"no pose near this one closes all loops within the joints' ranges; what "
+            f"is left is {1e3 * after:.3g} mm or mrad: state one by --pose or --key"
+        )
+    return PosedRobot(model, _evaluate(model, closed), stated, tuple(notes))
+
+
+def find_joint(model: mujoco.MjModel, name: str, option: str) -> int:
+    """Find a joint by its name, or raise an InputError that lists what is there."""
+    number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name)
+    if number < 0:
+        names = [model.joint(i).name for i in range(model.njnt)]
+        listed = ", ".join(name for name in names if name)
+        raise InputError(option, name, f"no such joint; the file has: {listed}")
+    return int(number)
+
+
+def find_outside(model: mujoco.MjModel, qpos: Array) -> list[int]:
+    """List the hinges and slides that are outside their ranges."""
+    low, high = _list_bounds(model)
+    outside = []
+    for joint in range(model.njnt):
+        if int(model.jnt_type[joint]) in UNITS:
+            value = qpos[model.jnt_qposadr[joint]]
+            dof = model.jnt_dofadr[joint]
+            if not low[dof] - OUTSIDE <= value <= high[dof] + OUTSIDE:
+                outside.append(joint)
+    return outside
+
+
+def _choose_start(model: mujoco.MjModel, options: PoseOptions) -> tuple[Array, str]:
+    """Return the positions to begin with, and where they are from."""
+    if options.key is None:
+        return model.qpos0.copy(), "in the rest pose of the file"
+    number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, options.key)
+    if number < 0 and options.key.isdigit() and int(options.key) < model.nkey:
+        number = int(options.key)
+    if number < 0:
+        names = ", ".join(model.key(i).name or str(i) for i in range(model.nkey))
+        raise InputError(
+            "--key", options.key, f"no such keyframe; the file has: {names or 'none'}"
+        )
+    return model.key_qpos[number].copy(), f"in keyframe {options.key}"
+
+
+def _read_position(name: str, text: str, unit: str) -> float:
+    try:
+        float(text)
+    except ValueError:
+        return require(f"--pose {name}", text, unit)
+    likely = "deg" if unit == "rad" else "mm"
+    raise InputError(
+        f"--pose {name}",
+        text,
+        f'the unit is missing; did you mean "{text}{likely}"?',
+    )
+
+
+def _list_bounds(model: mujoco.MjModel) -> tuple[Array, Array]:
+    """Return the range of each degree of freedom, (nv,) each, infinite where it has none."""
+    low, high = np.full(model.nv, -np.inf), np.full(model.nv, np.inf)
+    for joint in range(model.njnt):
+        if model.jnt_limited[joint] and int(model.jnt_type[joint]) in UNITS:
+            dof = model.jnt_dofadr[joint]
+            low[dof], high[dof] = model.jnt_range[joint]
+    return low, high
+
+
+def _evaluate(model: mujoco.MjModel, qpos: Array) -> mujoco.MjData:
+    data = mujoco.MjData(model)
+    data.qpos[:] = qpos
+    mujoco.mj_normalizeQuat(model, data.qpos)
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_comPos(model, data)
+    return data
+
+
+def _list_some(names: list[str], most: int = 6) -> str:
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(names[:most]) + more
+
+
+class _Closing:
+    """Least squares of a model's active equalities over the joints that may move."""
+
+    def __init__(self, model: mujoco.MjModel, fixed: set[int]) -> None:
+        self.model = _copy_for_equalities(model)
+        self.data = mujoco.MjData(self.model)
+        self.low, self.high = _list_bounds(model)
+        self.joints = [
+            joint
+            for joint in _list_tied_joints(model)
+            if joint not in fixed and int(model.jnt_type[joint]) != FREE
+        ]
+        self.dofs = [dof for joint in self.joints for dof in self._list_dofs(joint)]
+
+    def _list_dofs(self, joint: int) -> list[int]:
+        first = int(self.model.jnt_dofadr[joint])
+        count = 3 if int(self.model.jnt_type[joint]) == BALL else 1
+        return list(range(first, first + count))
+
+    def _residuals(self) -> tuple[Array, Array]:
+        """Return residuals of the equalities and their derivatives, (m,) and (m, nv)."""
+        data = self.data
+        rows = data.efc_type[: data.nefc] == mujoco.mjtConstraint.mjCNSTR_EQUALITY
+        jacobian = data.efc_J.reshape(-1, self.model.nv)[: data.nefc]
+        return data.efc_pos[: data.nefc][rows].copy(), jacobian[rows].copy()
+
+    def _move_to(self, qpos: Array) -> tuple[Array, Array]:
+        self.data.qpos[:] = qpos
+        mujoco.mj_fwdPosition(self.model, self.data)
+        return self._residuals()
+
+    def size(self, qpos: Array) -> float:
+        """Return the largest residual in a pose, m or rad."""
+        residuals, _ = self._move_to(qpos)
+        return float(np.abs(residuals).max(initial=0.0))
+
+    def close(self, start: Array) -> Array:
+        """Return the pose within the ranges, near `start`, with the least residuals, (nq,)."""
+        from scipy.optimize import lsq_linear
+
+        qpos = self._bring_inside(start)
+        if not self.dofs:
+            return qpos
+        damping = DAMPING * np.eye(len(self.dofs))
+        for _ in range(MOST_STEPS):
+            residuals, jacobian = self._move_to(qpos)
+            if np.abs(residuals).max(initial=0.0) <= 1e-3 * CLOSED:
+                break
+            matrix = np.vstack([jacobian[:, self.dofs], damping])
+            wanted = np.concatenate([-residuals, np.zeros(len(self.dofs))])
+            low, high = self._list_room(qpos)
+            step = np.zeros(self.model.nv)
+            step[self.dofs] = lsq_linear(matrix, wanted, (low, high)).x
+            mujoco.mj_integratePos(self.model, qpos, step, 1.0)
+        return qpos
+
+    def _bring_inside(self, start: Array) -> Array:
+        """Return the pose with every joint that may move inside its range."""
+        qpos = start.copy()
+        for joint in self.joints:
+            if int(self.model.jnt_type[joint]) in UNITS:
+                address, dof = (
+                    self.model.jnt_qposadr[joint],
+                    int(self.model.jnt_dofadr[joint]),
+                )
+                qpos[address] = np.clip(qpos[address], self.low[dof], self.high[dof])
+        return qpos
+
+    def _list_room(self, qpos: Array) -> tuple[Array, Array]:
+        """Return how far each unknown may step down and up."""
+        low = np.full(len(self.dofs), -LONGEST_STEP)
+        high = np.full(len(self.dofs), LONGEST_STEP)
+        place = {dof: number for number, dof in enumerate(self.dofs)}
+        for joint in self.joints:
+            if int(self.model.jnt_type[joint]) in UNITS:
+                dof = int(self.model.jnt_dofadr[joint])
+                value = qpos[self.model.jnt_qposadr[joint]]
+                number = place[dof]
+                # scipy asks for room on both sides
+                low[number] = max(low[number], min(self.low[dof] - value, -1e-15))
+                high[number] = min(high[number], max(self.high[dof] - value, 1e-15))
+        return low, high
+
+
+def _list_tied_joints(model: mujoco.MjModel) -> list[int]:
+    """List the joints on which an active equality depends."""
+    kinds, joints = mujoco.mjtEq, set[int]()
+    for number in range(model.neq):
+        if not model.eq_active0[number]:
+            continue
+        kind = kinds(int(model.eq_type[number]))
+        if kind in (kinds.mjEQ_CONNECT, kinds.mjEQ_WELD):
+            joints.update(list_joints_between(model, *find_tied_bodies(model, number)))
+        elif kind == kinds.mjEQ_JOINT:
+            tied = (int(model.eq_obj1id[number]), int(model.eq_obj2id[number]))
+            joints.update(joint for joint in tied if joint >= 0)
+    return sorted(joints)
+
+
+def _copy_for_equalities(model: mujoco.MjModel) -> mujoco.MjModel:
+    """Copy a model so that its equalities are the only constraints, with a dense Jacobian."""
+    from copy import copy
+
+    alone = copy(model)
+    alone.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
+    for name in ("CONTACT", "LIMIT", "FRICTIONLOSS", "ISLAND"):
+        alone.opt.disableflags |= int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{name}"))
+    enabling = int(mujoco.mjtDisableBit.mjDSBL_EQUALITY)
+    enabling |= int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
+    alone.opt.disableflags &= ~enabling
+    return alone

@@ -1,0 +1,1 @@
+"""Somebody's robot: its file, its closed loops, and a scene from one of them."""

@@ -1,0 +1,79 @@
+"""`fourbar-validation loops`: the closed loops of a robot's file, and a scene from one of them."""
+
+import math
+from pathlib import Path
+
+import click
+
+from fourbar_validation.compare.rows import make_plain
+from fourbar_validation.engines.mujoco.robots.loop import (
+    RobotClosure,
+    RobotReport,
+    write_length,
+)
+from fourbar_validation.robots.files import read_robot
+from fourbar_validation.robots.guard import examine_guarded
+from fourbar_validation.robots.options import FILE, pose_options, read_pose
+
+ROUND_OFF = 1e-12
+"""m or deg; less is printed as 0."""
+LIST = "fourbar_validation.engines.mujoco.robots.closures:list_closures"
+
+
+def write_closure(closure: RobotClosure) -> str:
+    """Write what is known of a closure in one line."""
+    parts = [f"{closure.name}: {closure.kind}"]
+    if closure.loop is None:
+        parts[0] += f", no four-bar: {closure.reason}"
+    if closure.ground:
+        parts.append(f"ground {closure.ground}")
+    if closure.hinges:
+        parts.append(f"hinges {', '.join(closure.hinges)}")
+    if closure.loop is not None:
+        parts.append(closure.loop.describe_lengths())
+    if closure.misaligned is not None:
+        angle = math.degrees(closure.misaligned)
+        parts.append(f"axes {angle if angle > ROUND_OFF else 0.0:.2g} deg apart")
+    if closure.gap is not None:
+        gap = closure.gap if closure.gap > ROUND_OFF else 0.0
+        parts.append(f"gap {write_length(gap) if gap else 0} mm")
+    parts.append(f"solref {_join(closure.solref)}")
+    parts.append(f"solimp {_join(closure.solimp)}")
+    return make_plain("; ".join(parts))
+
+
+def _join(numbers: tuple[float, ...]) -> str:
+    return " ".join(f"{number:.6g}" for number in numbers)
+
+
+def show_report(report: RobotReport) -> None:
+    """Print a line for each closure, and what was done to the file and its pose."""
+    for closure in report.closures:
+        click.echo(write_closure(closure))
+    if not report.closures:
+        click.echo("The file has no equality: no loop is closed in it.")
+    for closure in report.closures:
+        remarks = () if closure.loop is None else closure.loop.remarks
+        for remark in remarks:
+            click.echo(make_plain(f"note: {closure.name}: {remark}"))
+    for note in report.notes:
+        click.echo(make_plain(f"note: {note}"))
+
+
+@click.command()
+@click.argument("robot", metavar="ROBOT.xml", type=FILE)
+@pose_options
+def command(
+    robot: Path,
+    pose: tuple[str, ...],
+    key: str | None,
+    hold: tuple[str, ...],
+    drive: str | None,
+    assets: Path | None,
+) -> None:
+    """List the closed loops of a robot's MJCF, and say which are planar four-bars."""
+    options = read_pose(pose, key, hold, drive)
+    file = read_robot(robot, assets)
+    with examine_guarded(robot) as examined:
+        report: RobotReport = examined(LIST, file, options)
+    show_report(report)

@@ -1,0 +1,239 @@
+"""A robot's file is data: read with limits, and handed on only as what was screened.
+
+Includes are put in place, every mesh is read here and gets a plain name, and what is for the
+eye alone is left out. The text that the engine gets is written anew from the elements that
+were looked at, so nothing can mean one thing to the reader here and another to the engine's.
+"""
+
+import io
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+from fourbar.errors import InputError
+from fourbar.writing import read_text
+from fourbar_validation.engines.mujoco.robots.loop import RobotFile
+
+LARGEST_TEXT = 16 * 2**20
+"""Bytes of a file and its includes; a humanoid takes half a million."""
+LARGEST_ASSETS = 512 * 2**20
+"""Bytes of all meshes."""
+DEEPEST = 100
+"""Nested elements; the readers of XML recurse."""
+MOST_INCLUDES = 200
+REACHING_OUT = ("extension", "plugin", "attach", "composite", "flexcomp", "flex")
+"""Elements that load plugins or models, or make deformable bodies."""
+FOR_THE_EYE = ("texture", "skin", "layer")
+"""Elements that are dropped; so is every attribute `texture`."""
+FOLDERS = ("assetdir", "meshdir", "texturedir")
+"""Attributes of <compiler> that name folders of assets; the later ones go first."""
+OUTSIDE = ("file", "directory", "content_type")
+"""Attributes that name files."""
+COUNTS = (
+    "iterations",
+    "ls_iterations",
+    "noslip_iterations",
+    "ccd_iterations",
+    "sdf_iterations",
+    "sdf_initpoints",
+)
+MOST_ITERATIONS = 1000
+"""Upper limit of each count in <option>, ten times the greatest of MuJoCo's defaults: MuJoCo
+already steps while it compiles, and with a tolerance of 0 nothing else may stop a solver."""
+
+
+def read_robot(path: Path, assets: Path | None = None) -> RobotFile:
+    """Read a robot's file with its includes and meshes.
+
+    Parameters
+    ----------
+    assets : a further folder in which includes and meshes are looked for.
+
+    Raises
+    ------
+    InputError : what the file may not hold, or names and is not there, in one line.
+    """
+    return _Reading(path, assets).read()
+
+
+@dataclass
+class _Reading:
+    """One file that is being read, with what it names."""
+
+    path: Path
+    assets: Path | None
+    size: int = 0
+    included: list[Path] = field(default_factory=list)
+    contents: dict[str, bytes] = field(default_factory=dict)
+    missing: dict[str, str] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+
+    def read(self) -> RobotFile:
+        """Read and screen everything."""
+        if self.assets is not None and not self.assets.is_dir():
+            raise InputError("--assets", str(self.assets), "must be a folder")
+        root = self._parse(self.path)
+        if root.tag != "mujoco":
+            raise self._refuse(
+                root.tag, "must be an MJCF, whose outermost element is <mujoco>"
+            )
+        self._expand(root, self.path, 0)
+        self._take_meshes(root)
+        self._drop_pictures(root)
+        for element in root.iter():
+            self._screen(element)
+        text = ET.tostring(root, encoding="unicode")
+        return RobotFile(
+            self.path, text, self.contents, self.missing, tuple(self.notes)
+        )
+
+    def _refuse(self, what: object, allowed: str) -> InputError:
+        return InputError("MJCF", what, allowed, str(self.path))
+
+    def _parse(self, path: Path) -> ET.Element:
+        """Parse one file; no document type, no depth without bound."""
+        text = read_text(path, "MJCF", LARGEST_TEXT)
+        self.size += len(text)
+        if self.size > LARGEST_TEXT:
+            raise self._refuse(path.name, f"and its includes exceed {LARGEST_TEXT} B")
+        for word in ("<!DOCTYPE", "<!ENTITY"):
+            if word in text.upper():
+                raise self._refuse(
+                    word, "is not allowed: an MJCF needs no document type"
+                )
+        parsed, depth = ET.iterparse(io.StringIO(text), ("start", "end")), 0
+        try:
+            for event, _ in parsed:
+                depth += 1 if event == "start" else -1
+                if depth > DEEPEST:
+                    raise self._refuse(
+                        path.name, f"nests its elements deeper than {DEEPEST}"
+                    )
+        except (ET.ParseError, ValueError) as error:
+            raise self._refuse(path.name, f"is no XML: {error}") from None
+        root: ET.Element = parsed.root  # type: ignore[attr-defined]
+        return root
+
+    def _expand(self, element: ET.Element, inside: Path, depth: int) -> None:
+        """Put the contents of each included file in the place of <include>."""
+        if depth > DEEPEST:
+            raise self._refuse(self.path.name, f"is nested deeper than {DEEPEST}")
+        for place, child in reversed(list(enumerate(element))):
+            if child.tag != "include":
+                self._expand(child, inside, depth + 1)
+                continue
+            name = child.get("file", "")
+            # MuJoCo counts from the folder of the main file
+            path = self._find(name, (self.path.parent, inside.parent))
+            if path is None:
+                raise self._refuse(
+                    f'<include file="{name}">',
+                    "is not there; it must lie in the folder of the file, in a folder "
+                    "beside it, or in that of --assets DIR",
+                )
+            self.included.append(path)
+            if len(self.included) > MOST_INCLUDES:
+                raise self._refuse(
+                    name, f"more than {MOST_INCLUDES} files are included"
+                )
+            content = self._parse(path)
+            if content.tag not in ("mujoco", "mujocoinclude"):
+                raise self._refuse(content.tag, f"must be <mujocoinclude>, in {name}")
+            self._expand(content, path, depth + 1)
+            element[place : place + 1] = list(content)
+
+    def _find(self, name: str, folders: tuple[Path, ...]) -> Path | None:
+        """Find a file that may be read, in these folders or that of --assets."""
+        if not name or "\0" in name:
+            return None
+        candidates = [folder / name for folder in folders]
+        if self.assets is not None:
+            candidates += [self.assets / name, self.assets / Path(name).name]
+        for candidate in candidates:
+            try:
+                resolved = candidate.resolve()
+                if self._may_read(resolved) and resolved.is_file():
+                    return resolved
+            except (OSError, RuntimeError):  # no name of a file, or links in a circle
+                continue
+        return None
+
+    def _may_read(self, resolved: Path) -> bool:
+        """Tell whether a file lies in the folder of the robot's, in one beside it, or in that of --assets."""
+        home = self.path.resolve().parent
+        if resolved.is_relative_to(home):
+            return True
+        beside = home.parent
+        if beside != beside.parent and resolved.is_relative_to(beside):
+            return resolved.parent != beside
+        return self.assets is not None and resolved.is_relative_to(
+            self.assets.resolve()
+        )
+
+    def _take_meshes(self, root: ET.Element) -> None:
+        """Read each mesh, and give its file a plain name in the text."""
+        folder, strip = "", False
+        for compiler in root.iter("compiler"):
+            for name in FOLDERS[:2]:
+                folder = compiler.attrib.pop(name, folder)
+            compiler.attrib.pop("texturedir", None)
+            strip = compiler.attrib.pop("strippath", str(strip)).lower() == "true"
+        total = 0
+        for number, mesh in enumerate(root.iter("mesh")):
+            file = mesh.attrib.pop("file", None)
+            if file is None:
+                continue
+            mesh.attrib.pop("content_type", None)
+            stem = Path(file).stem
+            mesh.set("name", mesh.get("name", stem))
+            name = Path(file).name if strip else file
+            suffix = Path(file).suffix.lower()
+            plain = (
+                f"mesh_{number}{suffix if re.fullmatch('[.][a-z]+', suffix) else ''}"
+            )
+            mesh.set("file", plain)
+            path = self._find(name, (self.path.parent / folder, self.path.parent))
+            if path is None:
+                self.missing[plain] = file
+                continue
+            total += path.stat().st_size
+            if total > LARGEST_ASSETS:
+                raise self._refuse(file, f"and other meshes exceed {LARGEST_ASSETS} B")
+            self.contents[plain] = path.read_bytes()
+
+    def _drop_pictures(self, root: ET.Element) -> None:
+        """Drop what only draws, and height fields, on which nothing of a robot hangs."""
+        dropped = False
+        for parent in root.iter():
+            for child in list(parent):
+                field_of_heights = child.tag == "hfield" or "hfield" in child.attrib
+                if child.tag in FOR_THE_EYE or field_of_heights:
+                    parent.remove(child)
+                    dropped = dropped or field_of_heights
+            parent.attrib.pop("texture", None)
+        if dropped:
+            self.notes.append("height fields are left out")
+
+    def _screen(self, element: ET.Element) -> None:
+        """Refuse what reaches beyond the files that were read, or may never end."""
+        if element.tag in REACHING_OUT:
+            raise self._refuse(
+                f"<{element.tag}>",
+                "is not read here: save the model as MuJoCo compiles it "
+                "(mj_saveLastXML) and give that file",
+            )
+        for name in element.attrib:
+            if element.tag == "option" and name in COUNTS:
+                count = element.attrib[name].strip()
+                whole = re.fullmatch("[0-9]{1,9}", count)
+                if not whole or int(count) > MOST_ITERATIONS:
+                    raise self._refuse(
+                        f'<option {name}="{count}">',
+                        f"must be a whole number up to {MOST_ITERATIONS}: MuJoCo might "
+                        "never come back",
+                    )
+            if name.startswith(OUTSIDE) and element.tag != "mesh":
+                raise self._refuse(
+                    f"<{element.tag} {name}=...>", "is not allowed: it names a file"
+                )

@@ -1,0 +1,71 @@
+"""A process with limits, in which MuJoCo looks at somebody's file."""
+
+import os
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from pkgutil import resolve_name
+from typing import Any
+
+from fourbar.errors import FourBarError, InputError
+from fourbar.show.tables import show_running
+from fourbar_validation.engines.processes import WORKER_MEMORY, bound_memory
+
+SECONDS = 120.0
+"""A four-bar takes less than one, a humanoid a few."""
+
+
+@contextmanager
+def examine_guarded(
+    mjcf: Path, seconds: float | None = None
+) -> Iterator[Callable[..., Any]]:
+    """Examine a file, by an adapter and its arguments, in a process that may crash, hang or run out of memory.
+
+    An adapter is "module:function"; its arguments and its result are pickled.
+    `seconds`: limit of each call; None: SECONDS.
+    """
+    seconds = SECONDS if seconds is None else seconds
+    from multiprocessing import get_context
+
+    from pebble import ProcessExpired, ProcessPool
+
+    waiting = show_running(f"MuJoCo examines the file, in {seconds:g} s at most")
+    with (
+        waiting,
+        ProcessPool(
+            max_workers=1, context=get_context("spawn"), initializer=_confine
+        ) as pool,
+    ):
+
+        def examined(*arguments: object) -> Any:
+            try:
+                return pool.schedule(_examine, args=arguments, timeout=seconds).result()
+            except FourBarError as error:
+                if not isinstance(error, InputError) or error.key != "MJCF":
+                    raise
+                raise InputError(
+                    error.key, error.value or mjcf.name, error.allowed, str(mjcf)
+                ) from None
+            except TimeoutError:
+                reason = f"MuJoCo did not come back in {seconds:g} s"
+            except MemoryError:
+                reason = f"asks for more than {WORKER_MEMORY // 2**30} GB of memory"
+            except ProcessExpired as error:
+                reason = f"MuJoCo crashed on it (exit code {error.exitcode})"
+            except KeyboardInterrupt:
+                pool.stop()  # type: ignore[no-untyped-call]  # or the pool would wait for the file to its time limit
+                raise
+            raise InputError("MJCF", mjcf.name, reason, str(mjcf))
+
+        yield examined
+
+
+def _confine() -> None:
+    """Bound the memory, and put MuJoCo's log where it is swept away."""
+    os.chdir(tempfile.gettempdir())
+    bound_memory()
+
+
+def _examine(adapter: str, *arguments: object) -> Any:
+    return resolve_name(adapter)(*arguments)

@@ -1,0 +1,89 @@
+"""Options that the commands about a robot's file have in common."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import click
+
+from fourbar.errors import InputError
+from fourbar_validation.engines.mujoco.robots.loop import PoseOptions
+
+FILE = click.Path(path_type=Path)
+Command = Callable[..., Any]
+
+_OPTIONS = (
+    click.option(
+        "--pose",
+        metavar="JOINT=ANGLE,...",
+        multiple=True,
+        help="Positions of joints with units, like knee=-20deg,slide=3mm; the loops are "
+        "closed again around them.",
+    ),
+    click.option(
+        "--key",
+        metavar="NAME",
+        help="Keyframe that the pose is taken from (default: the file's rest pose).",
+    ),
+    click.option(
+        "--hold",
+        metavar="JOINT,...",
+        multiple=True,
+        help="Joints that are held where they stand: their bodies become one bar.",
+    ),
+    click.option(
+        "--drive",
+        metavar="JOINT",
+        help="Hinge on the ground of the loop that is driven (default: that of a motor).",
+    ),
+    click.option(
+        "--assets",
+        type=FILE,
+        metavar="DIR",
+        help="Folder in which includes and meshes are looked for too.",
+    ),
+)
+
+
+def pose_options(command: Command) -> Command:
+    """Add --pose, --key, --hold, --drive and --assets to a command: `pose`, `key`, `hold`, `drive`, `assets`."""
+    for option in reversed(_OPTIONS):
+        command = option(command)
+    return command
+
+
+loop_option = click.option(
+    "--loop",
+    metavar="NAME",
+    help="Closure by its name, as `loops` prints it.",
+)
+speed_option = click.option(
+    "--speed",
+    metavar="W",
+    help='Speed of the driven bar, rad/s or with a unit like "60 rpm".',
+)
+
+
+def read_pose(
+    pose: tuple[str, ...], key: str | None, hold: tuple[str, ...], drive: str | None
+) -> PoseOptions:
+    """Read the values of `pose_options`.
+
+    Raises
+    ------
+    InputError : an entry of --pose that is no JOINT=ANGLE.
+    """
+    joints = {}
+    for entry in _split(pose):
+        joint, equals, position = entry.partition("=")
+        if not equals or not joint or not position:
+            raise InputError("--pose", entry, "must be like JOINT=20deg")
+        joints[joint.strip()] = position.strip()
+    return PoseOptions(joints, key, tuple(_split(hold)), drive)
+
+
+def _split(values: tuple[str, ...]) -> list[str]:
+    """Split values at commas; the same option may be given several times."""
+    return [
+        part.strip() for value in values for part in value.split(",") if part.strip()
+    ]
