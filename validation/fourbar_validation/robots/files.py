@@ -54,12 +54,12 @@ def read_robot(path: Path, assets: Path | None = None) -> RobotFile:
     ------
     InputError : what the file may not hold, or names and is not there, in one line.
     """
-    return _Reading(path, assets).read()
+    return _RobotReading(path, assets).read()
 
 
 @dataclass
-class _Reading:
-    """One file that is being read, with what it names."""
+class _RobotReading:
+    """One robot that is being read, with the files that it names."""
 
     path: Path
     assets: Path | None
