@@ -378,6 +378,7 @@ PROCESSES = [
     ),
     ("validation", f"check {NO_FILE} {NO_FILE}", BAD_INPUT),
     ("validation", f"check-mjcf {NO_FILE} {NO_FILE}", BAD_INPUT),
+    ("validation", f"loops {NO_FILE}", BAD_INPUT),
     ("fourbar_lab", "fuzz-files --count 1", HOLDS),
     ("fourbar_lab", "write --no-such-option", BAD_INPUT),
     ("validation", "published --no-such-option", BAD_INPUT),
