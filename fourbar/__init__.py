@@ -65,9 +65,7 @@ if _TYPE_CHECKING:
     from fourbar.show.units import units as units
     from fourbar.studies.derivatives import Sensitivity as Sensitivity
     from fourbar.studies.derivatives import sensitivity as sensitivity
-    from fourbar.studies.enclosure import extremes as extremes
     from fourbar.studies.equilibrium import equilibrium as equilibrium
-    from fourbar.studies.function import function as function
     from fourbar.studies.internal_forces import internal_forces as internal_forces
     from fourbar.studies.spread import tolerances as tolerances
     from fourbar.studies.study import Study as Study
@@ -102,9 +100,7 @@ _ON_FIRST_USE = {
     **{name: "fourbar.studies.study" for name in ("Study", "vary")},
     **{name: "fourbar.evaluation.free_motion" for name in ("Released", "release")},
     "transmission_extremes": "fourbar.formulas.transmission",
-    "extremes": "fourbar.studies.enclosure",
     "equilibrium": "fourbar.studies.equilibrium",
-    "function": "fourbar.studies.function",
     "internal_forces": "fourbar.studies.internal_forces",
     "tolerances": "fourbar.studies.spread",
     "in_units": "fourbar.show.notebook",

@@ -9,7 +9,6 @@ from fourbar.cli.evaluate import (
     analyze,
     classify,
     equilibrium,
-    extremes,
     new,
     tolerance,
 )
@@ -20,7 +19,7 @@ SECTIONS = {
     "Begin": (new, edit),
     "Look": (classify, analyze, plot, animate),
     "Export": (mjcf, sdf, usd),
-    "Study": (tolerance, extremes, equilibrium),
+    "Study": (tolerance, equilibrium),
 }
 """Commands by what they are for, in the order of the help."""
 

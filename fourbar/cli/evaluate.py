@@ -330,44 +330,6 @@ def _refuse_units_of_json(as_json: bool, units: Conversion) -> None:
 
 @click.command()
 @given.scene_argument
-@click.option(
-    "--quantity",
-    "quantities",
-    multiple=True,
-    metavar="NAME",
-    help="Quantity: torque, drive_force, F12, F32, F43, F14 or transmission.",
-)
-@given.json_option
-@given.units_option
-@given.text_option(*given.TABLES)
-def extremes(
-    scene: Path,
-    quantities: tuple[str, ...],
-    as_json: bool,
-    units: Conversion,
-    out: Path | None,
-) -> None:
-    """Prove bounds of torque, pin forces and transmission angle over the input's range."""
-    from fourbar.show.studies import write_extremes, write_extremes_json
-    from fourbar.show.tables import show_running
-    from fourbar.studies.enclosure import extremes as proven
-
-    _refuse_units_of_json(as_json, units)
-    with (
-        given.open_scene(scene) as stated,
-        show_running("pieces of the interval are halved"),
-    ):
-        proof = proven(stated, quantities)
-    text = (
-        write_extremes_json(stated, proof)
-        if as_json
-        else write_extremes(stated, proof, {**DEGREES, **units})
-    )
-    given.print_to(text, out)
-
-
-@click.command()
-@given.scene_argument
 @given.json_option
 @given.text_option(*given.TABLES)
 def equilibrium(scene: Path, as_json: bool, out: Path | None) -> None:
@@ -376,7 +338,7 @@ def equilibrium(scene: Path, as_json: bool, out: Path | None) -> None:
     from fourbar.show.tables import show_running
     from fourbar.studies.equilibrium import equilibrium as found
 
-    with given.open_scene(scene) as described, show_running("the boxes are halved"):
+    with given.open_scene(scene) as described, show_running("zeros are sought"):
         rest = found(described)
     given.print_to(
         (write_equilibria_json if as_json else write_equilibria)(described.title, rest),

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.errors import InputError, expect
-from fourbar.formulas.arithmetic import Number, cross, is_any, select, sign
+from fourbar.formulas.arithmetic import Number, cross, is_any, select
 from fourbar.formulas.motion import State
 from fourbar.formulas.pin_forces import Bodies, Body, PinForces, Wrenches
 from fourbar.linkage import PINS, Declared, FourBar, require
@@ -133,7 +133,7 @@ class Actions:
     def pull_ends(self, start: Any, end: Any, force: Number) -> None:
         """Add the two forces where they act."""
         for point, sense in ((start, 1.0), (end, -1.0)):
-            self.force(point.bar, sense * force, point.of(self.state))
+            self.force(point.bar, sense * force, point.in_bar)
 
     def plus(self, unit: "Actions", size: Number) -> "Actions":
         """Make the sum of these and of what a drive of a size does that does `unit` per newton."""
@@ -196,7 +196,7 @@ class Actions:
         """
         slip, turning = self.state.slip(pin), self.turning(pin)
         if not is_any(self.side != 0):
-            return turning * sign(slip * self.state.speed)
+            return turning * np.sign(slip * self.state.speed)
         moving = np.where(turning, np.sign(slip * self.state.speed), self.side)
         return np.where(
             np.equal(self.state.speed, 0.0), self.side * turning * np.sign(slip), moving

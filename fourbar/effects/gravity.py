@@ -4,11 +4,8 @@ import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-import numpy as np
-
 from fourbar.effects.effect import Actions, Effect
-from fourbar.formulas.arithmetic import U, is_any, namespace, polar, vector
-from fourbar.formulas.longer import shorten
+from fourbar.formulas.arithmetic import is_any, polar, vector
 from fourbar.formulas.motion import State
 from fourbar.linkage import MOVING_BARS, Declared, check_numbers
 
@@ -31,14 +28,14 @@ class Gravity(Effect):
 
     @property
     def field(self) -> Any:
-        """g_x + i g_y, m/s^2; a component that the angle as a double cannot tell from zero is zero."""
+        """g_x + i g_y, m/s^2; a component lost in the rounding of the angle is zero.
+
+        Lost is what does not change 1. A component in longer numbers does, and so does
+        one with a slope: error bars and derivatives need the small ones.
+        """
         u = polar(1.0, self.angle)
-        # derivatives by the angle need the small component, and so does the error bar in longer numbers
-        if namespace(u) is not np or shorten(self.angle) is not self.angle:
-            return self.magnitude * u
-        return self.magnitude * vector(
-            u.real * (abs(u.real) > U), u.imag * (abs(u.imag) > U)
-        )
+        along, across = (part * (1.0 + abs(part) != 1.0) for part in (u.real, u.imag))
+        return self.magnitude * vector(along, across)
 
     @property
     def vector(self) -> tuple[float, float]:

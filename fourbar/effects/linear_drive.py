@@ -11,10 +11,12 @@ which is of the same form, with (theta_2', theta_3', theta_4') = (sin(theta_4 - 
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from fourbar.effects.effect import Actions
 from fourbar.effects.spring import COINCIDE, SpringEnd, require_ends
 from fourbar.errors import InputError
-from fourbar.formulas.arithmetic import Number, is_any, namespace
+from fourbar.formulas.arithmetic import Number, is_any
 from fourbar.formulas.motion import State
 from fourbar.formulas.path import NO_DIGIT_LEFT
 from fourbar.formulas.pin_forces import Body
@@ -67,7 +69,7 @@ class LinearDrive:
     def line(self, state: State) -> tuple[Number, Number]:
         """Compute the stroke, m, and the unit vector from `start` to `end`, no number where they coincide."""
         across = self.end.place(state) - self.start.place(state)
-        stroke = namespace(across).abs(across)
+        stroke = np.abs(across)
         return stroke, across / stroke
 
     def gain(self, state: State) -> Number:
@@ -117,8 +119,7 @@ class LinearDrive:
         )
         if not is_any(none | meet):
             return None
-        xp = namespace(meet)
-        return xp.where(meet, NO_DIRECTION, xp.where(none, NO_LEVER, OK))
+        return np.where(meet, NO_DIRECTION, np.where(none, NO_LEVER, OK))
 
 
 def _list_bars(linkage: FourBar, point: SpringEnd) -> set[int]:

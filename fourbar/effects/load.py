@@ -14,8 +14,6 @@ from fourbar.formulas.arithmetic import (
     angle,
     is_any,
     make_like,
-    namespace,
-    nearest,
     polar,
     split_sum,
 )
@@ -87,38 +85,21 @@ class Table:
         What the angle is beyond the table's last point before it is theta_2 less the point and whole turns, of which
         nothing is rounded but the result.
         """
-        first, xp = self.theta_2[0], namespace(theta_2)
-        place = first + xp.remainder(shorten(angle(polar(1.0, theta_2))) - first, TURN)
-        points, factors = (
-            make_like(self.theta_2, theta_2),
-            make_like(self.factor, theta_2),
-        )
-        if xp is np:
-            place = self._require_covered(place)
-            k = np.clip(
-                np.searchsorted(np.array(self.theta_2), place, "right") - 1,
-                0,
-                len(self.theta_2) - 2,
-            )
-        else:  # operations that every array library has
-            k = xp.sum(xp.astype(place[..., None] >= points[1:-1], xp.int32), axis=-1)[
-                None
-            ]
-        pieces = (
-            points[:-1],
-            points[1:] - points[:-1],
-            factors[:-1],
-            factors[1:] - factors[:-1],
-        )
-        start, width, before, rise = (
-            piece[k] if xp is np else piece[k][0] for piece in pieces
-        )
+        first = self.theta_2[0]
+        place = first + np.remainder(shorten(angle(polar(1.0, theta_2))) - first, TURN)
+        place = self._require_covered(place)
+        piece = np.searchsorted(np.array(self.theta_2), place, "right") - 1
+        piece = np.clip(piece, 0, len(self.theta_2) - 2)
+        points = make_like(self.theta_2, theta_2)
+        factors = make_like(self.factor, theta_2)
+        start, width = points[piece], points[piece + 1] - points[piece]
+        before, rise = factors[piece], factors[piece + 1] - factors[piece]
         away, lost = split_sum(theta_2, -start)
-        rest = xp.fmod(away, TURN)
-        turns = nearest((theta_2 - place) / TURN)
+        rest = np.fmod(away, TURN)
+        turns = np.rint((theta_2 - place) / TURN)
         past = (
             rest
-            + (nearest((away - rest) / TURN) - turns) * TURN
+            + (np.rint((away - rest) / TURN) - turns) * TURN
             + (lost - turns * BEYOND_TURN)
         )
         return before + rise * (past / width)

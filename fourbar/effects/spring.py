@@ -11,7 +11,6 @@ from fourbar.errors import InputError, expect
 from fourbar.formulas.arithmetic import (
     dot,
     is_any,
-    namespace,
     polar,
     select,
     sine_of,
@@ -66,17 +65,9 @@ class SpringEnd(NamedTuple):
         point = polar(self.distance, self.angle)
         return np.asarray(point) if isinstance(point, complex) else point
 
-    def of(self, state: State) -> Any:
-        """Return the vector in the bar's frame, m, as a number of the library of a state."""
-        return (
-            self.in_bar
-            if namespace(state.position.u2) is np
-            else polar(self.distance, self.angle)
-        )
-
     def from_pin(self, pin: str, state: State) -> tuple[Any, Any]:
         """Return the vector from one of the bar's pins in the bar's frame, complex, m, and the square of its length."""
-        arm = self.of(state)
+        arm = self.in_bar
         if pin != SECOND_PIN[self.bar]:
             return arm, self.distance * self.distance
         half = sine_of(
@@ -91,7 +82,7 @@ class SpringEnd(NamedTuple):
 
     def place(self, state: State) -> Any:
         """Return the position of the end, complex, m."""
-        return state.foot(self.bar) + self.of(state) * state.direction(self.bar)
+        return state.foot(self.bar) + self.in_bar * state.direction(self.bar)
 
 
 def require_ends(key: str, start: object, end: object) -> tuple[SpringEnd, SpringEnd]:
@@ -232,10 +223,9 @@ class Springs(Effect):
         for spring in self.springs:
             across = spring.end.place(state) - spring.start.place(state)
             by_distance = spring.stiffness
-            if is_any(
-                spring.slack != 0.0
-            ):  # NaN at a distance of 0, where the status says so
-                by_distance = by_distance + spring.slack / namespace(across).abs(across)
+            if is_any(spring.slack != 0.0):
+                # NaN at a distance of 0, where the status says so
+                by_distance = by_distance + spring.slack / np.abs(across)
             actions.pull(spring.start, spring.end, by_distance * across)
 
     def status(
@@ -252,8 +242,7 @@ class Springs(Effect):
                 + abs(spring.start.distance)
                 + abs(spring.end.distance)
             )
-            here = (namespace(across).abs(across) <= COINCIDE * away) & (
-                spring.slack != 0.0
-            )
+            coincide = np.abs(across) <= COINCIDE * away
+            here = coincide & (spring.slack != 0.0)
             codes = select(here, NO_DIRECTION, OK if codes is None else codes)
         return codes

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fourbar.effects.effect import Actions, PinRows
 from fourbar.errors import expect
-from fourbar.formulas.arithmetic import Number, conjugate, namespace, wrap_angle
+from fourbar.formulas.arithmetic import Number, angle, wrap_angle
 from fourbar.formulas.motion import State
 from fourbar.formulas.path import ROLES
 from fourbar.formulas.position import reorder_lengths
@@ -58,22 +58,20 @@ class Torsion(PinRows):
         """Add M on bar j = -(preload + k (theta_j - theta_i - rest)), its opposite on bar i."""
         for pin, k, rest, preload in self.springs:
             i, j = PINS[pin]
-            turned = state.direction(j) * conjugate(state.direction(i))
-            angle = namespace(turned).atan2(turned.imag, turned.real)
-            actions.couple(pin, -(preload + k * wrap_angle(angle - rest)))
+            turned = angle(state.direction(j) * state.direction(i).conjugate())
+            actions.couple(pin, -(preload + k * wrap_angle(turned - rest)))
 
     def counted_from(self, start: State, branch: Number) -> "Torsion":
         """Count whole turns where the motion begins."""
         away = [
-            angle - rest
-            for angle, (_, _, rest, _) in zip(
+            followed - rest
+            for followed, (_, _, rest, _) in zip(
                 self._follow_angles(start, branch), self.springs, strict=True
             )
         ]
-        counted = copy(
-            self
-        )  # a constructor checks what a user gives, one number at a time
-        turns = tuple(math.tau * np.floor(angle / math.tau + 0.5) for angle in away)
+        # a constructor checks what a user gives, one number at a time
+        counted = copy(self)
+        turns = tuple(math.tau * np.floor(turned / math.tau + 0.5) for turned in away)
         object.__setattr__(counted, "turns", turns)
         return counted
 
@@ -84,10 +82,10 @@ class Torsion(PinRows):
         if self.turns is None or branch is None:
             return None
         wound = np.zeros(np.shape(state.theta_2), dtype=bool)
-        for angle, turns, (_, _, rest, _) in zip(
+        for followed, turns, (_, _, rest, _) in zip(
             self._follow_angles(state, branch), self.turns, self.springs, strict=True
         ):
-            wound |= np.abs(angle - rest - turns) > HALF_TURN
+            wound |= np.abs(followed - rest - turns) > HALF_TURN
         return np.where(wound, WOUND, OK).astype(np.uint8)
 
     def _follow_angles(self, state: State, branch: Number) -> list[Array]:

@@ -9,15 +9,9 @@ Source: R. L. Norton, Design of Machinery, ch. 6 and 7; B. Paul, Kinematics and 
 
 from typing import NamedTuple
 
-from fourbar.formulas.arithmetic import (
-    Number,
-    conjugate,
-    divisor,
-    is_any,
-    namespace,
-    select,
-    vector,
-)
+import numpy as np
+
+from fourbar.formulas.arithmetic import Number, is_any, select, vector
 from fourbar.formulas.position import Loop, Position
 
 FAST = 4.0
@@ -74,9 +68,7 @@ def coefficients(lengths: Loop, position: Position) -> Coefficients:
     if is_any(may_turn_fast(lengths)):
         fast = find_fast_turns(lengths, position)
         heron = E2 * (d + a) * (d + a) * outer + E1 * (b - c) * (b - c) * (2.0 * grown)
-        w = select(
-            fast, -heron * per_root / divisor(x * S + y * position.root, fast), w
-        )
+        w = select(fast, -heron * per_root / (x * S + y * position.root), w)
         n, rest = select(fast, 0.5 + w, n), select(fast, 0.5 - w, rest)
     dg = ((2.0 * ad * E2) * kk / inner - (2.0 * ad * E1) * ss / outer) * per_root
     dn = (x * dg - S * w) * per_e2
@@ -107,7 +99,10 @@ def take_sines_of_rates(lengths: Loop, position: Position, k: Coefficients) -> P
     if not is_any(may_turn_fast(lengths)):
         return position
     fast, scale = find_fast_turns(lengths, position), position.sin_mu / d
-    u3, u4 = position.u3 * conjugate(position.u1), position.u4 * conjugate(position.u1)
+    u3, u4 = (
+        position.u3 * position.u1.conjugate(),
+        position.u4 * position.u1.conjugate(),
+    )
     u3 = select(
         fast, vector(u3.real, c * scale * (k.h23 - k.h43)) * position.u1, position.u3
     )
@@ -127,11 +122,11 @@ def take_sines_of_rates(lengths: Loop, position: Position, k: Coefficients) -> P
 
 def put_parallel_pairs(k: Coefficients, first: Number, second: Number) -> Coefficients:
     """Put in the exact coefficients of bars that stay parallel: h3, h4 = 0, 1 where `first`, 1, 0 where `second`."""
-    either, xp = first | second, namespace(first)
-    h3, h4 = xp.where(either, 1.0 * second, k.h3), xp.where(either, 1.0 * first, k.h4)
+    either = first | second
+    h3, h4 = np.where(either, 1.0 * second, k.h3), np.where(either, 1.0 * first, k.h4)
     h23, h43 = (
-        xp.where(either, 1.0 * first, k.h23),
-        xp.where(either, 1.0 * first - 1.0 * second, k.h43),
+        np.where(either, 1.0 * first, k.h23),
+        np.where(either, 1.0 * first - 1.0 * second, k.h43),
     )
     return Coefficients(
         k.h2,
@@ -140,8 +135,8 @@ def put_parallel_pairs(k: Coefficients, first: Number, second: Number) -> Coeffi
         h23,
         h43,
         k.dh2,
-        xp.where(either, 0.0, k.dh3),
-        xp.where(either, 0.0, k.dh4),
+        np.where(either, 0.0, k.dh3),
+        np.where(either, 0.0, k.dh4),
     )
 
 

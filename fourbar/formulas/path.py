@@ -16,12 +16,9 @@ import numpy as np
 from fourbar.formulas.arithmetic import (
     Number,
     is_any,
-    is_zero,
-    namespace,
     polar,
     power_of_two,
     select,
-    sign,
     sine,
     vector,
 )
@@ -74,19 +71,25 @@ class Path(NamedTuple):
         """Compute the half angle for the independent angle q (rad) against the ground."""
         return half_angle(self.lengths, q - self.theta_1, opposite=self.bar == 4)
 
+    def input_direction(self, q: Number, half: HalfAngle) -> Number:
+        """Compute e^{i q}: over level ground from the half angle, which is at hand."""
+        level = self.theta_1 == 0.0
+        if not is_any(level):
+            return direction(q)
+        u2 = vector(half.kk - half.ss, 2.0 * half.sk)
+        if self.bar == 4:
+            u2 = -u2
+        turned = self.theta_1 != 0.0
+        if is_any(turned):  # many linkages, some on level ground
+            u2 = select(turned, direction(q), u2)
+        return u2
+
     def position(self, q: Number, half: HalfAngle, branch: Number) -> Position:
         """Compute positions with the bars in the order of the path.
 
         `branch`: sign of the root in that order, which is that of `drive_sine` for a drive on the bar itself.
         """
-        along = is_any(is_zero(self.theta_1))
-        u2 = vector(half.kk - half.ss, 2.0 * half.sk) if along else direction(q)
-        if along and self.bar == 4:
-            u2 = -u2
-        if along and is_any(
-            turned := self.theta_1 != 0.0
-        ):  # many linkages, some on level ground
-            u2 = select(turned, direction(q), u2)
+        u2 = self.input_direction(q, half)
         position = close_loop(self.lengths, self.u1, u2, half, branch, self.unit)
         if self.may_stay_parallel:
             position = parallel_position(
@@ -123,7 +126,7 @@ class Path(NamedTuple):
         position = take_sines_of_rates(self.lengths, position, k)
         if self.may_stay_parallel:
             first, second = find_parallel_pairs(self.lengths, position.half, branch)
-            regular = ~namespace(position.root).isnan(position.root)
+            regular = ~np.isnan(position.root)
             k = parallel_motion(k, first & regular, second & regular)
         return (
             (position, k)
@@ -171,7 +174,7 @@ class Path(NamedTuple):
         sine = drive_sine_of_triangle(self.lengths, position, role)
         if self.may_stay_parallel:  # all bars make one angle, whose sine is exact
             first, second = find_parallel_pairs(
-                self.lengths, position.half, sign(position.root)
+                self.lengths, position.half, np.sign(position.root)
             )
             with_first, with_second = (
                 (0.0, 2.0 * position.half.sk)
@@ -192,7 +195,7 @@ def prepare_path(lengths: Loop, theta_1: Number, bar: int = 2) -> Path:
         loop(*reorder_lengths(bar, (d / unit, a / unit, b / unit, c / unit))),
         polar(1.0, theta_1),
     )
-    meets = is_any(is_zero(reordered.E1) & is_zero(reordered.E2))
+    meets = is_any((reordered.E1 == 0.0) & (reordered.E2 == 0.0))
     return Path(bar, reordered, theta_1, -u1 if bar == 4 else u1, unit, meets)
 
 

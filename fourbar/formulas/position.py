@@ -21,11 +21,7 @@ from fourbar.formulas.arithmetic import (
     U,
     exact_difference,
     is_any,
-    is_differentiated,
-    namespace,
-    polar,
     select,
-    sign,
     square_root,
     tangent,
     vector,
@@ -97,9 +93,7 @@ def loop(d: Number, a: Number, b: Number, c: Number) -> Loop:
 
 
 def direction(theta: Number) -> Number:
-    """Compute e^{i theta} = ((1 - t^2) + 2 i t)/(1 + t^2), t = tan(theta/2); by cosine and sine if differentiated."""
-    if is_differentiated(theta):
-        return polar(1.0, theta)
+    """Compute e^{i theta} = ((1 - t^2) + 2 i t)/(1 + t^2), t = tan(theta/2)."""
     t = tangent(0.5 * theta)
     kk = 1.0 / (1.0 + t * t)
     return vector((1.0 - t * t) * kk, 2.0 * t * kk)
@@ -111,21 +105,12 @@ def half_angle(lengths: Loop, psi: Number, *, opposite: bool = False) -> HalfAng
     `opposite`: h of psi - pi, from the same tangent: there the ground is read from O4 to O2.
     """
     E = lengths.E1 if opposite else lengths.E2
-    if is_differentiated(
-        psi
-    ):  # near 180 deg the tangent is large, and its derivative is a difference
-        xp = namespace(psi)
-        s, k = xp.sin(0.5 * psi), xp.cos(0.5 * psi)
-        if xp is not np:
-            s = select(E == 0.0, s + tiny_tangent(s), s)
-        ss, kk, sk = s * s, k * k, s * k
-    else:
-        t, meets = tangent(0.5 * psi), E == 0.0
-        if is_any(meets):
-            t = select(meets, t + tiny_tangent(t), t)
-        kk = 1.0 / (1.0 + t * t)
-        sk = t * kk
-        ss = t * sk
+    t, meets = tangent(0.5 * psi), E == 0.0
+    if is_any(meets):
+        t = select(meets, t + np.copysign(TINY_TANGENT, t), t)
+    kk = 1.0 / (1.0 + t * t)
+    sk = t * kk
+    ss = t * sk
     return (
         compute_factors(lengths, kk, ss, -sk)
         if opposite
@@ -146,16 +131,6 @@ def compute_factors(lengths: Loop, ss: Number, kk: Number, sk: Number) -> HalfAn
             select(short & (kk <= ss), four_bc - outer, inner),
         )
     return HalfAngle(ss, kk, sk, outer, inner)
-
-
-def tiny_tangent(t: Number) -> Number:
-    """Return TINY_TANGENT with the sign of a tangent."""
-    xp = namespace(t)
-    return (
-        np.copysign(TINY_TANGENT, t)
-        if xp is np
-        else xp.copysign(0.0 * t + TINY_TANGENT, t)
-    )
 
 
 def close_loop(
@@ -207,18 +182,17 @@ def find_parallel_pairs(
     Second: B stays on O2, bars 2, 3 turn together and bar 4 rests (a = b, c = d).
     """
     d, a, b, c, _, _ = lengths
-    side = branch * sign(half.sk)
+    side = branch * np.sign(half.sk)
     return (a == c) & (b == d) & (side > 0), (a == b) & (c == d) & (side < 0)
 
 
 def put_parallel_pairs(position: Position, first: Number, second: Number) -> Position:
     """Put in the exact directions u3 = u1, u4 = u2 where `first`, u3 = -u2, u4 = -u1 where `second`."""
-    xp = namespace(first, position.u2)
-    u3 = xp.where(first, position.u1, xp.where(second, -position.u2, position.u3))
-    u4 = xp.where(first, position.u2, xp.where(second, -position.u1, position.u4))
-    sine = xp.where(
+    u3 = np.where(first, position.u1, np.where(second, -position.u2, position.u3))
+    u4 = np.where(first, position.u2, np.where(second, -position.u1, position.u4))
+    sine = np.where(
         first | second,
-        sign(position.root) * 2.0 * abs(position.half.sk),
+        np.sign(position.root) * 2.0 * abs(position.half.sk),
         position.sin_mu,
     )
     return position._replace(u3=u3, u4=u4, sin_mu=sine)

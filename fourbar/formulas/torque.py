@@ -10,7 +10,7 @@ h3 = 0, T4 where h4 = 0.
 Source: R. L. Norton, Design of Machinery, ch. 11 (virtual work); M. Eksergian, Dynamical analysis of machines (1930).
 """
 
-from fourbar.formulas.arithmetic import Number, conjugate, dot, is_any
+from fourbar.formulas.arithmetic import Number, dot, is_any
 from fourbar.formulas.motion import Coefficients
 from fourbar.formulas.pin_forces import Bodies, about_first_pin
 from fourbar.formulas.position import Position
@@ -42,9 +42,8 @@ def half_slope(
         G'.G'' = a^2 h2 h2' + r^2 h3 h3' + (h2 h3' + h3 h2') A.R + h2 h3 (h2 - h3) A x R.
     """
     two, three, four = bodies
-    AR = ((a * k.h2 * three.m * three.z) * position.u3) * conjugate(
-        position.u2
-    )  # m h2 (A.R + i A x R)
+    # m h2 (A.R + i A x R)
+    AR = ((a * k.h2 * three.m * three.z) * position.u3) * position.u2.conjugate()
     half = about_first_pin(three) * (k.h3 * k.dh3) + about_first_pin(four) * (
         k.h4 * k.dh4
     )

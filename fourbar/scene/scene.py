@@ -14,9 +14,7 @@ from fourbar.formulas.arithmetic import (
     PI_LOW,
     Number,
     angle,
-    divisor,
     exact_difference,
-    namespace,
     polar,
     select,
 )
@@ -307,34 +305,28 @@ class Triangle(NamedTuple):
     ) -> tuple[Any, Any, Any, Any]:
         """Compute angle, speed and acceleration of the bar, and the condition: the lever over the longer of l and r.
 
-        NaN where the cylinder cannot have the stroke; in libraries other than NumPy the condition alone says so, by 0.
-        All may be arrays, and numbers that carry their derivatives.
+        NaN where the cylinder cannot have the stroke. All may be arrays, and numbers with slopes.
         """
         assert side is not None
         length, reach, zero = self.length, self.reach, 0.0 * self.length
-        sign, xp = SIDES[side], namespace(stroke, length, reach)
+        sign = SIDES[side]
         near = exact_difference(stroke, reach, length, zero) * exact_difference(
             stroke, length, reach, zero
         )
         far = exact_difference(length, reach, stroke, zero) * (length + reach + stroke)
-        inside = xp is np or (near > 0.0) & (far > 0.0)
-        near, far, stroke = (divisor(x, inside) for x in (near, far, stroke))
         with np.errstate(all="ignore"):
-            near, far = xp.sqrt(near), xp.sqrt(far)
-            beta = 2.0 * xp.atan2(near, far)
+            near, far = np.sqrt(near), np.sqrt(far)
+            beta = 2.0 * np.arctan2(near, far)
             lever = near * far / (2.0 * stroke)
             longer = 0.5 * (length + reach + abs(length - reach))
-            theta, condition = (
-                self.angle + sign * beta,
-                select(inside, lever / longer, 0.0),
-            )
+            theta, condition = self.angle + sign * beta, lever / longer
             if speed is None:
                 return theta, None, np.zeros(np.shape(theta)), condition
             rate = speed / lever
             growth = (
                 speed * speed
                 + stroke * acceleration
-                - length * reach * xp.cos(beta) * rate * rate
+                - length * reach * np.cos(beta) * rate * rate
             )
             growth = growth / (lever * stroke)
         return theta, sign * rate, sign * growth, condition

@@ -1,4 +1,4 @@
-"""Output of `classify`, `analyze --sensitivity`, `extremes` and `equilibrium`: text, or one JSON object, SI and rad."""
+"""Output of `classify`, `analyze --sensitivity` and `equilibrium`: text, or one JSON object, SI and rad."""
 
 import math
 from collections.abc import Callable, Iterator
@@ -19,7 +19,6 @@ from fourbar.formulas.mobility import (
 from fourbar.formulas.transmission import transmission_extremes
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, FourBar
 from fourbar.quantities import COUPLE, LINE, NOT_ASSEMBLED, PIN_FORCES, SINGULAR
-from fourbar.scene import Scene
 from fourbar.scene.motion import BRANCH_NAMES
 from fourbar.show.duty import read_drive
 from fourbar.show.tables import (
@@ -27,13 +26,11 @@ from fourbar.show.tables import (
     make_plain_table,
     write_cells,
     write_table,
-    write_value,
 )
 from fourbar.show.units import COMMON, choose_unit
-from fourbar.solution import Conversion, find_unit, find_unit_in
+from fourbar.solution import Conversion, find_unit
 from fourbar.studies.circuit_curve import RestPosition
 from fourbar.studies.derivatives import Sensitivity
-from fourbar.studies.enclosure import PROVEN, Extremes
 from fourbar.studies.equilibrium import Equilibria, Equilibrium
 from fourbar.writing import write_object
 
@@ -245,91 +242,6 @@ def write_sensitivity_json(derivatives: Sensitivity) -> str:
     )
 
 
-EXTREMES_SCHEMA = "fourbar-extremes/1"
-
-
-def write_extremes(scene: Scene, proof: Extremes, units: Conversion) -> str:
-    """Write each enclosure with its angle, below what it holds over."""
-    angle_unit, of_angle = find_unit_in("rad", units)
-    parts = " and ".join(
-        f"{low * of_angle:.6g} to {high * of_angle:.6g}" for low, high in proof.parts
-    )
-    lines = [
-        f"guaranteed over theta_2 = {parts} {angle_unit}, by interval arithmetic in {proof.boxes} pieces of it"
-    ]
-    if proof.distance:
-        lines.append(
-            f"left out: theta_2 within {write_value(proof.distance, 'rad', units)} "
-            "of a limit of the input or of a pole of "
-            "the drive, where the loads grow without bound"
-        )
-    if proof.nominal is None:
-        lines.append(
-            f"each extreme lies between the two numbers given, which differ by about {PROVEN:g} of the largest load"
-        )
-    else:
-        lines.append(
-            f"for every linkage within the {len(scene.tolerances)} tolerances (within three sigma where one is normal):"
-            " none goes beyond the outer number, the inner number is that of a linkage that was tried; over-estimate: "
-            "how many times as far from the nominal extreme the outer number lies as the inner one"
-        )
-    rows = []
-    for name in proof.least:
-        unit, factor = find_unit_in(
-            "rad" if name == "transmission" else find_unit(name.strip("|")), units
-        )
-        for word, sign, extreme in (
-            ("least", -1, proof.least[name]),
-            ("greatest", 1, proof.greatest[name]),
-        ):
-            ends = (f"{factor * extreme.low:.11g}", f"{factor * extreme.high:.11g}")
-            rows.append([name, unit, word, *ends, f"{of_angle * extreme.theta_2:.6f}"])
-            if proof.nominal is not None:
-                over = proof.over_estimate(name, sign)
-                rows[-1].append("-" if over is None else f"{over:.3g} times")
-    heads = (
-        "",
-        "unit",
-        "",
-        "from",
-        "to",
-        f"theta_2 ({angle_unit})",
-        *(["over-estimate"] if proof.nominal else []),
-    )
-    return write_table(
-        scene.title,
-        lines,
-        make_plain_table(heads, rows, left=("", "unit", "over-estimate")),
-    )
-
-
-def write_extremes_json(scene: Scene, proof: Extremes) -> str:
-    """Write one object, SI and rad."""
-
-    def rows(bounds: Extremes) -> dict[str, Any]:
-        return {
-            name: {"least": bounds.least[name], "greatest": bounds.greatest[name]}
-            for name in bounds.least
-        }
-
-    return write_object(
-        EXTREMES_SCHEMA,
-        title=scene.title,
-        theta_2=proof.parts,
-        distance_from_poles=proof.distance,
-        boxes=proof.boxes,
-        extremes=rows(proof),
-        nominal=None if proof.nominal is None else rows(proof.nominal),
-        over_estimate={
-            name: {
-                word: proof.over_estimate(name, sign)
-                for word, sign in (("least", -1), ("greatest", 1))
-            }
-            for name in proof.least
-        },
-    )
-
-
 EQUILIBRIUM_SCHEMA = "fourbar-equilibrium/1"
 MOVES = {0: "stays", 1: "theta_2 grows", -1: "theta_2 falls"}
 
@@ -363,12 +275,10 @@ def write_equilibria(title: str, rest: Equilibria) -> str:
 
 def _count_equilibria(rest: Equilibria) -> list[str]:
     count = len(rest.found)
-    how = (
-        "proven to be all"
-        if rest.proven
-        else "of those found, by changes of sign: there may be others"
+    grid = (
+        f"found between {rest.samples} positions where Q changes its sign or touches 0"
     )
-    lines = [f"{count} equilibri{'um' if count == 1 else 'a'} without friction, {how}"]
+    lines = [f"{count} equilibri{'um' if count == 1 else 'a'} without friction, {grid}"]
     if rest.not_decided:
         angles = " and ".join(
             f"theta_2 = {_write_degrees(place.theta_2)}" for place in rest.not_decided
@@ -466,7 +376,7 @@ def write_equilibria_json(title: str, rest: Equilibria) -> str:
     return write_object(
         EQUILIBRIUM_SCHEMA,
         title=title,
-        proven=rest.proven,
+        samples=rest.samples,
         equilibria=rest.found,
         indifferent=rest.indifferent,
         held=rest.held,

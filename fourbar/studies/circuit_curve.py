@@ -33,7 +33,7 @@ from fourbar.solve import solve
 from fourbar.studies.sloped import Sloped
 
 SAMPLES = 3600
-"""Positions of a whole branch that are looked at for friction, and for zeros where they cannot be proven."""
+"""Positions of a whole branch that are looked at for friction and for zeros."""
 NOTHING = 1e-11
 """Fraction of the sum of the absolute terms of Q: a Q no larger than this everywhere is zero within round-off."""
 AT_END = 1e-12
@@ -178,16 +178,30 @@ class CircuitCurve:
         return self.circuit.branches if self.full else (1,)
 
     def samples(self) -> Array:
-        """Sample all rows at even places within the sweep, off the limits and change points, (n, 2)."""
+        """Sample all rows at even places within the sweep and at its ends, off the limits and change points, (n, 2)."""
         tau = np.linspace(0.0, TURN, SAMPLES, endpoint=False) + 0.5 * TURN / SAMPLES
         points = np.concatenate([self.point(tau, branch) for branch in self.rows])
-        return points[self.inside(points[:, 0], np.zeros(1))]
-
-    def sorted(self, points: Array) -> Array:
-        """Return the points in the sweep, in order along the rows."""
         points = points[self.inside(points[:, 0], np.zeros(1))]
+        return np.concatenate([points, self.ends()])
+
+    def ends(self) -> Array:
+        """Return the ends of the sweep on each branch, (n, 2); none where there is no sweep or it is a whole turn."""
+        if self.sweep is None or self.sweep[1] - self.sweep[0] >= TURN:
+            return np.empty((0, 2))
+        psi = np.array(self.sweep) - self.theta_1
+        mu = transmission(self.ratios, psi)
+        on_circuit = np.remainder(psi - self.low, TURN) < self.high - self.low
+        on_circuit &= np.abs(np.sin(mu)) > AT_END
+        psi, mu = psi[on_circuit], mu[on_circuit]
+        return np.concatenate(
+            [np.stack([psi, branch * mu], axis=1) for branch in self.circuit.branches]
+        )
+
+    def order(self, points: Array) -> NDArray[np.intp]:
+        """Return the indices of the points in the sweep, in order along the rows."""
         tau, row = self.tau(points)
-        return points[np.lexsort((tau, row))]
+        order = np.lexsort((tau, row))
+        return order[self.inside(points[order, 0], np.zeros(1))]
 
     def state(self, points: Array) -> State:
         """Compute positions with their derivatives along the curve."""

@@ -2,18 +2,19 @@
 
 import math
 from collections.abc import KeysView
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.effects import Gravity
 from fourbar.effects.effect import Actions
 from fourbar.errors import InputError, expect
 from fourbar.evaluation.case import Case
 from fourbar.evaluation.evaluate import list_kinematics
-from fourbar.formulas.arithmetic import polar
+from fourbar.formulas.arithmetic import Number, polar
+from fourbar.formulas.path import Path
+from fourbar.formulas.position import HalfAngle, compute_factors
 from fourbar.quantities import (
     FORCES,
     NOT_ASSEMBLED,
@@ -270,7 +271,7 @@ def sensitivity(scene: Scene) -> Sensitivity:
         regular = np.flatnonzero(
             ~np.isin(status, [STATUS_NAMES[code] for code in (NOT_ASSEMBLED, SINGULAR)])
         )
-        seeded = make_differentiable(scene)
+        seeded = scene
         for number, (key, entry) in enumerate(keys.items()):
             if not key.startswith(
                 "motion."
@@ -299,26 +300,25 @@ def sensitivity(scene: Scene) -> Sensitivity:
     )
 
 
-class _Directed(Gravity):
-    """Gravity whose small components are kept: they have derivatives."""
+class _SlopedPath(Path):
+    """The same path by sine and cosine.
+
+    Near 180 deg a tangent is large, and slopes through it are differences of large numbers.
+    """
 
     __slots__ = ()
 
-    @property
-    def field(self) -> Any:
-        """Compute g e^{i angle}."""
-        return polar(self.magnitude, self.angle)
+    def half_angle(self, q: Number) -> HalfAngle:
+        """Compute the half angle for the independent angle q (rad) against the ground."""
+        h = 0.5 * (q - self.theta_1)
+        s, k = np.sin(h), np.cos(h)
+        if self.bar == 4:
+            return compute_factors(self.lengths, k * k, s * s, -(s * k))
+        return compute_factors(self.lengths, s * s, k * k, s * k)
 
-
-def make_differentiable(scene: Scene) -> Scene:
-    """Replace the scene's effects by some that compute their derivatives too."""
-    effects = (
-        _Directed(effect.magnitude, effect.angle)
-        if isinstance(effect, Gravity)
-        else effect
-        for effect in scene.effects
-    )
-    return replace(scene, effects=tuple(effects))
+    def input_direction(self, q: Number, half: HalfAngle) -> Number:
+        """Compute e^{i q}."""
+        return polar(1.0, q)
 
 
 def make_unit_slope(index: int, count: int) -> Sloped:
@@ -358,6 +358,7 @@ def _compute_derivatives(
     }
     q, speed, acceleration, condition = turn_bar(scene, *commanded.values())
     case, branch = Case.of(scene, stated.bar), stated.branch[index].astype(float)
+    case = case._replace(path=_SlopedPath(*case.path))
     state = case.assemble(
         q, case.path.half_angle(q), branch, speed, acceleration, moving=moving
     )

@@ -10,9 +10,8 @@ Source: R. L. Norton, Design of Machinery, ch. 11 (virtual work); L. Meirovitch,
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
 from functools import partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,10 +22,8 @@ from fourbar.formulas.mobility import (
     TURN,
     Circuit,
     choose_range,
-    circuits,
     turns_fully,
 )
-from fourbar.formulas.position import Loop
 from fourbar.formulas.torque import inertia
 from fourbar.quantities import JAMMED, NOT_ASSEMBLED, SINGULAR
 from fourbar.scene import Command, Scene
@@ -38,16 +35,9 @@ from fourbar.studies.circuit_curve import (
     SAMPLES,
     CircuitCurve,
     RestPosition,
-    compute_generalised_force,
     of_input,
-    on_curve,
     transmission,
 )
-from fourbar.studies.derivatives import make_differentiable
-from fourbar.studies.enclosure import PROVABLE
-from fourbar.studies.keys import read_numbers, replace_numbers
-from fourbar.studies.sloped import Sloped, make_balls
-from fourbar.studies.zeros import AT_CHANGE_POINT, Zeros, find_zeros
 
 A_JUMP = 1e-6
 """Fraction of the sum of the absolute terms: a torsion spring wound by half a turn makes Q jump, which is no zero."""
@@ -55,6 +45,8 @@ STILL = 1e-3
 """Ratio of the turns of bars 2 and 4 below which bar 2 stands at a limit, and theta_4 takes its place."""
 A_RANGE = 3
 """Samples in a row where Q is nothing: fewer may be a zero that falls on one."""
+AT_CHANGE_POINT = 1e-4
+"""rad; nearer to a change point nothing is decided: the curve crosses itself there."""
 HALVINGS = 60
 """Number of halvings of the distance between two samples, enough to reach its last digits."""
 
@@ -76,7 +68,7 @@ class Equilibrium(NamedTuple):
 
     place: RestPosition
     stability: str
-    """"stable", "unstable", or "undecided" where dQ/dq is zero as far as can be said."""
+    """"stable", "unstable", or "undecided" where dQ/dq is zero or has no value."""
     angle: str
     """q of the next two: "theta_2", at a limit of it "theta_4"."""
     slope: float
@@ -96,8 +88,10 @@ class Equilibria(NamedTuple):
     """Along theta_2, the open branch first; none where the linkage is indifferent."""
     indifferent: tuple[tuple[RestPosition, RestPosition], ...]
     """Ends of ranges in which Q is zero throughout, to the rounding of the description: it stays wherever it is put."""
-    proven: bool
-    """True if no other equilibrium can exist; otherwise there may be others between the samples."""
+    samples: int
+    """Number of positions of the grid. Every zero of Q at which its sign differs between
+    two neighbours is found, and every one at which Q touches zero or passes it twice
+    between two neighbours whose slopes differ in sign; there may be others between."""
     not_decided: tuple[RestPosition, ...]
     """Change points, nearer than 1e-4 rad to which nothing is decided."""
     held: tuple[tuple[RestPosition, RestPosition], ...]
@@ -113,12 +107,13 @@ def equilibrium(scene: Scene) -> Equilibria:
 
     On the circuit of the scene's first position that assembles, on both branches where it has both, within the sweep
     of theta_2 if one is stated (or that of its motion law, or of the command of another bar or a stroke). Speed,
-    acceleration and drive of the scene play no part, viscous damping none either. With python-flint (extra "exact") and
-    gravity, springs and constant loads alone the equilibria are proven to be all.
+    acceleration and drive of the scene play no part, viscous damping none either. Zeros of Q are sought between the
+    positions of a grid, 3600 a turn and the ends of the sweep: where Q changes its sign, and where its size is least.
 
     Raises
     ------
     NotAssembledError : the linkage closes at none of the scene's positions.
+    LimitError : an effect uses a function that derivatives cannot follow.
     """
     expect("scene", scene, Scene)
     with np.errstate(all="ignore"):
@@ -129,26 +124,18 @@ def equilibrium(scene: Scene) -> Equilibria:
             if part.samples > A_RANGE
         ]
         samples = curve.samples()
-        idle = curve.level(samples)
-        zeros = Zeros(np.empty((0, 2)), np.empty((0, 2)), True)
-        if not idle.all():
-            proof = _prove_zeros(curve, samples[idle])
-            zeros = (
-                proof
-                if proof is not None and proof.complete
-                else _find_sign_changes(curve, samples)
-            )
-        points = curve.sorted(np.concatenate([zeros.found, zeros.undecided]))
+        zeros = _find_zeros(curve, samples)
+        order = curve.order(zeros.points)
+        points, sizes = zeros.points[order], zeros.size[order]
         held: list[_CircuitRange] = []
         if any(term.dry_pins for term in curve.case.terms):
             held = _list_ranges(curve, partial(_holds, curve), points)
         equilibria = []
-        for point in points:
-            undecided = any(np.array_equal(point, part) for part in zeros.undecided)
+        for point, size in zip(points, sizes.tolist(), strict=True):
             around = next(
                 (part.ends for part in held if _is_inside(curve, point, part)), None
             )
-            equilibria.append(_describe(curve, point, around, undecided=undecided))
+            equilibria.append(_describe(curve, point, size, around))
         singular = tuple(curve.place(np.array(point)) for point in curve.singular)
         positions = _solve_at_rest(scene, curve.circuit)
         psi = positions.theta_2 - curve.theta_1
@@ -159,7 +146,7 @@ def equilibrium(scene: Scene) -> Equilibria:
         sense[np.isin(positions.status_code, (NOT_ASSEMBLED, SINGULAR))] = 0
         flat, ends = (tuple(part.ends for part in ranges) for ranges in (level, held))
         return Equilibria(
-            tuple(equilibria), flat, zeros.complete, singular, ends, positions, sense
+            tuple(equilibria), flat, len(samples), singular, ends, positions, sense
         )
 
 
@@ -190,162 +177,149 @@ def _solve_at_rest(scene: Scene, circuit: Circuit) -> Solution:
 def _describe(
     curve: CircuitCurve,
     point: Array,
+    size: float,
     held: tuple[RestPosition, RestPosition] | None,
-    *,
-    undecided: bool,
 ) -> Equilibrium:
-    """Describe an equilibrium by theta_2, at a limit by theta_4."""
+    """Describe an equilibrium by theta_2, at a limit by theta_4.
+
+    `size`: of the terms of Q about there.
+    """
     state = curve.state(point[None])
     bar = 4 if abs(state.k.h2[0]) < STILL * abs(state.k.h4[0]) else 2
     square = float(state.k[bar - 2][0]) ** 2
-    slope = float(curve.slope(point[None])[0]) / square
-    J = (
-        float(
-            np.sum(inertia(curve.lengths.a, curve.case.bodies, state.position, state.k))
-        )
-        / square
-    )
-    stable = "undecided" if undecided else "stable" if slope < 0.0 else "unstable"
-    frequency = math.sqrt(-slope / J) / TURN if stable == "stable" and J > 0.0 else None
+    along_curve = float(curve.slope(point[None])[0])
+    inertias = inertia(curve.lengths.a, curve.case.bodies, state.position, state.k)
+    slope, J = along_curve / square, float(np.sum(inertias)) / square
+    stability = "undecided"
+    if abs(along_curve) > A_JUMP * size:  # never of NaN
+        stability = "stable" if slope < 0.0 else "unstable"
+    frequency = None
+    if stability == "stable" and J > 0.0:
+        frequency = math.sqrt(-slope / J) / TURN
     return Equilibrium(
-        curve.place(point), stable, f"theta_{bar}", slope, J, frequency, held
+        curve.place(point), stability, f"theta_{bar}", slope, J, frequency, held
     )
 
 
-def _find_sign_changes(curve: CircuitCurve, points: Array) -> Zeros:
-    """Find the zeros between samples at which Q changes its sign."""
-    idle = curve.level(points)
-    points = points[
-        ~idle | np.roll(idle, 1) | np.roll(idle, -1)
-    ]  # a zero may fall on a sample
+class _Zeros(NamedTuple):
+    """Zeros of Q as psi and mu, rad."""
+
+    points: Array
+    """(n, 2)."""
+    size: Array
+    """Sum of the absolute terms of Q about each, (n,)."""
+
+
+class _Grid(NamedTuple):
+    """Points of the rows, and the pairs of neighbours between which Q has a value."""
+
+    points: Array
+    Q: Array
+    """Generalised force at each point."""
+    size: Array
+    """Sum of its absolute terms there or at a neighbour, whichever is larger."""
+    idle: NDArray[np.bool_]
+    """True where Q is nothing."""
+    first: NDArray[np.intp]
+    """Index of the first point of each pair."""
+    second: NDArray[np.intp]
+    tau: Array
+    """Place in the row of the first point of each pair, rad."""
+    gap: Array
+    """Distance to the second, rad."""
+    branch: Array
+    """Branch of the row."""
+
+
+def _make_grid(curve: CircuitCurve, points: Array) -> _Grid:
+    """Pair the neighbours in their order along the rows, none across what lies outside the sweep."""
     tau, row = curve.tau(points)
-    Q, size, one, idle = (
-        curve.force(points),
-        curve.size(points),
-        np.arange(len(points)),
-        curve.level(points),
+    first = np.lexsort((tau, row))
+    second = np.empty_like(first)
+    for number in range(len(curve.rows)):
+        in_row = row[first] == number
+        second[in_row] = np.roll(first[in_row], -1)
+    gap = np.remainder(tau[second] - tau[first], TURN)
+    near = gap < 2.5 * TURN / SAMPLES
+    first, second, gap = first[near], second[near], gap[near]
+    size = np.array(curve.size(points))
+    around = size.copy()
+    around[first] = np.maximum(around[first], size[second])
+    around[second] = np.maximum(around[second], size[first])
+    Q = curve.force(points)
+    idle = np.abs(Q) <= NOTHING * around
+    branch = np.array(curve.rows, dtype=float)[row[first]]
+    return _Grid(points, Q, around, idle, first, second, tau[first], gap, branch)
+
+
+def _find_zeros(curve: CircuitCurve, points: Array) -> _Zeros:
+    """Find the zeros of Q between samples: where its sign changes or its size is least.
+
+    A sample without Q may itself be a zero; with another one beside it, it is in a range
+    where Q is nothing.
+    """
+    grid = _make_grid(curve, points)
+    idle_beside = np.zeros(len(points), dtype=bool)
+    idle_beside[grid.first] = grid.idle[grid.second]
+    idle_beside[grid.second] |= grid.idle[grid.first]
+    alone = grid.idle & ~idle_beside
+    paired = np.bincount(
+        np.concatenate([grid.first, grid.second]), minlength=len(points)
     )
-    following = np.concatenate(
-        [np.roll(one[row == number], -1) for number in range(len(curve.rows))]
-    )
-    gap = np.remainder(tau[following] - tau, TURN)
-    between = np.flatnonzero(
-        (Q * Q[following] < 0.0)
-        & (gap < 2.5 * TURN / SAMPLES)
-        & ~idle
-        & ~idle[following]
-    )
-    start, branch = Q[between], np.array(curve.rows)[row[between]]
+    ending = alone & (paired == 1)  # the sweep: nothing beyond shows a sign
+    at_end = _Zeros(points[ending], grid.size[ending])
+    touching, passed = _find_least_sizes(curve, _make_grid(curve, points[~alone]))
+    refined = np.concatenate([points[~alone], passed])
+    crossing = _find_sign_changes(curve, _make_grid(curve, refined))
+    zeros = np.concatenate([at_end.points, touching.points, crossing.points])
+    size = np.concatenate([at_end.size, touching.size, crossing.size])
+    for point in curve.singular:  # nothing moves there, so that Q vanishes
+        near = np.abs(np.sin(0.5 * (zeros - point))) < AT_CHANGE_POINT
+        apart = ~near.all(axis=1)
+        zeros, size = zeros[apart], size[apart]
+    return _Zeros(zeros, size)
+
+
+def _find_least_sizes(curve: CircuitCurve, grid: _Grid) -> tuple[_Zeros, Array]:
+    """Find where dQ/ds changes its sign between two points at which Q has one sign.
+
+    Returns the places where Q touches zero, and those where it has the other sign.
+    """
+    first, second, slope = grid.first, grid.second, curve.slope(grid.points)
+    one_sign = grid.Q[first] * grid.Q[second] > 0.0
+    turning = one_sign & (slope[first] * slope[second] < 0.0)
+    turning &= ~grid.idle[first] & ~grid.idle[second]
+    tau, branch = grid.tau[turning], grid.branch[turning]
+    start = slope[first][turning]
+
+    def slopes_as_at_start(tau: Array) -> NDArray[np.bool_]:
+        return curve.slope(curve.in_rows(tau, branch)) * start > 0.0
+
+    _, after = _bisect(slopes_as_at_start, tau, tau + grid.gap[turning])
+    least = curve.in_rows(after, branch)
+    Q = curve.force(least)
+    size = grid.size[first][turning]
+    touches = np.abs(Q) <= NOTHING * size
+    passed = Q * grid.Q[first][turning] < 0.0
+    return _Zeros(least[touches], size[touches]), least[passed & ~touches]
+
+
+def _find_sign_changes(curve: CircuitCurve, grid: _Grid) -> _Zeros:
+    """Find the zeros between points at which Q has two signs; a jump is none."""
+    first, second = grid.first, grid.second
+    between = grid.Q[first] * grid.Q[second] < 0.0
+    between &= ~grid.idle[first] & ~grid.idle[second]
+    tau, branch = grid.tau[between], grid.branch[between]
+    start = grid.Q[first][between]
 
     def has_sign_of_start(tau: Array) -> NDArray[np.bool_]:
         return curve.force(curve.in_rows(tau, branch)) * start > 0.0
 
-    _, after = _bisect(has_sign_of_start, tau[between], tau[between] + gap[between])
+    _, after = _bisect(has_sign_of_start, tau, tau + grid.gap[between])
     zeros = curve.in_rows(after, branch)
-    real = np.abs(curve.force(zeros)) <= A_JUMP * size[between]
-    for point in curve.singular:  # nothing moves there, so that Q vanishes
-        real &= ~(np.abs(np.sin(0.5 * (zeros - point))) < AT_CHANGE_POINT).all(axis=1)
-    zeros = zeros[real]
-    level = np.abs(curve.slope(zeros)) <= A_JUMP * curve.size(zeros)
-    return Zeros(zeros[~level], zeros[level], False)
-
-
-def _prove_zeros(curve: CircuitCurve, idle: Array) -> Zeros | None:
-    """Find all zeros of Q on the circuit; None if ball arithmetic or an effect's form in it is missing.
-
-    `idle`: samples in which Q is nothing.
-    """
-    try:
-        from flint import ctx
-    except ImportError:
-        return None
-    before, ctx.prec = ctx.prec, 128
-    try:
-        force = _enclose_force(curve.scene)
-        if force is None:
-            return None
-        return find_zeros(
-            curve.ratios,
-            force,
-            _bound_circuit(curve),
-            _choose_boxes(curve, idle),
-            curve.singular,
-        )
-    finally:
-        ctx.prec = before
-
-
-def _enclose_force(scene: Scene) -> Callable[[Any, Any], Sloped] | None:
-    """Make Q of psi and mu in ball arithmetic, with its slopes by both; None if an effect has no form in it."""
-    acting = tuple(
-        term for term in scene.effects if not term.dry_pins
-    )  # dry friction does no work at rest
-    if any(
-        term.key not in PROVABLE or getattr(term, "table", None)
-        for term in (*scene.loads, *acting)
-    ):
-        return None
-    scene = make_differentiable(replace(scene, effects=acting))
-    still = np.zeros((2, 1), dtype=object)
-    numbers = {
-        key: Sloped(make_balls(value), still)
-        for key, value in read_numbers(scene).items()
-        if not key.startswith("motion.")
-    }
-    exact = replace_numbers(scene, numbers)
-    lengths, theta_1 = (
-        Loop(*exact.linkage.lengths, 0.0, 0.0),
-        exact.linkage.ground_angle,
-    )
-    by_psi, by_mu = (
-        np.array(column, dtype=object) for column in ([[1], [0]], [[0], [1]])
-    )
-
-    def force(psi: Any, mu: Any) -> Sloped:
-        state = on_curve(lengths, theta_1, Sloped(psi, by_psi), Sloped(mu, by_mu))
-        Q: Sloped = compute_generalised_force(
-            exact, (*exact.loads, *exact.effects), state
-        )
-        return Q
-
-    return force
-
-
-def _bound_circuit(
-    curve: CircuitCurve,
-) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return ranges of psi and mu that hold the circuit: half a turn of one of them where there is another circuit."""
-    turn, ahead, back = (-math.pi, math.pi), (0.0, math.pi), (-math.pi, 0.0)
-    if len(circuits(curve.scene.linkage)) == 1:
-        return turn, turn
-    if curve.full:
-        return turn, ahead if curve.circuit.branches == (1,) else back
-    return ahead if 0.0 <= curve.low < math.pi else back, turn
-
-
-def _choose_boxes(
-    curve: CircuitCurve, idle: Array
-) -> Callable[[Array, Array], NDArray[np.bool_]]:
-    """Make the choice of the boxes in which a zero is looked for: those within the sweep where Q may be something.
-
-    Between two change points, where signs of psi and mu tell the ways of moving apart, Q may be zero throughout: a load
-    on a bar that rests in one of them.
-    """
-    idle_ways: list[Array] = []
-    if curve.singular:
-        ways, idle_of = (np.sign(np.sin(points)) for points in (curve.samples(), idle))
-        for way in np.unique(idle_of, axis=0):
-            if (ways == way).all(axis=1).sum() == (idle_of == way).all(axis=1).sum():
-                idle_ways.append(way)
-
-    def holds_a_zero(centres: Array, radii: Array) -> NDArray[np.bool_]:
-        kept = curve.inside(centres[:, 0], radii[:, 0])
-        sines = np.sin(centres)
-        for way in idle_ways:
-            kept &= ~((way * sines > 0.0) & (np.abs(sines) > radii)).all(axis=1)
-        return kept
-
-    return holds_a_zero
+    size = grid.size[first][between]
+    continuous = np.abs(curve.force(zeros)) <= A_JUMP * size
+    return _Zeros(zeros[continuous], size[continuous])
 
 
 def _add_friction(curve: CircuitCurve, points: Array, side: int) -> Array:

@@ -13,7 +13,7 @@ from fourbar.effects import Gravity, Springs
 from fourbar.effects.effect import PinRows
 from fourbar.effects.spring import END_POSITION
 from fourbar.errors import InputError, expect
-from fourbar.formulas.arithmetic import namespace, polar
+from fourbar.formulas.arithmetic import polar
 from fourbar.linkage import (
     ANY,
     AT_LEAST_ZERO,
@@ -60,7 +60,7 @@ class SceneNumber(NamedTuple):
         low = {ANY: True, AT_LEAST_ZERO: values >= 0.0, POSITIVE: values > 0.0}[
             self.bound
         ]
-        return namespace(values).isfinite(values) & low
+        return np.isfinite(values) & low
 
 
 def _list_numbers(description: Any, key: str, place: Place) -> dict[str, SceneNumber]:
@@ -191,9 +191,7 @@ class ManyBars(Bar):
     def to_centre(self) -> Any:
         """Vector to G as a single bar has it: cosine and sine are those of the C library, not of NumPy."""
         r, phi = self.mass_centre
-        if (
-            isinstance(phi, NDArrayOperatorsMixin) or namespace(r, phi) is not np
-        ):  # with its derivatives, or traced
+        if isinstance(phi, NDArrayOperatorsMixin):  # with slopes
             return polar(r, phi)
         if np.ndim(phi) and np.asarray(phi).dtype == np.longdouble:
             return super().to_centre

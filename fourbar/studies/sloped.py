@@ -1,11 +1,10 @@
-"""Numbers that carry their derivatives: the formulas as they stand, evaluated with these, give both.
+"""Numbers that carry their slopes: the formulas as they stand, evaluated with these, give both.
 
     z = f(x, y):   dz = f_x dx + f_y dy
 
 Source: A. Griewank, A. Walther, Evaluating Derivatives, ch. 3 (forward mode).
 """
 
-import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -16,7 +15,7 @@ from numpy.typing import NDArray
 from fourbar.errors import LimitError
 
 Rule = Callable[..., tuple[Any, ...]]
-"""The partial derivatives of a function by its arguments, from its value and them."""
+"""Partial derivatives of a function by its arguments, from its value and them."""
 RULES: dict[Any, Rule] = {
     np.add: lambda z, x, y: (1.0, 1.0),
     np.subtract: lambda z, x, y: (1.0, -1.0),
@@ -28,89 +27,29 @@ RULES: dict[Any, Rule] = {
     np.sin: lambda z, x: (np.cos(x),),
     np.cos: lambda z, x: (-np.sin(x),),
     np.arctan2: lambda z, y, x: (x / (x * x + y * y), -y / (x * x + y * y)),
-    **dict.fromkeys(
-        (np.remainder, np.fmod), lambda z, x, y: (1.0, 0.0)
-    ),  # by a constant
+    np.copysign: lambda z, x, y: (np.copysign(1.0, x) * np.copysign(1.0, y), 0.0),
+    np.remainder: lambda z, x, y: (1.0, (z - x) / y),
+    np.fmod: lambda z, x, y: (1.0, (z - x) / y),
 }
-COMPLEMENT = {
-    np.less: np.greater_equal,
-    np.less_equal: np.greater,
-    np.greater: np.less_equal,
-    np.greater_equal: np.less,
-}
-PIECEWISE = (
+STEPS = (
     np.sign,
-    np.copysign,
     np.floor,
     np.rint,
-    np.frexp,
     np.isnan,
     np.isfinite,
-    *COMPLEMENT,
+    np.less,
+    np.less_equal,
+    np.greater,
+    np.greater_equal,
 )
-"""Functions of the values alone; of balls the comparisons, each decided where all that the balls hold agrees."""
-
-
-class Undecided:
-    """A comparison of balls that some of them leave open, (n,).
-
-    What selects by it takes both sides there, `any` says that it may hold; it is no truth value.
-    """
-
-    __array_ufunc__ = None
-
-    def __init__(self, holds: Any, fails: Any) -> None:
-        self.holds, self.fails = holds, fails
-
-    def __and__(self, other: Any) -> "Undecided":
-        holds, fails = (
-            (other.holds, other.fails)
-            if isinstance(other, Undecided)
-            else (other, np.logical_not(other))
-        )
-        return Undecided(self.holds & holds, self.fails | fails)
-
-    __rand__ = __and__
-
-    def __bool__(self) -> bool:
-        raise LimitError("a comparison of balls is undecided: there is no bound")
-
-    def any(self) -> bool:
-        """Return True if the comparison may hold anywhere."""
-        return not self.fails.all()
-
-    def of_one(self, x: Any, y: Any) -> "Sloped":
-        """Select between two forms of one number; the slopes are those of either where the mask is undecided."""
-        return self._choose(x, y, _hull(take_slopes(x), take_slopes(y)))
-
-    def _choose(self, x: Any, y: Any, unknown: Any) -> "Sloped":
-        """Select between two values and slopes; undecided entries get the hull of both values and the given slopes."""
-        pairs = (
-            (take_values(x), take_values(y), _hull(take_values(x), take_values(y))),
-            (take_slopes(x), take_slopes(y), unknown),
-        )
-        return Sloped(
-            *(
-                np.where(self.holds, one, np.where(self.fails, other, both))
-                for one, other, both in pairs
-            )
-        )
-
-    def __array_function__(
-        self, function: Any, types: Any, args: Sequence[Any], options: Any
-    ) -> Any:
-        return _find_by_name(function, args, options)
-
-
-def decided(holds: Any, fails: Any) -> Any:
-    """Return where a comparison holds if every entry is decided, else an `Undecided`."""
-    return holds if (holds | fails).all() else Undecided(holds, fails)
+"""Functions that are constant between their jumps: they return plain values."""
 
 
 class Sloped(NDArrayOperatorsMixin):
-    """Values (n,) with their derivatives by p variables, slopes (p, n) or (p, 1): of doubles, or of balls as objects.
+    """Values (n,) with their slopes by p variables, (p, n) or (p, 1).
 
-    A number is equal to a constant only where its derivatives vanish too, so that no term is left out for being zero.
+    A number is equal to a constant only where its slopes vanish too, so that no term is
+    left out for being zero. A function without a rule raises LimitError.
     """
 
     def __init__(self, values: Any, slopes: Any) -> None:
@@ -125,130 +64,95 @@ class Sloped(NDArrayOperatorsMixin):
     @property
     def real(self) -> "Sloped":
         """Real part of values and slopes."""
-        return Sloped(real(self.values), real(self.slopes))
+        return Sloped(self.values.real, self.slopes.real)
 
     @property
     def imag(self) -> "Sloped":
         """Imaginary part of values and slopes."""
-        return Sloped(imag(self.values), imag(self.slopes))
+        return Sloped(self.values.imag, self.slopes.imag)
 
     def conjugate(self) -> "Sloped":
         """Return the complex conjugate of values and slopes."""
-        return Sloped(conjugate(self.values), conjugate(self.slopes))
+        return Sloped(self.values.conjugate(), self.slopes.conjugate())
 
-    def _compared(self, other: Any, function: Any) -> Any:
-        """Mark where the value and the derivatives are those of the other, or where one of them is not, (n,)."""
-        gap = self - other
-        same = np.asarray(gap.values == 0.0) & np.asarray(gap.slopes == 0.0).all(axis=0)
-        unlike = np.asarray(gap.values != 0.0) if self.values.dtype == object else ~same
-        return decided(
-            *((unlike, same) if function is np.not_equal else (same, unlike))
-        )
+    def _is_constant(self, constant: Any) -> Any:
+        """Mark where the value is that of a constant and no slope differs from its own, (n,)."""
+        gap = self - constant
+        return (gap.values == 0.0) & (gap.slopes == 0.0).all(axis=0)
+
+    def __array__(self, *_: Any, **__: Any) -> Any:
+        raise LimitError("a number with slopes cannot become a plain array")
+
+    def __float__(self) -> float:
+        raise LimitError("a number with slopes cannot become a float")
 
     def __bool__(self) -> bool:
-        raise TypeError("numbers with derivatives are no truth value")
+        raise LimitError("a number with slopes has no truth value")
 
     def __array_ufunc__(
         self, function: Any, method: str, *inputs: Any, **options: Any
     ) -> Any:
         if method != "__call__" or options:
-            return NotImplemented
-        operands = [
-            x.item()
-            if isinstance(x, np.ndarray) and x.dtype == object and not x.ndim
-            else x
-            for x in inputs
-        ]
+            raise _refuse(f"{function.__name__} with options")
         if function in (np.equal, np.not_equal):
-            sloped, constant = (
-                operands if isinstance(operands[0], Sloped) else operands[::-1]
-            )
-            return sloped._compared(constant, function)
+            sloped, constant = inputs if isinstance(inputs[0], Sloped) else inputs[::-1]
+            same = sloped._is_constant(constant)
+            return same if function is np.equal else ~same
         if function is np.conjugate:
             return self.conjugate()
-        plain = [take_values(x) for x in operands]
-        if self.values.dtype == object and any(isinstance(x, complex) for x in plain):
-            from flint import acb  # balls accept no complex number of Python's
-
-            plain = [acb(x) if isinstance(x, complex) else x for x in plain]
         if function is np.absolute:
-            size = np.absolute(plain[0])
-            along = conjugate(plain[0]) / size
-            return Sloped(size, real(along * self.slopes))
-        if self.values.dtype == object and function in COMPLEMENT:
-            return decided(function(*plain), COMPLEMENT[function](*plain))
-        if function not in RULES and (
-            function not in PIECEWISE or self.values.dtype == object
-        ):
-            return NotImplemented
+            return self._size()
+        if function is np.frexp:
+            mantissa, exponent = np.frexp(self.values)
+            return Sloped(mantissa, np.ldexp(self.slopes, -exponent)), exponent
+        plain = [take_values(number) for number in inputs]
+        if function in STEPS:
+            return function(*plain)
+        if function not in RULES:
+            raise _refuse(function.__name__)
         values = function(*plain)
-        if function in PIECEWISE:
-            return values
-        partial = RULES[function](values, *plain)
         slopes = None
-        for by, x in zip(partial, operands, strict=True):
-            if isinstance(x, Sloped):
-                term = (
-                    x.slopes if isinstance(by, float) and by == 1.0 else by * x.slopes
-                )
+        for by, number in zip(RULES[function](values, *plain), inputs, strict=True):
+            if isinstance(number, Sloped):
+                unchanged = isinstance(by, float) and by == 1.0
+                term = number.slopes if unchanged else by * number.slopes
                 slopes = term if slopes is None else slopes + term
         return Sloped(values, slopes)
+
+    def _size(self) -> "Sloped":
+        """Return the absolute value, of a complex number too."""
+        size = np.absolute(self.values)
+        along = self.values.conjugate() / size
+        return Sloped(size, (along * self.slopes).real)
 
     def __array_function__(
         self, function: Any, types: Any, args: Sequence[Any], options: Any
     ) -> Any:
-        return _find_by_name(function, args, options)
+        if function not in FUNCTIONS or options:
+            raise _refuse(function.__name__)
+        return FUNCTIONS[function](*args)
 
 
-def make_balls(centre: Any, radius: Any = 0.0) -> NDArray[Any]:
-    """Return balls (n,) of centres and radii."""
-    from flint import arb
-
-    return np.atleast_1d(np.frompyfunc(arb, 2, 1)(centre, radius))
-
-
-def _find_by_name(function: Any, args: Sequence[Any], options: Any) -> Any:
-    return (
-        NotImplemented
-        if function not in FUNCTIONS or options
-        else FUNCTIONS[function](*args)
+def _refuse(name: str) -> LimitError:
+    """Return the error for a function that has no rule."""
+    followed = ", ".join(rule.__name__ for rule in (*RULES, *STEPS))
+    return LimitError(
+        f"derivatives cannot follow numpy.{name}; an effect may use "
+        f"absolute, angle, where, {followed}"
     )
 
 
 def take_values(number: Any) -> Any:
-    """Return the values without their derivatives."""
+    """Return the values without their slopes."""
     return number.values if isinstance(number, Sloped) else number
 
 
 def take_slopes(number: Any) -> Any:
-    """Return the derivatives; of a constant 0."""
+    """Return the slopes; of a constant 0."""
     return number.slopes if isinstance(number, Sloped) else 0.0
 
 
-def _apply_by_entry(function: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    """Make a function that applies to a whole array, or entry by entry to an array of objects."""
-    by_entry = np.frompyfunc(function, 1, 1)
-    return lambda z: by_entry(z) if z.dtype == object else function(z)
-
-
-real, imag = _apply_by_entry(lambda z: z.real), _apply_by_entry(lambda z: z.imag)
-conjugate = _apply_by_entry(lambda z: z.conjugate() if hasattr(z, "conjugate") else z)
-
-
-def _unite(x: Any, y: Any) -> Any:
-    """Return the least ball that holds two."""
-    from flint import acb, arb
-
-    kind: Any = acb if any(isinstance(z, (acb, complex)) for z in (x, y)) else arb
-    return kind(x).union(kind(y))
-
-
-_hull = np.frompyfunc(_unite, 2, 1)
-
-
 def _choose_where(mask: Any, x: Any, y: Any) -> Sloped:
-    if isinstance(mask, Undecided):  # the function may jump
-        return mask._choose(x, y, math.nan)
     return Sloped(
         np.where(mask, take_values(x), take_values(y)),
         np.where(mask, take_slopes(x), take_slopes(y)),

@@ -15,12 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar import Bar, FourBar, Gravity, Motion, Scene, vary
-from fourbar.errors import say_install
 from fourbar.quantities import UNKNOWNS, VECTORS
 from fourbar.scene import Command
 from fourbar.show.plot.style import Drawing, apply_style
 from fourbar.solve import solve
-from fourbar.studies.function import function
 from fourbar_validation.cost.study import time_call, time_in_turns
 from fourbar_validation.report.machine import name_machine
 
@@ -100,7 +98,6 @@ def time_interleaved(
 def collect_loops() -> Peers:
     """Collect the closed formulas by several hands: each writes into arrays that are there."""
     loops: dict[str, Loop | str] = {"NumPy": _make_solve_loop(), "C": compile_loop()}
-    loops |= {name: _make_library_loop(name) for name in ("JAX", "PyTorch")}
     reasons = {name: loop for name, loop in loops.items() if isinstance(loop, str)}
     return Peers(
         {name: loop for name, loop in loops.items() if not isinstance(loop, str)},
@@ -117,35 +114,6 @@ def _make_solve_loop() -> Loop:
             row = next(rows)
             into[name] = out[row : next(rows) + 1].T if name in VECTORS else out[row]
         solve(scene, at=make_command(len(theta_2))._replace(angle=theta_2), out=into)
-
-    return call
-
-
-def _make_library_loop(name: str) -> Loop | str:
-    """Evaluate the scene's function, by JAX compiled, by PyTorch as it stands, on the CPU in doubles."""
-    try:
-        if name == "JAX":
-            import jax
-        else:
-            import torch
-        import array_api_compat  # noqa: F401
-    except ModuleNotFoundError as error:
-        extra = "jax" if name == "JAX" else "torch"
-        return f"{error.name} is not installed: {say_install(extra)}"
-    f = function(make_example(), ["motion.theta_2"], UNKNOWNS)
-    run = jax.jit(f) if name == "JAX" else f
-
-    def call(theta_2: Any, out: Any) -> None:
-        if name == "JAX":
-            with jax.enable_x64(True):
-                evaluated = run(jax.numpy.asarray(theta_2))
-        else:
-            evaluated = run(torch.from_numpy(theta_2))
-        row = 0
-        for unknown in UNKNOWNS:
-            values = np.atleast_2d(np.asarray(evaluated[unknown]).T)
-            out[row : row + len(values)] = values
-            row += len(values)
 
     return call
 

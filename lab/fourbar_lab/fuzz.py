@@ -1,4 +1,4 @@
-"""Random scenes through files, formulas and exact engines, or bounds; what fails is made smaller and kept.
+"""Random scenes through files, formulas and exact engines; what fails is made smaller and kept.
 
 Even numbers are ordinary scenes, odd ones adversarial; scene i depends on the seed and i alone.
 """
@@ -20,7 +20,6 @@ from fourbar.errors import FourBarError, InputError
 from fourbar.files import dump, loads, save
 from fourbar.scene import Command, Scene, command
 from fourbar.solution import Solution
-from fourbar_lab import outside
 from fourbar_validation.compare.compare import Comparison
 from fourbar_validation.compare.rows import FAILS, say_error
 from fourbar_validation.compare.tolerance import TOUCHING_MARGIN, find_margin
@@ -91,7 +90,7 @@ EXACT = tuple(
     if w.name in ("pinocchio-inverse", "mujoco-inverse", "free-body")
 )
 """The exact engines, held to full accuracy or to what was predicted for the position."""
-CHUNK, CHUNK_OF_PROOFS = 200, 10
+CHUNK = 200
 """Scenes per task: some seconds, which is what an interruption costs."""
 SHOWN = 20
 LOST = "worker:"
@@ -314,13 +313,9 @@ def _check_engines(question: Question) -> list[str]:
     return [f"{row.engine} {row.quantity}: {row.reason}" for row in failed]
 
 
-def examine(seed: int, bounds: bool, index: int) -> list[str]:
-    """Examine the scene of a number, or the bounds that are proven of it."""
-    return (
-        outside.list_findings(outside.draw_scene(seed, index))
-        if bounds
-        else list_findings(draw_fuzz_scene(seed, index))
-    )
+def examine(seed: int, index: int) -> list[str]:
+    """Examine the scene of a number."""
+    return list_findings(draw_fuzz_scene(seed, index))
 
 
 def _find_lost(_: int, error: Exception, __: object) -> list[str]:
@@ -328,24 +323,23 @@ def _find_lost(_: int, error: Exception, __: object) -> list[str]:
 
 
 def run(
-    count: int, seed: int, out: Path, workers: int, bounds: bool = False
+    count: int, seed: int, out: Path, workers: int
 ) -> Iterator[dict[str, list[str]]]:
     """Examine the scenes chunk by chunk, what is wrong by number; chunks of an interrupted run are read."""
-    size = CHUNK_OF_PROOFS if bounds else CHUNK
-    with Store(out, {"seed": seed, "bounds": bounds, **name_code(LAB)}).held() as store:
+    with Store(out, {"seed": seed, **name_code(LAB)}).held() as store:
         chunks = {
-            min(start + size, count): range(start, min(start + size, count))
-            for start in range(0, count, size)
+            min(start + CHUNK, count): range(start, min(start + CHUNK, count))
+            for start in range(0, count, CHUNK)
         }
         done = store.done() & chunks.keys()
         yield from (store.read(stop)[0] for stop in sorted(done))
         todo = [chunk for chunk in chunks.items() if chunk[0] not in done]
-        of, longest = (
-            partial(examine, seed, bounds),
-            None if bounds else processes.SECONDS,
-        )
         for stop, outcomes in processes.apply_over_processes(
-            of, todo, workers, seconds=longest, instead=_find_lost
+            partial(examine, seed),
+            todo,
+            workers,
+            seconds=processes.SECONDS,
+            instead=_find_lost,
         ):
             wrong = {
                 str(number): outcome
@@ -364,11 +358,6 @@ def run(
     type=click.IntRange(1),
     help="Half of them adversarial.",
 )
-@click.option(
-    "--bounds",
-    is_flag=True,
-    help="Search for values outside proven extremes instead; two seconds a scene.",
-)
 @click.option("--seed", default=0, show_default=True, type=click.IntRange(0))
 @click.option(
     "--workers", default=2, show_default=True, type=click.IntRange(1), help="Processes."
@@ -380,37 +369,30 @@ def run(
     default=Path("results/fuzz"),
     show_default=True,
 )
-def fuzz(scenes: int, bounds: bool, seed: int, workers: int, out: Path) -> int:
+def fuzz(scenes: int, seed: int, workers: int, out: Path) -> int:
     """Put random scenes through files, formulas and exact engines; every failure is shrunk and kept."""
     from rich.console import Console
     from rich.progress import track
 
     console = Console(stderr=True)
     wrong: dict[str, list[str]] = {}
-    chunks = -(-scenes // (CHUNK_OF_PROOFS if bounds else CHUNK))
-    for chunk in track(
-        run(scenes, seed, out, workers, bounds),
-        "fuzzing",
-        total=chunks,
-        console=console,
-    ):
+    chunks = -(-scenes // CHUNK)
+    running = run(scenes, seed, out, workers)
+    for chunk in track(running, "fuzzing", total=chunks, console=console):
         wrong |= chunk
     for number in sorted(wrong, key=int)[:SHOWN]:
-        source, name = wrong[number][0], "bounds_seed" if bounds else "seed"
-        scene = (outside.draw_scene if bounds else draw_fuzz_scene)(seed, int(number))
-        if not bounds and not source.startswith(
-            LOST
-        ):  # a proof at each step, or the end of this process
+        source, scene = wrong[number][0], draw_fuzz_scene(seed, int(number))
+        if not source.startswith(LOST):  # shrinking would end this process too
             scene = shrink_scene(
                 scene, lambda candidate: bool(list_findings(candidate))
             )
             source = list_findings(scene)[0]
         title = f"found by fuzzing, seed {seed}, scene {number}"
         path = keep(
-            replace(scene, title=title, source=source), f"{name}_{seed}_scene_{number}"
+            replace(scene, title=title, source=source), f"seed_{seed}_scene_{number}"
         )
         console.print(f"scene {number}: {wrong[number][0]}\n  kept as {path.name}")
     print(
-        f"{len(wrong)} of {scenes} scenes fail (seed {seed}{'' if bounds else ', half of them adversarial'})"
+        f"{len(wrong)} of {scenes} scenes fail (seed {seed}, half of them adversarial)"
     )
     return 1 if wrong else 0

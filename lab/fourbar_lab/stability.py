@@ -17,14 +17,12 @@ from fourbar.scene.motion import Motion
 from fourbar.solution import Solution
 from fourbar.solve import solve
 from fourbar_lab.families import FAMILIES
-from fourbar_lab.slopes import LIBRARIES, evaluate, judge_slopes
+from fourbar_lab.slopes import judge_slopes
 from fourbar_lab.tally import (
     HALF_A_DIGIT,
     TOO_LARGE,
     Tally,
-    compute_allowed,
     compute_ratio,
-    is_untold,
     list_components,
 )
 from fourbar_validation.compare.tolerance import find_used
@@ -53,7 +51,7 @@ def solve_position(scene: Scene, angle: float) -> dict[str, Any]:
     }
 
 
-def judge(scene: Scene, tally: Tally, sample: str, library: str = "numpy") -> None:
+def judge(scene: Scene, tally: Tally, sample: str) -> None:
     """Compare one position with the reference."""
     tally.samples += 1
     motion, angle = scene.motion, float(np.asarray(scene.motion.angle))
@@ -64,11 +62,7 @@ def judge(scene: Scene, tally: Tally, sample: str, library: str = "numpy") -> No
     )
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        solution = (
-            solve_position(scene, angle)
-            if library == "numpy"
-            else evaluate(scene, library)
-        )
+        solution = solve_position(scene, angle)
     tally.warned += [f"{sample}: {warning.message}" for warning in caught]
     exact = compute_reference(scene, motion.branch, angle)
     if exact is None:
@@ -77,13 +71,6 @@ def judge(scene: Scene, tally: Tally, sample: str, library: str = "numpy") -> No
             tally.worst["assembled"] = (math.inf, sample)
         return
     values, sensitivity = exact
-    if (
-        library != "numpy"
-        and math.isnan(solution["sin_mu"])
-        and is_untold(values["sin_mu"], sensitivity["sin_mu"])
-    ):
-        tally.untold += 1
-        return
     errors: dict[str, float] = {}
     for name in solution:
         for component, index in list_components(name):
@@ -98,19 +85,10 @@ def judge(scene: Scene, tally: Tally, sample: str, library: str = "numpy") -> No
                 internal and name in PIN_FORCES
             ):  # a component that the drive has no part in is left of larger ones
                 rate = max(sensitivity[other] for other, _ in list_components(name))
-            if (
-                library != "numpy"
-            ):  # lengths are no constants there: no bar rests or stays parallel exactly
-                rate += max(
-                    compute_allowed(0.0, sensitivity[other])
-                    for other, _ in list_components(name)
-                )
             part, errors[component] = compute_ratio(name, own, values[component], rate)
             tally.note(component, part, sample)
     if drive not in values:
         tally.no_torque += 1
-        return
-    if f"{drive}_error" not in solution:
         return
     force = max(
         math.hypot(errors[f"{name}_x"], errors[f"{name}_y"]) for name in PIN_FORCES
@@ -134,7 +112,6 @@ def run(
     samples: range,
     seed: int = 0,
     bar: int = 2,
-    library: str = "numpy",
     *,
     derivatives: bool = False,
 ) -> Tally:
@@ -143,17 +120,14 @@ def run(
     Parameters
     ----------
     bar : whose motion is commanded, as it comes out where the input is.
-    library : whose arrays evaluate the scene as a function of all its numbers; NumPy's do it by `solve`.
-    derivatives : judge those instead, NumPy's by `sensitivity`.
+    derivatives : judge those of `sensitivity` instead.
     """
     tally = Tally()
     for number in samples:
         rng = np.random.default_rng([seed, list(FAMILIES).index(family), number])
         scene = feed_back(FAMILIES[family](rng), bar)
         if scene is not None:
-            (judge_slopes if derivatives else judge)(
-                scene, tally, f"{family} {number}", library
-            )
+            (judge_slopes if derivatives else judge)(scene, tally, f"{family} {number}")
     return tally
 
 
@@ -182,10 +156,8 @@ def read_commanded(solution: Solution, bar: int) -> tuple[float, float, float, f
     return theta, omega, alpha, math.sin(other - one)
 
 
-def _run(
-    seed: int, bar: int, library: str, derivatives: bool, task: tuple[str, range]
-) -> Tally:
-    return run(*task, seed, bar, library, derivatives=derivatives)
+def _run(seed: int, bar: int, derivatives: bool, task: tuple[str, range]) -> Tally:
+    return run(*task, seed, bar, derivatives=derivatives)
 
 
 @click.command()
@@ -212,16 +184,9 @@ def _run(
     help="Whose motion is commanded.",
 )
 @click.option(
-    "--library",
-    default="numpy",
-    show_default=True,
-    type=click.Choice(["numpy", *LIBRARIES]),
-    help="Whose arrays: jax and torch by `fourbar.function`, jax compiled.",
-)
-@click.option(
     "--derivatives",
     is_flag=True,
-    help="Judge those by every number of a scene; numpy: `sensitivity`.",
+    help="Judge those of `sensitivity` by every number of a scene.",
 )
 @click.option("--jobs", default=2, show_default=True, help="Processes.")
 def stability(
@@ -229,7 +194,6 @@ def stability(
     families: tuple[str, ...],
     seed: int,
     bar: int,
-    library: str,
     derivatives: bool,
     jobs: int,
 ) -> int:
@@ -242,7 +206,7 @@ def stability(
         range(start, min(start + CHUNK, samples)) for start in range(0, samples, CHUNK)
     ]
     tasks = [(family, part) for family in chosen for part in parts]
-    results = apply_each(partial(_run, seed, bar, library, derivatives), tasks, jobs)
+    results = apply_each(partial(_run, seed, bar, derivatives), tasks, jobs)
     tallies = {family: Tally() for family in chosen}
     for (family, _), tally in track(
         zip(tasks, results, strict=True), "samples", total=len(tasks)
@@ -293,7 +257,7 @@ def stability(
         ("not assembled", *(str(tallies[family].not_assembled) for family in chosen))
     )
     rows.append(("no torque", *(str(tallies[family].no_torque) for family in chosen)))
-    if library != "numpy" or derivatives:
+    if derivatives:
         rows.append(
             ("no digit tells", *(str(tallies[family].untold) for family in chosen))
         )
@@ -303,7 +267,7 @@ def stability(
     ):  # in a file the columns of all families keep their width
         console.width = WIDE
     of = ", of derivatives by every number" if derivatives else ""
-    title = f"largest error / (8 eps (|y| + sum |x dy/dx|)), {samples} samples each, seed {seed}, {library}{of}"
+    title = f"largest error / (8 eps (|y| + sum |x dy/dx|)), {samples} samples each, seed {seed}{of}"
     console.print(make_table(("output", *chosen), rows, title=title))
     for family, tally in tallies.items():
         for name, (part, sample) in tally.worst.items():

@@ -35,7 +35,7 @@ class Tally:
     no_torque: int = 0
     """Samples in which the exact system of forces is singular: nothing to compare."""
     untold: int = 0
-    """Samples without a value in a library without many digits, where doubles do not tell that the loop closes."""
+    """Samples without derivatives, where doubles do not tell that the loop closes."""
     worst: dict[str, tuple[float, str]] = field(default_factory=dict)
     """Output: largest error/allowed, and the sample it belongs to."""
     too_small: dict[str, float] = field(default_factory=dict)
@@ -104,7 +104,7 @@ def compute_ratio(
 
 
 def is_untold(sine: Any, sensitivity: float) -> bool:
-    """Return whether so few digits of sin mu are known that a library without many digits may give no value."""
+    """Return whether so few digits of sin mu are known that there may be no derivatives."""
     return compute_allowed(size := abs(float(sine.mid())), sensitivity) > UNTOLD * size
 
 

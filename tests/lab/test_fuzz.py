@@ -5,26 +5,17 @@ import signal
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 import fourbar.formulas.mobility
-from fourbar.effects import spring
-from fourbar.effects.effect import Actions
 from fourbar.files import loads
-from fourbar.formulas.motion import State
-from fourbar.studies.enclosure import Extreme, Extremes
-from fourbar.studies.sloped import Sloped
 from fourbar_lab import fuzz as examine
-from fourbar_lab import outside
 from fourbar_lab.fuzz import KEPT, LAB, draw_fuzz_scene, keep, run, shrink_scene
 from fourbar_validation.compare.compare import Held
 from fourbar_validation.report.machine import name_code
 from fourbar_validation.run.store import Store
-from tests.fourbar.studies.test_enclosure import meeting
-from tests.support.here import judge_here
 from tests.support.scenes import crank_rocker
 
 SEED = 0
@@ -35,13 +26,12 @@ SEED = 0
     "path", sorted(KEPT.glob("*.toml")), ids=lambda path: path.stem
 )
 def test_a_kept_counterexample_holds(path: Path) -> None:
-    findings = (outside if path.stem.startswith("bounds") else examine).list_findings
-    assert findings(loads(path.read_text(encoding="utf-8"))) == []
+    assert examine.list_findings(loads(path.read_text(encoding="utf-8"))) == []
 
 
 @pytest.mark.slow
 def test_a_stretch_of_scenes_holds() -> None:
-    assert not [number for number in range(60) if examine.examine(SEED, False, number)]
+    assert not [number for number in range(60) if examine.examine(SEED, number)]
 
 
 def test_a_scene_depends_on_its_number_alone() -> None:
@@ -163,9 +153,7 @@ def test_an_interrupted_run_goes_on(
     first = run(12, 1, tmp_path, 1)
     next(first)
     first.close()
-    with Store(
-        tmp_path, {"seed": 1, "bounds": False, **name_code(LAB)}
-    ).held() as store:
+    with Store(tmp_path, {"seed": 1, **name_code(LAB)}).held() as store:
         assert store.done() >= {4}
         store.put(4, [{"0": ["left by the run before"]}])
     findings = list(run(12, 1, tmp_path, 1))
@@ -181,100 +169,7 @@ def test_a_scene_that_kills_its_worker_costs_itself_alone(
     assert finding.keys() == {"2"} and finding["2"][0].startswith(examine.LOST)
 
 
-def dies_in_scene_2(seed: int, bounds: bool, index: int) -> list[str]:
+def dies_in_scene_2(seed: int, index: int) -> list[str]:
     if index == 2:
         os.kill(os.getpid(), signal.SIGSEGV)
     return []
-
-
-def watched(
-    monkeypatch: pytest.MonkeyPatch, change: Any = lambda extremes: extremes
-) -> list[Extremes]:
-    """The proofs that the search is held against, each changed."""
-    proven, true = [], outside.extremes
-
-    def proof(*arguments: Any) -> Extremes:
-        proven.append(change(true(*arguments)))
-        return proven[-1]
-
-    monkeypatch.setattr(outside, "extremes", proof)
-    return proven
-
-
-@pytest.mark.slow
-def test_no_value_lies_outside_what_is_proven(monkeypatch: pytest.MonkeyPatch) -> None:
-    proven = watched(monkeypatch)
-    assert not [
-        number for number in range(45, 48) if examine.examine(SEED, True, number)
-    ]
-    assert len(proven) == 3 and any(extremes.nominal for extremes in proven)
-
-
-@pytest.mark.slow
-def test_bounds_narrower_by_a_millionth_are_found(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    def within(extremes: dict[str, Extreme], part: float) -> dict[str, Extreme]:
-        return {
-            name: x._replace(
-                low=x.low + part * abs(x.low), high=x.high + part * abs(x.high)
-            )
-            for name, x in extremes.items()
-        }
-
-    def narrower(extremes: Extremes) -> Extremes:
-        return extremes._replace(
-            least=within(extremes.least, 1e-6),
-            greatest=within(extremes.greatest, -1e-6),
-        )
-
-    watched(monkeypatch, narrower)
-    findings = outside.list_findings(outside.draw_scene(SEED, 45))
-    assert [line.split(":")[0] for line in findings if "beyond" in line] == [
-        "extremes torque"
-    ] * 2 + ["extremes |F12|"] * 2
-
-
-@pytest.mark.slow
-def test_a_ball_that_decides_silently_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A distance that may be 0 had 1 m added."""
-
-    def act_silently(effect: spring.Springs, actions: Actions, state: State) -> None:
-        for tension_spring in effect.springs:
-            across = tension_spring.end.place(state) - tension_spring.start.place(state)
-            distance = np.abs(across)
-            if isinstance(distance, Sloped):
-                distance.values += np.array(
-                    [float(ball.contains(0)) for ball in distance.values], dtype=object
-                )
-            actions.pull(
-                tension_spring.start,
-                tension_spring.end,
-                (tension_spring.stiffness + tension_spring.slack / distance) * across,
-            )
-
-    assert outside.list_findings(meeting(0.1005)) == []
-    monkeypatch.setattr(spring.Springs, "act", act_silently)
-    assert any("beyond" in line for line in outside.list_findings(meeting(0.1005)))
-
-
-def test_a_scene_with_a_value_outside_is_kept_as_it_is(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    scene = fourbar.dump(outside.draw_scene(3, 1))
-    judge_here(monkeypatch)
-    monkeypatch.setattr(
-        outside,
-        "list_findings",
-        lambda of: ["outside"] if fourbar.dump(of) == scene else [],
-    )
-    monkeypatch.setattr(examine, "keep", lambda of, name: keep(of, name, tmp_path))
-    assert examine.fuzz.callback(2, True, 3, 1, tmp_path / "out") == 1
-    assert capsys.readouterr().out == "1 of 2 scenes fail (seed 3)\n"
-    (kept,) = tmp_path.glob("bounds_seed_3_scene_1.toml")
-    assert (
-        fourbar.dump(
-            replace(loads(kept.read_text(encoding="utf-8")), title="", source="")
-        )
-        == scene
-    )

@@ -178,8 +178,6 @@ def calls() -> dict[str, tuple[Callable[..., object], tuple[Any, ...]]]:
                 ),
             ),
         ),
-        "extremes": (fourbar.extremes, (scene, ("torque",))),
-        "function": (fourbar.function, (scene, ["lengths.input"], ["torque"])),
         "tolerances": (
             lambda *x: fourbar.tolerances(
                 fourbar.Scene(link, scene.motion, tolerances=x[0]),

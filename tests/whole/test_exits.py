@@ -361,7 +361,6 @@ PROCESSES = [
     ("fourbar", f"plot {NO_FILE} -o a.svg", BAD_INPUT),
     ("fourbar", f"animate {NO_FILE} -o a.html", BAD_INPUT),
     ("fourbar", f"tolerance {NO_FILE}", BAD_INPUT),
-    ("fourbar", f"extremes {NO_FILE}", BAD_INPUT),
     ("validation", f"run {NO_FILE}", BAD_INPUT),
     ("fourbar", f"equilibrium {NO_FILE}", BAD_INPUT),
     ("fourbar", "edit --port none", BAD_INPUT),

@@ -35,7 +35,7 @@ MODULE_OF = {
     "python-flint": "flint",
     "pin": "pinocchio",
     "imageio-ffmpeg": "imageio_ffmpeg",
-} | {"array-api-compat": "array_api_compat"}
+}
 """Libraries that are imported under another name than they are installed by."""
 
 

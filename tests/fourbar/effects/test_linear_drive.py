@@ -385,25 +385,6 @@ def test_derivatives_by_its_ends_are_those_of_differences(
             )
 
 
-@pytest.mark.slow
-def test_extremes_hold_every_sample() -> None:
-    link, motion = fourbar.uniform(0.5, 0.3, 0.15, 0.15), fourbar.Motion(0.1, 3.0)
-    across = fourbar.LinearDrive(SpringEnd(1, 0.4, 1.5), SpringEnd(2, 0.2, 0.1))
-    scene = crank_rocker(linkage=link, loads=(), motion=motion, drive=across)
-    with pytest.raises(fourbar.InputError, match="quantity = 'torque'"):
-        fourbar.extremes(scene, ["torque"])
-    bounds = fourbar.extremes(scene, ["drive_force"])
-    ((low, high),) = bounds.parts
-    s = fourbar.solve(
-        replace(scene, motion=fourbar.Motion(np.linspace(low, high, 2001), 3.0))
-    )
-    least, greatest = bounds.least["drive_force"], bounds.greatest["drive_force"]
-    assert least.low <= s.drive_force.min() <= least.high + 1e-3 * abs(least.high)
-    assert (
-        greatest.low - 1e-3 * abs(greatest.low) <= s.drive_force.max() <= greatest.high
-    )
-
-
 @pytest.mark.parametrize(("start_bar", "end_bar"), PAIRS)
 def test_the_frame_bears_what_changes_the_momentum_of_the_bars(
     start_bar: int, end_bar: int

@@ -30,6 +30,7 @@ from fourbar_validation.compare.compare import COMPARED, Comparison, Held
 from fourbar_validation.compare.rows import AGREES, REFUSES
 from fourbar_validation.compare.tolerance import EQUIVALENCE
 from fourbar_validation.engines import loop
+from fourbar_validation.engines.balls import closure, make_balls, wedge
 from fourbar_validation.engines.effects import TERM_OF
 from fourbar_validation.engines.limits import LIGHTEST
 from fourbar_validation.engines.mujoco.inverse import MujocoInverse, MujocoTree
@@ -665,3 +666,18 @@ def test_near_a_jam_an_engine_finds_the_one_solution_that_there_is(
         assert jams or abs(engine - bodies) <= 1e-9 * abs(
             bodies
         )  # of some 1e-12 that rounding leaves near a jam
+
+
+@pytest.mark.parametrize("ground_angle", [0.0, 1.0, 2.5])
+def test_a_loop_that_just_closes_closes_however_the_ground_is_turned(
+    ground_angle: float,
+) -> None:
+    """Its discriminant is 0 exactly; from turned directions it was undecided, and read as open."""
+    bars = (Bar(length) for length in (1.0, 2.0, 4.0))
+    folded = Scene(
+        FourBar(3.0, *bars, ground_angle=ground_angle), Motion(ground_angle, 1.0)
+    )  # type: ignore[misc]
+    closed = closure(make_balls(folded, ground_angle), 1)
+    assert closed is not None and abs(float(wedge(*closed[1:]).mid())) < 1e-60
+    apart = replace(folded, linkage=replace(folded.linkage, ground=3.0 - 1e-15))
+    assert closure(make_balls(apart, ground_angle), 1) is None

@@ -355,7 +355,7 @@ def test_a_run_prints_one_row_an_engine_and_the_rest_on_demand(
             demo(draw=False),
             name="first",
             rows=[row, share, *colours],
-            left_out=["extremes: too near"],
+            left_out=["equilibria: too near"],
         )
     ]
     summary = summary_of(pages)
@@ -380,7 +380,7 @@ def test_a_run_prints_one_row_an_engine_and_the_rest_on_demand(
         and len(printed.splitlines()) < 14
     )
     print_table(summary, tmp_path, verbose=True)
-    assert "extremes left out in 1 scene: too near" in " ".join(
+    assert "equilibria left out in 1 scene: too near" in " ".join(
         capsys.readouterr().out.split()
     )
     assert write_markdown(summary).splitlines()[6].startswith("| mujoco-simulated")

@@ -46,7 +46,6 @@ SHIPPED = (
     "study",
     "sensitivity",
     "internal_forces",
-    "extremes",
     "tolerances",
     "equilibria",
     "sdf",

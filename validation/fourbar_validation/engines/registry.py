@@ -93,7 +93,7 @@ class Engine:
         return find_missing(self.library) if self.library else None
 
 
-EXTRA = {"mujoco": "validation", "pinocchio": "validation", "flint": "studies"}
+EXTRA = {"mujoco": "validation", "pinocchio": "validation", "flint": "validation"}
 """Module of an engine: the extra that brings it; others are installed by the name of their package."""
 PACKAGE_OF = {"pydrake": "drake"}
 """Module of an engine: its package, where that has another name."""

@@ -31,7 +31,6 @@ from fourbar_validation.run.printed import (
 )
 from fourbar_validation.run.question import Question, select_positions
 from fourbar_validation.run.released import check_released
-from fourbar_validation.run.shipped.bounds import extremes
 from fourbar_validation.run.shipped.cuts import internal_forces
 from fourbar_validation.run.shipped.equilibria import equilibria
 from fourbar_validation.run.shipped.files import sdf, usd
@@ -83,7 +82,6 @@ CHECKS = (
             study,
             sensitivity,
             internal_forces,
-            extremes,
             tolerances,
             equilibria,
         )

@@ -26,7 +26,6 @@ ENGINES = {
     "study",
     "sensitivity",
     "internal_forces",
-    "extremes",
     "tolerances",
     "equilibria",
     "sdf",
@@ -258,7 +257,7 @@ def test_other_commands_are_judged_too_and_what_is_not_is_named(name: str) -> No
     record = judge.judge("", commanding(name), (), order=False, shipped=True)
     assert not [row for row in record.rows if row.failed]
     compared = {row.engine for row in record.rows if row.compared}
-    assert compared >= ENGINES - {"extremes", "sdf", "usd"} and {
+    assert compared >= ENGINES - {"sdf", "usd"} and {
         "status",
         "blocks",
     } <= {r.quantity for r in record.rows}
@@ -292,29 +291,6 @@ def test_a_study_of_another_command_that_errs_fails(
 
     monkeypatch.setattr(fourbar, "solve", wrong)
     assert "drive_force" in failing(rows_of(scene, "study"))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_bounds_that_are_narrower_fail(
-    monkeypatch: pytest.MonkeyPatch, sign: float
-) -> None:
-    call = fourbar.extremes
-
-    def narrow(*arguments: Any) -> Any:
-        answer = call(*arguments)
-        ends = answer.greatest if sign > 0 else answer.least
-        end = ends["torque"]
-        off = 1e-3 * abs(end.high)
-        ends["torque"] = (
-            end._replace(high=end.high - off)
-            if sign > 0
-            else end._replace(low=end.low + off)
-        )
-        return answer
-
-    monkeypatch.setattr(fourbar, "extremes", narrow)
-    assert failing(rows_of(SHIPPED, "extremes")) == {"torque"}
 
 
 @pytest.mark.parametrize(
