@@ -67,7 +67,6 @@ JUDGED_BY = {
     # studies: each through its command
     "lab/test_bench.py": "lab: contenders",
     "lab/test_stability.py": "lab: families slopes tally",
-    "lab/test_fuzz.py": "lab: outside",
     "lab/test_faults.py": "lab: fault_scenes injection",
     "validation/cost/test_cost.py": "validation/cost: series formulas laws pictures study; "
     "validation/advise: worst_errors",

@@ -44,7 +44,7 @@ def test_derivatives_are_those_of_a_50_digit_reference(drive: int) -> None:
     effects = (Gravity(), Viscous.at(O2=0.01, A=0.02), Friction.at(B=0.05))
     for theta_2 in ANGLES[1:3]:
         case = scene(effects, drive, theta_2=float(theta_2))
-        judge_slopes(case, tally := Tally(), "", "numpy")
+        judge_slopes(case, tally := Tally(), "")
         assert len(tally.worst) > 40 and max(tally.worst.values())[0] < 1.0
         slopes = sensitivity(case)
         assert slopes.status == ["ok"] and set(slopes.keys) == {
@@ -60,7 +60,7 @@ def test_derivatives_are_those_of_a_50_digit_reference(drive: int) -> None:
         )
         for name, key in product(slopes.by, LEFT_OUT):
             np.testing.assert_array_equal(slopes.of(name, key), stated.of(name, key))
-    judge_slopes(stated.scene, tally := Tally(), "", "numpy")
+    judge_slopes(stated.scene, tally := Tally(), "")
     assert max(tally.worst.values())[0] < 1.0
 
 
