@@ -1,8 +1,14 @@
 """The command `loops` as it is called."""
 
+import math
+from pathlib import Path
+
+import numpy as np
 import pytest
+from click import UsageError
 from click.testing import CliRunner
 
+import fourbar
 from fourbar.errors import InputError
 from fourbar_validation.robots.command import command
 from fourbar_validation.robots.options import read_pose
@@ -44,3 +50,28 @@ def test_a_pose_is_read_from_pairs() -> None:
     assert (options.key, options.drive) == ("home", "c")
     with pytest.raises(InputError, match="must be like JOINT=20deg"):
         read_pose(("knee",), None, (), None)
+
+
+@pytest.mark.slow
+def test_a_scene_is_written_that_the_formulas_solve(tmp_path: Path) -> None:
+    out = tmp_path / "finger.toml"
+    loop = "right_finger-right_follower"
+    arguments = [str(MODELS / "gripper.xml"), "--loop", loop, "-o", str(out)]
+    arguments += ["--speed", "60 rpm"]
+    result = CliRunner().invoke(command, arguments, standalone_mode=False)
+    assert result.exception is None
+    assert result.output.splitlines()[-1] == f"written to {out}"
+    text = out.read_text()
+    assert text.startswith("# Pins: O2 right_driver, A right_finger, B ")
+    assert "# not in the scene: contacts" in text
+    scene = fourbar.load(out)
+    assert scene.motion.omega_2 == pytest.approx(2.0 * math.pi)
+    assert np.isfinite(fourbar.solve(scene).torque).all()
+
+
+def test_a_speed_without_a_scene_is_refused() -> None:
+    arguments = [str(MODELS / "gripper.xml"), "--speed", "1"]
+    with pytest.raises(UsageError, match="--speed goes with -o"):
+        CliRunner().invoke(
+            command, arguments, standalone_mode=False, catch_exceptions=False
+        )

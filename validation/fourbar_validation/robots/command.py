@@ -5,18 +5,29 @@ from pathlib import Path
 
 import click
 
+from fourbar.files import dump
+from fourbar.writing import require_file, write_text
 from fourbar_validation.compare.rows import make_plain
 from fourbar_validation.engines.mujoco.robots.loop import (
+    LoopScene,
     RobotClosure,
     RobotReport,
     write_length,
 )
 from fourbar_validation.robots.files import read_robot
 from fourbar_validation.robots.guard import examine_guarded
-from fourbar_validation.robots.options import FILE, pose_options, read_pose
+from fourbar_validation.robots.options import (
+    FILE,
+    loop_option,
+    pose_options,
+    read_pose,
+    read_speed,
+    speed_option,
+)
 
 ROUND_OFF = 1e-12
 """m or deg; less is printed as 0."""
+SCENE = "fourbar_validation.engines.mujoco.robots.scene:read_loop_scene"
 LIST = "fourbar_validation.engines.mujoco.robots.closures:list_closures"
 
 
@@ -60,9 +71,25 @@ def show_report(report: RobotReport) -> None:
         click.echo(make_plain(f"note: {note}"))
 
 
+def write_scene(made: LoopScene) -> str:
+    """Write a scene file that says in comments where it is from and what it leaves out."""
+    lines = [*made.parts, *made.remarks, *made.notes]
+    comments = "".join(f"# {make_plain(line)}\n" for line in lines)
+    return f"{comments}\n{dump(made.scene)}"
+
+
 @click.command()
 @click.argument("robot", metavar="ROBOT.xml", type=FILE)
 @pose_options
+@loop_option
+@speed_option
+@click.option(
+    "-o",
+    "--out",
+    type=FILE,
+    metavar="SCENE.toml",
+    help="Write the loop as a scene: what it carries, its range, and what acts on it.",
+)
 def command(
     robot: Path,
     pose: tuple[str, ...],
@@ -70,10 +97,27 @@ def command(
     hold: tuple[str, ...],
     drive: str | None,
     assets: Path | None,
+    loop: str | None,
+    speed: str | None,
+    out: Path | None,
 ) -> None:
     """List the closed loops of a robot's MJCF, and say which are planar four-bars."""
     options = read_pose(pose, key, hold, drive)
+    omega = read_speed(speed)
+    if out is None and speed is not None:
+        raise click.UsageError("--speed goes with -o: it is that of the scene")
+    if out is not None:
+        require_file(out, robot)
     file = read_robot(robot, assets)
     with examine_guarded(robot) as examined:
-        report: RobotReport = examined(LIST, file, options)
-    show_report(report)
+        if out is not None:
+            made: LoopScene = examined(SCENE, file, options, loop, omega)
+        else:
+            report: RobotReport = examined(LIST, file, options, loop)
+    if out is None:
+        show_report(report)
+        return
+    write_text(out, write_scene(made))
+    for line in [*made.parts, *made.remarks, *made.notes]:
+        click.echo(make_plain(line))
+    click.echo(make_plain(f"written to {out}"))

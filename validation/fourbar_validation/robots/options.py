@@ -7,6 +7,7 @@ from typing import Any
 import click
 
 from fourbar.errors import InputError
+from fourbar.linkage import require
 from fourbar_validation.engines.mujoco.robots.loop import PoseOptions
 
 FILE = click.Path(path_type=Path)
@@ -80,6 +81,16 @@ def read_pose(
             raise InputError("--pose", entry, "must be like JOINT=20deg")
         joints[joint.strip()] = position.strip()
     return PoseOptions(joints, key, tuple(_split(hold)), drive)
+
+
+def read_speed(text: str | None) -> float | None:
+    """Read the value of `speed_option`, rad/s."""
+    if text is None:
+        return None
+    try:
+        return require("--speed", float(text))
+    except ValueError:
+        return require("--speed", text, "rad/s")
 
 
 def _split(values: tuple[str, ...]) -> list[str]:

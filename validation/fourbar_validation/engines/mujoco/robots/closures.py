@@ -67,13 +67,16 @@ NUMBERS = {
 }
 
 
-def list_closures(file: RobotFile, options: PoseOptions) -> RobotReport:
-    """Compile a robot's file, pose it, and describe each of its equalities."""
+def list_closures(
+    file: RobotFile, options: PoseOptions, name: str | None = None
+) -> RobotReport:
+    """Compile a robot's file, pose it, and describe each of its equalities, or the one of a name."""
     compiled = compile_robot(file)
     posed = pose_robot(compiled.model, options)
-    return RobotReport(
-        tuple(find_closures(posed, options)), (*compiled.notes, *posed.notes)
-    )
+    closures = find_closures(posed, options)
+    if name is not None:
+        closures = [find_closure(closures, name)]
+    return RobotReport(tuple(closures), (*compiled.notes, *posed.notes))
 
 
 def find_closures(posed: PosedRobot, options: PoseOptions) -> list[RobotClosure]:
@@ -97,28 +100,33 @@ def find_closures(posed: PosedRobot, options: PoseOptions) -> list[RobotClosure]
     return closures
 
 
-def choose_loop(closures: Sequence[RobotClosure], name: str) -> RobotLoop:
-    """Return the four-bar of a closure by its name, or raise an InputError that says why there is none."""
+def find_closure(closures: Sequence[RobotClosure], name: str) -> RobotClosure:
+    """Return the closure of a name, or raise an InputError that lists what is there."""
     for closure in closures:
         if closure.name == name:
-            if closure.loop is None:
-                raise InputError("--loop", name, f"is no four-bar: {closure.reason}")
-            return closure.loop
+            return closure
     names = ", ".join(closure.name for closure in closures)
     raise InputError(
         "--loop", name, f"no such closure; the file has: {names or 'none'}"
     )
 
 
-def describe_closure(posed: PosedRobot, number: int) -> str:
-    """Name an equality: as the file does, or by the two bodies, joints or tendons that it ties."""
-    model = posed.model
+def choose_loop(closures: Sequence[RobotClosure], name: str) -> RobotLoop:
+    """Return the four-bar of a closure, or raise an InputError that says why there is none."""
+    closure = find_closure(closures, name)
+    if closure.loop is None:
+        raise InputError("--loop", name, f"is no four-bar: {closure.reason}")
+    return closure.loop
+
+
+def describe_equality(model: mujoco.MjModel, number: int) -> str:
+    """Name an equality: as the file does, or by the two bodies or joints that it ties."""
     if model.equality(number).name:
         return str(model.equality(number).name)
     kind = KINDS.get(int(model.eq_type[number]))
     first, second = int(model.eq_obj1id[number]), int(model.eq_obj2id[number])
     if kind in ("connect", "weld"):
-        names = [name_body(model, end.body) for end in find_ends(posed, number)]
+        names = [name_body(model, body) for body in find_tied_bodies(model, number)]
     elif kind == "joint":
         names = [name_joint(model, i) for i in (first, second) if i >= 0]
     else:
@@ -256,8 +264,10 @@ class _Finder:
 
     def _name(self, number: int) -> str:
         """Name an equality so that no other has the same name."""
-        name = describe_closure(self.posed, number)
-        names = [describe_closure(self.posed, other) for other in range(self.model.neq)]
+        name = describe_equality(self.model, number)
+        names = [
+            describe_equality(self.model, other) for other in range(self.model.neq)
+        ]
         same = [other for other, text in enumerate(names) if text == name]
         return name if len(same) == 1 else f"{name}-{same.index(number) + 1}"
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from fourbar.linkage import BAR_NAMES
+from fourbar.scene import Scene
 from fourbar_validation.compare.answer import Array
 
 PAIRS = {"O2": (1, 2), "A": (2, 3), "B": (3, 4), "O4": (1, 4)}
@@ -125,6 +126,20 @@ class RobotReport:
 
     closures: tuple[RobotClosure, ...]
     notes: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class LoopScene:
+    """A scene from a loop, and what it does not hold."""
+
+    scene: Scene
+    loop: RobotLoop
+    parts: tuple[str, ...]
+    """Which joint is which pin, which body which bar, and what is held, in sentences."""
+    remarks: tuple[str, ...]
+    """What was chosen, and what the scene leaves out, with its size."""
+    notes: tuple[str, ...] = ()
+    """What was done to the file and its pose."""
 
 
 def write_length(metres: float) -> str:

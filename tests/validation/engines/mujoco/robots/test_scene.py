@@ -1,0 +1,348 @@
+"""A scene from a loop against MuJoCo, asked in the whole robot: inverse dynamics, and multipliers of the closure.
+
+Every other joint of the robot stands still. Nothing of the scene enters: the loop is closed by
+Newton's method on MuJoCo's own residual of the equality, its speeds and accelerations follow from
+MuJoCo's Jacobian.
+"""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+import pytest
+
+import fourbar
+from fourbar.errors import InputError
+from fourbar.files import loads
+from fourbar_validation.engines.mujoco.robots.loop import (
+    LoopScene,
+    PoseOptions,
+    RobotFile,
+)
+from fourbar_validation.engines.mujoco.robots.scene import read_loop_scene
+from tests.support.robots import Planar
+from tests.whole.test_imports import ROOT
+
+MODELS = ROOT / "models" / "robots"
+FOOT = (MODELS / "biped_foot.xml").read_text()
+GRIPPER = (MODELS / "gripper.xml").read_text()
+EXACT = 1e-8
+"""Relative: the difference quotient of the Jacobian loses half the digits of a double."""
+DIFFERENCE = 1e-5
+"""s, step of that quotient along the motion."""
+
+
+class Whole(NamedTuple):
+    """What the whole robot answers at one position."""
+
+    torque: float
+    forces: dict[str, float]
+    """Size of the force in the plane at each pin, N."""
+
+
+class WholeRobot:
+    """A robot's model that answers for one loop while everything else stands still."""
+
+    def __init__(self, text: str, made: LoopScene) -> None:
+        self.model = model = mujoco.MjModel.from_xml_string(text)
+        model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
+        for name in ("CONTACT", "LIMIT", "FRICTIONLOSS"):
+            model.opt.disableflags |= getattr(mujoco.mjtDisableBit, f"mjDSBL_{name}")
+        self.data = mujoco.MjData(model)
+        self.data.eq_active[:] = 0
+        self.data.eq_active[made.loop.equality] = 1
+        self.loop = made.loop
+        self.dofs = {
+            pin: int(model.jnt_dofadr[j]) for pin, j in made.loop.hinges.items()
+        }
+        self.addresses = {
+            pin: int(model.jnt_qposadr[j]) for pin, j in made.loop.hinges.items()
+        }
+        self.others = [dof for pin, dof in self.dofs.items() if pin != "O2"]
+
+    def closure(self, qpos: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Residual of the equality and its derivative."""
+        self.data.qpos[:] = qpos
+        mujoco.mj_fwdPosition(self.model, self.data)
+        rows = self.data.nefc
+        jacobian = self.data.efc_J.reshape(-1, self.model.nv)[:rows]
+        return self.data.efc_pos[:rows].copy(), jacobian.copy()
+
+    def place(self, qpos: np.ndarray, angle: float) -> np.ndarray:
+        """Turn the driven joint to an angle and close the loop from a near pose."""
+        qpos = qpos.copy()
+        qpos[self.addresses["O2"]] = angle
+        for _ in range(50):
+            residual, jacobian = self.closure(qpos)
+            step = np.linalg.lstsq(jacobian[:, self.others], -residual, rcond=1e-9)[0]
+            for dof, change in zip(self.others, step, strict=True):
+                pin = next(p for p, d in self.dofs.items() if d == dof)
+                qpos[self.addresses[pin]] += change
+            if np.abs(step).max() < 1e-14:
+                break
+        return qpos
+
+    def rates(
+        self, jacobian: np.ndarray, driven: float, rest: np.ndarray
+    ) -> np.ndarray:
+        """Solve J rates + rest = 0 with the driven rate given and all other joints still."""
+        rates = np.zeros(self.model.nv)
+        rates[self.dofs["O2"]] = driven
+        wanted = -(jacobian @ rates + rest)
+        solved = np.linalg.lstsq(jacobian[:, self.others], wanted, rcond=1e-9)[0]
+        rates[self.others] = solved
+        return rates
+
+    def ask(self, qpos: np.ndarray, omega: float) -> Whole:
+        """Torque and pin forces at a closed pose, constant speed of the driven joint."""
+        model, data = self.model, self.data
+        _, jacobian = self.closure(qpos)
+        still = np.zeros(len(jacobian))
+        speeds = self.rates(jacobian, omega, still)
+        drift = still.copy()
+        for side in (1.0, -1.0):
+            moved = qpos.copy()
+            mujoco.mj_integratePos(model, moved, speeds, side * DIFFERENCE)
+            drift += side * self.closure(moved)[1] @ speeds / (2.0 * DIFFERENCE)
+        accelerations = self.rates(jacobian, 0.0, drift)
+        data.qpos[:], data.qvel[:], data.qacc[:] = qpos, speeds, accelerations
+        active = data.eq_active.copy()
+        data.eq_active[:] = 0
+        mujoco.mj_inverse(model, data)
+        needed = data.qfrc_inverse + model.dof_frictionloss * np.sign(speeds)
+        rows = list(self.dofs.values())
+        drive = np.zeros((model.nv, 1))
+        drive[self.dofs["O2"]] = 1.0
+        matrix = np.hstack([jacobian.T, drive])[rows]
+        solved = np.linalg.lstsq(matrix, needed[rows], rcond=1e-9)[0]
+        forces = self.pin_forces(solved[:-1])
+        data.eq_active[:] = active
+        data.xfrc_applied[:] = 0.0
+        return Whole(float(solved[-1]), forces)
+
+    def pin_forces(self, multipliers: np.ndarray) -> dict[str, float]:
+        """Sizes in the plane, from the recursion of MuJoCo with the closing force and gravcomp applied."""
+        model, data = self.model, self.data
+        data.xfrc_applied[:] = 0.0
+        lifted = model.body_gravcomp * model.body_mass
+        data.xfrc_applied[:, :3] -= np.outer(lifted, model.opt.gravity)
+        objects = (model.eq_obj1id, model.eq_obj2id)
+        number = self.loop.equality
+        for which, sign in enumerate((1.0, -1.0)):
+            target = int(objects[which][number])
+            if model.eq_objtype[number] == mujoco.mjtObj.mjOBJ_SITE:
+                body = int(model.site_bodyid[target])
+                place = data.site_xpos[target]
+            else:
+                body = target
+                anchor = model.eq_data[number, 3 * which : 3 * which + 3]
+                place = data.xpos[body] + data.xmat[body].reshape(3, 3) @ anchor
+            force = sign * multipliers[:3]
+            data.xfrc_applied[body, :3] += force
+            data.xfrc_applied[body, 3:] += np.cross(place - data.xipos[body], force)
+        mujoco.mj_rnePostConstraint(model, data)
+        axis = data.xaxis[self.loop.joint]
+        forces = {self.loop.cut: multipliers[:3]}
+        for pin, joint in self.loop.hinges.items():
+            body = int(model.jnt_bodyid[joint])
+            forces[pin] = data.cfrc_int[body, 3:] + data.xfrc_applied[body, :3] * 0.0
+        return {
+            pin: float(np.linalg.norm(force - (force @ axis) * axis))
+            for pin, force in forces.items()
+        }
+
+
+def read(
+    text: str, *, loop: str | None = None, speed: float = 3.0, **pose: object
+) -> LoopScene:
+    options = PoseOptions(**pose)  # type: ignore[arg-type]
+    return read_loop_scene(RobotFile(Path("robot.xml"), text), options, loop, speed)
+
+
+def compare(text: str, made: LoopScene, speed: float = 3.0) -> None:
+    """Hold torque and pin forces of the scene against the whole robot over the sweep."""
+    robot = WholeRobot(text, made)
+    assert made.scene.motion.theta_2 is not None
+    solution = fourbar.solve(made.scene)
+    driven = made.loop.hinges["O2"]
+    address = robot.model.jnt_qposadr[driven]
+    order = np.argsort(np.abs(solution.theta_2 - solution.theta_2.mean()))
+    torque_scale = np.abs(solution.torque).max()
+    names = {"O2": "F12", "A": "F32", "B": "F43", "O4": "F14"}
+    sizes = {p: np.linalg.norm(getattr(solution, n), axis=1) for p, n in names.items()}
+    compared = 0
+    in_pose = made.loop.qpos[address]
+    for row in np.concatenate([order[:1], order[1::17], order[-1:]]):
+        turned = math.remainder(solution.theta_2[row] - made.loop.angles[1], math.tau)
+        qpos = made.loop.qpos.copy()
+        for part in np.linspace(0.0, turned, 20)[1:]:  # on the same branch
+            qpos = robot.place(qpos, in_pose + part)
+        whole = robot.ask(qpos, speed)
+        assert whole.torque == pytest.approx(
+            solution.torque[row], abs=EXACT * torque_scale
+        )
+        for pin, force in whole.forces.items():
+            scale = sizes[pin].max()
+            assert force == pytest.approx(sizes[pin][row], abs=EXACT * scale), pin
+        compared += 1
+    assert compared > 5
+
+
+@pytest.mark.parametrize(
+    "loop", ["right_finger-right_follower", "left_finger-left_follower"]
+)
+def test_the_gripper_has_the_torques_and_forces_of_the_whole_robot(loop: str) -> None:
+    made = read(GRIPPER, loop=loop)
+    compare(GRIPPER, made)
+
+
+def test_a_finger_in_another_attitude_has_them_too() -> None:
+    text = GRIPPER.replace(
+        '<body name="palm" pos="0 0 0.5">', '<body name="palm" euler="20 40 60">'
+    )
+    made = read(text, loop="right_finger-right_follower", joints={"wrist": "30deg"})
+    compare(text, made)
+
+
+@pytest.mark.parametrize("key", [None, "crouch"])
+def test_the_foot_has_the_torques_and_forces_of_the_whole_robot(
+    key: str | None,
+) -> None:
+    made = read(FOOT, key=key)
+    compare(FOOT, made)
+
+
+def test_what_hangs_on_a_bar_counts_as_it_stands() -> None:
+    straight, bent = (read(FOOT, joints={"toe": angle}) for angle in ("0deg", "30deg"))
+    assert straight.scene.linkage.output.mass == pytest.approx(0.53)
+    inertias = [s.scene.linkage.output.inertia for s in (straight, bent)]
+    assert inertias[0] != pytest.approx(inertias[1], rel=1e-3)
+    compare(FOOT, bent)
+
+
+EVERYTHING = {
+    "springs": Planar(joint='stiffness="2" springref="4.5"'),
+    "springs wound beyond half a turn": Planar(joint='stiffness="0.5" springref="-4"'),
+    "gravcomp": Planar(),
+    "damping and friction": Planar(joint='damping="0.1" frictionloss="0.2"'),
+    "output armature": Planar(cut="A", by="site"),
+    "closure on the ground": Planar(cut="O4"),
+    "axis the other way": Planar(
+        axes={"O2": "0 0 -1", "A": "0 0 -1"}, joint='stiffness="1"'
+    ),
+}
+
+
+@pytest.mark.parametrize("name", EVERYTHING)
+def test_every_effect_is_that_of_the_whole_robot(name: str) -> None:
+    planar = replace(EVERYTHING[name], base='<joint name="base" axis="0 1 0"/>')
+    text = planar.text()
+    if name == "gravcomp":
+        text = text.replace(
+            '<body name="coupler"', '<body name="coupler" gravcomp="0.7"'
+        )
+    if name == "output armature":
+        text = text.replace('name="O4" axis', 'name="O4" armature="0.02" axis')
+        text = text.replace('name="O2" axis', 'name="O2" armature="0.03" axis')
+    text = text.replace('name="O2" ', 'name="O2" range="-0.5 0.4" limited="true" ')
+    made = read(text)
+    compare(text, made)
+
+
+def test_a_motor_counts_behind_its_gear() -> None:
+    motor = '<motor name="motor" joint="O2" gear="10" armature="1e-4" damping="2e-3"/>'
+    plain = '<motor name="motor" joint="O2"/>'
+    text = Planar().text().replace(plain, motor)
+    if not hasattr(mujoco.MjModel, "actuator_armature"):
+        pytest.skip("this MuJoCo has no armature of motors")
+    effects = {effect.key: effect for effect in read(text).scene.effects}
+    assert effects["flywheel"].inertia == pytest.approx(0.01)
+    assert effects["viscous"].coefficients == (("O2", pytest.approx(0.2)),)
+
+
+def test_armature_between_moving_bars_is_named_with_its_size() -> None:
+    text = Planar().text().replace('name="A" axis', 'name="A" armature="0.125" axis')
+    remarks = read(text).remarks
+    assert any("armature 0.125 kg m^2 of A" in remark for remark in remarks)
+
+
+def test_forces_across_the_plane_are_named_with_their_sizes() -> None:
+    made = read(FOOT)
+    (remark,) = [r for r in made.remarks if "across the plane" in r]
+    model = mujoco.MjModel.from_xml_string(FOOT)
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    pull = abs(data.xaxis[model.joint("crank").id] @ model.opt.gravity)
+    assert f"input {0.15 * pull:.4g} N" in remark
+    assert f"output {0.53 * pull:.4g} N" in remark
+
+
+def test_the_sweep_is_the_range_of_the_driven_hinge() -> None:
+    made = read(GRIPPER, loop="right_finger-right_follower")
+    motion = made.scene.motion.angle
+    assert motion.stop - motion.start == pytest.approx(math.radians(80.0))
+    # the driver stands upright in the pose, and its range is 40 deg to either side
+    assert 0.5 * (motion.start + motion.stop) == pytest.approx(0.5 * math.pi)
+
+
+def test_the_range_of_another_hinge_ends_the_sweep_and_is_named() -> None:
+    text = GRIPPER.replace(
+        '<joint name="right_follower" class="passive" />',
+        '<joint name="right_follower" class="passive" range="-10 20" />',
+    )
+    made = read(text, loop="right_finger-right_follower")
+    motion = made.scene.motion.angle
+    assert motion.stop - motion.start == pytest.approx(math.radians(30.0), rel=0.01)
+    assert motion.stop - motion.start < math.radians(30.0) + 1e-9
+    assert any("range of right_follower ends the motion" in r for r in made.remarks)
+
+
+def test_without_a_range_it_goes_as_far_as_the_loop_assembles() -> None:
+    planar = Planar()
+    made = read(planar.text())
+    d, a, b, c = planar.lengths()
+    # the input turns fully, for it and the longest bar are shorter than the other two
+    assert a + d < b + c
+    motion = made.scene.motion.angle
+    assert motion.stop - motion.start == pytest.approx(math.tau)
+    rocker = replace(planar, pins={**planar.pins, "A": (0.12, 0.2)})
+    made = read(rocker.text())
+    d, a, b, c = rocker.lengths()
+    assert a + d > b + c
+    # it stops where coupler and output are in one line
+    most = math.acos((a * a + d * d - (b + c) ** 2) / (2.0 * a * d))
+    motion = made.scene.motion.angle
+    width = motion.stop - motion.start
+    assert width == pytest.approx(2.0 * most - 2.0 * math.radians(1.0))
+
+
+def test_a_scene_reads_back_and_says_what_it_is() -> None:
+    made = read(FOOT)
+    assert loads(fourbar.dump(made.scene)) == made.scene
+    assert made.parts[0] == "Pins: O2 crank, A rod, B rod, O4 ankle."
+    assert "Held as they stand" in made.parts[2]
+
+
+def test_gravcomp_away_from_the_mass_centre_is_named() -> None:
+    text = FOOT.replace('<body name="toe"', '<body name="toe" gravcomp="1"')
+    made = read(text)
+    assert not made.scene.loads
+    assert any("gravcomp of 0.760" in remark for remark in made.remarks)
+
+
+def test_a_loop_is_asked_for_where_there_are_several() -> None:
+    with pytest.raises(InputError, match="right_finger-right_follower, left_finger"):
+        read(GRIPPER)
+    with pytest.raises(InputError, match="no such closure"):
+        read(GRIPPER, loop="thumb")
+
+
+def test_a_pose_in_a_change_point_is_said() -> None:
+    text = GRIPPER.replace('range="-40 40"', 'range="-100 100"')
+    made = read(
+        text, loop="right_finger-right_follower", joints={"right_driver": "90deg"}
+    )
+    assert any("in line in this pose" in remark for remark in made.remarks)

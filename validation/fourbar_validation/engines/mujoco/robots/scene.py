@@ -1,0 +1,574 @@
+"""A scene from a loop of a robot: lengths, masses, effects and range, in the pose, everything else held.
+
+What hangs on a bar by other joints is held as it stands and counts with its mass. What a scene
+cannot hold is named with its size.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from fourbar.effects import Effect, Flywheel, Friction, Gravity, Load, Torsion, Viscous
+from fourbar.errors import InputError
+from fourbar.formulas.mobility import (
+    MARGIN,
+    find_intervals,
+    follow_smooth_path,
+    turns_fully,
+)
+from fourbar.linkage import BAR_NAMES, MOVING_BARS, Bar, FourBar
+from fourbar.scene import Scene
+from fourbar.scene.motion import Motion, Sweep
+from fourbar.solve import solve
+from fourbar_validation.compare.answer import Array
+from fourbar_validation.engines.mujoco.robots.ancestry import climb, name_joint
+from fourbar_validation.engines.mujoco.robots.closures import (
+    PINS_OF_BAR,
+    choose_loop,
+    describe_equality,
+    find_closures,
+)
+from fourbar_validation.engines.mujoco.robots.compiled import (
+    CompiledRobot,
+    compile_robot,
+    require_masses,
+)
+from fourbar_validation.engines.mujoco.robots.loop import (
+    PAIRS,
+    LoopScene,
+    PoseOptions,
+    RobotFile,
+    RobotLoop,
+)
+from fourbar_validation.engines.mujoco.robots.pose import (
+    OUTSIDE,
+    PosedRobot,
+    pose_robot,
+)
+
+DIGITS = 12
+"""Significant digits of a number of the scene; those beyond are round-off of the compiler."""
+FLAT = 1e-3
+"""Sine of theta_4 - theta_3 below which the pose does not tell the assembly: a loop that is
+closed to 1e-12 m leaves about as much of an angle open there."""
+STEPS = 120
+"""Intervals of the sweep."""
+SAMPLES = 720
+"""Intervals in which the ranges of the other hinges are looked for."""
+SPEED = 1.0
+"""rad/s, where none is stated."""
+NOTHING = 1e-9
+"""Part of what acts below which a number is round-off."""
+ACROSS = 1e-6
+"""Part of gravity below which none acts across the plane."""
+SKEW = 1e-6
+"""rad; axes less apart than this are parallel but for the digits of the file."""
+
+
+def read_loop_scene(
+    file: RobotFile, options: PoseOptions, name: str | None, speed: float | None
+) -> LoopScene:
+    """Make a scene from a loop of a robot's file.
+
+    Parameters
+    ----------
+    name : of the closure; None: the only four-bar of the file.
+    speed : of the driven bar, rad/s; None: 1.
+
+    Raises
+    ------
+    InputError : there is no such four-bar, or one of its masses is unknown.
+    """
+    compiled = compile_robot(file)
+    posed = pose_robot(compiled.model, options)
+    closures = find_closures(posed, options)
+    if name is None:
+        names = [closure.name for closure in closures if closure.loop is not None]
+        if len(names) != 1:
+            listed = ", ".join(names) or "none"
+            raise InputError("--loop", None, f"states one of the four-bars: {listed}")
+        (name,) = names
+    loop = choose_loop(closures, name)
+    title = f"{name} of {file.path.name}"
+    made = make_scene(compiled, posed, loop, speed, title, str(file.path.name))
+    notes = (*compiled.notes, *posed.notes)
+    return replace(made, notes=notes)
+
+
+def make_scene(
+    compiled: CompiledRobot,
+    posed: PosedRobot,
+    loop: RobotLoop,
+    speed: float | None = None,
+    title: str = "",
+    source: str = "",
+) -> LoopScene:
+    """Make a scene from a loop in its pose; errors as of `read_loop_scene`."""
+    made = _SceneOfLoop(compiled, posed, loop)
+    scene = made.describe(SPEED if speed is None else speed, title, source)
+    remarks = [*loop.remarks, *made.remarks]
+    if speed is None:
+        remarks.append(f"a speed of {SPEED:g} rad/s is taken; --speed states another")
+    return LoopScene(scene, loop, made.write_parts(), tuple(remarks), ())
+
+
+def list_carried(model: mujoco.MjModel, loop: RobotLoop) -> dict[int, list[int]]:
+    """List the bodies that move with each moving bar, those included that hang on it by held joints."""
+    bars = {body: bar for bar, bodies in loop.bodies.items() for body in bodies}
+    carried: dict[int, list[int]] = {bar: [] for bar in MOVING_BARS}
+    for body in range(1, model.nbody):
+        bar = next((bars[above] for above in climb(model, body) if above in bars), 1)
+        if bar != 1:
+            carried[bar].append(body)
+    return carried
+
+
+def reflect_armature(model: mujoco.MjModel, joint: int) -> float:
+    """Return the armature of a hinge with that of its motors behind their gears, kg m^2."""
+    return _sum_over_motors(model, joint, model.dof_armature, "actuator_armature")
+
+
+def reflect_damping(model: mujoco.MjModel, joint: int) -> float:
+    """Return the damping of a hinge with that of its motors behind their gears, N m s/rad."""
+    damping = model.dof_damping * is_enabled(model, "damper", "passive")
+    return _sum_over_motors(model, joint, damping, "actuator_damping")
+
+
+def _sum_over_motors(
+    model: mujoco.MjModel, joint: int, of_dofs: Array, field: str
+) -> float:
+    total = float(of_dofs[model.jnt_dofadr[joint]])
+    of_motors = getattr(model, field, np.zeros(model.nu))  # since MuJoCo 4.0
+    for number in range(model.nu):
+        on_joint = model.actuator_trntype[number] == mujoco.mjtTrn.mjTRN_JOINT
+        if on_joint and int(model.actuator_trnid[number, 0]) == joint:
+            total += float(of_motors[number] * model.actuator_gear[number, 0] ** 2)
+    return total
+
+
+def is_enabled(model: mujoco.MjModel, *flags: str) -> bool:
+    """Tell whether no flag switches a feature off; a flag that this MuJoCo does not have switches nothing."""
+    bits = (
+        int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{flag.upper()}", 0))
+        for flag in flags
+    )
+    return not any(model.opt.disableflags & bit for bit in bits)
+
+
+def round_off(number: float) -> float:
+    """Round to the digits that a compiled model has."""
+    return float(f"{number:.{DIGITS}g}")
+
+
+def round_angle(angle: float) -> float:
+    """Round an angle to the digits that a compiled model has, rad; -0.0 becomes 0.0."""
+    return round(angle, DIGITS) + 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class _Lump:
+    """What a bar carries, as one rigid body in the plane."""
+
+    mass: float
+    centre: tuple[float, float]
+    """Distance (m) from the bar's first pin, and angle (rad) from its line."""
+    inertia: float
+    """About the mass centre and the plane's normal, kg m^2."""
+
+
+class _SceneOfLoop:
+    """A scene that is made from one loop."""
+
+    def __init__(
+        self, compiled: CompiledRobot, posed: PosedRobot, loop: RobotLoop
+    ) -> None:
+        self.model, self.data, self.loop = posed.model, posed.data, loop
+        self.remarks: list[str] = []
+        ground = self.data.xmat[loop.bodies[1][0]].reshape(3, 3)
+        self.normal = ground @ loop.axis
+        self.along = ground @ loop.along
+        self.across = np.cross(self.normal, self.along)
+        self.carried = list_carried(self.model, loop)
+        bodies = {body for carried in self.carried.values() for body in carried}
+        require_masses(compiled, bodies)
+        gravity = self.model.opt.gravity * is_enabled(self.model, "gravity")
+        self.gravity = np.asarray(gravity, float)
+
+    def write_parts(self) -> tuple[str, ...]:
+        """Say which joint is which pin, which body which bar, and what is held."""
+        model, loop = self.model, self.loop
+        closing = loop.name if loop.cut else ""
+        pins = (
+            f"{pin} {name_joint(model, loop.hinges[pin]) if pin in loop.hinges else closing}"
+            for pin in PAIRS
+        )
+        bars = (
+            f"{name} {' + '.join(model.body(body).name for body in loop.bodies[bar])}"
+            for bar, name in BAR_NAMES.items()
+        )
+        lines = [f"Pins: {', '.join(pins)}.", f"Bars: {', '.join(bars)}."]
+        held = [name_joint(model, joint) for joint in loop.held]
+        if held:
+            lines.append(f"Held as they stand: {', '.join(held)}.")
+        return tuple(lines)
+
+    def describe(self, speed: float, title: str, source: str) -> Scene:
+        """Describe the scene."""
+        lumps = {bar: self._lump(bar) for bar in MOVING_BARS}
+        armature = self._list_armature()
+        lengths = [round_off(length) for length in self.loop.lengths]
+        bars = {}
+        for bar, lump in lumps.items():
+            inertia = lump.inertia + (armature.get("O4", 0.0) if bar == 4 else 0.0)
+            length = lengths[bar - 1]
+            bars[bar] = Bar(length)
+            if lump.mass or inertia:
+                bars[bar] = Bar(
+                    length,
+                    round_off(lump.mass),
+                    round_off(inertia),
+                    (round_off(lump.centre[0]), round_angle(lump.centre[1])),
+                )
+        theta_1 = round_angle(self.loop.angles[0])
+        linkage = FourBar(lengths[0], bars[2], bars[3], bars[4], theta_1)
+        path = self._find_sweep(linkage)
+        whole = math.tau * math.ceil((-math.pi - path.start) / math.tau)
+        start, stop = (round_angle(end + whole) for end in (path.start, path.stop))
+        theta_2 = Sweep(start, stop, STEPS) if stop > start else start
+        branch = self._find_branch(linkage, path.start)
+        motion = Motion(theta_2, speed, branch=branch, through="follow")
+        effects = tuple(self._list_effects(armature, path.betas))
+        self._remark_what_is_left_out(lumps)
+        return Scene(
+            linkage,
+            motion,
+            loads=tuple(self._list_loads()),
+            effects=effects,
+            title=title,
+            source=source,
+        )
+
+    def _in_plane(self, vector: Array) -> complex:
+        return complex(float(vector @ self.along), float(vector @ self.across))
+
+    def _locate(self, bar: int, pin: str) -> Array:
+        """Locate a pin of a bar in world axes, (3,), m."""
+        body = self.loop.bodies[bar][0]
+        turn = self.data.xmat[body].reshape(3, 3)
+        return np.asarray(self.data.xpos[body] + turn @ self.loop.points[bar, pin])
+
+    def _find_polar(self, bar: int, place: Array) -> tuple[float, float]:
+        """Return a place from the first pin of a bar: distance, m, and angle from its line, rad."""
+        first, second = PINS_OF_BAR[bar]
+        pin = self._locate(bar, first)
+        line = self._in_plane(self._locate(bar, second) - pin)
+        arm = self._in_plane(place - pin)
+        if abs(arm) <= NOTHING * abs(line):
+            return 0.0, 0.0
+        turned = arm / line
+        return abs(arm), math.atan2(turned.imag, turned.real)
+
+    def _lump(self, bar: int) -> _Lump:
+        """Sum what a bar carries."""
+        model, data = self.model, self.data
+        bodies = self.carried[bar]
+        masses = model.body_mass[bodies]
+        mass = float(masses.sum())
+        if not mass:
+            return _Lump(0.0, (0.0, 0.0), 0.0)
+        centre = masses @ data.xipos[bodies] / mass
+        inertia = 0.0
+        for body, body_mass in zip(bodies, masses, strict=True):
+            axis = data.ximat[body].reshape(3, 3).T @ self.normal
+            arm = self._in_plane(data.xipos[body] - centre)
+            inertia += float(axis**2 @ model.body_inertia[body])
+            inertia += float(body_mass) * abs(arm) ** 2
+        return _Lump(mass, self._find_polar(bar, centre), inertia)
+
+    def _list_armature(self) -> dict[str, float]:
+        """Return the armature of each hinge that has any, by its pin, kg m^2."""
+        model, armature = self.model, dict[str, float]()
+        for pin, joint in self.loop.hinges.items():
+            size = reflect_armature(model, joint)
+            if size:
+                armature[pin] = size
+                name = name_joint(model, joint)
+                if pin == "O4":
+                    self.remarks.append(
+                        f"the armature {size:.6g} kg m^2 of {name} is in the inertia of "
+                        "the output, which turns as it does"
+                    )
+                elif pin != "O2":
+                    self.remarks.append(
+                        f"not in the scene: the armature {size:.6g} kg m^2 of {name}, "
+                        "between two moving bars"
+                    )
+        return armature
+
+    def _list_effects(
+        self, armature: dict[str, float], betas: dict[str, tuple[float, float]]
+    ) -> Iterator[Effect]:
+        """List the effects, the pins in their order."""
+        model = self.model
+        pull = self._in_plane(self.gravity)
+        if abs(pull) > NOTHING * float(np.linalg.norm(self.gravity)):
+            angle = math.atan2(pull.imag, pull.real)
+            yield Gravity(round_off(abs(pull)), round_angle(angle))
+        hinges = {
+            pin: self.loop.hinges[pin] for pin in PAIRS if pin in self.loop.hinges
+        }
+        damping = {pin: reflect_damping(model, joint) for pin, joint in hinges.items()}
+        rows = tuple((pin, round_off(k)) for pin, k in damping.items() if k)
+        if rows:
+            yield Viscous(rows)
+        rubbing = is_enabled(model, "frictionloss", "constraint")
+        losses = {
+            pin: float(model.dof_frictionloss[model.jnt_dofadr[joint]]) * rubbing
+            for pin, joint in hinges.items()
+        }
+        rows = tuple((pin, round_off(f)) for pin, f in losses.items() if f)
+        if rows:
+            yield Friction(rows)
+        springs = tuple(self._list_springs(hinges, betas))
+        if springs:
+            yield Torsion(springs)
+        if armature.get("O2"):
+            yield Flywheel(round_off(armature["O2"]), 2)
+
+    def _list_springs(
+        self, hinges: dict[str, int], betas: dict[str, tuple[float, float]]
+    ) -> Iterator[tuple[str, float, float, float]]:
+        """List pin, stiffness, rest angle and preload of the hinges' springs.
+
+        A scene counts its rest angle within half a turn where the motion begins; the
+        couple of whole turns beyond is a preload.
+        """
+        model, loop = self.model, self.loop
+        if not is_enabled(model, "spring", "passive"):
+            return
+        for pin, joint in hinges.items():
+            stiffness = float(model.jnt_stiffness[joint])
+            if not stiffness:
+                continue
+            address = model.jnt_qposadr[joint]
+            wound = float(loop.qpos[address] - model.qpos_spring[address])
+            in_pose, at_start = betas[pin]
+            rest = in_pose - loop.senses[pin] * wound
+            turns = math.tau * round((at_start - rest) / math.tau)
+            angle = math.remainder(rest, math.tau)
+            yield (
+                pin,
+                round_off(stiffness),
+                round_angle(angle),
+                round_off(stiffness * turns),
+            )
+
+    def _list_loads(self) -> Iterator[Load]:
+        """List the forces by which bodies are held against gravity (gravcomp)."""
+        model, data = self.model, self.data
+        if not hasattr(model, "body_gravcomp"):
+            return
+        for bar in MOVING_BARS:
+            bodies = self.carried[bar]
+            lifted = model.body_mass[bodies] * model.body_gravcomp[bodies]
+            total = float(lifted.sum())
+            force = -total * self._in_plane(self.gravity)
+            if not lifted.any() or not force:
+                continue
+            masses = model.body_mass[bodies]
+            apart = (lifted / total - masses / masses.sum()) @ data.xipos[bodies]
+            if abs(self._in_plane(apart)) > NOTHING * self.loop.lengths[bar - 1]:
+                self._leave_out(
+                    f"gravcomp of {abs(force):.6g} N on the {BAR_NAMES[bar]}, which acts "
+                    "away from its mass centre"
+                )
+                continue
+            size, angle = abs(force), math.atan2(force.imag, force.real)
+            yield Load(bar, (round_off(size), round_angle(angle)))
+
+    def _find_sweep(self, linkage: FourBar) -> "_Path":
+        """Follow the loop over the range of the driven hinge, as far as it assembles and no other hinge stops it."""
+        theta_2 = self.loop.angles[1]
+        low, high = self._find_range("O2", theta_2)
+        first, last = _find_assembling(linkage, theta_2)
+        low, high = max(low, first), min(high, last)
+        if math.isinf(low) and math.isinf(high):
+            low, high = theta_2, theta_2 + math.tau
+        low, high = max(low, high - math.tau), min(high, low + math.tau)
+        reach = np.linspace(low, high, SAMPLES + 1)
+        angles = np.union1d(reach, [theta_2])
+        in_pose = int(np.searchsorted(angles, theta_2))
+        betas = self._follow(linkage, angles, in_pose)
+        free = (angles >= low) & (angles <= high)
+        stops = []
+        for pin in self.loop.hinges.keys() - {"O2"}:
+            least, most = self._find_range(pin, float(betas[pin][in_pose]))
+            inside = (betas[pin] >= least - OUTSIDE) & (betas[pin] <= most + OUTSIDE)
+            if not inside[free].all():
+                stops.append(name_joint(self.model, self.loop.hinges[pin]))
+            free &= inside
+        if stops:
+            self.remarks.append(
+                f"the range of {', '.join(sorted(stops))} ends the motion before that of "
+                f"{name_joint(self.model, self.loop.joint)}"
+            )
+        if not free.any():
+            raise InputError(
+                "MJCF", self.loop.name, "no position is within the ranges of its hinges"
+            )
+        rows = _find_run(free, in_pose)
+        return _Path(
+            float(angles[rows[0]]),
+            float(angles[rows[-1]]),
+            {pin: (beta[in_pose], beta[rows[0]]) for pin, beta in betas.items()},
+        )
+
+    def _find_range(self, pin: str, beta: float) -> tuple[float, float]:
+        """Return the angles between the bars of a pin at which its hinge stops, rad; `beta`: that in the pose."""
+        model, loop = self.model, self.loop
+        joint = loop.hinges[pin]
+        if not model.jnt_limited[joint] or not is_enabled(model, "limit", "constraint"):
+            return -math.inf, math.inf
+        now = loop.qpos[model.jnt_qposadr[joint]]
+        ends = beta + loop.senses[pin] * (model.jnt_range[joint] - now)
+        return float(min(ends)), float(max(ends))
+
+    def _follow(
+        self, linkage: FourBar, angles: Array, in_pose: int
+    ) -> dict[str, Array]:
+        """Return the angle between the bars of each pin along theta_2, continuous, rad."""
+        branch = self._find_branch(linkage, float(angles[0]))
+        motion = Motion(angles, branch=branch, through="follow")
+        solution = solve(Scene(linkage, motion), "position")
+        thetas = {
+            1: np.full_like(angles, linkage.ground_angle),
+            2: angles,
+            3: solution.theta_3,
+            4: solution.theta_4,
+        }
+        return {pin: thetas[j] - thetas[i] for pin, (i, j) in PAIRS.items()}
+
+    def _find_branch(self, linkage: FourBar, theta_2: float) -> int:
+        """Return the sign of sin(theta_4 - theta_3) at theta_2 on the smooth path from the pose."""
+        _, in_pose, theta_3, theta_4 = self.loop.angles
+        sine = math.sin(theta_4 - theta_3)
+        sign = -1 if sine < -FLAT else 1
+        if abs(sine) <= FLAT:
+            text = "the bars of pin B are in line in this pose: open is taken"
+            if f"{text}; --pose states another" not in self.remarks:
+                self.remarks.append(f"{text}; --pose states another")
+        path = np.array([in_pose, theta_2])
+        return int(follow_smooth_path(linkage, path, sign)[1])
+
+    def _remark_what_is_left_out(self, lumps: dict[int, _Lump]) -> None:
+        """Name what acts on the loop and is not in the scene."""
+        model, loop = self.model, self.loop
+        across = float(self.gravity @ self.normal)
+        weights = {bar: abs(lump.mass * across) for bar, lump in lumps.items()}
+        if abs(across) > ACROSS * float(np.linalg.norm(self.gravity)):
+            texts = ", ".join(
+                f"{BAR_NAMES[bar]} {weight:.4g} N" for bar, weight in weights.items()
+            )
+            self._leave_out(f"weights across the plane: {texts}")
+        if loop.misaligned > SKEW:
+            angle = math.degrees(loop.misaligned)
+            self._leave_out(f"the {angle:.2g} deg between its axes")
+        for number in loop.other_equalities:
+            name = describe_equality(model, number)
+            self._leave_out(f"the equality {name}, which acts on its bars too")
+        dofs = [int(model.jnt_dofadr[joint]) for joint in loop.hinges.values()]
+        joints = list(loop.hinges.values())
+        for field, rows, what in (
+            ("dof_dampingpoly", dofs, "damping that is a polynomial of the speed"),
+            (
+                "jnt_stiffnesspoly",
+                joints,
+                "stiffness that is a polynomial of the angle",
+            ),
+        ):
+            if np.any(getattr(model, field, np.zeros(model.nv))[rows]):
+                self._leave_out(what)
+        self._remark_tendons_and_motors()
+        if np.any(model.opt.density) or np.any(model.opt.viscosity):
+            self._leave_out(
+                f"a fluid of density {model.opt.density:g} kg/m^3 and viscosity "
+                f"{model.opt.viscosity:g} Pa s"
+            )
+        bodies = [body for carried in self.carried.values() for body in carried]
+        collides = (model.geom_contype != 0) | (model.geom_conaffinity != 0)
+        if np.any(collides & np.isin(model.geom_bodyid, bodies)):
+            self._leave_out("contacts, and what its bars touch")
+
+    def _leave_out(self, what: str) -> None:
+        self.remarks.append(f"not in the scene: {what}")
+
+    def _remark_tendons_and_motors(self) -> None:
+        """Name tendons and actuators that act on the loop besides the motor of the driven hinge."""
+        model, bodies = self.model, {b for c in self.carried.values() for b in c}
+        joints = {*self.loop.hinges.values()}
+        for number in range(model.ntendon):
+            start = int(model.tendon_adr[number])
+            touches = False
+            for wrap in range(start, start + int(model.tendon_num[number])):
+                kind = mujoco.mjtWrap(int(model.wrap_type[wrap]))
+                target = int(model.wrap_objid[wrap])
+                if kind == mujoco.mjtWrap.mjWRAP_JOINT:
+                    touches |= target in joints
+                elif kind == mujoco.mjtWrap.mjWRAP_SITE:
+                    touches |= int(model.site_bodyid[target]) in bodies
+            acts = [
+                f"{name} {float(np.max(getattr(model, f'tendon_{name}')[number])):.6g}"
+                for name in ("stiffness", "damping", "frictionloss")
+                if np.any(getattr(model, f"tendon_{name}")[number])
+            ]
+            if touches and acts:
+                name = model.tendon(number).name or str(number)
+                self._leave_out(f"the tendon {name} ({', '.join(acts)})")
+        for number in range(model.nu):
+            kind = mujoco.mjtTrn(int(model.actuator_trntype[number]))
+            target = int(model.actuator_trnid[number, 0])
+            on_joint = kind == mujoco.mjtTrn.mjTRN_JOINT and target in joints
+            on_site = (
+                kind == mujoco.mjtTrn.mjTRN_SITE
+                and int(model.site_bodyid[target]) in bodies
+            )
+            if on_site or (on_joint and target != self.loop.joint):
+                name = model.actuator(number).name or str(number)
+                self._leave_out(f"the actuator {name}")
+
+
+@dataclass(frozen=True, slots=True)
+class _Path:
+    """Motion of a loop over its range."""
+
+    start: float
+    stop: float
+    betas: dict[str, tuple[float, float]]
+    """Angle between the bars of each pin in the pose, and where the path starts, rad."""
+
+
+def _find_run(free: NDArray[np.bool_], near: int) -> NDArray[np.intp]:
+    """Return the indices of the run of True that is nearest to an index."""
+    edges = np.flatnonzero(np.diff(free)) + 1
+    runs = [run for run in np.split(np.arange(len(free)), edges) if free[run[0]]]
+    distances = [int(np.abs(run - near).min()) for run in runs]
+    return np.asarray(runs[int(np.argmin(distances))])
+
+
+def _find_assembling(linkage: FourBar, theta_2: float) -> tuple[float, float]:
+    """Return the range of theta_2 around a position in which the loop assembles, a little less than it."""
+    if turns_fully(linkage):
+        return -math.inf, math.inf
+    ranges = []
+    for first, last in find_intervals(linkage):
+        middle = 0.5 * (first + last)
+        turns = math.tau * round((theta_2 - middle) / math.tau)
+        ranges.append((first + turns, last + turns))
+    outside = [max(ends[0] - theta_2, theta_2 - ends[1]) for ends in ranges]
+    first, last = ranges[int(np.argmin(outside))]
+    margin = min(MARGIN, 0.25 * (last - first))
+    return first + margin, last - margin
