@@ -111,13 +111,13 @@ def write_mjcf(
         find_row(term).add(term, model)
     armature = size_flywheel(scene, settings)
     root = ET.Element("mujoco", model=clean_line(scene.title) or "four-bar")
-    for line in _write_comments(scene, drive, reader):
+    for line in _write_comments(scene, drive, reader, exerts=model.exerts):
         root.append(ET.Comment(f" {line} "))
     ET.SubElement(root, "compiler", angle="radian", autolimits="true")
     model.add_option(root)
     add_appearance(root, scene.linkage)
     actuator = (
-        make_motor(scene.drive_bar)
+        make_motor(scene.drive_bar, _size_control(scene))
         if drive == "motor"
         else make_constant_motor(armature * scene.motion.alpha_2)
     )
@@ -131,7 +131,10 @@ def write_mjcf(
     model.add_closure(root)
     model.add_tendons(root)
     model.add_actuators(
-        root, actuator, cylinder=cylinder is not None and drive != "none"
+        root,
+        actuator,
+        cylinder=cylinder is not None and drive == "flywheel",
+        passive=_is_passive(drive, reader),
     )
     if start is not None:
         frame = ET.SubElement(root, "keyframe")
@@ -142,7 +145,27 @@ def write_mjcf(
     return ET.tostring(root, encoding="unicode") + "\n"
 
 
-def _write_comments(scene: Scene, drive: Drive, reader: str) -> list[str]:
+def _is_passive(drive: Drive, reader: str) -> bool:
+    """Return whether loads have no controls: MuJoCo alone reads motors without one."""
+    return drive == "motor" and reader == "mujoco"
+
+
+def _size_control(scene: Scene) -> float:
+    """Return twice the largest couple (N m) or push (N) of the scene's drive; where there is none, its scale."""
+    motion = scene.motion.replace(speed=scene.motion.speed or 0.0)
+    solution = solve(replace(scene, motion=motion), "force")
+    driving = solution.torque if scene.drive is None else solution.drive_force
+    sizes = np.abs(np.asarray(driving))
+    largest = float(sizes[np.isfinite(sizes)].max(initial=0.0))
+    if not largest:
+        inertia = _sum_inertia(scene.linkage) + _sum_load_inertia(scene)
+        largest = inertia * _compute_acceleration_scale(scene)
+    return float(f"{2.0 * largest:.3g}")
+
+
+def _write_comments(
+    scene: Scene, drive: Drive, reader: str, *, exerts: bool
+) -> list[str]:
     """Say how the file starts and where its numbers stand, a line each."""
     notes, numbers, bar = NOTES["mjcf"], NOTES["numbers"][reader], scene.drive_bar
     kinds: list[str] = [drive if scene.drive is None else f"cylinder_{drive}"]
@@ -174,6 +197,12 @@ def _write_comments(scene: Scene, drive: Drive, reader: str) -> list[str]:
         + (numbers["driven"] if drive == "flywheel" else [])
         + numbers["pins"]
     )
+    if reader == "mujoco" and drive != "flywheel" and scene.motion.free is None:
+        lines += notes["without_flywheel"]
+    if drive == "motor":
+        lines.append(notes["control"])
+    if _is_passive(drive, reader) and exerts:
+        lines.append(notes["passive"])
     lines += [notes["loads"]] if reader == "mujoco" and scene.loads else []
     return [*lines, *numbers["after"]]
 

@@ -174,6 +174,16 @@ def _find_body(root: ET.Element, bar: int) -> ET.Element:
 UNCONTROLLED = {"gaintype": "fixed", "gainprm": "0", "biastype": "affine"}
 
 
+PASSIVE = {"input": "none", "motorconst": "0", "resistance": "1"}
+"""A motor without a control and without back-EMF: what is left is its cogging, which here does not depend on the angle.
+To MuJoCo, and so to Gymnasium, it is no control."""
+
+
+def make_passive(force: float) -> dict[str, str]:
+    """Return the attributes of a `dcmotor` that exerts a constant force (N, or factor on its gear)."""
+    return {**PASSIVE, "cogging": join(force, 0.0, math.pi / 2.0)}
+
+
 def make_constant_motor(force: float) -> dict[str, str]:
     """Make the drive a motor on pin O2 that ignores its control; none where the force is 0."""
     return (
@@ -188,13 +198,17 @@ def make_servo(gain: float, omega: float) -> dict[str, str]:
     return {**UNCONTROLLED, "joint": "O2", "biasprm": join(gain * omega, 0.0, -gain)}
 
 
-def make_motor(bar: int | None) -> dict[str, str]:
-    """Make the drive a motor whose control is the couple of ground on a bar, N m; a cylinder has one of its own."""
-    if bar is None:
-        return {}
-    return (
-        {"joint": FIRST_PIN[bar]} if bar != 3 else {"site": "B3", "gear": "0 0 0 0 0 1"}
-    )
+def make_motor(bar: int | None, most: float) -> dict[str, str]:
+    """Make the drive a motor whose control is the couple of ground on a bar, N m, or the push of the cylinder, N.
+
+    `most`: its `ctrlrange` reaches from -most to most; it bounds no control, and tells others the size of one.
+    """
+    placed = {"tendon": CYLINDER}
+    if bar is not None:
+        placed = {"joint": FIRST_PIN[bar]}
+    if bar == 3:
+        placed = {"site": "B3", "gear": "0 0 0 0 0 1"}
+    return {**placed, "ctrlrange": join(-most, most), "ctrllimited": "false"}
 
 
 A_MILLIONTH = 1e-6
@@ -262,6 +276,11 @@ class Model:
     def radius(self) -> float:
         """Radius of the capsules, m."""
         return THICKNESS * max(self.linkage.lengths)
+
+    @property
+    def exerts(self) -> bool:
+        """Return True if loads or springs need actuators."""
+        return bool(self.loads) or not all(map(_is_slack_somewhere, self.springs))
 
     def used(self, attribute: str) -> bool:
         """Return True if any pin carries the attribute."""
@@ -434,9 +453,12 @@ class Model:
             self._add_site(_find_body(root, load.bar), f"load_{index}", x, y)
 
     def add_actuators(
-        self, root: ET.Element, drive: dict[str, str], *, cylinder: bool
+        self, root: ET.Element, drive: dict[str, str], *, cylinder: bool, passive: bool
     ) -> None:
-        """Add actuators: the drive, if it has attributes; loads and some springs, uncontrolled."""
+        """Add actuators: the drive, if it has attributes; loads and some springs, which ignore their controls.
+
+        `passive`: these have no controls.
+        """
         springs = {
             f"spring_{i}": s
             for i, s in enumerate(self.springs, 1)
@@ -446,18 +468,23 @@ class Model:
             return
         actuators = ET.SubElement(root, "actuator")
         if drive:
-            ET.SubElement(actuators, "general", drive, name="drive")
+            name = CYLINDER if drive.get("tendon") == CYLINDER else "drive"
+            ET.SubElement(actuators, "general", drive, name=name)
         if cylinder:
             ET.SubElement(actuators, "general", name=CYLINDER, tendon=CYLINDER)
         for name, spring in springs.items():
+            placed = {"name": name, "tendon": name}
+            if passive:
+                tendon = root.find(f"tendon/spatial[@name='{name}']")
+                assert tendon is not None
+                tendon.set("stiffness", join(spring.stiffness))
+                tendon.set("springlength", "0")
+                preload = make_passive(-spring.slack)
+                ET.SubElement(actuators, "dcmotor", {**preload, **placed})
+                continue
             tension = join(-spring.slack, 0.0 - spring.stiffness, 0.0)
             ET.SubElement(
-                actuators,
-                "general",
-                UNCONTROLLED,
-                name=name,
-                tendon=name,
-                biasprm=tension,
+                actuators, "general", {**UNCONTROLLED, **placed}, biasprm=tension
             )
         for index, load in enumerate(self.loads, 1):
             fx = fy = 0.0
@@ -476,13 +503,12 @@ class Model:
             placed = {"name": f"load_{index}", "site": f"load_{index}"}
             if load.frame == "world":
                 placed["refsite"] = "O2"
-            gear = join(fx, fy, 0.0, 0.0, 0.0, couple)
+            placed["gear"] = join(fx, fy, 0.0, 0.0, 0.0, couple)
+            if passive:
+                ET.SubElement(actuators, "dcmotor", {**make_passive(1.0), **placed})
+                continue
             ET.SubElement(
-                actuators,
-                "general",
-                {**UNCONTROLLED, **placed},
-                gear=gear,
-                biasprm="1 0 0",
+                actuators, "general", {**UNCONTROLLED, **placed}, biasprm="1 0 0"
             )
 
 

@@ -329,6 +329,47 @@ def counts_loads_in(file: Opened) -> None:
     assert min(file.errors(file.at_pins(loads=True)).values()) > FOUND
 
 
+def yields_more(file: Opened) -> None:
+    """In this scene inertia dominates; change points and static loads are measured with the check of files."""
+    file.step()
+    file.forward()
+    motion = fourbar.solve(file.scene, "position")
+    bound = 1e-4 / float(np.abs(motion.sin_mu).min()) ** 2
+    assert file.errors({"F43": file.data.efc_force[:2]})["F43"] < bound
+
+
+def holds_with_a_flywheel(file: Opened) -> None:
+    driven = Opened(replace(file.scene, drive=None, drive_bar=2), "flywheel")
+    driven.step()
+    driven.forward()
+    assert driven.errors({"F43": driven.data.efc_force[:2]})["F43"] < EXACT
+
+
+def has_one_control_with_a_range(file: Opened) -> None:
+    """Gymnasium's MujocoEnv makes its box of actions of `actuator_ctrlrange`, a row for each control."""
+    m, d, scene = file.model, file.data, file.scene
+    assert m.nu == 1 and m.actuator_ctrlrange.shape == (1, 2)
+    turn = fourbar.solve(scene, "force")
+    driving = turn.torque if scene.drive is None else turn.drive_force
+    most = 2.0 * float(np.nanmax(np.abs(np.asarray(driving))))
+    assert m.actuator_ctrlrange[0] == pytest.approx([-most, most], rel=5e-3)
+    d.ctrl[0] = 10.0 * most
+    file.forward()
+    assert d.actuator_force[0] == 10.0 * most
+
+
+def has_passive_motors(file: Opened) -> None:
+    m, d = file.model, file.data
+    drive = "drive" if file.scene.drive is None else "cylinder"
+    others = [i for i in range(m.nactuator) if m.actuator(i).name != drive]
+    assert len(others) >= len(file.scene.loads)
+    assert all(m.actuator_ctrlnum[i] == 0 for i in others)
+    file.forward()
+    before = d.actuator_force[others].copy()
+    file.step(50)
+    np.testing.assert_allclose(d.actuator_force[others], before, rtol=1e-15)
+
+
 def was_wrong_before_3_7(file: Opened) -> None:
     """Compare the two versions of the benchmark's matrix, which is generated, at the worst of three timesteps."""
     errors: dict[str, dict[str, float]] = {"3.3.7": {}, "4.0.0": {}}
@@ -369,10 +410,18 @@ SAID: dict[str, Callable[[Opened], None]] = {
     "efc_force[0], efc_force[1]: force of bar 4 on bar 3": gives_force_at_B,
     "cfrc_int[bar][3:5]": gives_forces_at_pins,
     "MuJoCo counts loads in": counts_loads_in,
+    "Without a flywheel the loop yields more": yields_more,
+    "With the flywheel as drive they hold to 1e-6": holds_with_a_flywheel,
+    "ctrlrange is twice the largest couple or force": has_one_control_with_a_range,
+    "Loads and preloads are motors without a control": has_passive_motors,
     "MuJoCo before 3.7": was_wrong_before_3_7,
 }
 """By how a sentence begins, what it promises."""
 CYLINDER = fourbar.LinearDrive(SpringEnd(1, 0.17, -1.1), SpringEnd(3, 0.09, 0.7))
+PRELOADED = fourbar.Spring(
+    SpringEnd(1, 0.1, -1.5), SpringEnd(3, 0.08, 0.3), 200.0, 0.02, 30.0
+)
+"""A spring that pulls even where its ends meet: a tendon's rest length cannot express it."""
 FILES: dict[str, tuple[Scene, Drive]] = {
     "at omega_2": (acted_on(), "flywheel"),
     "at alpha_2": (
@@ -382,6 +431,10 @@ FILES: dict[str, tuple[Scene, Drive]] = {
     "motor on bar 4": (acted_on(), "motor"),
     "motor on bar 3": (acted_on(drive_bar=3), "motor"),
     "motor on bar 2": (acted_on(drive_bar=2), "motor"),
+    "motor and a preloaded spring": (
+        acted_on(effects=(fourbar.Springs((PRELOADED,)),), drive_bar=2),
+        "motor",
+    ),
     "no drive": (acted_on(), "none"),
     "cylinder": (acted_on(drive_bar=None, drive=CYLINDER), "flywheel"),
     "motor along a cylinder": (acted_on(drive_bar=None, drive=CYLINDER), "motor"),

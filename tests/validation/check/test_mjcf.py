@@ -270,11 +270,7 @@ def test_loads_under_other_names_and_in_another_order_are_the_same_loads() -> No
 
 
 def described(text: str) -> Mapping[str, ModelEntry]:
-    from fourbar_validation.engines.mujoco.describe import describe_model as describe
-    from fourbar_validation.engines.mujoco.theirs import compile_text
-    from fourbar_validation.engines.mujoco.topology import Topology
-
-    return describe(Topology(compile_text(text), {}))
+    return examine(CRANK_ROCKER, text, {}).described
 
 
 @pytest.mark.parametrize(

@@ -16,8 +16,6 @@ SAME = 1e-12
 """Relative; a number written with its digits in another order of operations."""
 TENFOLD = 1e-9
 """Relative distance from a power of ten at which a ratio is called one."""
-OF_THE_DRIVE = "pins.O2.armature"
-"""The generated file keeps its speed by a flywheel, and another drive needs none: both files are driven alike here."""
 ONE_SIDED = ("loads.", "tendons.", "actuators.")
 """Entries that a file may lack: what is missing on one side is a difference."""
 NOTHING: dict[str, Value] = {".force": (0.0, 0.0), ".couple": 0.0}
@@ -106,12 +104,13 @@ def price(
 ) -> Difference:
     """Put the cost on a difference: what it adds to the worst error of a force.
 
-    `rows`: of the generated file that has it, none where it cannot be set alone; `unchanged`: of the file without it.
+    `rows`: of a file that has it, none where there is no such file; `unchanged`: of the same file without it.
     """
     before = _collect_errors(unchanged)
     gains = [
         (error - before.get(key, 0.0), key[1])
         for key, error in _collect_errors(rows).items()
+        if math.isfinite(before.get(key, 0.0))
     ]
     if not gains:
         return difference
@@ -120,11 +119,11 @@ def price(
 
 
 def _collect_errors(rows: Sequence[Row]) -> dict[tuple[str, str], float]:
-    """Collect the error of the torque and of each pin force, by method."""
+    """Collect the error of the torque and of each pin force, by method; infinite where there is no answer."""
     return {
-        (row.engine, row.quantity): row.error
+        (row.engine, row.quantity): row.error if math.isfinite(row.error) else math.inf
         for row in rows
-        if row.quantity in FORCES and math.isfinite(row.error)
+        if row.quantity in FORCES
     }
 
 
@@ -167,12 +166,7 @@ def _is_same(key: str, ours: Value | None, theirs: Value | None, length: float) 
 
 def _remark(key: str, ours: Value | None, theirs: Value | None) -> str:
     remark = next((text for part, text in REMARKS.items() if part in key), "")
-    if (
-        key != OF_THE_DRIVE
-        and isinstance(ours, float)
-        and isinstance(theirs, float)
-        and ours * theirs > 0.0
-    ):
+    if isinstance(ours, float) and isinstance(theirs, float) and ours * theirs > 0.0:
         power = math.log10(abs(theirs)) - math.log10(abs(ours))
         if (
             not key.startswith("option")

@@ -11,7 +11,7 @@ from pathlib import Path
 import click
 
 from fourbar.errors import InputError
-from fourbar.quantities import UNKNOWNS
+from fourbar.quantities import FORCES, PIN_FORCES, UNKNOWNS
 from fourbar.scene import Scene
 from fourbar.solve import solve
 from fourbar.writing import write_text
@@ -32,12 +32,17 @@ from fourbar_validation.robots.guard import examine_guarded
 from fourbar_validation.scenes.suites import read_scene_files
 
 ABOUT_COSTS = (
-    "cost: what this one entry, as in the file, adds to the error of the generated file; of torque and pin forces that "
-    "which grows most. A dash: this entry cannot be set by itself, or the file holds what it is held to"
+    "cost: what this one entry, as in the file, adds to the error of the generated file; of a weld, contacts, a range "
+    "and a motor what it adds to the error of the file itself. Of torque and pin forces the one that grows most. "
+    "A dash: this entry cannot be set by itself, or the file holds what it is held to"
 )
+JUDGED = tuple(name for name in UNKNOWNS if name not in ("alpha_3", "alpha_4"))
+"""Quantities that a file is held to. A soft loop lets the bars accelerate by themselves for an instant; what that does
+to the torque and the pin forces is judged there."""
 HEADINGS = ("quantity", "theirs", "generated", "allowed", "verdict")
 EXAMINE = "fourbar_validation.engines.mujoco.theirs:examine"
 CHANGED = "fourbar_validation.engines.mujoco.theirs:examine_changed"
+MENDED = "fourbar_validation.engines.mujoco.theirs:examine_mended"
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,6 +84,30 @@ class ModelReport:
     def methods(self) -> list[str]:
         """List the methods by which their file was evaluated."""
         return list(dict.fromkeys(cost.method for cost in self.costs))
+
+    def sentences(self) -> Iterator[str]:
+        """Yield a sentence for each method: how wrong the torque and the worst pin force are."""
+        for method in self.methods():
+            errors = {
+                cost.row.quantity: cost.row.error
+                for cost in self.costs
+                if cost.method == method and cost.row.quantity in FORCES
+            }
+            if not errors or any(math.isnan(error) for error in errors.values()):
+                continue
+            driving = {
+                name: errors.pop(name) for name in [*errors] if name not in PIN_FORCES
+            }
+            parts = [
+                f"{name} is off by {write_number(error)}"
+                for name, error in driving.items()
+            ]
+            if errors:
+                worst = max(errors, key=lambda name: errors[name])
+                parts.append(
+                    f"the worst pin force, {worst}, by {write_number(errors[worst])}"
+                )
+            yield f"{method}: {', '.join(parts)}, of its largest value."
 
     @property
     def counts(self) -> Counts:
@@ -138,6 +167,17 @@ def examine_model(
                 price(*pair, unchanged)
                 for pair in zip(differences, changed, strict=True)
             ]
+            unpriced = [
+                difference.key for difference in differences if difference.cost is None
+            ]
+            answered = examined(MENDED, scene, text, theirs.names, unpriced)
+            for key, answers in zip(unpriced, answered, strict=True):
+                if answers is not None:
+                    mended = _list_rows(name, scene, answers, tolerance)
+                    differences = [
+                        price(one, rows, mended) if one.key == key else one
+                        for one in differences
+                    ]
     unread = (
         [f"not looked at: {', '.join(parts)}"] if (parts := list_unread(text)) else []
     )
@@ -151,7 +191,7 @@ def _list_rows(
     for answer in answers:
         formulas = solve(scene, "force", at=answer.at)
         rows += Comparison(
-            name, scene, answer, formulas, Held(tolerance, UNKNOWNS)
+            name, scene, answer, formulas, Held(tolerance, JUDGED)
         ).rows()
     return rows
 
@@ -195,6 +235,8 @@ def show(report: ModelReport, mjcf: Path, out: Path) -> None:
     out.mkdir(parents=True, exist_ok=True)
     write_text(out / "theirs.md", write_markdown(report, mjcf))
     write_results([cost.row for cost in report.costs], out / "results.csv")
+    for sentence in report.sentences():
+        console.print(sentence)
     sentence = (
         f"{report.counts.sentence()}. It differs in {len(report.differences)} entries"
     )

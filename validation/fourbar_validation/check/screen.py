@@ -93,6 +93,7 @@ LOOKED_AT = {
         "name class group user joint tendon site refsite gear gaintype gainprm biastype biasprm kp kv dampratio "
         "ctrlrange ctrllimited",
     ),
+    "dcmotor": "name class group joint tendon site refsite gear input motorconst resistance cogging",
 }
 """Elements and their attributes that the check compares, that enter what it compares, or that move nothing: of those
 that read and draw, of what collides only whether anything does, and of the drive nothing, for it is taken off."""

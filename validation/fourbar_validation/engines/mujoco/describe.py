@@ -18,6 +18,9 @@ from fourbar_validation.engines.mujoco.topology import Topology
 
 Described = dict[str, ModelEntry]
 NONE = "none"
+FREE = "free"
+"""Range of a pin that no stop ends."""
+GROUND_PINS = ("O2", "O4")
 
 PIN = {
     "damping": ("dof_damping", "damping", "damper"),
@@ -55,19 +58,24 @@ WORDS = {
     "NEWTON": "Newton",
 }
 """Integrators and solvers as MJCF spells them, where MuJoCo spells them otherwise."""
+TORQUE_SCALE = 10
+"""Place in eq_data of the factor on the rotation that a weld holds."""
 SOFTEST, STIFFEST = 1e-4, 0.9999
 """Impedances between which MuJoCo keeps that of a constraint."""
 
 
-def describe_model(topology: Topology) -> Described:
-    """Describe lengths, masses, pins, gravity, closure, loads, tendons and options, as compiled."""
+def describe_model(topology: Topology, flywheel: float = 0.0) -> Described:
+    """Describe lengths, masses, pins, gravity, closure, loads, tendons and options, as compiled.
+
+    `flywheel`: the part of the armature of pin O2 that drives, kg m^2, and so is no inertia of the input.
+    """
     model = topology.model
     described = {"plane": ModelEntry(topology.plane)}
     for bar, name in BAR_NAMES.items():
         described[f"lengths.{name}"] = ModelEntry(topology.length(bar))
     described["lengths.ground_angle"] = ModelEntry(topology.ground_angle)
     for bar in MOVING_BARS:
-        described |= _describe_bar(topology, bar)
+        described |= _describe_bar(topology, bar, flywheel)
     gravity = model.opt.gravity * _is_on(model, "gravity")
     for axis, size in zip("xy", topology.in_plane(gravity), strict=True):
         described[f"gravity.{axis}"] = ModelEntry(float(size), "option", "gravity")
@@ -117,8 +125,11 @@ def _name_element(tag: str, name: str, number: int) -> str:
     return f'{tag} "{name}"' if name else f"{tag} {number} (unnamed)"
 
 
-def _describe_bar(topology: Topology, bar: int) -> Described:
-    """Describe mass, inertia about the mass centre, and its place from the first pin, with all that is welded to it."""
+def _describe_bar(topology: Topology, bar: int, flywheel: float) -> Described:
+    """Describe mass, inertia about the mass centre, and its place from the first pin, with all that is welded to it.
+
+    The armature of a hinge on the ground turns with the bar, and is inertia of it.
+    """
     model, data = topology.model, topology.data
     parts = np.flatnonzero(model.body_weldid == topology.root[bar])
     masses = model.body_mass[parts]
@@ -149,10 +160,28 @@ def _describe_bar(topology: Topology, bar: int) -> Described:
         "centre.distance": math.hypot(*arm),
         "centre.angle": angle,
     }
-    return {
+    described = {
         f"{key}.{name}": ModelEntry(value, element, "inertial")
         for name, value in values.items()
     }
+    armature = _find_armature(topology, FIRST_PIN[bar])
+    if bar == 2:
+        armature -= flywheel
+    if FIRST_PIN[bar] in GROUND_PINS and armature:
+        joint = topology.hinge[FIRST_PIN[bar]]
+        hinge = _name_element("joint", model.joint(joint).name, joint)
+        described[f"{key}.inertia"] = ModelEntry(
+            inertia + armature, f"{element} inertial and {hinge}", "armature"
+        )
+    return described
+
+
+def _find_armature(topology: Topology, pin: str) -> float:
+    """Find the armature of a pin's hinge, kg m^2; 0 where the loop is cut."""
+    if pin not in topology.hinge:
+        return 0.0
+    dof = topology.model.jnt_dofadr[topology.hinge[pin]]
+    return float(topology.model.dof_armature[dof])
 
 
 def _describe_pin(topology: Topology, pin: str) -> Described:
@@ -161,7 +190,7 @@ def _describe_pin(topology: Topology, pin: str) -> Described:
     joint = topology.hinge.get(pin)
     if joint is None:
         return {f"{key}.{name}": ModelEntry(0.0) for name in PIN} | {
-            f"{key}.range": ModelEntry("free")
+            f"{key}.range": ModelEntry(FREE)
         }
     dof, element = (
         int(model.jnt_dofadr[joint]),
@@ -169,6 +198,8 @@ def _describe_pin(topology: Topology, pin: str) -> Described:
     )
     described = {}
     for name, (field, attribute, flag) in PIN.items():
+        if name == "armature" and pin in GROUND_PINS:
+            continue  # it is inertia of the bar there
         size = float(getattr(model, field)[joint if field.startswith("jnt") else dof])
         acts = not flag or _is_on(
             model, flag, *(("passive",) if flag in ("spring", "damper") else ())
@@ -187,9 +218,9 @@ def _describe_pin(topology: Topology, pin: str) -> Described:
         described[f"{key}.spring angle"] = ModelEntry(
             topology.rest_angle(pin) + turned, element, "springref"
         )
-    limited = model.jnt_limited[joint] and _is_on(model, "limit")
+    stops = topology.stops(pin)
     described[f"{key}.range"] = ModelEntry(
-        _read_numbers(model.jnt_range[joint]) if limited else "free", element, "range"
+        FREE if stops is None else stops, element, "range"
     )
     sense = "counter-clockwise" if topology.sense[pin] > 0 else "clockwise"
     return described | {f"{key}.positive": ModelEntry(sense, element, "axis")}
@@ -244,9 +275,9 @@ def _describe_loads(topology: Topology) -> Described:
     model, data = topology.model, topology.data
     sums: dict[str, Array] = {}
     described: Described = {}
-    for i in sorted({*range(model.nu)} - {*topology.drives()}):
-        bias = model.actuator_biasprm[i, :3]
-        if model.actuator_biastype[i] == mujoco.mjtBias.mjBIAS_NONE or not bias.any():
+    for i in sorted({*range(len(model.actuator_trntype))} - {*topology.drives()}):
+        bias = _read_bias(model, i)
+        if not bias.any():
             continue  # it exerts what it is told to, and it is told nothing
         number, frame = (int(index) for index in model.actuator_trnid[i])
         gear, kind = model.actuator_gear[i], model.actuator_trntype[i]
@@ -305,6 +336,22 @@ def _describe_loads(topology: Topology) -> Described:
             float(couple) if squared else float(couple + turning)
         )
     return described
+
+
+def _read_bias(model: mujoco.MjModel, actuator: int) -> Array:
+    """Read what an actuator exerts without a control: its force, and its force per length and per speed, (3,).
+
+    Of direct-current motors that have no control, those are read whose force is constant: a cogging without a period.
+    """
+    bias, kinds = model.actuator_biasprm[actuator, :3], mujoco.mjtBias
+    if model.actuator_biastype[actuator] == kinds.mjBIAS_AFFINE:
+        return np.array(bias)
+    direct = getattr(kinds, "mjBIAS_DCMOTOR", None)
+    if direct is not None and model.actuator_biastype[actuator] == direct:
+        amplitude, periods, phase = bias
+        if not periods:
+            return np.array([amplitude * math.sin(phase), 0.0, 0.0])
+    return np.zeros(3)
 
 
 def _name_tendon(topology: Topology, number: int) -> str:
@@ -569,3 +616,25 @@ def _set_load(
             actuators, "general", frame, site=f"changed_{number}", name=f"changed_{number}", gaintype="fixed",
             gainprm="0", biastype="affine", biasprm="1 0 0", gear=_write_value(tuple(gear.tolist())),
         )  # fmt: skip
+
+
+def mend_entry(topology: Topology, key: str) -> bool:
+    """Take an entry that the generated file cannot hold out of a model; False where that is not possible.
+
+    A weld becomes a pin, contacts are switched off, a stop and the motors at a pin are removed.
+    """
+    model, (subject, _, rest) = topology.model, key.partition(".")
+    pin, _, what = rest.partition(".")
+    if key == "contacts":
+        model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
+    elif key == "closure.by" and topology.closed_by.startswith("weld"):
+        model.eq_data[topology.closure, TORQUE_SCALE] = 0.0
+    elif subject == "pins" and what == "range":
+        model.jnt_limited[topology.hinge[pin]] = 0
+    elif subject == "pins" and what == "motor":
+        joint = topology.hinge[pin]
+        for i in topology.list_actuators(joint):
+            model.actuator_gainprm[i] = model.actuator_biasprm[i] = 0.0
+    else:
+        return False
+    return True

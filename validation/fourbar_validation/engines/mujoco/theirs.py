@@ -1,23 +1,28 @@
 """Somebody's own MJCF of a linkage, and its torque and pin forces on a scene.
 
 At one state: its own assembly and speeds, then the couple on the driven bar with which its crank
-accelerates as commanded; the accelerations are linear in that couple, so a few `mj_forward` find it.
+accelerates as commanded. The accelerations are linear in that couple, so a few `mj_forward` find it;
+where the acceleration found is another one (dry friction, joint limits, clamped actuators) the couple
+is bracketed, and where none gives the acceleration this is said.
 Through time: the same, at the states that its own timestep, integrator and closure lead to, a
 flywheel on pin O2 keeping the speed. The file's own drive on that pin is taken off in both.
 """
 
 import math
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import chain
 
 import mujoco
 import numpy as np
 
+from fourbar.effects import Flywheel
 from fourbar.errors import FourBarError, InputError, LimitError
 from fourbar.linkage import PINS
 from fourbar.mjcf import choose_run, size_flywheel, write_mjcf
+from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Command, Scene
 from fourbar.scene import command as command_of
 from fourbar_validation.compare.answer import Answer, Array
@@ -33,12 +38,15 @@ from fourbar_validation.engines.loop import (
 )
 from fourbar_validation.engines.mujoco.closed_loop import (
     WARNINGS,
+    bracket_couple,
     load_force,
     solve_couple,
 )
 from fourbar_validation.engines.mujoco.describe import (
+    FREE,
     Described,
     describe_model,
+    mend_entry,
     set_entry,
 )
 from fourbar_validation.engines.mujoco.runner import (
@@ -59,6 +67,14 @@ PRICING = 60.0
 """Seconds in which differences are tried one by one; each takes two evaluations."""
 REFINEMENTS = 3
 """Secant steps after the first: each gains the digits that the one before has."""
+DRIVING = 1e3
+"""Armature over the inertia of all else from which it is a flywheel that drives: the speed then ripples by 1e-3."""
+LEAST = 1e-6
+"""Acceleration of the crank, over that of the open tree's joints, below which it is not told from none."""
+MISSED = 1e-9
+"""Part of the acceleration sought that a linear solve may leave: its rounding is 1e-12, also near a change point."""
+NOISE = 1e-3
+"""Part of it that the noise of the file's solver may leave; where the acceleration jumps, all of it is left."""
 NO_BIAS = mujoco.mjtBias.mjBIAS_NONE
 SHARED = "theta_2, omega_2, alpha_2 and the branch; the rest is the file's"
 OWN = "assembly, speeds, accelerations, drive torque and pin forces, by MuJoCo from the file as compiled"
@@ -75,6 +91,23 @@ class Examined:
     notes: list[str]
     names: dict[str, str]
     """Role: body or site, as stated or guessed."""
+
+
+@contextmanager
+def collect_warnings() -> Iterator[list[str]]:
+    """Collect the warnings of MuJoCo, each once, in place of printing and logging them."""
+    heard: list[str] = []
+
+    def hear(warning: str) -> None:
+        if warning not in heard:
+            heard.append(warning)
+
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(hear)
+    try:
+        yield heard
+    finally:
+        mujoco.set_mju_user_warning(before)
 
 
 def compile_text(text: str) -> mujoco.MjModel:
@@ -105,17 +138,40 @@ def compile_text(text: str) -> mujoco.MjModel:
 
 def examine(scene: Scene, text: str | None, names: Mapping[str, str]) -> Examined:
     """Describe an MJCF, evaluate it at single states and through time; None: the one generated from the scene."""
-    model = compile_text(write_mjcf(scene) if text is None else text)
+    with collect_warnings() as warnings:
+        examined = _examine(scene, write_mjcf(scene) if text is None else text, names)
+    examined.notes += [f"MuJoCo warns: {warning}" for warning in warnings]
+    return examined
+
+
+def _examine(scene: Scene, text: str, names: Mapping[str, str]) -> Examined:
+    model = compile_text(text)
     topology, guessed = find_topology(model, names, scene.linkage.lengths)
     loop = UserLoop(topology, scene)
-    described = describe_model(topology)
+    described = describe_model(topology, loop.flywheel)
     for key, (value, *_) in described.items():
         if key.startswith(("bars.", "lengths.")) and not math.isfinite(value):  # type: ignore[arg-type]
             raise InputError(
                 "MJCF", None, f"{key} is beyond the range of doubles: {value}"
             )
     answers = _list_answers(loop, scene)
-    return Examined(described, answers, [*guessed, *loop.notes], topology.names)
+    notes = [*guessed, *loop.notes, *_free_unmet_stops(described, loop)]
+    return Examined(described, answers, notes, topology.names)
+
+
+def _free_unmet_stops(described: Described, loop: "UserLoop") -> Iterator[str]:
+    """Describe as free what no stop ended at any state, and yield a note of each such joint."""
+    for pin, joint in loop.topology.hinge.items():
+        stops = loop.topology.stops(pin)
+        if stops is None or joint in loop.stopped:
+            continue
+        key = f"pins.{pin}.range"
+        described[key] = described[key]._replace(value=FREE)
+        low, high = (f"{math.degrees(stop):.4g}" for stop in stops)
+        yield (
+            f"the stops of joint {loop.model.joint(joint).name!r}, at {low} and {high} deg of pin {pin}, "
+            "are not met"
+        )
 
 
 def examine_changed(
@@ -125,24 +181,36 @@ def examine_changed(
 
     None stands for an entry that cannot be set alone. After PRICING seconds the rest are not evaluated either.
     """
-    text, start, answered = (
-        write_mjcf(scene, drive="none"),
-        time.perf_counter(),
-        list[list[Answer] | None](),
-    )
+    start, answered = time.perf_counter(), list[list[Answer] | None]()
+    text = write_mjcf(scene, drive="none")
     generated = describe_model(Topology(compile_text(text), {}))
     texts = (set_entry(text, generated, key, value) for key, value in changes)
     for changed in chain([text], texts):
         answers = None
         if time.perf_counter() - start < PRICING and changed is not None:
             try:
-                answers = _list_answers(
-                    UserLoop(Topology(compile_text(changed), {}), scene), scene
-                )
+                with collect_warnings():
+                    topology = Topology(compile_text(changed), {})
+                    answers = _list_answers(UserLoop(topology, scene), scene)
             except (
                 FourBarError
             ):  # with this entry it is no four-bar, or does not compile
                 answers = None
+        answered.append(answers)
+    return answered
+
+
+def examine_mended(
+    scene: Scene, text: str, names: Mapping[str, str], keys: Sequence[str]
+) -> list[list[Answer] | None]:
+    """Answer with a file without one of its entries at a time; None where it cannot be taken out of the file."""
+    start, answered = time.perf_counter(), list[list[Answer] | None]()
+    for key in keys:
+        topology = Topology(compile_text(text), names)
+        answers = None
+        if time.perf_counter() - start < PRICING and mend_entry(topology, key):
+            with collect_warnings():
+                answers = _list_answers(UserLoop(topology, scene), scene)
         answered.append(answers)
     return answered
 
@@ -198,6 +266,10 @@ class UserLoop(Assembled):
         self.topology, self.scene, self.model = topology, scene, topology.model
         self.data = mujoco.MjData(self.model)
         self.notes: list[str] = []
+        self.unreached: list[str] = []
+        """Angles theta_2 at which no couple gives the commanded acceleration, deg."""
+        self.stopped: set[int] = set()
+        """Joints that were at a limit of their range at some state."""
         self.to_joints, self.from_joints = (
             topology.to_joints,
             np.linalg.inv(topology.to_joints),
@@ -210,16 +282,34 @@ class UserLoop(Assembled):
         self.armature = (
             0.0 if self.crank is None else float(self.model.dof_armature[self.crank])
         )
+        self.flywheel = self._find_flywheel()
+        """The part of the armature that keeps the speed: its torque is the drive's, kg m^2."""
         self._take_off_the_drive()
         self._loads = [
             i
-            for i in range(self.model.nu)
+            for i in range(len(self.model.actuator_trntype))
             if self.model.actuator_trntype[i] == mujoco.mjtTrn.mjTRN_SITE
         ]
         self._jac = np.zeros((3, self.model.nv))
 
+    def _find_flywheel(self) -> float:
+        """Return the armature of pin O2 if it is so heavy that it drives; else it is inertia like any other."""
+        mass_matrix = float(self.model.dof_M0.sum() - self.model.dof_armature.sum())
+        of_scene = sum(
+            effect.inertia
+            for effect in self.scene.effects
+            if isinstance(effect, Flywheel)
+        )
+        drives = self.armature > DRIVING * (mass_matrix + of_scene)
+        return self.armature if drives else 0.0
+
     def _take_off_the_drive(self) -> None:
         model = self.model
+        if self.flywheel:
+            self.notes.append(
+                f"its armature of {self.flywheel:.3g} kg m^2 on pin O2 is taken for a flywheel that drives: "
+                "the torque on it is not counted"
+            )
         for i in self.topology.drives():
             model.actuator_gainprm[i], model.actuator_biasprm[i] = 0.0, 0.0
             self.notes.append(
@@ -306,11 +396,9 @@ class UserLoop(Assembled):
         mujoco.mj_resetData(self.model, data)
         data.eq_active[:] = active
         data.qpos[:], data.qvel[:] = q, v
-        if (
-            self.crank is not None
-        ):  # the torque of its own armature belongs to the drive
+        if self.crank is not None:  # the torque on a flywheel belongs to the drive
             data.qfrc_applied[self.crank] = (
-                self.armature * self.topology.sense["O2"] * alpha_2
+                self.flywheel * self.topology.sense["O2"] * alpha_2
             )
 
         def acceleration(couple: float) -> float:
@@ -323,18 +411,7 @@ class UserLoop(Assembled):
             mujoco.mj_forward(self.model, data)
             return float((self.from_joints @ data.qacc)[0])
 
-        inertia = float(self.model.dof_M0.sum())
-        trial = inertia * max(
-            abs(alpha_2 - acceleration(0.0)), np.finfo(float).tiny / np.finfo(float).eps
-        )
-        couple = solve_couple(acceleration, alpha_2, 0.0, trial, REFINEMENTS)
-        if couple is None:
-            what = (
-                "its cylinder"
-                if self.cylinder is not None
-                else f"a couple on bar {drive}"
-            )
-            raise LimitError(f"{what} does not move the crank of this model")
+        couple = self._solve_drive(acceleration, alpha_2)
         mujoco.mj_rnePostConstraint(self.model, data)
         values: Values = {name_driving(self.scene): couple}
         turned = (
@@ -346,7 +423,48 @@ class UserLoop(Assembled):
             ("theta", "omega", "alpha"), turned, strict=True
         ):
             values |= {f"{name}_2": two, f"{name}_3": two + three, f"{name}_4": four}
+        self._count_stops()
+        if math.isnan(couple):
+            return values | {name: np.full(2, np.nan) for name in PIN_FORCES}
         return values | self._read_forces()
+
+    def _solve_drive(
+        self, acceleration: Callable[[float], float], wanted: float
+    ) -> float:
+        """Solve for the couple or force of the drive; NaN where none gives the acceleration, which is noted."""
+        free = acceleration(0.0)
+        # without a couple the crank may already accelerate as wanted, to the rounding of the others
+        others = float(np.abs(self.data.qacc_smooth).max()) or 1.0
+        sought = max(abs(wanted - free), LEAST * others)
+        trial = float(self.model.dof_M0.sum()) * sought
+        couple = solve_couple(acceleration, wanted, 0.0, trial, REFINEMENTS)
+        what = (
+            "its cylinder"
+            if self.cylinder is not None
+            else f"a couple on bar {self.scene.drive_bar}"
+        )
+        if couple is None:
+            raise LimitError(f"{what} does not move the crank of this model")
+        if abs(acceleration(couple) - wanted) <= MISSED * sought:
+            return couple
+        # the solver starts from the same accelerations at every trial, or its noise would look like a jump
+        start = self.data.qacc_warmstart.copy()
+
+        def repeatable(size: float) -> float:
+            self.data.qacc_warmstart[:] = start
+            return acceleration(size)
+
+        bracketed = bracket_couple(repeatable, wanted, trial, NOISE * sought)
+        if bracketed is None:
+            theta_2 = math.degrees(self.topology.angles(self.data)[0])
+            self.unreached.append(f"{theta_2:.4g}")
+            return math.nan
+        return bracketed
+
+    def _count_stops(self) -> None:
+        """Collect the joints that are at a limit of their range in this state."""
+        limits = self.data.efc_type == mujoco.mjtConstraint.mjCNSTR_LIMIT_JOINT
+        self.stopped.update(self.data.efc_id[limits].tolist())
 
     def _read_forces(self) -> dict[str, Array]:
         """Read F12, F32, F43, F14 in the plane; NaN at a cut pin that no connect or weld holds."""
@@ -410,6 +528,16 @@ def answer_one_state(loop: UserLoop, command: Command) -> Answer:
         loop.notes.append(
             f"{contacts} contacts at a position where nothing but pins should touch"
         )
+    if loop.unreached:
+        what = (
+            "the cylinder"
+            if loop.cylinder is not None
+            else f"bar {loop.scene.drive_bar}"
+        )
+        places = ", ".join(dict.fromkeys(loop.unreached))
+        loop.notes.append(
+            f"nothing on {what} gives the commanded acceleration at theta_2 = {places} deg"
+        )
     evidence = {"closure_gap_m": gap, "contacts": float(contacts)}
     return Answer(ONE_STATE, "as compiled", command, assembled, out, evidence=evidence)
 
@@ -460,6 +588,9 @@ def answer_through_time(loop: UserLoop, command: Command) -> Answer:
         alpha_2 = float((loop.from_joints @ data.qacc)[0])
         model.dof_armature[loop.crank] = loop.armature
         values = loop.ask(data.qpos.copy(), data.qvel.copy(), alpha_2)
+        target = float(command.theta_2[index])
+        turned = math.remainder(float(values["theta_2"]) - target, math.tau)
+        values["theta_2"] = target + turned  # a joint with stops has turns of its own
         seen["closure_gap_m"] = max(seen["closure_gap_m"], float(np.hypot(*loop.gap())))
         seen["speed_error"] = max(
             seen["speed_error"], abs(float(values["omega_2"]) / command.omega_2 - 1.0)

@@ -102,11 +102,29 @@ class Topology:
 
     def drives(self) -> list[int]:
         """List the actuators that turn pin O2."""
-        model, joint = self.model, self.hinge.get("O2")
+        return self.list_actuators(self.hinge["O2"]) if "O2" in self.hinge else []
+
+    def list_actuators(self, joint: int) -> list[int]:
+        """List the actuators on a joint."""
+        model = self.model
         on_joints = np.flatnonzero(
             model.actuator_trntype == mujoco.mjtTrn.mjTRN_JOINT
         ).tolist()
         return [i for i in on_joints if model.actuator_trnid[i, 0] == joint]
+
+    def stops(self, pin: str) -> tuple[float, float] | None:
+        """Return the range of a pin, rad, from the line of its bearer to its bar's; None without stops."""
+        model, joint = self.model, self.hinge[pin]
+        if not self._is_limited(joint):
+            return None
+        turned = model.jnt_range[joint] - model.qpos0[model.jnt_qposadr[joint]]
+        ends = self.rest_angle(pin) + self.sense[pin] * turned
+        return float(ends.min()), float(ends.max())
+
+    def _is_limited(self, joint: int) -> bool:
+        """Tell whether stops end the range of a joint."""
+        off = self.model.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_LIMIT)
+        return bool(self.model.jnt_limited[joint]) and not off
 
     def cylinders(self) -> list[int]:
         """List the actuators along a tendon that take a control: without one a spring is such an actuator too."""
@@ -137,10 +155,11 @@ class Topology:
         bars = [self.bar(body), self.bar(model.body_parentid[body])]
         kind = mujoco.mjtJoint(model.jnt_type[joint])
         if kind != mujoco.mjtJoint.mjJNT_HINGE or None in bars:
+            advice = self._advise(ROLES, "name the bodies by --name")
             raise InputError(
                 "MJCF",
                 name,
-                "every joint must be a hinge of the input, coupler or output; name the bodies by --name",
+                f"every joint must be a hinge of the input, coupler or output{advice}",
             )
         pin = PIN_OF.get(frozenset(bars))  # type: ignore[arg-type]
         if pin is None or pin in self.hinge:
@@ -158,6 +177,16 @@ class Topology:
         for bar in bars:
             assert bar is not None
             self.point[bar, pin] = self._find_in_bar(bar, self.data.xanchor[joint])
+
+    def _advise(self, roles: Sequence[str], advice: str) -> str:
+        """Return advice on names; where all were stated, which they are."""
+        if any(role not in self.names for role in roles):
+            return f"; {advice}"
+        return (
+            "; stated: " + ", ".join(f"{role}={self.names[role]}" for role in roles)
+            if roles
+            else ""
+        )
 
     def _find_in_bar(self, bar: int, world: Array) -> Array:
         body = self.root[bar]
@@ -196,11 +225,15 @@ class Topology:
             name = names.get(role, role)
             site = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, name)
             if self.cut != "B" or site < 0 or self.bar(model.site_bodyid[site]) != bar:
+                advice = self._advise(
+                    (*SITES,) if self.cut == "B" else (),
+                    "where something else does, say where pin B is: "
+                    "--name B3=SITE on the coupler, --name B4=SITE on the output",
+                )
                 raise InputError(
                     "MJCF",
                     self.cut,
-                    "no connect or weld closes the loop at this pin; where something else does, say where pin B is: "
-                    "--name B3=SITE on the coupler, --name B4=SITE on the output",
+                    f"no connect or weld closes the loop at this pin{advice}",
                 )
             self.point[bar, "B"] = self._find_in_bar(bar, self.data.site_xpos[site])
         if (model.eq_type == kinds.mjEQ_TENDON).any():
@@ -287,11 +320,18 @@ class Topology:
         return child, parent
 
     def qpos(self, x: Sequence[float]) -> Array:
-        """Return the joint positions at (theta_2, theta_3 - theta_2, theta_4)."""
+        """Return the joint positions at (theta_2, theta_3 - theta_2, theta_4).
+
+        MuJoCo counts the turns of a hinge: a joint with stops stands in the turn of its range.
+        """
         q = self._rest.copy()
         turned = self.to_joints @ (np.asarray(x) - self._rest_angles)
         for joint in self.hinge.values():
-            q[self.model.jnt_qposadr[joint]] += turned[self.model.jnt_dofadr[joint]]
+            address = self.model.jnt_qposadr[joint]
+            q[address] += turned[self.model.jnt_dofadr[joint]]
+            if self._is_limited(joint):
+                middle = float(self.model.jnt_range[joint].mean())
+                q[address] = middle + math.remainder(q[address] - middle, math.tau)
         return np.asarray(q)
 
     def angles(self, data: mujoco.MjData) -> Array:
@@ -363,11 +403,12 @@ def find_topology(
         )
         why = refused[0] if refused else few
         nowhere = f"no body is named {', '.join(missing) or 'B3, B4'}, and no guess makes a four-bar ({why})"
-        raise InputError(
-            "MJCF",
-            list_bodies(model),
-            f"{nowhere}; say which is which: --name input=BODY, and so on",
-        )
+        unstated = [role for role in missing or SITES if role not in names]
+        advice = ""
+        if unstated:
+            kind = "BODY" if missing else "SITE"
+            advice = f"; say which is which: --name {unstated[0]}={kind}, and so on"
+        raise InputError("MJCF", list_bodies(model), nowhere + advice)
     best = min(misfit[0] for misfit in guesses)
     _, _, topology, guessed = min(
         (misfit for misfit in guesses if misfit[0] <= best + ALIKE),

@@ -1,0 +1,400 @@
+"""A file that is right is called right, and where one is wrong its cause stands first."""
+
+import math
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+import fourbar
+from fourbar.effects import Flywheel, Friction
+from fourbar.errors import InputError
+from fourbar.linkage import Bar, FourBar
+from fourbar.mjcf import RECIPE, write_mjcf
+from fourbar.scene import Scene
+from fourbar.solve import solve
+from fourbar_validation.check.differences import find_differences
+from fourbar_validation.check.mjcf import ModelReport, examine_model
+from fourbar_validation.compare.answer import Answer
+from fourbar_validation.engines.mujoco.closed_loop import bracket_couple
+from fourbar_validation.engines.mujoco.theirs import (
+    ONE_STATE,
+    THROUGH_TIME,
+    Examined,
+    examine,
+)
+
+ARM = FourBar(0.3, Bar(0.1, 0.2), Bar(0.25, 0.3), Bar(0.22, 0.3))
+SWEEP = fourbar.Motion(np.radians(np.linspace(30.0, 90.0, 61)), 1.0)
+DRY = Scene(ARM, SWEEP, effects=(Friction.at(O2=0.5, A=0.5),), title="dry friction")
+ROTOR = Scene(
+    ARM,
+    fourbar.Motion(np.radians(np.linspace(30.0, 60.0, 31)), 10.0, 20.0),
+    effects=(Flywheel(0.02, 2),),
+    title="a rotor",
+)
+BARE = replace(DRY, effects=())
+FAST = fourbar.Motion(np.radians(np.linspace(0.0, 3600.0, 61)), 10.0)
+TURNED = -4.0
+"""Zero of a joint whose file counts from elsewhere, rad."""
+SOFT_FRICTION = 4e-6
+"""Torque of the file with MuJoCo's default friction, of its largest: 3.4e-6 at one state, as measured."""
+SOFT_LOOP = 5e-5
+"""Pin forces of it, of their largest: the loop yields to the friction, 4.6e-5."""
+BISECTED = 1e-9
+"""Relative; both solve for the same couple, and the solver's noise is 1e-11."""
+
+
+def default_friction() -> str:
+    """The file of the dry arm whose friction yields as MuJoCo's does if nothing is said of it."""
+    text = write_mjcf(DRY, drive="none")
+    return re.sub(' sol(ref|imp)friction="[^"]*"', "", text)
+
+
+def rotor_as_armature() -> str:
+    """The file of the arm with the rotor as armature of its driven hinge."""
+    text = write_mjcf(replace(ROTOR, effects=()), drive="none")
+    assert 'armature="0"' in text
+    return text.replace('armature="0"', 'armature="0.02"')
+
+
+def answer_of(examined: Examined, how: str) -> Answer:
+    (answer,) = (answer for answer in examined.answers if answer.engine == how)
+    assert answer.refusal is None, answer.refusal
+    return answer
+
+
+def error_of(scene: Scene, examined: Examined, how: str, name: str) -> float:
+    """Largest difference from the formulas, over the largest value."""
+    answer = answer_of(examined, how)
+    ours = np.asarray(getattr(solve(scene, "force", at=answer.at), name))
+    difference, size = answer.quantities[name] - ours, np.abs(ours)
+    if ours.ndim == 2:
+        difference, size = np.hypot(*difference.T), np.hypot(*ours.T)
+    return float(np.abs(difference).max() / size.max())
+
+
+def bisect_on_the_couple(text: str, theta_2: float, alpha_2: float) -> float:
+    """Ask MuJoCo for the couple on the input at keyframe 0, moved to an angle by a chain of Newton steps."""
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    three, four = (model.site(name).id for name in ("B3", "B4"))
+    speed = data.qvel[0]
+    data.qpos[0] = theta_2
+    jacobians = np.zeros((2, 3, model.nv))
+    for _ in range(50):
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        for index, site in enumerate((three, four)):
+            mujoco.mj_jacSite(model, data, jacobians[index], None, site)
+        jacobian = (jacobians[0] - jacobians[1])[:2]
+        gap = (data.site_xpos[three] - data.site_xpos[four])[:2]
+        data.qpos[1:] -= np.linalg.solve(jacobian[:, 1:], gap)
+    data.qvel[0] = speed
+    data.qvel[1:] = np.linalg.solve(jacobian[:, 1:], -jacobian[:, 0] * speed)
+    low, high = -100.0, 100.0
+    for _ in range(200):
+        couple = 0.5 * (low + high)
+        data.qfrc_applied[0] = couple
+        mujoco.mj_forward(model, data)
+        if data.qacc[0] < alpha_2:
+            low = couple
+        else:
+            high = couple
+    return couple
+
+
+@cache
+def examined_dry() -> Examined:
+    return examine(DRY, default_friction(), {})
+
+
+@pytest.mark.slow
+def test_a_file_with_dry_friction_is_right_to_the_softness_of_its_loop() -> None:
+    """Two trials and a line gave a couple at which the crank accelerates at -56 rad/s^2 in place of 0."""
+    for how in (ONE_STATE, THROUGH_TIME):
+        assert error_of(DRY, examined_dry(), how, "torque") < SOFT_FRICTION
+        for pin in ("F12", "F32", "F43", "F14"):
+            assert error_of(DRY, examined_dry(), how, pin) < SOFT_LOOP
+
+
+@pytest.mark.slow
+def test_the_couple_is_the_one_that_bisection_finds() -> None:
+    answer = answer_of(examined_dry(), ONE_STATE)
+    assert answer.at.theta_2[0] == pytest.approx(math.radians(30.0))
+    bisected = bisect_on_the_couple(default_friction(), math.radians(30.0), 0.0)
+    assert answer.quantities["torque"][0] == pytest.approx(bisected, rel=BISECTED)
+    assert bisected == pytest.approx(1.2243167, abs=5e-8)  # and 1.2243155 by formulas
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("pin", ["O2", "A"])
+def test_friction_that_is_too_large_is_seen_at_one_state_and_through_time(
+    pin: str,
+) -> None:
+    """By virtual work 0.5 N m more at O2 is 0.5 N m of torque, at A it is 0.5 |omega_3 - omega_2| / omega_2."""
+    text = write_mjcf(DRY, drive="none").replace(
+        f'name="{pin}" type="hinge"', f'name="{pin}" type="hinge" LOSS'
+    )
+    text = re.sub('LOSS([^>]*) frictionloss="0.5"', r'\1 frictionloss="1"', text)
+    assert text.count('frictionloss="1"') == 1
+    examined = examine(DRY, text, {})
+    for how in (ONE_STATE, THROUGH_TIME):
+        answer = answer_of(examined, how)
+        ours = solve(DRY, "force", at=answer.at)
+        assert ours.torque is not None and ours.omega_3 is not None
+        slip = (
+            1.0 if pin == "O2" else np.abs(ours.omega_3 - ours.omega_2) / ours.omega_2
+        )
+        more = answer.quantities["torque"] - ours.torque
+        np.testing.assert_allclose(more, 0.5 * slip * np.ones(len(more)), rtol=1e-4)
+
+
+def test_armature_of_the_driven_hinge_is_the_flywheel_of_the_scene() -> None:
+    examined = examine(ROTOR, rotor_as_armature(), {})
+    torque = answer_of(examined, ONE_STATE).quantities["torque"]
+    assert torque[0] == pytest.approx(0.3624249, abs=2e-7)
+    for how in (ONE_STATE, THROUGH_TIME):
+        assert error_of(ROTOR, examined, how, "torque") < 1e-6
+    generated = examine(ROTOR, None, {})
+    keys = {d.key for d in find_differences(generated.described, examined.described)}
+    assert not {key for key in keys if key.startswith(("bars.", "pins."))}
+
+
+def test_armature_that_the_scene_does_not_have_is_inertia_of_the_input() -> None:
+    """By virtual work it adds its own moment alone: 0.02 kg m^2 times 20 rad/s^2."""
+    scene = replace(ROTOR, effects=())
+    answer = answer_of(examine(scene, rotor_as_armature(), {}), ONE_STATE)
+    ours = solve(scene, "force", at=answer.at).torque
+    np.testing.assert_allclose(answer.quantities["torque"] - ours, 0.4, rtol=1e-5)
+
+
+def limited(pin: str, low: float, high: float) -> str:
+    """The file of the arm without friction, with a joint range in rad of its own zero."""
+    text = write_mjcf(BARE, drive="none").replace('limit="disable" ', "")
+    hinge = f'name="{pin}" type="hinge"'
+    assert hinge in text
+    return text.replace(hinge, f'{hinge} range="{low!r} {high!r}"')
+
+
+def counted_from_elsewhere(text: str, pin: str) -> str:
+    """The same file with another zero of a joint: its `ref` and range are moved alike."""
+
+    def moved(match: re.Match[str]) -> str:
+        return f'{match[1]}"{float(match[2]) + TURNED!r}"'
+
+    line = next(line for line in text.splitlines() if f'name="{pin}" type' in line)
+    low, high = re.search('range="(\\S+) (\\S+)"', line).groups()  # type: ignore[union-attr]
+    ends = f'range="{float(low) + TURNED!r} {float(high) + TURNED!r}"'
+    other = re.sub('range="[^"]*"', ends, re.sub('(ref=)"([^"]*)"', moved, line))
+    return re.sub("<keyframe>.*</keyframe>", "", text.replace(line, other), flags=re.S)
+
+
+def test_a_stop_that_the_motion_does_not_meet_is_no_difference() -> None:
+    """Bar 4 turns between 1.7 and 2.1 rad; the file's zero makes that -2.3 to -1.9."""
+    theta_4 = solve(BARE, "position").theta_4
+    low, high = float(theta_4.min()) - 0.1, float(theta_4.max()) + 0.1
+    for text in (
+        limited("O4", low, high),
+        counted_from_elsewhere(limited("O4", low, high), "O4"),
+        limited("O4", low + math.tau, high + math.tau),
+    ):
+        examined = examine(BARE, text, {})
+        assert examined.described["pins.O4.range"].value == "free"
+        assert any("the stops of joint 'O4'" in note for note in examined.notes)
+        assert error_of(BARE, examined, ONE_STATE, "torque") < 1e-4
+
+
+def test_a_stop_inside_the_motion_is_where_the_bars_meet_it() -> None:
+    theta_4 = solve(BARE, "position").theta_4
+    middle = float(theta_4.mean())
+    for text in (
+        limited("O4", middle, 3.0),
+        counted_from_elsewhere(limited("O4", middle, 3.0), "O4"),
+    ):
+        examined = examine(BARE, text, {})
+        stops = examined.described["pins.O4.range"].value
+        assert stops == pytest.approx((middle, 3.0))
+        answer = answer_of(examined, ONE_STATE)
+        ours = solve(BARE, "force", at=answer.at)
+        off = np.abs(answer.quantities["torque"] - ours.torque)
+        before = np.asarray(ours.theta_4) < middle
+        assert off[before].max() > 1.0
+        assert off[~before].max() < 1e-6
+
+
+def welded(text: str) -> str:
+    return text.replace("<connect ", "<weld ")
+
+
+def colliding(text: str) -> str:
+    touching = re.sub('contype="0" conaffinity="0"', "", text)
+    return touching.replace('contact="disable" ', "")
+
+
+def stopped(text: str) -> str:
+    hinge = 'name="O4" type="hinge"'
+    return text.replace(hinge, f'{hinge} range="0 1.8"').replace('limit="disable" ', "")
+
+
+@cache
+def report_of(spoil: Callable[[str], str], folder: Path) -> ModelReport:
+    """The report on the arm's file with two faults: a mass that is 1 % off, and one that explains the error."""
+    text = write_mjcf(BARE, drive="none").replace('mass="0.3"', 'mass="0.303"', 1)
+    path = folder / f"{spoil.__name__}.xml"
+    path.write_text(spoil(text))
+    return examine_model("arm", BARE, path, {})
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("spoil", "key"),
+    [(welded, "closure.by"), (colliding, "contacts"), (stopped, "pins.O4.range")],
+)
+def test_the_cause_that_explains_the_error_stands_first(
+    spoil: Callable[[str], str], key: str, tmp_path: Path
+) -> None:
+    report = report_of(spoil, tmp_path)
+    assert report.differences[0].key == key
+    cost = report.differences[0].cost
+    worst = max(
+        c.row.error for c in report.costs if c.row.quantity in ("torque", "F12", "F43")
+    )
+    assert cost is not None and cost > 0.1 * worst
+
+
+def test_a_couple_that_nothing_gives_is_none() -> None:
+    """A clamped drive reaches 2 rad/s^2, a ratchet jumps over 5."""
+    assert bracket_couple(lambda couple: min(couple, 2.0), 3.0, 1.0, 1e-3) is None
+    assert bracket_couple(lambda couple: 10.0 * (couple > 4.0), 5.0, 1.0, 1e-3) is None
+    for wanted in (-7.0, 0.0, 1.5):
+        couple = bracket_couple(lambda couple: min(couple, 2.0), wanted, 1e-3, 1e-9)
+        assert couple == pytest.approx(wanted, abs=1e-12)
+
+
+def test_where_no_force_gives_the_acceleration_is_said() -> None:
+    """The tendon of a cylinder that carries at most a part of what the motion asks for."""
+    end, start = fourbar.SpringEnd(4, 0.09, 0.7), fourbar.SpringEnd(1, 0.1, -1.0)
+    scene = replace(
+        BARE, drive_bar=None, drive=fourbar.LinearDrive(start, end),
+        motion=BARE.motion.replace(acceleration=50.0),
+    )  # fmt: skip
+    forces = np.abs(solve(scene, "force").drive_force)
+    most = float(np.median(forces))
+    text = write_mjcf(scene, drive="motor").replace(
+        '<spatial name="cylinder"',
+        f'<spatial name="cylinder" actuatorfrcrange="{-most!r} {most!r}"',
+    )
+    examined = examine(scene, text, {})
+    answer = answer_of(examined, ONE_STATE)
+    reached = np.isfinite(answer.quantities["drive_force"])
+    assert 0 < reached.sum() < len(reached)
+    assert any(
+        "gives the commanded acceleration at theta_2" in n for n in examined.notes
+    )
+
+
+def test_warnings_of_the_engine_are_notes_and_nothing_is_printed(
+    capfd: pytest.CaptureFixture[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    text = re.sub('timestep="[^"]*"', 'timestep="0.2"', write_mjcf(BARE, drive="none"))
+    text = re.sub('solref="[^"]*"', 'solref="0.001 0.01"', text)
+    text = text.replace('integrator="RK4"', 'integrator="Euler"')
+    examined = examine(replace(BARE, motion=FAST), text, {})
+    assert any(note.startswith("MuJoCo warns: ") for note in examined.notes)
+    printed = capfd.readouterr()
+    assert printed.out == printed.err == ""
+    assert not list(tmp_path.iterdir())
+
+
+def test_no_message_advises_names_that_were_stated() -> None:
+    text = write_mjcf(BARE, drive="none")
+    slider = text.replace('name="A" type="hinge"', 'name="A" type="slide"')
+    stated = {role: role for role in ("input", "coupler", "output")}
+    with pytest.raises(InputError, match="name the bodies by --name"):
+        examine(BARE, slider, {})
+    with pytest.raises(InputError) as caught:
+        examine(BARE, slider, stated)
+    assert "--name" not in str(caught.value)
+    opened = re.sub("<connect [^>]*>", "", text)
+    sites = stated | {"B3": "A", "B4": "B4"}
+    with pytest.raises(InputError) as caught:
+        examine(BARE, opened, sites)
+    assert "--name" not in str(caught.value) and "stated: B3=A" in str(caught.value)
+
+
+MODELS = Path(__file__).parents[3] / "models"
+
+
+def default_constraint(scene: Scene) -> str:
+    """The file of a scene without a drive, its loop closed as MuJoCo does where nothing is said."""
+    text = write_mjcf(scene, replace(RECIPE, pad=None), drive="none")
+    closed, times = re.subn(
+        '(<connect [^>]*) solref="[^"]*" solimp="[^"]*"', r"\1", text
+    )
+    assert times == 1
+    return closed
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "off"),
+    [("crank_rocker", 0.037), ("drag_link", 0.10), ("gallery/landing_gear", 0.88)],
+)
+def test_how_wrong_the_default_constraint_is_as_the_pages_say(
+    name: str, off: float
+) -> None:
+    scene = fourbar.load(MODELS / f"{name}.toml")
+    examined = examine(scene, default_constraint(scene), {})
+    assert error_of(scene, examined, ONE_STATE, "torque") == pytest.approx(
+        off, rel=0.05
+    )
+
+
+PARALLELOGRAM = Scene(
+    FourBar(0.3, Bar(0.1, 0.1), Bar(0.3, 0.3), Bar(0.1, 0.1)),
+    fourbar.Motion(np.radians(np.linspace(10.0, 170.0, 33)), 2.0 * math.pi),
+    effects=(fourbar.Gravity(),),
+    title="a parallelogram near its change points",
+)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("scene", "motor"),
+    [
+        (fourbar.load(MODELS / "crank_rocker.toml"), 3e-5),
+        (PARALLELOGRAM, 1.3e-3),
+        (fourbar.load(MODELS / "gallery" / "landing_gear.toml"), 4.5e-3),
+    ],
+    ids=lambda value: value.title if isinstance(value, Scene) else "",
+)
+def test_what_each_drive_reaches_as_the_guide_says(scene: Scene, motor: float) -> None:
+    for drive, reached in (("flywheel", 1e-6), ("motor", motor), ("none", motor)):
+        examined = examine(scene, write_mjcf(scene, drive=drive), {})  # type: ignore[arg-type]
+        worst = max(
+            error_of(scene, examined, ONE_STATE, name)
+            for name in ("torque", "F12", "F32", "F43", "F14")
+        )
+        assert worst < 1.1 * reached
+        if drive != "flywheel":
+            assert worst > 0.9 * reached
+
+
+def test_loads_of_passive_motors_are_the_loads_of_the_scene() -> None:
+    scene = fourbar.load(MODELS / "crank_rocker.toml")
+    assert len(scene.loads) == 2
+    examined = examine(scene, write_mjcf(scene, drive="motor"), {})
+    generated = examine(scene, None, {})
+    keys = {d.key for d in find_differences(generated.described, examined.described)}
+    assert not {key for key in keys if key.startswith(("loads.", "actuators."))}
+    assert error_of(scene, examined, ONE_STATE, "F32") < 1e-4
