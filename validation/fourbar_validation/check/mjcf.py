@@ -4,7 +4,7 @@ The file is somebody's: it is compiled and run in a process of its own, with a l
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
