@@ -51,8 +51,6 @@ if _TYPE_CHECKING:
     from fourbar.files import dump as dump
     from fourbar.files import load as load
     from fourbar.files import save as save
-    from fourbar.formulas.points import coupler_curve as coupler_curve
-    from fourbar.formulas.points import instant_centres as instant_centres
     from fourbar.formulas.points import point_coefficients as point_coefficients
     from fourbar.formulas.transmission import (
         transmission_extremes as transmission_extremes,
@@ -67,6 +65,8 @@ if _TYPE_CHECKING:
     from fourbar.studies.derivatives import sensitivity as sensitivity
     from fourbar.studies.equilibrium import equilibrium as equilibrium
     from fourbar.studies.internal_forces import internal_forces as internal_forces
+    from fourbar.studies.points import coupler_curve as coupler_curve
+    from fourbar.studies.points import instant_centres as instant_centres
     from fourbar.studies.spread import tolerances as tolerances
     from fourbar.studies.study import Study as Study
     from fourbar.studies.study import vary as vary
@@ -88,10 +88,8 @@ _EFFECTS = (
 _ON_FIRST_USE = {
     **{name: "fourbar.effects" for name in _EFFECTS},
     **{name: "fourbar.files" for name in ("dump", "load", "save")},
-    **{
-        name: "fourbar.formulas.points"
-        for name in ("coupler_curve", "instant_centres", "point_coefficients")
-    },
+    **{name: "fourbar.studies.points" for name in ("coupler_curve", "instant_centres")},
+    "point_coefficients": "fourbar.formulas.points",
     **{
         name: "fourbar.show.duty"
         for name in ("bearing_load", "motor_duty", "shaking_force", "shaking_moment")

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from fourbar.errors import InputError, expect
 from fourbar.linkage import POSITIVE, require
 from fourbar.quantities import (
+    DERIVED_NAMES,
     LINE_QUANTITIES,
     NOT_ASSEMBLED,
     PIN_FORCES,
@@ -22,7 +23,7 @@ from fourbar.quantities import (
     UNITS,
     Quantities,
 )
-from fourbar.scene import Command
+from fourbar.scene import Command, Scene
 from fourbar.scene.scene import load_show
 from fourbar.writing import (
     describe_extent,
@@ -78,6 +79,8 @@ class Solution(Quantities):
     """Accelerations of the scene's points, m/s^2."""
     ground: tuple[Any, Any] | None = field(default=None, init=False)
     """Length and angle of the ground bar, m and rad; of a study (m, 1) each where they vary."""
+    scene: "Scene | None" = field(default=None, init=False)
+    """Scene that was solved; None for a study."""
     drive: "LinearDrive | None" = field(default=None, init=False)
     """Linear drive of the scene; None: a bar is driven."""
     stopped_at: float | None = field(default=None, init=False)
@@ -223,23 +226,30 @@ def write_json(solution: Solution, units: Conversion = SI, **more: Any) -> str:
     )
 
 
-def write_csv(solution: Solution, units: Conversion = SI, decimal: str = ".") -> str:
-    """Write one line per position; vectors as columns `A_x`, `A_y`, empty where there is no value."""
-    size, first = solution.theta_2.size, list_leading(solution)
+def write_csv(
+    solution: Solution,
+    units: Conversion = SI,
+    decimal: str = ".",
+    chosen: Mapping[str, Array] | None = None,
+) -> str:
+    """Write one line per position; vectors as columns `A_x`, `A_y`, empty where there is no value.
+
+    `chosen`: the columns by heading, in these units; left out: all quantities.
+    """
+    size = solution.theta_2.size
+    first = list_leading(solution) if chosen is None else {}
+    scalars = list_scalars(solution, units) if chosen is None else chosen
     columns = {
         name: [math.nan] * size if values is None else values.tolist()
-        for name, values in list_scalars(solution, units).items()
+        for name, values in scalars.items()
     }
     text = io.StringIO()
     writer = csv.writer(
         text, lineterminator="\n", delimiter=";" if decimal == "," else ","
     )
     writer.writerow([*first, *columns])
-    for start, row in zip(
-        zip(*first.values(), strict=True),
-        zip(*columns.values(), strict=True),
-        strict=True,
-    ):
+    for index, row in enumerate(zip(*columns.values(), strict=True)):
+        start = [values[index] for values in first.values()]
         writer.writerow(
             [
                 *start,
@@ -276,36 +286,62 @@ def list_scalars(solution: Solution, units: Conversion = SI) -> dict[str, Array 
     """
     columns: dict[str, Array | None] = {}
     for name in _list_quantities(solution):
-        values, unit = find_values(solution, name, units), find_unit(name)
-        heading = f" [{find_unit_in(unit, units)[0]}]" if units and unit != "1" else ""
-        if name not in SCALARS:
-            for axis, letter in enumerate("xy"):
-                columns[f"{name}_{letter}{heading}"] = (
-                    None if values is None else values[..., axis].ravel()
-                )
-            if name in PIN_FORCES:
-                columns[f"|{name}|{heading}"] = (
-                    None if values is None else np.hypot(*values.T).T.ravel()
-                )
-        else:
-            columns[name + heading] = None if values is None else values.ravel()
-    if solution.time is None and (time := _compute_times(solution)) is not None:
+        _add_columns(columns, name, find_values(solution, name, units), units)
+    for name, values in load_show("derived").list_derived(solution, units).items():
+        _add_columns(columns, name, values, units)
+    if solution.time is None and (time := compute_times(solution)) is not None:
         columns["time [s]" if units else "time"] = time
     return columns
 
 
-def _compute_times(solution: Solution) -> Array | None:
-    """Compute when each position of a sweep at one constant speed is passed, s; None for any other."""
-    if (
-        solution.omega_2 is None
-        or solution.alpha_2 is None
-        or solution.theta_2.ndim > 1
-        or not solution.omega_2.all()
-    ):
+def _add_columns(
+    columns: dict[str, Array | None],
+    name: str,
+    values: Array | None,
+    units: Conversion,
+) -> None:
+    """Add the columns of a quantity, headed with its unit where units are given."""
+    unit = find_unit(name)
+    heading = f" [{find_unit_in(unit, units)[0]}]" if units and unit != "1" else ""
+    if is_scalar(name):
+        columns[name + heading] = None if values is None else values.ravel()
+        return
+    for axis, letter in enumerate("xy"):
+        columns[f"{name}_{letter}{heading}"] = (
+            None if values is None else values[..., axis].ravel()
+        )
+    if has_size(name):
+        columns[f"|{name}|{heading}"] = (
+            None if values is None else np.hypot(*values.T).T.ravel()
+        )
+
+
+def is_scalar(name: str) -> bool:
+    """Return True if a quantity is one number at a position."""
+    if name in DERIVED_NAMES:
+        return DERIVED_NAMES[name].kind == "scalar"
+    return name in SCALARS
+
+
+def has_size(name: str) -> bool:
+    """Return True if a table has the size of a vector besides its components: a force."""
+    return name in PIN_FORCES or name == "shaking_force"
+
+
+def compute_times(solution: Solution) -> Array | None:
+    """Compute when each position of a steady sweep is passed, s; None for any other.
+
+    A sweep is steady if what it commands moves at one speed.
+    """
+    at, places = solution.at, solution.at.places
+    speed, acceleration = at.speed, at.acceleration
+    if at.stroke is not None and solution.scene is not None:
+        speed, acceleration = at.stroke_speed, solution.scene.motion.acceleration
+    if speed is None or solution.theta_2.ndim > 1 or len(places) < 2:
         return None
-    if np.ptp(solution.omega_2) != 0.0 or solution.alpha_2.any():
+    if np.ptp(speed) != 0.0 or np.any(acceleration) or not np.all(speed):
         return None
-    time: Array = solution.theta_2 / solution.omega_2
+    time: Array = places / np.ravel(speed)[0]
     time -= time.min()
     return time
 
@@ -351,6 +387,8 @@ def _list_quantities(solution: "Solution") -> list[str]:
 
 def find_unit(name: str) -> str:
     """Return the SI unit of a quantity, or of a point of the scene: its path, velocity or acceleration."""
+    if name in DERIVED_NAMES:
+        return DERIVED_NAMES[name].unit
     return UNITS.get(name) or {"v_": "m/s", "a_": "m/s^2"}.get(name[:2], "m")
 
 

@@ -148,6 +148,7 @@ def solve(
     solution = make_solution(
         scene if study is None else study.members(None, 1), commanded, code, arrays
     )
+    solution.scene = scene if study is None else None
     solution.time, solution.stopped_at = commanded.time, stopped_at
     return solution
 

@@ -3,6 +3,7 @@
 import shutil
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
@@ -10,7 +11,10 @@ from fourbar.cli import given
 from fourbar.errors import InputError, NotAssembledError
 from fourbar.linkage import POSITIVE
 from fourbar.scene import Scene
-from fourbar.solution import DEGREES, Conversion
+from fourbar.solution import DEGREES, Array, Conversion, Solution
+
+if TYPE_CHECKING:
+    from fourbar.show.columns import Column
 
 
 @click.command()
@@ -123,7 +127,13 @@ def _choose_form(table: bool, as_json: bool, as_csv: bool, out: Path | None) -> 
 
 @click.command()
 @given.scene_argument
+@given.at_option
 @click.option("--table", is_flag=True, help="Print the positions one by one.")
+@click.option(
+    "--columns",
+    metavar="NAMES",
+    help="Columns of the table or CSV, like theta_2,time,torque,F12,F12_x,omega_4/omega_2.",
+)
 @click.option(
     "--every",
     type=click.IntRange(min=1),
@@ -162,7 +172,9 @@ def _choose_form(table: bool, as_json: bool, as_csv: bool, out: Path | None) -> 
 @given.text_option(*given.TABLES, ".csv")
 def analyze(  # noqa: PLR0913 - one for each option
     scene: Path,
+    at: tuple[str, ...],
     table: bool,
+    columns: str | None,
     every: int | None,
     as_json: bool,
     decimal: str | None,
@@ -174,52 +186,117 @@ def analyze(  # noqa: PLR0913 - one for each option
 ) -> None:
     """Solve a scene: ranges, torque, pin forces, and what the drive must deliver.
 
-    A FILE that ends in .csv or .json asks for that form.
+    Of one position, the scene's or that of --at, everything is printed. A FILE that ends in .csv
+    or .json asks for that form.
     """
     form = _choose_form(table or every is not None, as_json, decimal is not None, out)
+    if columns is not None and form == "json":
+        raise click.UsageError("--columns are those of a table or of CSV")
+    if columns is not None and form == "summary":
+        form = "table"
     if sensitivity:
-        if form in ("csv", "table") or degrees or units:
+        if form in ("csv", "table") or degrees or units or at:
             raise click.UsageError(
                 "--sensitivity is a table, or with --json all of it, SI and rad"
             )
         _print_sensitivity(scene, form == "json", out)
         return
-    from fourbar.show.block import write_block, write_motor
-    from fourbar.show.tables import print_positions
-    from fourbar.show.units import units_of_file
-    from fourbar.solution import write_csv, write_json
     from fourbar.solve import find_last_stage, solve
+    from fourbar.studies.passing import find_positions
 
     with given.open_scene(scene) as described, given.show_waiting(described):
         bore = _read_pressure(described, pressure)
-        shown = dict(units or {})
-        if form == "table" or (form == "summary" and units is not None):
-            shown = {**DEGREES, **shown}
-        elif form == "summary":
-            shown = dict(units_of_file(scene))
-        if degrees:
-            shown |= DEGREES
-        elif degrees is False:
-            shown.pop("rad", None)
-        solution = solve(described, find_last_stage(described))
+        shown = _choose_units(scene, form, units, degrees)
+        wanted = [given.read_position(described, text) for text in at]
+        positions = find_positions(described, wanted) if wanted else None
+        solution = solve(described, find_last_stage(described), at=positions)
     if not solution.assembled.any():
         raise _assembles_nowhere(scene, described)
-    if form == "json":
-        text = write_json(
-            solution, shown, motor=write_motor(described, solution, shown)
-        )
-    elif form == "csv":
-        text = write_csv(solution, shown, decimal or ".")
-    elif form == "table":
-        width = (
-            None
-            if out or not sys.stdout.isatty()
-            else shutil.get_terminal_size().columns
-        )
-        text = print_positions(solution, width, shown, every=every)
+    if form == "summary":
+        text = _write_summary(described, solution, shown, bore, apart=bool(wanted))
     else:
-        text = "\n".join([*write_block(described, solution, shown, pressure=bore), ""])
+        text = _write_positions(solution, form, shown, columns, every, decimal, out)
     given.print_to(text, out)
+
+
+def _choose_units(
+    scene: Path, form: str, units: Conversion | None, degrees: bool | None
+) -> Conversion:
+    """Choose the units of the output: those asked for, otherwise those of the file; JSON and CSV are in SI."""
+    from fourbar.show.units import units_of_file
+
+    shown = dict(units or {})
+    if form in ("summary", "table"):
+        shown = {**DEGREES, **shown}
+        if units is None:
+            shown = dict(units_of_file(scene))
+    if degrees:
+        shown |= DEGREES
+    elif degrees is False:
+        shown.pop("rad", None)
+    return shown
+
+
+def _write_summary(
+    scene: Scene,
+    solution: Solution,
+    units: Conversion,
+    pressure: float | None,
+    *,
+    apart: bool,
+) -> str:
+    """Write the block of a scene, or one block for each of its positions."""
+    from fourbar.show.block import write_block
+    from fourbar.solve import find_last_stage, solve
+
+    if not apart:
+        return "\n".join([*write_block(scene, solution, units, pressure=pressure), ""])
+    lines: list[str] = []
+    for row in range(len(solution)):
+        at = solution.at.part(slice(row, row + 1))
+        one = solve(scene, find_last_stage(scene), at=at)
+        block = write_block(scene, one, units, pressure=pressure, headed=row == 0)
+        lines += [*block, ""]
+    return "\n".join(lines)
+
+
+def _write_positions(
+    solution: Solution,
+    form: str,
+    units: Conversion,
+    names: str | None,
+    every: int | None,
+    decimal: str | None,
+    out: Path | None,
+) -> str:
+    """Write every position, as JSON, CSV or a table, whose columns may be named."""
+    from fourbar.show.block import write_motor
+    from fourbar.show.columns import read_columns
+    from fourbar.show.tables import print_positions
+    from fourbar.solution import write_csv, write_json
+
+    scene = solution.scene
+    assert scene is not None
+    columns = [] if names is None else read_columns(scene, solution, names)
+    if form == "json":
+        motor = write_motor(scene, solution, units)
+        return write_json(solution, units, motor=motor)
+    if form == "csv":
+        chosen = _list_chosen(columns, units) if columns else None
+        return write_csv(solution, units, decimal or ".", chosen)
+    on_terminal = out is None and sys.stdout.isatty()
+    width = shutil.get_terminal_size().columns if on_terminal else None
+    return print_positions(solution, width, units, every=every, columns=columns)
+
+
+def _list_chosen(columns: "list[Column]", units: Conversion) -> dict[str, Array]:
+    """List chosen columns of CSV by heading; in other units than SI each names its own."""
+    chosen = dict[str, Array]()
+    for column in columns:
+        label = column.label(units)
+        heading = f"{column.name} [{label}]" if units and label else column.name
+        chosen[heading] = column.shown(units)
+    return chosen
 
 
 def _assembles_nowhere(path: Path, scene: Scene) -> NotAssembledError:

@@ -47,6 +47,13 @@ units_option = click.option(
     metavar="UNITS",
     help='Units: SI (default), imperial, or a list like "mm N.mm deg".',
 )
+at_option = click.option(
+    "--at",
+    "at",
+    multiple=True,
+    metavar="PLACE",
+    help='Position, like "60 deg", "theta_4=30 deg" or "time=0.2 s"; repeatable.',
+)
 own_units_option = click.option(
     "--units",
     callback=_read_units,
@@ -156,6 +163,24 @@ def is_bare(text: str) -> bool:
 def read_number(key: str, text: str, unit: str, bound: str = ANY) -> float:
     """Read a number of the command line: bare in SI, or with a unit."""
     return require(key, float(text) if is_bare(text) else text, unit, bound)
+
+
+def read_position(scene: Scene, text: str) -> tuple[str, float]:
+    """Read a position like "60 deg" (of what the scene commands) or "theta_4=30 deg"."""
+    from fourbar.studies.passing import PLACES
+
+    name, equals, value = text.rpartition("=")
+    name = name.strip() if equals else scene.motion.commanded
+    if name not in PLACES:
+        allowed = f"must be one of {', '.join(PLACES)}"
+        raise InputError("--at", name, f'{allowed}, like "theta_4=30 deg"')
+    unit, likely = {"stroke": ("m", "mm"), "time": ("s", "s")}.get(name, ("rad", "deg"))
+    value = value.strip()
+    if is_bare(value):  # it may have been meant in any unit
+        raise InputError(
+            "--at", text, f'the unit is missing; did you mean "{value} {likely}"?'
+        )
+    return name, read_number("--at", value, unit)
 
 
 def print_to(text: str, out: Path | None) -> None:

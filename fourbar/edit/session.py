@@ -27,7 +27,7 @@ from fourbar.linkage import BAR_NAMES, POSITIVE
 from fourbar.quantities.units import find_unit, to_si
 from fourbar.scene import Scene
 from fourbar.scene.motion import COMMANDS, SIDES, STROKE_COMMAND, require_steps
-from fourbar.show.units import suit_units, units
+from fourbar.show.units import units, units_of_scene
 from fourbar.solution import Conversion, Solution
 from fourbar.solve import solve
 from fourbar.studies.keys import list_entries, read_place
@@ -159,7 +159,7 @@ class Session:
         """Units of results: as chosen, or those of the file."""
         if self.unit_names != AS_THE_FILE:
             return _read_units(self.unit_names)
-        return _suit_units(self.now.plain["lengths"]["ground"])
+        return units_of_scene(self.now.plain)
 
     @property
     def pressure(self) -> float | None:
@@ -275,7 +275,7 @@ class Session:
             self.document = SceneDocument(now.text)
 
 
-_read_units, _suit_units = cache(units), cache(suit_units)
+_read_units = cache(units)
 
 
 def _require_units(name: str) -> None:

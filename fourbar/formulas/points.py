@@ -93,19 +93,22 @@ def instant_centres(
     Source: R. L. Norton, Design of Machinery, ch. 6.
     """
     here = _compute_state(linkage, theta_2, branch)
-    position, one = here.position, np.ones_like(here.theta_2)
-    O4, A, B = (
-        linkage.ground * position.u1 + 0.0 * position.u2,
-        here.foot(3),
-        here.point(4, linkage.output.length),
-    )
-    centres = {
-        bars: Centre(p.real, p.imag, one)
-        for bars, p in {(1, 2): 0.0 * A, (2, 3): A, (3, 4): B, (1, 4): O4}.items()
-    }
-    I13, I24 = cross(O4, position.u4) * position.u2, cross(A, position.u3) * position.u1
-    centres[1, 3] = Centre(I13.real, I13.imag, sine(position.u2, position.u4))
-    centres[2, 4] = Centre(I24.real, I24.imag, sine(position.u1, position.u3))
+    position = here.position
+    O4 = linkage.ground * position.u1 + 0.0 * position.u2
+    A, B = here.foot(3), here.point(4, linkage.output.length)
+    return locate_centres(O4, A, B, position.u1, position.u2, position.u3, position.u4)
+
+
+def locate_centres(
+    O4: Number, A: Number, B: Number, u1: Number, u2: Number, u3: Number, u4: Number
+) -> dict[tuple[int, int], Centre]:
+    """Locate the six instant centres from the pins and the directions of the bars, complex."""
+    one = np.ones(np.shape(A))
+    pins = {(1, 2): 0.0 * A, (2, 3): A, (3, 4): B, (1, 4): O4}
+    centres = {bars: Centre(pin.real, pin.imag, one) for bars, pin in pins.items()}
+    I13, I24 = cross(O4, u4) * u2, cross(A, u3) * u1
+    centres[1, 3] = Centre(I13.real, I13.imag, sine(u2, u4))
+    centres[2, 4] = Centre(I24.real, I24.imag, sine(u1, u3))
     return centres
 
 

@@ -161,6 +161,24 @@ UNKNOWNS = tuple(q.name for q in QUANTITIES if q.group == "unknown")
 """Every unknown of a position, in the order of the mechanics."""
 
 
+DERIVED = (
+    Quantity(
+        "shaking_force", "vector", "N", "force", "force of bars and drive on the frame"
+    ),
+    Quantity("shaking_moment", "scalar", "N m", "force", "their moment about O2"),
+    Quantity("transmission", "scalar", "rad", "position", "acute angle of bars 3, 4"),
+    Quantity("omega_3/omega_2", "scalar", "1", "position", "speed ratio"),
+    Quantity("omega_4/omega_2", "scalar", "1", "position", "speed ratio"),
+    Quantity(
+        "mechanical_advantage", "scalar", "1", "position", "omega_2/omega_4, signed"
+    ),
+    Quantity("I13", "vector", "m", "position", "instant centre of the coupler"),
+    Quantity("I24", "vector", "m", "position", "instant centre of bars 2 and 4"),
+)
+"""Quantities that follow from those of a solution; tables, plots and CSV have them."""
+DERIVED_NAMES = {q.name: q for q in DERIVED}
+
+
 class DriveNames(NamedTuple):
     """Names of the quantities of one kind of drive."""
 

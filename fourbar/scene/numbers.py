@@ -17,7 +17,7 @@ from fourbar.linkage import (
     require,
     require_whole,
 )
-from fourbar.quantities import UNITS
+from fourbar.quantities import DERIVED_NAMES, UNITS
 from fourbar.scene.motion import Motion
 
 LONGEST_NAME = 40
@@ -73,6 +73,7 @@ class Point:
 COLUMNS = frozenset(
     (
         *UNITS,
+        *DERIVED_NAMES,
         "status",
         "branch",
         "drive_bar",

@@ -1,6 +1,7 @@
 """Output of `analyze`: one block of aligned lines, at most 80 columns wide; and the duty in its JSON."""
 
 import math
+from collections.abc import Iterator
 from textwrap import wrap
 from typing import Any
 
@@ -13,8 +14,16 @@ from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Scene
 from fourbar.scene.motion import BRANCH_NAMES
 from fourbar.show.duty import DUTY_UNITS, bearing_load, describe_drive, motor_duty
+from fourbar.show.position import PositionSheet
 from fourbar.show.summary import Facts, locate_between, summarize
-from fourbar.show.units import COMMON, choose_unit, write_digits, write_short
+from fourbar.show.units import (
+    COMMON,
+    DIGITS,
+    POSITION_DIGITS,
+    choose_unit,
+    write_digits,
+    write_short,
+)
 from fourbar.solution import Conversion, Solution, find_unit_in
 
 WIDTH = 80
@@ -24,8 +33,8 @@ COLUMN = 12
 """Least width of a column."""
 LABEL = 11
 """Width of what stands before a row."""
-FOUR_DIGITS = 5e-5
-"""Error bar as a part of the value from which on it changes four digits."""
+HALF_OF_LAST = 0.5
+"""Part of the last digit shown from which on an error bar changes it."""
 FEW_DIGITS = 1e-8
 """Error bar as a part of the value from which on the block says where digits are lost: half of those of a double."""
 ALIKE = 1e-3
@@ -40,15 +49,17 @@ def write_block(
     units: Conversion = COMMON,
     *,
     pressure: float | None = None,
+    headed: bool = True,
 ) -> list[str]:
-    """Write the summary of a solved scene, line by line.
+    """Write the summary of a solved scene, line by line; of one position everything about it.
 
     Parameters
     ----------
     units : units of the numbers; one that is left out is the SI unit with a prefix.
     pressure : pressure of a cylinder, Pa; adds the bore that it needs.
+    headed : begin with the linkage.
     """
-    return _Block(summarize(scene, solution), units).write(pressure)
+    return _Block(summarize(scene, solution), units).write(pressure, headed=headed)
 
 
 class _Block:
@@ -56,6 +67,7 @@ class _Block:
 
     def __init__(self, facts: Facts, units: Conversion) -> None:
         self.facts, self.units = facts, units
+        self.digits = POSITION_DIGITS if facts.kind == "position" else DIGITS
         self.longest = max(facts.scene.linkage.lengths)
         if facts.kind in ("law", "released"):
             self.symbol, self.unit = "t", "s"
@@ -63,27 +75,56 @@ class _Block:
             self.symbol = facts.solution.commanded
             self.unit = "rad" if facts.solution.at.stroke is None else "m"
 
-    def write(self, pressure: float | None) -> list[str]:
-        """Write all paragraphs; a blank line parts the motion from the loads."""
-        loads = [
-            *self._write_drive(pressure),
-            *self._write_pins(),
-            *self._write_bending(),
-            *self._write_remarks(),
-        ]
+    def write(self, pressure: float | None, *, headed: bool = True) -> list[str]:
+        """Write all paragraphs; a blank line parts them. `headed`: with the linkage."""
+        head = self._write_head() if headed else []
+        if self.facts.kind == "position":
+            paragraphs = [*self._write_position(head, pressure)]
+        else:
+            loads = [
+                *self._write_drive(pressure),
+                *self._write_pins(),
+                *self._write_bending(),
+                *self._write_remarks(),
+            ]
+            paragraphs = [[*head, *self._write_motion()], loads]
         lines: list[str] = []
-        for line in [*self._write_motion(), *([""] if loads else []), *loads]:
-            aligned = len(line) <= WIDTH
-            lines += (
-                [line]
-                if aligned
-                else wrap(line, WIDTH, subsequent_indent="    ", break_on_hyphens=False)
-            )
+        for paragraph in filter(None, paragraphs):
+            for line in [*([""] if lines else []), *paragraph]:
+                lines += [line] if len(line) <= WIDTH else _wrap(line)
         return [line.replace(TIED, " ") for line in lines]
+
+    def _write_position(
+        self, head: list[str], pressure: float | None
+    ) -> Iterator[list[str]]:
+        """Write the paragraphs of one position: motion, forces, ratios."""
+        facts = self.facts
+        sheet = PositionSheet(facts.scene, facts.solution, self.units)
+        yield [*head, self._write_place(), *self._write_statuses()]
+        yield sheet.write_bars()
+        yield sheet.write_points()
+        if facts.solution.F12 is not None and self._is_acted_on():
+            yield [*self._write_drive(pressure), *sheet.write_pin_forces()]
+            yield self._write_bending()
+        elif facts.stroke_range is not None:
+            yield self._write_stroke()
+        yield [*sheet.write_ratios(), *self._write_static_hint()]
+        yield self._write_remarks()
+
+    def _write_place(self) -> str:
+        """Write what is commanded at the position, and the time of a motion over time."""
+        one = self.facts.solution
+        name, unit = one.commanded, "rad" if one.at.stroke is None else "m"
+        place = one.at.angle if one.at.stroke is None else one.at.stroke
+        text = f"at {name} = {self._value(float(place[0]), unit)}"
+        if one.time is None:
+            return text
+        return f"{text}, t = {self._value(float(one.time[0]), 's', 1.0)}"
 
     def _value(self, value: float, unit: str, largest: float | None = None) -> str:
         """Write a quantity of an SI unit, with the prefix that suits it or the largest of its kind."""
-        return write_short(value, unit, self.units, largest).replace(" ", TIED)
+        text = write_short(value, unit, self.units, largest, self.digits)
+        return text.replace(" ", TIED)
 
     def _place(self, place: float, *, named: bool = True) -> str:
         """Write a place as "theta_2 = 22.8 deg", or without its name."""
@@ -95,9 +136,9 @@ class _Block:
     def _angle(self, angle: float) -> str:
         return self._value(angle, "rad")
 
-    def _write_motion(self) -> list[str]:
-        """Write what the linkage is, how far it moves, and how well it transmits."""
-        facts, scene = self.facts, self.facts.scene
+    def _write_head(self) -> list[str]:
+        """Write what the linkage is."""
+        scene = self.facts.scene
         factor, unit = choose_unit(self.longest, "m", self.units)
         bars = zip(BAR_NAMES.values(), scene.linkage.lengths, strict=True)
         lengths = ", ".join(
@@ -109,51 +150,48 @@ class _Block:
             "" if scene.motion.bar == 2 else f" of the command {scene.motion.commanded}"
         )
         head = f"{name[0].upper()}{name[1:]}{title}, {BRANCH_NAMES[scene.motion.branch]} branch{of_bar}:"
-        lines = [f"{head} {lengths} {unit}"]
-        if len(lines[0]) > WIDTH:
-            lines = [head, f"    {lengths} {unit}"]
-        if facts.kind == "position":
-            one = facts.solution
-            angles = ", ".join(
-                f"theta_{bar} = {self._angle(float(getattr(one, f'theta_{bar}')[0]))}"
-                for bar in (2, 3, 4)
-            )
-            stroke = (
-                ""
-                if one.stroke is None
-                else f"stroke {self._value(float(one.stroke[0]), 'm')}: "
-            )
-            lines += [
-                stroke + angles,
-                f"transmission angle {self._angle(facts.transmission.value)}",
-            ]
-        else:
-            lines += [self._write_ranges()]
-            least = facts.transmission
-            lines += [
-                f"transmission angle: at least {self._angle(least.value)}, at {self._place(least.place)}"
-            ]
-        bad = {name: count for name, count in facts.counts.items() if name != "ok"}
-        if bad:
-            counts = ", ".join(
-                f"{count} {name.replace('_', ' ')}"
-                for name, count in facts.counts.items()
-            )
-            lines.append(
-                f"{len(facts.solution)} position{'s' if len(facts.solution) > 1 else ''}: {counts}"
-            )
-        lines += self._write_stretches()
-        acted_on = (
-            scene.loads
-            or scene.effects
-            or any(bar.mass > 0.0 for bar in scene.linkage.moving)
+        line = f"{head} {lengths} {unit}"
+        return [line] if len(line) <= WIDTH else [head, f"    {lengths} {unit}"]
+
+    def _write_motion(self) -> list[str]:
+        """Write how far the linkage moves, and how well it transmits."""
+        facts = self.facts
+        least = facts.transmission
+        return [
+            self._write_ranges(),
+            f"transmission angle: at least {self._angle(least.value)}, at {self._place(least.place)}",
+            *self._write_statuses(),
+            *self._write_stretches(),
+            *self._write_static_hint(),
+        ]
+
+    def _write_statuses(self) -> list[str]:
+        """Write how many positions have which status, where one is not ok."""
+        facts = self.facts
+        if not any(name != "ok" for name in facts.counts):
+            return []
+        counts = ", ".join(
+            f"{count} {name.replace('_', ' ')}" for name, count in facts.counts.items()
         )
-        if facts.solution.F12 is None and acted_on:
-            lines += [
-                f"positions only, since {scene.motion.names[1]} is left out:",
-                f"    {explain_static(scene)}",
-            ]
-        return lines
+        return [
+            f"{len(facts.solution)} position{'s' if len(facts.solution) > 1 else ''}: {counts}"
+        ]
+
+    def _is_acted_on(self) -> bool:
+        """Return True if anything acts, or a bar has mass: forces are then of interest."""
+        scene = self.facts.scene
+        has_mass = any(bar.mass > 0.0 for bar in scene.linkage.moving)
+        return bool(scene.loads or scene.effects or has_mass)
+
+    def _write_static_hint(self) -> list[str]:
+        """Say what asks for forces, where a scene on which something acts states positions alone."""
+        scene = self.facts.scene
+        if self.facts.solution.F12 is not None or not self._is_acted_on():
+            return []
+        return [
+            f"positions only, since {scene.motion.names[1]} is left out:",
+            f"    {explain_static(scene)}",
+        ]
 
     def _write_ranges(self) -> str:
         """Write how far the commanded bar goes, or the stroke, and how far the output, or else the input."""
@@ -372,8 +410,6 @@ class _Block:
         if not loads:
             return []
         peaks = self._cells([load.peak.value for load in loads], "N")
-        if facts.kind == "position":
-            return _align([("pins", list(facts.pins)), ("  force", peaks)])
         places = [self._place(load.peak.place, named=False) for load in loads]
         means = self._cells([load.rms for load in loads], "N")
         lines = _align(
@@ -462,7 +498,8 @@ class _Block:
                 if facts.error
                 else "zero"
             )
-            changed = "none of these" if facts.error < FOUR_DIGITS else "some"
+            limit = HALF_OF_LAST * 10.0 ** (1 - self.digits) / 10.0
+            changed = "none of these" if facts.error < limit else "some"
             lines.append(
                 f"rounding changes {changed} digits (worst error bar {below} of the value)"
             )
@@ -504,6 +541,10 @@ class _Block:
     @staticmethod
     def _row(label: str, text: str) -> str:
         return f"  {label:<{LABEL - 2}}{text}"
+
+
+def _wrap(line: str) -> list[str]:
+    return wrap(line, WIDTH, subsequent_indent="    ", break_on_hyphens=False)
 
 
 def _align(rows: list[tuple[str, list[str]]]) -> list[str]:

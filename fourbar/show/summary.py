@@ -401,7 +401,8 @@ def summarize(scene: Scene, solution: Solution) -> Facts:
 
     least, _ = find_range(np.square(fine.sin_mu))
     mu = math.asin(min(1.0, math.sqrt(max(least.value, 0.0))))
-    drive = None if kind == "released" or solution.F12 is None else read_drive(solution)
+    released = scene.motion.free is not None
+    drive = None if released or solution.F12 is None else read_drive(solution)
     peak = None
     if drive is not None and np.isfinite(drive.values).any():  # type: ignore[arg-type]
         peak = _find_peak(between.drive, read_drive(between.drive).values)
@@ -435,12 +436,12 @@ def summarize(scene: Scene, solution: Solution) -> Facts:
 
 def _find_kind(scene: Scene, solution: Solution) -> str:
     motion = scene.motion
+    if len(solution) == 1:
+        return "position"
     if motion.free is not None:
         return "released"
     if motion.law is not None:
         return "law"
-    if len(solution) == 1:
-        return "position"
     if isinstance(motion.angle, np.ndarray):
         return "list"
     once_round = (

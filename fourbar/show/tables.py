@@ -9,15 +9,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fourbar.errors import clean_line
-from fourbar.quantities import ANGLES, OK, PIN_FORCES, UNITS
+from fourbar.quantities import ANGLES, DERIVED_NAMES, OK, PIN_FORCES, UNITS
+from fourbar.show.columns import Column
+from fourbar.show.derived import derive
 from fourbar.show.duty import read_drive
 from fourbar.solution import (
     DEGREES,
     Array,
     Conversion,
     Solution,
+    compute_times,
     find_unit,
     find_unit_in,
+    has_size,
 )
 
 if TYPE_CHECKING:
@@ -81,16 +85,26 @@ def print_positions(
     units: Conversion = DEGREES,
     *,
     every: int | None = None,
+    columns: Sequence[Column] = (),
 ) -> str:
     """Write the table of positions as text.
 
     Parameters
     ----------
+    columns : the columns; left out: all of them, most wanted first.
     width : columns of a terminal, where the positions are thinned out; None: a file or a pipe, which gets them all.
     every : show every so many positions; left out: as `width` says.
     """
     step = every or (1 if width is None else _choose_step(len(solution)))
-    shown, left_out = make_table(solution, width, units, every=step)
+    cells = None
+    if columns:
+        cells = {
+            f"{column.name}\n{column.label(units)}": write_cells(
+                column.shown(units), _choose_form(column.unit)
+            )
+            for column in columns
+        }
+    shown, left_out = make_table(solution, width, units, every=step, cells=cells)
     notes = []
     if step > 1:
         more = "; --all shows each" if every is None else ""
@@ -136,9 +150,8 @@ def list_columns(
     def add(name: str, unit: str, values: Array | None) -> None:
         assert values is not None
         label, factor = find_unit_in(unit, units)
-        shown[f"{name}\n{label}"] = write_cells(
-            values * factor, ".4f" if unit == "rad" else ".6g"
-        )
+        heading = "" if unit == "1" else label
+        shown[f"{name}\n{heading}"] = write_cells(values * factor, _choose_form(unit))
 
     if solution.time is not None:
         add("time", "s", solution.time)
@@ -150,30 +163,52 @@ def list_columns(
             add("power", "W", solution.power)
         for name in PIN_FORCES:
             add(f"|{name}|", "N", np.hypot(*getattr(solution, name).T))
-    moving = {"": solution.points, "v_": solution.velocity, "a_": solution.acceleration}
-    for name, vector in (
-        (start + name, v)
-        for start, arrays in moving.items()
-        for name, v in arrays.items()
-    ):
-        add(f"{name}_x", find_unit(name), vector[:, 0])
-        add(f"{name}_y", find_unit(name), vector[:, 1])
-    for name in ANGLES:
-        add(name, "rad", getattr(solution, name))
-    sought = [bar for bar in "234" if bar != solution.commanded[-1]]
-    for name in (
-        "stroke",
-        "stroke_speed",
-        *(f"{kind}_{bar}" for kind in ("omega", "alpha") for bar in sought),
-    ):
-        if getattr(solution, name) is not None:
-            add(name, UNITS[name], getattr(solution, name))
+    for name, unit, values in _list_motion(solution):
+        add(name, unit, values)
     shown["sin mu\n"] = write_cells(solution.sin_mu)
     if solution.time is None and drive.values is not None and drive.error is not None:
         shown[f"digits\nof {drive.symbol[0]}"] = _count_digits(
             drive.values, drive.error
         )
+    if solution.time is None and (time := compute_times(solution)) is not None:
+        add("time", "s", time)
+    for name, quantity in DERIVED_NAMES.items():
+        for part, values in _list_parts(solution, name).items():
+            add(part, quantity.unit, values)
     return shown
+
+
+def _list_motion(solution: Solution) -> Iterator[tuple[str, str, Array]]:
+    """List the points' coordinates, and angles and rates of the bars: name, SI unit, values."""
+    moving = {"": solution.points, "v_": solution.velocity, "a_": solution.acceleration}
+    for start, arrays in moving.items():
+        for name, vector in arrays.items():
+            unit = find_unit(start + name)
+            yield f"{start}{name}_x", unit, vector[:, 0]
+            yield f"{start}{name}_y", unit, vector[:, 1]
+    for name in ANGLES:
+        yield name, "rad", getattr(solution, name)
+    sought = [bar for bar in "234" if bar != solution.commanded[-1]]
+    rates = (f"{kind}_{bar}" for kind in ("omega", "alpha") for bar in sought)
+    for name in ("stroke", "stroke_speed", *rates):
+        if getattr(solution, name) is not None:
+            yield name, UNITS[name], getattr(solution, name)
+
+
+def _list_parts(solution: Solution, name: str) -> dict[str, Array]:
+    """List a derived quantity as columns: components, of a force the size first."""
+    values = derive(solution, name)
+    if values is None:
+        return {}
+    if values.ndim == 1:
+        return {name: values}
+    size = {f"|{name}|": np.hypot(values[:, 0], values[:, 1])} if has_size(name) else {}
+    return {**size, f"{name}_x": values[:, 0], f"{name}_y": values[:, 1]}
+
+
+def _choose_form(unit: str) -> str:
+    """Choose the form of numbers of an SI unit: angles line up at the point."""
+    return ".4f" if unit == "rad" else ".6g"
 
 
 def make_table(
@@ -182,12 +217,14 @@ def make_table(
     units: Conversion = DEGREES,
     *,
     every: int = 1,
+    cells: dict[str, list[str]] | None = None,
 ) -> "tuple[Table, list[str]]":
     """Make the table for a terminal of the given width (None: as wide as it needs), and name the columns left out.
 
-    Every so many positions are shown, the last one always.
+    Every so many positions are shown, the last one always. `cells`: by heading; left out: all columns.
     """
-    cells = list_columns(solution, units)
+    if cells is None:
+        cells = list_columns(solution, units)
     needed = -GAP
     kept: list[str] = []
     for name, column in cells.items():

@@ -1,9 +1,13 @@
 """The units in which results are shown: a list such as "mm N N.mm deg", those of a scene file, or SI with prefixes."""
 
 import math
+from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
+from typing import Any
 
 from fourbar.errors import InputError
+from fourbar.linkage import MOVING_BARS
 from fourbar.solution import DEGREES, SI, Conversion, find_unit_in
 
 ALLOWED = 'must be "SI", "imperial" or a list like "mm N N.mm deg rpm"'
@@ -14,6 +18,10 @@ DERIVED = {"m/s": ("m", "{}/s"), "m/s^2": ("m", "{}/s^2"), "J": ("N m", "{}")}
 """Not stated, these follow another one: energy the unit of torque, speeds that of length."""
 IMPERIAL = ("in", "inch", "inches", "ft", "foot", "feet")
 """Units of lengths.ground with which a scene is shown in imperial units."""
+METRIC = ("mm", "cm", "dm", "m")
+"""Units of lengths.ground in which lengths are shown as they are stated."""
+ROTATIONS = ("rpm", "rad/s", "deg/s", "rad/s^2", "deg/s^2", "rad/s²", "deg/s²")
+"""Units of omega and alpha in which rates are shown as they are stated."""
 COMMON: Conversion = {**DEGREES, "rad/s": ("rpm", 30.0 / math.pi)}
 """Units of a summary where nobody asks for others: what is left out has the SI unit with a prefix."""
 PREFIXES = (
@@ -88,12 +96,60 @@ def suit_units(length: str) -> Conversion:
 
 
 def units_of_file(path: Path) -> Conversion:
-    """Return the units that suit a scene file, by the unit of its lengths.ground."""
+    """Return the units that suit a scene file."""
     import tomllib
 
-    return suit_units(
-        str(tomllib.loads(path.read_text(encoding="utf-8"))["lengths"]["ground"])
+    return units_of_scene(tomllib.loads(path.read_text(encoding="utf-8")))
+
+
+def units_of_scene(document: Mapping[str, Any]) -> Conversion:
+    """Return the units that suit the tables of a scene file.
+
+    They are imperial where the lengths are in inches or feet; otherwise lengths have the unit of
+    lengths.ground, and speeds and accelerations of bars those that the motion is stated in.
+    """
+    motion = document.get("motion", {})
+    rates = (
+        (motion.get(f"omega_{bar}", ""), motion.get(f"alpha_{bar}", ""))
+        for bar in MOVING_BARS
     )
+    return _suit_texts(str(_find_length(document)), tuple(rates))
+
+
+@cache
+def _suit_texts(length: str, rates: tuple[tuple[object, object], ...]) -> Conversion:
+    """Return the units that suit a length and speeds and accelerations as they are written."""
+    from fourbar.quantities.units import find_unit
+
+    name = find_unit(length, "m")
+    if name.casefold() in IMPERIAL:
+        shown = dict(units("imperial"))
+    else:
+        shown = {**COMMON, **(units(name) if name in METRIC else {})}
+    for texts in rates:
+        for text, unit in zip(texts, ("rad/s", "rad/s^2"), strict=True):
+            stated = find_unit(text, "")
+            if stated in ROTATIONS:
+                shown |= _suit_rotation(stated, unit)
+    return shown
+
+
+def _suit_rotation(stated: str, unit: str) -> Conversion:
+    """Return the units of speed and acceleration for a rate as it is stated, like "deg/s"."""
+    turned = stated.removesuffix("^2").removesuffix("²")
+    if turned == "rpm":
+        return {"rad/s": COMMON["rad/s"]}
+    angle = turned.removesuffix("/s")
+    factor = 1.0 if angle == "rad" else DEGREES["rad"][1]
+    rates = {"rad/s": (f"{angle}/s", factor), "rad/s^2": (f"{angle}/s^2", factor)}
+    return rates if unit == "rad/s" else {unit: rates[unit]}
+
+
+def _find_length(document: Mapping[str, Any]) -> object:
+    """Return the first length of a scene as it is written: lengths.ground, or a coordinate of a pin."""
+    if "pins" in document:
+        return document["pins"]["A"][0]
+    return document["lengths"]["ground"]
 
 
 def choose_unit(largest: float, unit: str, units: Conversion = SI) -> tuple[float, str]:
@@ -107,14 +163,22 @@ def choose_unit(largest: float, unit: str, units: Conversion = SI) -> tuple[floa
     return 1.0 / size, prefix + unit
 
 
-def write_digits(value: float) -> str:
-    """Write a number with four significant digits, up to a million without an exponent."""
-    return f"{float(f'{value:.4g}'):.6g}"
+DIGITS, POSITION_DIGITS = 4, 6
+"""Significant digits of a number of a summary, and of one about a single position."""
+
+
+def write_digits(value: float, digits: int = DIGITS) -> str:
+    """Write a number with some significant digits, up to a million without an exponent."""
+    return f"{float(f'{value:.{digits}g}'):.6g}"
 
 
 def write_short(
-    value: float, unit: str, units: Conversion, largest: float | None = None
+    value: float,
+    unit: str,
+    units: Conversion,
+    largest: float | None = None,
+    digits: int = DIGITS,
 ) -> str:
-    """Write a quantity with four significant digits and a unit that suits it, or the largest of its kind."""
+    """Write a quantity with some significant digits and a unit that suits it, or the largest of its kind."""
     factor, name = choose_unit(abs(value) if largest is None else largest, unit, units)
-    return f"{write_digits(factor * value)} {name}"
+    return f"{write_digits(factor * value, digits)} {name}"

@@ -1,0 +1,162 @@
+"""Quantities by the names that the command line takes: sizes, components, ratios of any two.
+
+`torque` and `omega_4` are numbers, `F12` and `v_B` the sizes of vectors, `F12_x` a component,
+`A` a place with two coordinates, `omega_4/omega_2` a ratio.
+"""
+
+from dataclasses import replace
+from difflib import get_close_matches
+from typing import NamedTuple
+
+import numpy as np
+
+from fourbar.errors import InputError
+from fourbar.quantities import DERIVED_NAMES, STAGE_OF
+from fourbar.scene import Command, Scene, command_at
+from fourbar.show.derived import derive
+from fourbar.solution import (
+    Array,
+    Conversion,
+    Solution,
+    compute_times,
+    find_unit,
+    find_unit_in,
+    find_values,
+    is_scalar,
+)
+from fourbar.solve import solve
+
+AXES = {"_x": 0, "_y": 1}
+
+
+class Column(NamedTuple):
+    """One column of a table: its name, SI unit and values."""
+
+    name: str
+    unit: str
+    values: Array
+    """(n,)."""
+    divisor: str = "1"
+    """SI unit of what a ratio is divided by."""
+
+    def label(self, units: Conversion) -> str:
+        """Return the unit that the column is shown in; empty for a pure number."""
+        above, below = (
+            find_unit_in(unit, units)[0] for unit in (self.unit, self.divisor)
+        )
+        if above == below or (above, below) == ("1", "1"):
+            return ""
+        if below == "1":
+            return above
+        return (
+            f"{above}/({below})" if " " in below or "/" in below else f"{above}/{below}"
+        )
+
+    def shown(self, units: Conversion) -> Array:
+        """Return the values in the unit that they are shown in."""
+        above, below = (
+            find_unit_in(unit, units)[1] for unit in (self.unit, self.divisor)
+        )
+        return self.values * (above / below)
+
+
+def read_columns(scene: Scene, solution: Solution, names: str) -> list[Column]:
+    """Read the columns of a list like "theta_2,torque,F12,omega_4/omega_2".
+
+    Raises InputError for a name that no quantity has, and for one that was not evaluated.
+    """
+    columns: list[Column] = []
+    for name in (word.strip() for word in names.split(",")):
+        if _is_place(solution, name):
+            columns += [read_column(scene, solution, f"{name}{axis}") for axis in AXES]
+        else:
+            columns.append(read_column(scene, solution, name))
+    return columns
+
+
+def read_column(scene: Scene, solution: Solution, name: str) -> Column:
+    """Read one column by its name; InputError as of `read_columns`."""
+    if name in DERIVED_NAMES or "/" not in name:
+        return Column(name, *_find_number(solution, name))
+    above, _, below = (part.strip() for part in name.partition("/"))
+    of = solution
+    if _is_velocity(above) and _is_velocity(below):
+        of = _solve_at_unit_speed(scene, solution)
+    (unit, numerator), (divisor, denominator) = (
+        _find_number(of, part) for part in (above, below)
+    )
+    with np.errstate(all="ignore"):
+        ratio = numerator / denominator
+    ratio = np.where(np.isfinite(ratio), ratio, np.nan)
+    return Column(name, unit, ratio, divisor)
+
+
+def _find_number(solution: Solution, name: str) -> tuple[str, Array]:
+    """Return the SI unit of a number of each position and its values."""
+    if name == "time":
+        values = compute_times(solution) if solution.time is None else solution.time
+        if values is None:
+            raise InputError(
+                "--columns", name, "the positions are passed at no one speed: no time"
+            )
+        return "s", values
+    stem, axis = name, None
+    if name[-2:] in AXES:
+        stem, axis = name[:-2], AXES[name[-2:]]
+    quantities = list_quantities(solution)
+    if stem not in quantities or (axis is not None and is_scalar(stem)):
+        close = get_close_matches(name, ["time", *quantities], 1)
+        hint = f'did you mean "{close[0]}"? ' if close else ""
+        raise InputError(
+            "--columns",
+            name,
+            f"unknown; {hint}quantities are {', '.join(['time', *quantities])}; "
+            "F12_x is a component, omega_4/omega_2 a ratio",
+        )
+    values = (
+        derive(solution, stem) if stem in DERIVED_NAMES else find_values(solution, stem)
+    )
+    if values is None:
+        raise InputError(
+            "--columns", name, "was not evaluated: the scene states no speed"
+        )
+    if axis is not None:
+        return find_unit(stem), values[..., axis]
+    if is_scalar(stem):
+        return find_unit(stem), values
+    if _is_place(solution, stem):
+        raise InputError("--columns", name, f"is a place: {name}_x or {name}_y")
+    return find_unit(stem), np.hypot(values[..., 0], values[..., 1])
+
+
+def list_quantities(solution: Solution) -> list[str]:
+    """List the quantities that a scene has, its own points among them, without derived ones of another drive."""
+    names = [name for name in solution.evaluated() if name != "time"]
+    points = [
+        f"{start}{name}" for start in ("", "v_", "a_") for name in solution.points
+    ]
+    return [*names, *points, *DERIVED_NAMES]
+
+
+def _is_place(solution: Solution, name: str) -> bool:
+    """Return True for a point or an instant centre."""
+    known = name in list_quantities(solution)
+    return known and not is_scalar(name) and find_unit(name) == "m"
+
+
+def _is_velocity(name: str) -> bool:
+    """Return True for a quantity that grows with the speed of the command."""
+    stem = name[:-2] if name[-2:] in AXES else name
+    return stem.startswith("v_") or STAGE_OF.get(stem) == "velocity"
+
+
+def _solve_at_unit_speed(scene: Scene, solution: Solution) -> Solution:
+    """Solve the same positions with speed 1 of the command: ratios of speeds exist at rest too."""
+    if solution.at.stroke is not None:
+        motion = scene.motion.replace(speed=1.0, acceleration=0.0)
+        at = command_at(replace(scene, motion=motion), solution.at.stroke)
+    elif solution.at.independent is not None:
+        at = Command(solution.theta_2, solution.branch, 1.0, 0.0)
+    else:
+        at = solution.at._replace(speed=1.0, acceleration=0.0)
+    return solve(scene, "velocity", at=at)

@@ -1,0 +1,187 @@
+"""Everything about one position: bars, points, pin forces, ratios and instant centres, in aligned rows."""
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from fourbar.linkage import MOVING_BARS, PIN_FORCE
+from fourbar.quantities import DERIVED_NAMES
+from fourbar.scene import Scene
+from fourbar.show.columns import read_column
+from fourbar.show.derived import derive
+from fourbar.show.units import POSITION_DIGITS, choose_unit
+from fourbar.solution import Array, Conversion, Solution, find_values
+
+LABEL, CELL = 15, 15
+"""Width of a label and of a cell: four of them and a unit are 80 columns."""
+NUMBER_LABEL = 22
+"""Width of the label of a number that stands alone."""
+ROUND_OFF = 1e-13
+"""Part of the largest number of its kind below which a number is shown as zero."""
+FORCE_HEADS = {pin: f"{name} at {pin}" for pin, name in PIN_FORCE.items()}
+
+
+class PositionSheet:
+    """The rows of one position of a solved scene.
+
+    Parameters
+    ----------
+    solution : of one position.
+    units : units of the numbers; one that is left out is the SI unit with a prefix.
+    """
+
+    def __init__(self, scene: Scene, solution: Solution, units: Conversion) -> None:
+        self.scene, self.solution, self.units = scene, solution, units
+
+    def write_bars(self) -> list[str]:
+        """Write angle, speed and acceleration of the moving bars."""
+        kinds = {"theta": "rad", "omega": "rad/s", "alpha": "rad/s^2"}
+        columns: dict[str, list[str]] = {}
+        for letter, unit in kinds.items():
+            values = [getattr(self.solution, f"{letter}_{bar}") for bar in MOVING_BARS]
+            if any(value is None for value in values):
+                continue
+            numbers = np.array([value[0] for value in values])
+            factor, name = choose_unit(0.0, unit, self.units)
+            form = ".4f" if letter == "theta" else f".{POSITION_DIGITS}g"
+            columns[f"{letter}, {name}"] = _write_numbers(factor * numbers, form)
+        rows = [_write_row("", columns)]
+        for index, bar in enumerate(MOVING_BARS):
+            cells = (cells[index] for cells in columns.values())
+            rows.append(_write_row(f"bar {bar}", cells))
+        return rows
+
+    def write_points(self) -> list[str]:
+        """Write place, velocity and acceleration of the pins, mass centres and points."""
+        centres = [
+            f"G{bar}" for bar in MOVING_BARS if self.scene.linkage.bar(bar).mass > 0.0
+        ]
+        names = ["A", "B", *centres, *self.solution.points]
+        rows = [_write_row("", ("x", "y", "size"))]
+        scales = {"": "m", "v_": "m/s", "a_": "m/s^2"}
+        largest = {start: self._find_largest(start, names) for start in scales}
+        for name in names:
+            for start, unit in scales.items():
+                vector = find_values(self.solution, start + name)
+                if vector is None:
+                    continue
+                label = name if not start else f"  {start[0]}"
+                rows.append(
+                    self._write_vector(
+                        label, vector[0], unit, largest[start], sized=bool(start)
+                    )
+                )
+        return rows
+
+    def write_pin_forces(self) -> list[str]:
+        """Write the pin forces, and the force and the moment on the frame."""
+        forces = {
+            FORCE_HEADS[pin]: getattr(self.solution, name)
+            for pin, name in PIN_FORCE.items()
+        }
+        shaking = derive(self.solution, "shaking_force")
+        if shaking is not None:
+            forces["shaking force"] = shaking
+        largest = max(float(np.hypot(*vector[0])) for vector in forces.values())
+        rows = [_write_row("", ("x", "y", "size"))]
+        for label, vector in forces.items():
+            rows.append(self._write_vector(label, vector[0], "N", largest))
+        moment = derive(self.solution, "shaking_moment")
+        if moment is not None:
+            factor, name = choose_unit(abs(float(moment[0])), "N m", self.units)
+            cells = [*_write_numbers(factor * moment), "", "", f"{name} about O2"]
+            rows.append(_write_row("shaking moment", cells))
+        return rows
+
+    def write_ratios(self) -> list[str]:
+        """Write what relates the bars' motions: transmission angle, ratios, instant centres."""
+        rows = []
+        for name in ("transmission", "omega_3/omega_2", "omega_4/omega_2"):
+            values = derive(self.solution, name)
+            assert values is not None
+            label = "transmission angle" if name == "transmission" else name
+            rows.append(self._write_number(label, values, DERIVED_NAMES[name].unit))
+        rows.append(self._write_advantage())
+        rows += self._write_force_ratios()
+        for name in ("I13", "I24"):
+            centre = derive(self.solution, name)
+            assert centre is not None
+            if np.isfinite(centre).all():
+                row = self._write_vector(
+                    f"centre {name}", centre[0], "m", self._find_largest("", ["A", "B"])
+                )
+                rows.append(row)
+            else:
+                rows.append(_write_row(f"centre {name}", ("at infinity",)))
+        return rows
+
+    def _write_advantage(self) -> str:
+        values = derive(self.solution, "mechanical_advantage")
+        assert values is not None
+        label = "mechanical advantage"
+        if not np.isfinite(values[0]):
+            return f"{label:<{NUMBER_LABEL}}without a bound: bar 4 stands still"
+        return self._write_number(label, values, "1", "  (torque of bar 4 to bar 2)")
+
+    def _write_force_ratios(self) -> list[str]:
+        """Write the ratio of forces along the paths of a point of the input and one of the output."""
+        rows = []
+        points = self.scene.points
+        of_input, of_output = (
+            [point.name for point in points if point.bar == bar] for bar in (2, 4)
+        )
+        for start in of_input:
+            for end in of_output:
+                ratio = read_column(self.scene, self.solution, f"v_{start}/v_{end}")
+                text = f"  (forces along the paths of {end} and {start})"
+                rows.append(
+                    self._write_number(f"F_{end}/F_{start}", ratio.values, "1", text)
+                )
+        return rows
+
+    def _find_largest(self, start: str, names: Iterable[str]) -> float:
+        """Find the largest component of a kind: what is below its rounding is zero."""
+        vectors = [find_values(self.solution, start + name) for name in names]
+        sizes = [
+            float(np.max(np.abs(vector[0]))) for vector in vectors if vector is not None
+        ]
+        finite = [size for size in sizes if np.isfinite(size)]
+        return max(finite, default=0.0)
+
+    def _write_vector(
+        self,
+        label: str,
+        vector: Array,
+        unit: str,
+        largest: float,
+        *,
+        sized: bool = True,
+    ) -> str:
+        """Write the components of a vector, and its size."""
+        factor, name = choose_unit(largest, unit, self.units)
+        numbers = np.where(np.abs(vector) <= ROUND_OFF * largest, 0.0, vector)
+        size = [float(np.hypot(*numbers))] if sized else []
+        cells = _write_numbers(factor * np.array([*numbers, *size]))
+        return _write_row(label, [*cells, *([] if sized else [""]), name])
+
+    def _write_number(
+        self, label: str, values: Array, unit: str, after: str = ""
+    ) -> str:
+        factor, name = 1.0, ""
+        if unit != "1":
+            factor, name = choose_unit(abs(float(values[0])), unit, self.units)
+            name = f" {name}"
+        (text,) = _write_numbers(factor * values)
+        return f"{label:<{NUMBER_LABEL}}{text}{name}{after}"
+
+
+def _write_numbers(numbers: Array, form: str = f".{POSITION_DIGITS}g") -> list[str]:
+    """Write numbers; a dash where there is no value, and 0 without a sign."""
+    return [
+        format(number + 0.0, form) if np.isfinite(number) else "-"
+        for number in numbers.tolist()
+    ]
+
+
+def _write_row(label: str, cells: Iterable[str]) -> str:
+    return f"{label:<{LABEL}}{''.join(f'{cell:<{CELL}}' for cell in cells)}".rstrip()

@@ -1,0 +1,266 @@
+"""Positions at which a named angle, the stroke or the time of a scene's motion has a value."""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fourbar.errors import InputError, NotAssembledError
+from fourbar.formulas.mobility import TURN, find_intervals
+from fourbar.quantities import Array
+from fourbar.scene import Command, Scene, command_at
+from fourbar.scene.motion import COMMANDS, SIDES, STROKE_COMMAND, Motion
+from fourbar.scene.scene import Independent
+from fourbar.solve import solve
+
+ANGLES = tuple(names[0] for names in COMMANDS.values())
+PLACES = (*ANGLES, STROKE_COMMAND[0], "time")
+"""What a position may be named by."""
+SAME = 1e-6
+"""rad, or part of a length: two places that the formulas give in two ways are one."""
+FINE = 2000
+"""Instants of a motion by a law among which passings are looked for."""
+LAST_DIGIT = 1e-15
+"""Relative width at which a time is located."""
+ROUNDS = 60
+"""Halvings of an interval: each passing is located to the last digits."""
+
+
+def find_positions(scene: Scene, wanted: list[tuple[str, float]]) -> Command:
+    """Find the positions of a scene's motion where named quantities have values.
+
+    Parameters
+    ----------
+    wanted : names among `PLACES` and values, rad, m or s. Each gives the positions of the scene's
+        assembly that have it, of a motion over time those that it passes, of a released one the
+        first.
+
+    Raises
+    ------
+    InputError : a name that the motion has not.
+    NotAssembledError : no position has the value; the message says the range.
+    """
+    if scene.motion.free is not None:
+        return _join([_find_released(scene, *entry) for entry in wanted])
+    find = _find_places if scene.motion.law is None else _find_times
+    places = [place for entry in wanted for place in find(scene, *entry)]
+    return command_at(scene, np.array(places))
+
+
+def _find_places(scene: Scene, name: str, value: float) -> list[float]:
+    """Find the commanded angles or strokes at which a named one has a value."""
+    motion = scene.motion
+    if name == motion.commanded:
+        _require_assembled(scene, name, value)
+        return [value]
+    if name == "time":
+        raise InputError(
+            "at", name, "needs a law or a release: motion.law, motion.free"
+        )
+    places: list[float] = []
+    for place in _list_candidates(scene, name, value):
+        here = solve(scene, "position", at=command_at(scene, np.array([place])))
+        reached = getattr(here, name)[0]
+        is_new = not any(_is_same(motion.commanded, place, other) for other in places)
+        if is_new and math.isfinite(reached) and _is_same(name, reached, value):
+            places.append(place)
+    if not places:
+        raise NotAssembledError(
+            f"{_say(name, value)}: no position of this assembly has it"
+        )
+    return places
+
+
+def _require_assembled(scene: Scene, name: str, value: float) -> None:
+    """Raise NotAssembledError with the range where the linkage does not assemble at a commanded place."""
+    at = command_at(scene, np.array([value]))  # which refuses a stroke out of range
+    if solve(scene, "position", at=at).assembled[0]:
+        return
+    bar = scene.motion.bar
+    ranges = " and ".join(
+        f"{math.degrees(low):.6g} to {math.degrees(high):.6g} deg"
+        for low, high in find_intervals(scene.linkage, bar)
+    )
+    raise NotAssembledError(
+        f"{_say(name, value)}: the linkage does not assemble there; "
+        f"theta_{bar} goes from {ranges}"
+    )
+
+
+def _list_candidates(scene: Scene, name: str, value: float) -> list[float]:
+    """List what is commanded where a named quantity has a value, of both assemblies and a second turn."""
+    commanded = scene.motion.commanded
+    candidates: list[float] = []
+    for branch in (1, -1):
+        for side in SIDES if name == STROKE_COMMAND[0] else (None,):
+            stated: dict[str, Any] = {name: value, "branch": branch, "side": side}
+            other = replace(scene, motion=Motion(**stated))
+            found = solve(other, "position")
+            place = getattr(found, commanded)
+            if place is not None and math.isfinite(place[0]):
+                candidates.append(float(place[0]))
+    if commanded in ANGLES:  # with one change point an assembly repeats after two turns
+        candidates += [place + TURN for place in candidates]
+    return candidates
+
+
+def _is_same(name: str, first: float, second: float) -> bool:
+    """Return True if two values of an angle (whole turns apart) or a stroke are one."""
+    if name in ANGLES:
+        return abs(math.remainder(first - second, TURN)) <= SAME
+    return abs(first - second) <= SAME * abs(second)
+
+
+def _find_times(scene: Scene, name: str, value: float) -> list[float]:
+    """Find the times at which a motion by a law passes a value."""
+    law = scene.motion.law
+    assert law is not None
+    start, stop = law.time[0], law.time[-1]
+    if name == "time":
+        if not start <= value <= stop:
+            raise NotAssembledError(
+                f"{_say(name, value)}: the law goes from {start:.6g} to {stop:.6g} s"
+            )
+        return [value]
+
+    def read(times: Array) -> Array:
+        solution = solve(scene, "position", at=command_at(scene, times))
+        return _require_values(getattr(solution, name), name)
+
+    grid = np.unique([*np.linspace(start, stop, FINE + 1), *law.time])
+    gaps = _gap(name, read(grid), value)
+
+    def gap(time: float) -> float:
+        return float(_gap(name, read(np.array([time])), value)[0])
+
+    times = [float(start)] if gaps[0] == 0.0 else []
+    times += [_bisect(gap, *grid[row : row + 2]) for row in _find_crossings(name, gaps)]
+    if not times:
+        raise _never_passed(name, value, read(grid))
+    return times
+
+
+def _gap(name: str, values: Array, value: float) -> Array:
+    """Return how far values lie from one, of angles within half a turn."""
+    if name in ANGLES:
+        return np.asarray(np.angle(np.exp(1j * (values - value))))
+    return values - value
+
+
+def _find_crossings(name: str, gaps: Array) -> NDArray[np.intp]:
+    """Return the index before each change of sign; a jump by a turn is none.
+
+    A zero counts once, with the step that ends there.
+    """
+    before, after = gaps[:-1], gaps[1:]
+    near = name not in ANGLES or np.abs(after - before) < 0.5 * math.pi
+    return np.flatnonzero((before != 0.0) & (before * after <= 0.0) & near)
+
+
+def _bisect(gap: Callable[[float], float], low: float, high: float) -> float:
+    """Bisect an interval in which a gap changes its sign."""
+    start = gap(low)
+    for _ in range(ROUNDS):
+        middle = 0.5 * (low + high)
+        if gap(middle) * start > 0.0:
+            low = middle
+        else:
+            high = middle
+    return high
+
+
+def _never_passed(name: str, value: float, values: Array) -> NotAssembledError:
+    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    factor, unit = (math.degrees(1.0), "deg") if name in ANGLES else (1.0, "m")
+    return NotAssembledError(
+        f"{_say(name, value)}: the motion does not pass it; it stays within "
+        f"{factor * low:.6g} and {factor * high:.6g} {unit}"
+    )
+
+
+def _require_values(values: Array | None, name: str) -> Array:
+    if values is None:
+        raise InputError("at", name, "needs a drive along a line")
+    return values
+
+
+def _say(name: str, value: float) -> str:
+    """Say a place as the command line has it."""
+    if name in ANGLES:
+        return f"at {name} = {math.degrees(value):.6g} deg"
+    return f"at {name} = {value:.6g} {'s' if name == 'time' else 'm'}"
+
+
+def _find_released(scene: Scene, name: str, value: float) -> Command:
+    """Find the instant at which a released motion first passes a value."""
+    from fourbar.evaluation.free_motion import release
+
+    free = scene.motion.free
+    assert free is not None
+
+    def run(duration: float, steps: int) -> Command:
+        shorter = replace(free, duration=duration, steps=steps)
+        return release(
+            replace(scene, motion=scene.motion.replace(free=shorter))
+        ).command
+
+    def read(at: Command) -> Array:
+        return _require_values(getattr(solve(scene, "position", at=at), name), name)
+
+    if name == "time":
+        if not 0.0 < value <= free.duration:
+            raise NotAssembledError(
+                f"{_say(name, value)}: the release lasts {free.duration:.6g} s"
+            )
+        return _take_last(run(value, 1), value)
+    whole = run(free.duration, free.steps)
+    times = whole.time
+    assert times is not None
+    values = read(whole)
+    gaps = _gap(name, values, value)
+    if gaps[0] == 0.0:
+        return whole.part(slice(0, 1))
+    rows = _find_crossings(name, gaps)
+    if len(rows) == 0:
+        raise _never_passed(name, value, values)
+    first = int(rows[0])
+    if gaps[first + 1] == 0.0:
+        return whole.part(slice(first + 1, first + 2))
+
+    def gap(time: float) -> float:
+        if time == times[0]:
+            return float(gaps[0])
+        return float(_gap(name, read(run(time, 1))[-1:], value)[0])
+
+    from scipy.optimize import brentq
+
+    low, high = times[first : first + 2].tolist()
+    time = float(brentq(gap, low, high, xtol=LAST_DIGIT * high, rtol=LAST_DIGIT))
+    return _take_last(run(time, 1), time)
+
+
+def _take_last(motion: Command, time: float) -> Command:
+    """Take the last instant; NotAssembledError where the motion had stopped before."""
+    assert motion.time is not None
+    if motion.time[-1] != time:
+        raise NotAssembledError(f"{_say('time', time)}: the motion has stopped before")
+    return motion.part(slice(-1, None))
+
+
+def _join(commands: list[Command]) -> Command:
+    """Join instants of one released motion."""
+    fields = (_join_field(values) for values in zip(*commands, strict=True))
+    return Command(*fields)
+
+
+def _join_field(values: tuple[Any, ...]) -> Any:
+    if isinstance(values[0], Independent):
+        return Independent(
+            *(np.concatenate(rows) for rows in zip(*values, strict=True))
+        )
+    if isinstance(values[0], np.ndarray) and values[0].ndim:
+        return np.concatenate(values)
+    return values[0]

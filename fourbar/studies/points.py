@@ -1,0 +1,129 @@
+"""Instant centres and coupler curves of a linkage, of a scene, or of a solution."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fourbar.errors import InputError, expect
+from fourbar.formulas import points
+from fourbar.formulas.arithmetic import Number, polar
+from fourbar.formulas.mobility import find_circuit
+from fourbar.formulas.points import Centre, CouplerCurve
+from fourbar.linkage import FourBar
+from fourbar.quantities import Array
+from fourbar.scene import Scene, command
+from fourbar.solution import Solution
+from fourbar.solve import solve
+
+
+def instant_centres(
+    of: FourBar | Scene | Solution,
+    theta_2: Array | None = None,
+    branch: Number | None = None,
+) -> dict[tuple[int, int], Centre]:
+    """Locate the six instant centres I_ij, keyed by (i, j) with i < j.
+
+    I12, I23, I34, I14 are the pins; I13 = line O2 A with line B O4, I24 = line A B with
+    line O2 O4 (Aronhold-Kennedy). Where two such lines coincide the centre is
+    undetermined: x = y = w = 0.
+
+    Parameters
+    ----------
+    of : a linkage, a scene (at its own positions), or a solution.
+    theta_2 : (n,), rad; of a linkage alone.
+    branch : +1 or -1, or one of them for each position; of a linkage alone.
+
+    Source: R. L. Norton, Design of Machinery, ch. 6.
+    """
+    expect("of", of, FourBar, Scene, Solution)
+    if isinstance(of, FourBar):
+        if theta_2 is None or branch is None:
+            raise InputError(
+                "theta_2",
+                theta_2,
+                "a linkage needs theta_2 and branch; a scene has its own",
+            )
+        return points.instant_centres(of, theta_2, branch)
+    for name, value in (("theta_2", theta_2), ("branch", branch)):
+        if value is not None:
+            raise InputError(name, value, "must be left out: the positions are stated")
+    solution = solve(of, "position") if isinstance(of, Scene) else of
+    A, B = (_as_complex(vector) for vector in (solution.A, solution.B))
+    assert solution.ground is not None
+    length, angle = solution.ground
+    O4 = length * (np.cos(angle) + 1j * np.sin(angle)) + 0.0 * A
+    along = [_direction(vector) for vector in (O4, A, B - A, B - O4)]
+    return points.locate_centres(O4, A, B, *along)
+
+
+def _as_complex(vector: Array) -> NDArray[np.complex128]:
+    return np.asarray(vector[..., 0] + 1j * vector[..., 1])
+
+
+def _direction(vector: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    return np.asarray(vector / np.abs(vector))
+
+
+def coupler_curve(
+    of: FourBar | Scene | Solution,
+    r_along: float | str,
+    r_across: float | None = None,
+    circuit: int | None = None,
+    *,
+    branch: int | None = None,
+    steps: int = 360,
+) -> CouplerCurve:
+    """Trace the closed coupler curve of one circuit, run smoothly through limits and change points.
+
+    Where the input turns fully theta_2 is spaced evenly, over two turns if one turn ends on the
+    other branch; else it goes from limit to limit on one branch and back on the other, spaced by
+    the cosine, so that the curve's points do not thin out at the limits.
+
+    Parameters
+    ----------
+    of : a linkage; or a scene or a solution, which state the circuit by their first position.
+    r_along, r_across : the point in the coupler's frame at A, m; of a scene or a solution the name
+        of one of its points of the coupler will do.
+    circuit : index into `circuits`; left out: 0, or that of the scene.
+    branch : where to start, for a linkage with change points; left out: open, or that of the scene.
+    steps : number of intervals, a multiple of 4 (InputError otherwise): limits and change points,
+        at which directions are undetermined or lose digits, then fall between positions.
+    """
+    expect("of", of, FourBar, Scene, Solution)
+    if isinstance(of, Solution):
+        if of.scene is None:
+            raise InputError("of", "a study", "has many linkages; take one scene of it")
+        of = of.scene
+    if isinstance(of, FourBar):
+        return points.coupler_curve(
+            of,
+            r_along,  # type: ignore[arg-type]  # checked there
+            r_across,  # type: ignore[arg-type]
+            circuit or 0,
+            branch=1 if branch is None else branch,
+            steps=steps,
+        )
+    if isinstance(r_along, str):
+        r_along, r_across = _find_in_coupler(of, r_along)
+    first = solve(of, "position", at=command(of).part(slice(0, 1)))
+    if circuit is None:
+        circuit = int(find_circuit(of.linkage, first.theta_2, first.branch)[0])
+    return points.coupler_curve(
+        of.linkage,
+        r_along,
+        r_across,  # type: ignore[arg-type]  # checked there
+        circuit,
+        branch=int(first.branch[0]) if branch is None else branch,
+        steps=steps,
+    )
+
+
+def _find_in_coupler(scene: Scene, name: str) -> tuple[float, float]:
+    """Return a point of the coupler, along and across at A, m; InputError for another name."""
+    of_coupler = {point.name: point for point in scene.points if point.bar == 3}
+    if name not in of_coupler:
+        allowed = "must be a point of the coupler"
+        if of_coupler:
+            allowed += f": {', '.join(of_coupler)}"
+        raise InputError("point", name, allowed)
+    z = polar(*of_coupler[name].from_pin)
+    return float(z.real), float(z.imag)
