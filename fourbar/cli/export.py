@@ -8,6 +8,7 @@ import click
 
 from fourbar.cli import given
 from fourbar.errors import DependencyError, InputError, say_install
+from fourbar.scene import Scene
 from fourbar.solution import Conversion
 
 if TYPE_CHECKING:
@@ -33,9 +34,9 @@ without_loads_option = click.option(
     "transmission, freebody, bars, sensitivity or stroke.",
 )
 @click.option(
-    "--position",
+    "--at",
     metavar="PLACE",
-    help='Position of linkage and free bodies, like "135 deg".',
+    help='Position of linkage and free bodies, like "135 deg" or "theta_4=30 deg".',
 )
 @click.option(
     "--branches",
@@ -52,7 +53,7 @@ def plot(
     scene: Path,
     out: Path,
     figure: str,
-    position: str | None,
+    at: str | None,
     branches: str,
     dimensions: bool,
     units: Conversion,
@@ -61,22 +62,7 @@ def plot(
     from fourbar.show.plot import draw
 
     with given.open_scene(scene) as described, given.show_waiting(described):
-        unit, likely = (
-            ("rad", "deg") if described.motion.stroke is None else ("m", "mm")
-        )
-        if position is not None and given.is_bare(
-            position
-        ):  # it may have been meant in any unit
-            raise InputError(
-                "--position",
-                position,
-                f'the unit is missing; did you mean "{position} {likely}"?',
-            )
-        place = (
-            None
-            if position is None
-            else given.read_number("--position", position, unit)
-        )
+        place = None if at is None else _find_place(described, at)
         draw(
             described,
             out,
@@ -86,6 +72,15 @@ def plot(
             units=units,
             dimensions=dimensions,
         )
+
+
+def _find_place(scene: Scene, text: str) -> float:
+    """Return what is commanded at a position, rad or m; of a motion over time its angle there."""
+    from fourbar.studies.passing import find_positions
+
+    positions = find_positions(scene, [given.read_position(scene, text)])
+    places = positions.angle if positions.stroke is None else positions.stroke
+    return float(places[0])
 
 
 @click.command()

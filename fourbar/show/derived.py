@@ -8,6 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from fourbar.formulas.arithmetic import cross
+from fourbar.formulas.path import NO_DIGIT_LEFT
 from fourbar.quantities import DERIVED_NAMES
 from fourbar.show.duty import read_drive, shaking_force, shaking_moment
 from fourbar.solution import Array, Conversion, Solution, find_unit_in
@@ -55,7 +56,10 @@ def _compute_ratio(solution: Solution, bar: int) -> Array:
 
 
 def _locate_centre(solution: Solution, bars: tuple[int, int]) -> Array:
-    return np.stack(instant_centres(solution)[bars].point, axis=-1)
+    """Return an instant centre; NaN where its two lines are parallel within rounding."""
+    centre = instant_centres(solution)[bars]
+    point = np.stack(centre.point, axis=-1)
+    return np.where(np.abs(centre.w)[..., None] <= NO_DIGIT_LEFT, np.nan, point)
 
 
 COMPUTE: dict[str, Callable[[Solution], Array]] = {

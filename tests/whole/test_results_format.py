@@ -46,6 +46,7 @@ PAGE = (Path(__file__).parents[2] / "docs" / "results.md").read_text()
 NOT_QUANTITIES = (
     *(
         "title",
+        "scene",
         "drive",
         "drive_bar",
         "status_code",

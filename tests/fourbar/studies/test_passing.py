@@ -1,0 +1,95 @@
+"""Positions by a named angle, a stroke or a time: solved back, of every kind of motion."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fourbar
+from fourbar.errors import InputError, NotAssembledError
+from fourbar.studies.passing import find_positions
+from tests.support.scenes import crank_rocker, thesis
+
+MODELS = Path(__file__).parents[3] / "models"
+LOCATED = 1e-12
+"""rad, m or s: a place is found to its last digits, and solved back with a few eps/condition."""
+LAW = crank_rocker(
+    motion=fourbar.Motion(
+        law=fourbar.Law((0.0, 1.0, 2.0), (0.3, 2.0, 0.5), steps=20, ends="rest")
+    )
+)
+DROPPED = crank_rocker(
+    motion=fourbar.Motion(1.0, 0.0, free=fourbar.Free(1.0, 50)),
+    effects=(fourbar.Gravity(),),
+)
+
+
+def test_every_position_of_the_assembly_with_that_output_angle_is_found() -> None:
+    scene = crank_rocker()
+    sweep = fourbar.solve(replace(scene, motion=fourbar.Motion()))
+    value = float(sweep.theta_4[100])
+    found = find_positions(scene, [("theta_4", value)])
+    assert len(found.angle) == 2
+    solved = fourbar.solve(scene, "position", at=found)
+    assert solved.theta_4 == pytest.approx(value, abs=LOCATED)
+    assert np.abs(found.angle - sweep.theta_2[100]).min() < LOCATED
+
+
+def test_a_place_out_of_range_is_refused_with_the_range() -> None:
+    with pytest.raises(NotAssembledError, match=r"theta_2 goes from 84\.6\d* to 365"):
+        find_positions(thesis(), [("theta_2", math.radians(30.0))])
+    with pytest.raises(NotAssembledError, match="no position of this assembly"):
+        find_positions(crank_rocker(), [("theta_4", 0.0)])
+    with pytest.raises(InputError, match="needs a law or a release"):
+        find_positions(crank_rocker(), [("time", 1.0)])
+    with pytest.raises(NotAssembledError, match="it stays within"):
+        find_positions(LAW, [("theta_2", 3.0)])
+    with pytest.raises(NotAssembledError, match="goes from 0 to 2 s"):
+        find_positions(LAW, [("time", 3.0)])
+    with pytest.raises(NotAssembledError, match="lasts 1 s"):
+        find_positions(DROPPED, [("time", 3.0)])
+
+
+def test_a_law_passes_an_angle_up_and_down() -> None:
+    found = find_positions(LAW, [("theta_2", 1.5), ("time", 0.5)])
+    assert len(found.angle) == 3 and found.time is not None
+    assert found.angle[:2] == pytest.approx(1.5, abs=LOCATED)
+    assert found.time[0] < 1.0 < found.time[1] and found.time[2] == 0.5
+    begins = find_positions(LAW, [("theta_2", 0.3)])
+    assert begins.time is not None and begins.time[0] == 0.0
+
+
+def test_a_release_is_met_when_it_first_passes() -> None:
+    """By a much finer release: the angle lies between two of its instants."""
+    fine = fourbar.release(
+        replace(DROPPED, motion=DROPPED.motion.replace(free=fourbar.Free(1.0, 20000)))
+    )
+    value = float(fine.theta_2[3001])
+    found = find_positions(DROPPED, [("theta_2", value)])
+    assert found.time is not None
+    assert found.angle[0] == pytest.approx(value, abs=1e-9)
+    first = np.flatnonzero(
+        (fine.theta_2[:-1] - value) * (fine.theta_2[1:] - value) <= 0.0
+    )[0]
+    assert abs(found.time[0] - fine.time[first]) <= fine.time[1]
+    state = fourbar.solve(DROPPED, at=found)
+    assert state.omega_2[0] == pytest.approx(fine.omega_2[first], rel=1e-3)
+    timed = find_positions(DROPPED, [("time", 0.25), ("theta_2", value)])
+    assert timed.time is not None and timed.time[0] == 0.25
+    assert len(timed.angle) == 2 and timed.time[1] == found.time[0]
+
+
+def test_a_stroke_is_found_where_an_angle_is_commanded() -> None:
+    scene = fourbar.load(MODELS / "capabilities" / "stroke_input.toml")
+    assert scene.drive is not None
+    commanded = replace(scene, motion=fourbar.Motion(), tolerances=())
+    stroke = fourbar.solve(commanded, "position").stroke
+    assert stroke is not None
+    value = float(np.nanmean(stroke))
+    found = find_positions(commanded, [("stroke", value)])
+    solved = fourbar.solve(commanded, "position", at=found).stroke
+    assert solved == pytest.approx(value, abs=LOCATED)
+    back = find_positions(scene, [("theta_4", float(fourbar.solve(scene).theta_4[3]))])
+    assert back.stroke is not None and len(back.stroke) >= 1
