@@ -110,14 +110,14 @@ def units_of_scene(document: Mapping[str, Any]) -> Conversion:
     """
     motion = document.get("motion", {})
     rates = (
-        (motion.get(f"omega_{bar}", ""), motion.get(f"alpha_{bar}", ""))
+        (str(motion.get(f"omega_{bar}", "")), str(motion.get(f"alpha_{bar}", "")))
         for bar in MOVING_BARS
     )
     return _suit_texts(str(_find_length(document)), tuple(rates))
 
 
 @cache
-def _suit_texts(length: str, rates: tuple[tuple[object, object], ...]) -> Conversion:
+def _suit_texts(length: str, rates: tuple[tuple[str, str], ...]) -> Conversion:
     """Return the units that suit a length and speeds and accelerations as they are written."""
     from fourbar.quantities.units import find_unit
 
