@@ -73,7 +73,7 @@ def test_a_release_is_met_when_it_first_passes() -> None:
     first = np.flatnonzero(
         (fine.theta_2[:-1] - value) * (fine.theta_2[1:] - value) <= 0.0
     )[0]
-    assert abs(found.time[0] - fine.time[first]) <= fine.time[1]
+    assert abs(found.time[0] - fine.time[first]) <= fine.time[1] * (1.0 + 1e-6)
     state = fourbar.solve(DROPPED, at=found)
     assert state.omega_2[0] == pytest.approx(fine.omega_2[first], rel=1e-3)
     timed = find_positions(DROPPED, [("time", 0.25), ("theta_2", value)])

@@ -710,7 +710,10 @@ def test_the_file_of_analyze_is_read_as_it_is_and_as_a_spreadsheet_saves_it(
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    rows = [row[:14] + row[-10:] for row in rows_of("thesis", *options)[:40]]
+    # without the derived quantities, which stand before the time
+    rows = [
+        row[:14] + row[-22:-13] + row[-1:] for row in rows_of("thesis", *options)[:40]
+    ]
     if delimiter == ";":  # decimal commas, and what is left of a deleted column
         rows = [[cell.replace(".", ",") for cell in row] + [""] for row in rows]
     path = tmp_path / "theirs.csv"

@@ -1,0 +1,67 @@
+"""The sheet of one position: every number is that of the solution, in the units of the scene."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import fourbar
+from fourbar.show.position import PositionSheet
+from fourbar.show.units import COMMON, units
+from tests.support.scenes import crank_rocker
+
+SIX_DIGITS = 6e-6
+ONE = crank_rocker(
+    motion=fourbar.Motion(1.0, 10.0, 3.0), points=(fourbar.Point("P", 3, (0.1, 0.7)),)
+)
+
+
+def numbers(line: str) -> list[float]:
+    return [float(x) for x in re.findall(r"(?<!\S)-?[\d.]+(?:e[-+]\d+)?(?!\S)", line)]
+
+
+def test_bars_points_and_forces_are_those_of_the_solution() -> None:
+    s = fourbar.solve(ONE)
+    shown = {**COMMON, **units("m N N.m rad/s")}
+    sheet = PositionSheet(ONE, s, shown)
+    bars = [numbers(line)[1:] for line in sheet.write_bars()[1:]]
+    for bar, row in zip((2, 3, 4), bars, strict=True):
+        rates = [getattr(s, f"{letter}_{bar}")[0] for letter in ("omega", "alpha")]
+        assert row[1:] == pytest.approx(rates, rel=SIX_DIGITS)
+        angle = np.degrees(getattr(s, f"theta_{bar}")[0])
+        assert row[0] == pytest.approx(angle, abs=6e-5)
+    points = sheet.write_points()
+    at = next(i for i, line in enumerate(points) if line.startswith("P "))
+    place, speed, growth = (numbers(line) for line in points[at : at + 3])
+    assert place == pytest.approx(s.points["P"][0], rel=SIX_DIGITS)
+    for row, vector in ((speed, s.velocity["P"][0]), (growth, s.acceleration["P"][0])):
+        assert row == pytest.approx([*vector, np.hypot(*vector)], rel=SIX_DIGITS)
+    forces = sheet.write_pin_forces()[1:5]
+    for line, name in zip(forces, ("F12", "F32", "F43", "F14"), strict=True):
+        vector = getattr(s, name)[0]
+        assert line.startswith(name)
+        assert numbers(line) == pytest.approx(
+            [*vector, np.hypot(*vector)], rel=SIX_DIGITS
+        )
+
+
+def test_what_a_scene_has_not_is_left_out() -> None:
+    still = replace(ONE, motion=fourbar.Motion(1.0), points=())
+    sheet = PositionSheet(still, fourbar.solve(still), COMMON)
+    assert "omega" not in sheet.write_bars()[0]
+    assert not any(line.startswith("  v") for line in sheet.write_points())
+    assert not any(line.startswith("F_") for line in sheet.write_ratios())
+
+
+def test_rounding_is_shown_as_zero_and_a_far_centre_by_a_word() -> None:
+    lift = fourbar.Scene(
+        fourbar.uniform(0.3, 0.1, 0.3, 0.1), fourbar.Motion(np.pi / 2.0, 1.0)
+    )
+    text = "\n".join(
+        line
+        for sheet in [PositionSheet(lift, fourbar.solve(lift), COMMON)]
+        for line in (*sheet.write_points(), *sheet.write_ratios())
+    )
+    assert "e-1" not in text and "-0 " not in text
+    assert re.search(r"^centre I13 +at infinity$", text, re.MULTILINE)

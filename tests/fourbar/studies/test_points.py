@@ -1,0 +1,39 @@
+"""Instant centres and coupler curves of scenes and solutions."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import fourbar
+from fourbar.errors import InputError
+from tests.support.scenes import crank_rocker
+
+TURN = crank_rocker(
+    motion=fourbar.Motion(fourbar.Sweep(0.1, 0.1 + math.tau, 24), 10.0),
+    points=(fourbar.Point("P", 3, (0.1, 0.7)), fourbar.Point("J", 4, (0.05, 0.2))),
+)
+
+
+def test_centres_of_a_scene_and_of_its_solution_are_those_of_its_linkage() -> None:
+    of_scene, of_solution = (
+        fourbar.instant_centres(of) for of in (TURN, fourbar.solve(TURN))
+    )
+    assert np.array_equal(of_scene[1, 3].x, of_solution[1, 3].x)
+    with pytest.raises(InputError, match="must be left out"):
+        fourbar.instant_centres(TURN, np.array([1.0]), 1)
+    with pytest.raises(InputError, match="needs theta_2 and branch"):
+        fourbar.instant_centres(TURN.linkage)
+
+
+def test_a_coupler_curve_of_a_scene_passes_through_its_point() -> None:
+    curve = fourbar.coupler_curve(TURN, "P", steps=4000)
+    path = fourbar.solve(TURN).points["P"]
+    away = np.hypot(curve.x[:, None] - path[:, 0], curve.y[:, None] - path[:, 1])
+    assert away.min(axis=0).max() < 1e-4
+    crossed = replace(TURN, motion=TURN.motion.replace(branch=-1))
+    other = fourbar.coupler_curve(fourbar.solve(crossed), "P", steps=400)
+    assert set(other.branch) == {-1} and set(curve.branch) == {1}
+    with pytest.raises(InputError, match="must be a point of the coupler: P"):
+        fourbar.coupler_curve(TURN, "J")
