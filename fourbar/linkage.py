@@ -53,9 +53,12 @@ def is_within(number: float, bound: str) -> bool:
 def require(key: str, value: object, unit: str = "1", bound: str = ANY) -> float:
     """Return the value as a float, or raise an InputError that says what is allowed.
 
-    `unit`: of the number; a text like "48 cm" is converted to it. "1": there is none, and no text is read.
+    `unit`: of the number; a text like "48 cm" and a `pint.Quantity` are converted to it. "1": there is none, and
+    neither is read.
     """
     number = math.nan
+    if unit != "1":
+        value = read_quantity(value)
     if unit != "1" and isinstance(value, str):
         from fourbar.quantities.units import UnitError, to_si
 
@@ -79,8 +82,20 @@ def require_whole(key: str, value: object, among: Container[int], allowed: str) 
     return int(value)
 
 
+def read_quantity(value: object) -> object:
+    """Return a `pint.Quantity` as text with its unit, in a list if it is an array; other values as they are."""
+    if not hasattr(value, "magnitude") or not hasattr(value, "units"):
+        return value
+    from fourbar.quantities.units import write_quantity
+
+    text: object = write_quantity(value)
+    return text
+
+
 def convert_to_unit(key: str, value: object, unit: str) -> object:
     """Convert each text like "48 cm" of a value, in lists too, as `require` does; numbers and arrays stay."""
+    if unit != "1":
+        value = read_quantity(value)
     if isinstance(value, (list, tuple)):
         return [convert_to_unit(key, entry, unit) for entry in value]
     return (

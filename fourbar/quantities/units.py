@@ -13,6 +13,8 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
+import numpy as np
+
 from fourbar.errors import InputError
 
 FILE = files("fourbar.quantities").joinpath("units.toml")
@@ -58,9 +60,10 @@ NUMBER = re.compile(
     r"[+-]?(?:[0-9]{1,100}(?:\.[0-9]{0,100})?|\.[0-9]{1,100})(?:[eE][+-]?[0-9]{1,3})?(?![0-9.])"
 )
 UNIT = re.compile(
-    r"(?:[A-Za-zµμ°_]+(?:_?0(?![0-9]))?(?:(?:\^|\*\*)-?[1-9](?![0-9])|[²³])?|[·*/()]|\s)+"
+    r"(?:[A-Za-zµμ°_]++(?:0(?![0-9]))?(?:(?:\^|\*\*)-?[1-9](?![0-9])|[²³])?|[·*/()]|\s)++"
 )
-"""Names, each with at most one small exponent, and operators: nothing else reaches the parser, no tower of powers."""
+"""Names, each with at most one small exponent, and operators: nothing else reaches the parser, no tower of powers.
+Names are taken whole (`++`), so that a text which does not fit is refused in one pass."""
 LONGEST_UNIT = 60
 
 
@@ -117,6 +120,19 @@ def to_si(text: str, unit: str) -> float:
         raise UnitError("the number is too large")
     # Fraction has no -0.0
     return -0.0 if value == 0.0 and number_text[0].startswith("-") else value
+
+
+def write_quantity(quantity: Any) -> Any:
+    """Write a quantity of the units library as text like "48 cm", an array of numbers as a list of such texts.
+
+    The text is read as any other is: an angle is a dimension here, which it is not in the library, so that
+    10 Hz stay no speed.
+    """
+    unit = f"{quantity.units:~C}"
+    numbers = np.asarray(quantity.magnitude, dtype=float).tolist()
+    if isinstance(numbers, list):
+        return [f"{number!r} {unit}" for number in numbers]
+    return f"{numbers!r} {unit}"
 
 
 def find_unit(text: object, otherwise: str) -> str:

@@ -1,0 +1,85 @@
+"""Regular expressions against hostile repeats: no text that somebody hands in may hang the program."""
+
+import ast
+import re
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+FOLDERS = ("fourbar", "validation/fourbar_validation", "lab/fourbar_lab")
+FUNCTIONS = {
+    "compile",
+    "match",
+    "search",
+    "fullmatch",
+    "sub",
+    "split",
+    "findall",
+    "finditer",
+}
+REPEATED = (
+    *("a", "0", " ", ".", "-", "^", "_", "/", "(", "[", "<", '"', "'", "=", ",", ":"),
+    *("a0", "a.", "1.", "a ", "m^2 ", "m_", "N m", "1 ", "a-", '="', "[a", "{ a", "²"),
+)
+"""Pieces of the texts; a pattern that can read one of them in two ways takes 2^n steps to refuse n of them."""
+ENDS = ("", "!", "^", "\n", "0^", ")")
+LENGTHS = (8, 12, 16, 20, 24, 60, 600)
+"""Characters. The short texts come first, so that a bad pattern is named within the time of the test."""
+SECONDS = 0.25
+"""Processor time of one search. The slowest takes 0.02 s; a quadratic one passes, an exponential one cannot."""
+
+
+def list_patterns() -> Iterator[tuple[str, re.Pattern[str]]]:
+    """List the literal patterns of the three packages, each with its place."""
+    for folder in FOLDERS:
+        for path in sorted((ROOT / folder).rglob("*.py")):
+            for call in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+                if not isinstance(call, ast.Call) or not call.args:
+                    continue
+                called = call.func
+                if (
+                    not isinstance(called, ast.Attribute)
+                    or called.attr not in FUNCTIONS
+                ):
+                    continue
+                pattern = call.args[0]
+                of_re = isinstance(called.value, ast.Name) and called.value.id == "re"
+                if of_re and isinstance(pattern, ast.Constant):
+                    place = f"{path.relative_to(ROOT)}:{call.lineno}"
+                    yield place, re.compile(str(pattern.value))
+
+
+PATTERNS = dict(list_patterns())
+
+
+def measure_slowest(pattern: re.Pattern[str]) -> float:
+    """Return the longest processor time of a search in hostile texts, s; it ends at the first one that is too long."""
+    slowest = 0.0
+    for length in LENGTHS:
+        for piece in REPEATED:
+            for end in ENDS:
+                text = (length * piece)[:length] + end
+                started = time.process_time()
+                pattern.fullmatch(text)
+                pattern.search(text)
+                slowest = max(slowest, time.process_time() - started)
+                if slowest > SECONDS:
+                    return slowest
+    return slowest
+
+
+def test_the_patterns_are_found() -> None:
+    assert len(PATTERNS) > 30
+    assert any(place.startswith("fourbar/quantities/units.py") for place in PATTERNS)
+
+
+@pytest.mark.parametrize("place", PATTERNS)
+def test_a_hostile_repeat_is_refused_at_once(place: str) -> None:
+    assert measure_slowest(PATTERNS[place]) <= SECONDS
+
+
+def test_a_pattern_with_two_readings_is_caught() -> None:
+    assert measure_slowest(re.compile("(?:[a-z]+)+")) > SECONDS
