@@ -4,6 +4,7 @@ import json
 import math
 import os
 import stat
+import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -19,35 +20,46 @@ if TYPE_CHECKING:
 
 TEMPORARY = ".part"
 """Suffix of the name of an unfinished file."""
+STANDARD_STREAM = Path("-")
+"""Path that stands for standard input where a file is read, for standard output where one is written."""
 
 
 def read_bytes(
-    path: str | Path, key: str, largest: int, *, shown: str | None = None
+    path: str | Path,
+    key: str,
+    largest: int,
+    *,
+    shown: str | None = None,
+    pipes: bool = False,
 ) -> bytes:
-    """Read an ordinary file; its kind and its size are looked at before it is opened.
+    """Read a file whose kind and size are looked at before it is opened.
 
     Parameters
     ----------
     key : what names the file, for the error.
     largest : bytes.
     shown : how the error names it; left out: by its path.
+    pipes : read standard input for the path `-`, and pipes (those of a shell's `<(...)` too) until they end.
 
-    Raises InputError for a file that is missing, too large or unreadable, for a directory, and for pipes (those of a
-    shell's `<(...)` too) and devices.
+    Raises InputError for a file that is missing, too large or unreadable, for a directory, for devices, and for pipes
+    where they are not read.
     """
 
     def refuse(allowed: str) -> InputError:
         return InputError(key, str(path) if shown is None else shown, allowed)
 
+    source = sys.stdin.fileno() if pipes and Path(path) == STANDARD_STREAM else path
     try:
-        about = os.stat(path)
+        about = os.stat(source)
+        is_pipe = stat.S_ISFIFO(about.st_mode) or stat.S_ISSOCK(about.st_mode)
+        may_end = pipes and (is_pipe or source is not path)
         if stat.S_ISDIR(about.st_mode):
             raise refuse("is a directory; must be a file")
-        if not stat.S_ISREG(about.st_mode):
+        if not stat.S_ISREG(about.st_mode) and not may_end:
             raise refuse("must be an ordinary file: a pipe or a device may never end")
         if about.st_size > largest:
             raise refuse(f"has {about.st_size} bytes; must not exceed {largest}")
-        with open(path, "rb") as opened:
+        with open(source, "rb", closefd=source is path) as opened:
             data = opened.read(largest + 1)
     except FileNotFoundError:
         raise refuse("file not found") from None
@@ -60,13 +72,13 @@ def read_bytes(
     return data
 
 
-def read_text(path: str | Path, key: str, largest: int) -> str:
+def read_text(path: str | Path, key: str, largest: int, *, pipes: bool = False) -> str:
     """Read a file as text in UTF-8, with or without a byte order mark, line ends as they are.
 
     Raises InputError as `read_bytes` does, and for what is no UTF-8.
     """
     try:
-        return read_bytes(path, key, largest).decode("utf-8-sig")
+        return read_bytes(path, key, largest, pipes=pipes).decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise InputError(
             key, str(path), f"must be UTF-8 text; byte {error.start} is not"
@@ -91,7 +103,12 @@ def name_file(path: Path) -> Iterator[None]:
 
 
 def require_file(target: Path, *read: Path) -> None:
-    """Raise InputError for what can name no output: a folder, a file in a missing folder, one that is read."""
+    """Raise InputError for what can name no output: a folder, a file in a missing folder, one that is read.
+
+    `-` names standard output.
+    """
+    if target == STANDARD_STREAM:
+        return
     if target.is_dir() or "\0" in str(target):
         raise InputError("path", str(target), "must name a file, not a folder")
     if not target.parent.is_dir():
@@ -108,10 +125,15 @@ def write_bytes(path: str | Path, data: bytes, *, private: bool = False) -> None
     """Write a file whole; on any failure the old file, or none, stays.
 
     A symbolic link stays and the file that it names is written. An existing file keeps its mode; a new one is an
-    ordinary file, and with `private` it is readable by its owner alone in either case.
+    ordinary file, and with `private` it is readable by its owner alone in either case. `-` is standard output.
 
     Raises InputError as `require_file` does, OSError for what fails otherwise (full disk, read-only folder).
     """
+    if Path(path) == STANDARD_STREAM:
+        sys.stdout.flush()
+        sys.stdout.buffer.write(data)
+        sys.stdout.buffer.flush()
+        return
     require_file(Path(path))
     target = Path(os.path.realpath(path))
     require_file(target)

@@ -79,7 +79,7 @@ def new(
     Each length has a unit, like 300mm; or --unit mm is the unit of all.
     """
     from fourbar.files.scene_text import write_new_scene
-    from fourbar.writing import write_text
+    from fourbar.writing import STANDARD_STREAM, write_text
 
     if (file is None) == (out is None):
         raise click.UsageError("name the new file once: FILE, or -o FILE")
@@ -102,9 +102,10 @@ def new(
             [f"{text} {unit}" if text in bare else text for text in lengths]
         ),
     )
-    shown = (
-        str(file) if " " not in str(file) else f'"{file}"'
-    )  # to be copied into any shell
+    if file == STANDARD_STREAM:
+        return
+    # to be copied into any shell
+    shown = str(file) if " " not in str(file) else f'"{file}"'
     click.echo(f"wrote {file}; edit it, then: fourbar analyze {shown}")
 
 

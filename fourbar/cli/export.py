@@ -165,6 +165,7 @@ def mjcf(
 ) -> None:
     """Write a scene, or four lengths, as MJCF for MuJoCo and its kin."""
     from fourbar import mjcf as writer
+    from fourbar.writing import STANDARD_STREAM
 
     if (scene is None) == (lengths is None):
         raise click.UsageError("give a scene file or --lengths D A B C, one of the two")
@@ -184,8 +185,9 @@ def mjcf(
         )
         made = writer.make_scene(*given.read_lengths(lengths), **speed)
         given.print_to(writer.write_mjcf_for(made, simulator, drive), out)
+        to_output = out == STANDARD_STREAM
         for line in writer.list_defaults(made):
-            click.echo(line)
+            click.echo(line, err=to_output)
 
 
 @click.command()

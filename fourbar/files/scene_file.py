@@ -82,7 +82,7 @@ MOST_POINTS = 1000
 
 
 def load(path: str | Path) -> Scene:
-    """Read the scene of a TOML file.
+    """Read the scene of a TOML file, of standard input for `-`, or of a pipe.
 
     Raises InputError, in one line with file, key, value and what is allowed, for a file that is
     missing, not a file, too large, not text or not TOML, and for every entry that is wrong.
@@ -92,8 +92,8 @@ def load(path: str | Path) -> Scene:
 
 
 def read_text(path: str | Path) -> str:
-    """Read the text of a scene file."""
-    return writing.read_text(path, "scene file", LARGEST_FILE)
+    """Read the text of a scene file, of standard input for `-`, or of a pipe."""
+    return writing.read_text(path, "scene file", LARGEST_FILE, pipes=True)
 
 
 def loads(text: str, name: str = "scene") -> Scene:

@@ -14,7 +14,7 @@ from fourbar.errors import DependencyError, InputError, clean_line, expect, say_
 from fourbar.quantities import PIN_FORCES
 from fourbar.show.units import choose_unit
 from fourbar.solution import SI, Array, Conversion
-from fourbar.writing import write_bytes
+from fourbar.writing import STANDARD_STREAM, write_bytes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -107,8 +107,10 @@ def apply_style() -> Iterator[None]:
 
 
 def format_of(path: str | Path, formats: tuple[str, ...] = FORMATS) -> str:
-    """Return the format that a file's ending names; InputError where it is none of `formats`."""
+    """Return the format that a file's ending names, the first for `-`; InputError where it is none of `formats`."""
     expect("path", path, str, Path)
+    if Path(path) == STANDARD_STREAM:
+        return formats[0]
     kind = Path(path).suffix.removeprefix(".").lower()
     if kind not in formats:
         raise InputError(
