@@ -8,7 +8,7 @@ import re
 import tomllib
 from dataclasses import MISSING, fields, replace
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 
@@ -81,14 +81,33 @@ MOST_POINTS = 1000
 """Each is three columns of every table."""
 
 
-def load(path: str | Path) -> Scene:
-    """Read the scene of a TOML file, of standard input for `-`, or of a pipe.
+def load(path: str | Path | IO[str] | IO[bytes]) -> Scene:
+    """Read the scene of a TOML file, of standard input for `-`, of a pipe, or of an open file.
 
     Raises InputError, in one line with file, key, value and what is allowed, for a file that is
     missing, not a file, too large, not text or not TOML, and for every entry that is wrong.
     """
-    expect("path", path, str, Path)
-    return loads(read_text(path), str(path))
+    if isinstance(path, str | Path):
+        return loads(read_text(path), str(path))
+    if not hasattr(path, "read"):
+        expect("path", path, str, Path)
+    return _read_stream(path)
+
+
+def _read_stream(stream: IO[str] | IO[bytes]) -> Scene:
+    """Read the scene of an open file, text or bytes."""
+    name = getattr(stream, "name", None)
+    shown = name if isinstance(name, str) else "stream"
+    content = stream.read(LARGEST_FILE + 1)
+    if len(content) > LARGEST_FILE:
+        raise InputError("scene file", shown, f"must not exceed {LARGEST_FILE} bytes")
+    if isinstance(content, bytes):
+        try:
+            content = content.decode("utf-8-sig")
+        except UnicodeDecodeError as error:
+            allowed = f"must be UTF-8 text; byte {error.start} is not"
+            raise InputError("scene file", shown, allowed) from None
+    return loads(content.replace("\r\n", "\n"), shown)
 
 
 def read_text(path: str | Path) -> str:

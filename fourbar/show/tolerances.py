@@ -96,7 +96,8 @@ def describe_counts(spreads: Tolerances, units: Conversion = DEGREES) -> list[st
     count = f"{len(spreads.scene.tolerances)} tolerance" + (
         "s" if len(spreads.scene.tolerances) > 1 else ""
     )
-    lines = [f"{count}, {spreads.samples} samples (seed {spreads.seed}), {n} positions"]
+    drawn = f"{spreads.samples} samples ({spreads.describe_seed()})"
+    lines = [f"{count}, {drawn}, {n} positions"]
     if spreads.invalid:
         lines.append(
             f"{_write_share(spreads.invalid, spreads)} have an impossible dimension, such as a length below 0"

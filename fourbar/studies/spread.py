@@ -83,7 +83,8 @@ class Tolerances:
 
     scene: Scene
     samples: int
-    seed: int
+    seed: int | None
+    """None if the samples were drawn by a generator of the caller's."""
     theta_2: Array
     """(n,), rad."""
     spreads: dict[str, Spread]
@@ -111,8 +112,13 @@ class Tolerances:
                   for k, tolerance in enumerate(self.scene.tolerances)}  # fmt: skip
         return make_data_frame(first | columns | shares)
 
+    def describe_seed(self) -> str:
+        """Say where the random numbers came from."""
+        return "a generator's" if self.seed is None else f"seed {self.seed}"
+
     def _title(self) -> str:
-        tried = f"{self.samples} samples (seed {self.seed}), {self.apart} of them do not assemble somewhere"
+        drawn = f"{self.samples} samples ({self.describe_seed()})"
+        tried = f"{drawn}, {self.apart} of them do not assemble somewhere"
         return (
             f"Tolerances {self.scene.title!r}: {describe_extent(self.theta_2)}, {tried}"
         )
@@ -152,7 +158,7 @@ class Tolerances:
 def tolerances(
     scene: Scene,
     samples: int = SAMPLES,
-    seed: int = 0,
+    seed: int | np.random.Generator = 0,
     *,
     progress: Callable[[float], None] | None = None,
 ) -> Tolerances:
@@ -163,7 +169,8 @@ def tolerances(
 
     Parameters
     ----------
-    samples, seed : of a scrambled Sobol' sequence.
+    samples : number of points of a scrambled Sobol' sequence.
+    seed : whole number, or the generator that scrambles the sequence.
     progress : is given the share that is done, from time to time.
 
     Raises
@@ -182,8 +189,11 @@ def tolerances(
         raise InputError(
             "samples", samples, f"must be a whole number from 2 to {MOST_SAMPLES}"
         )
-    if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
-        raise InputError("seed", seed, "must be a whole number, 0 or more")
+    is_generator = isinstance(seed, np.random.Generator)
+    is_whole = isinstance(seed, int) and not isinstance(seed, bool)
+    if not is_generator and not (is_whole and seed >= 0):  # type: ignore[operator]
+        allowed = "must be a whole number, 0 or more, or a numpy.random.Generator"
+        raise InputError("seed", seed, allowed)
     if not scene.tolerances:
         raise InputError(
             "tolerances",
@@ -229,7 +239,7 @@ def tolerances(
     return Tolerances(
         scene,
         samples,
-        seed,
+        None if isinstance(seed, np.random.Generator) else seed,
         slopes.solution.theta_2,
         spreads,
         without,
@@ -238,7 +248,7 @@ def tolerances(
     )
 
 
-def _make_members(scene: Scene, samples: int, seed: int) -> Study:
+def _make_members(scene: Scene, samples: int, seed: int | np.random.Generator) -> Study:
     """Make the linkages of the samples."""
     try:
         from scipy.stats import norm, qmc
@@ -251,7 +261,8 @@ def _make_members(scene: Scene, samples: int, seed: int) -> Study:
         read_numbers(scene),
         dict[str, Any](),
     )
-    drawn = qmc.Sobol(len(scene.tolerances), seed=seed).random_base2(
+    rng = np.random.default_rng(seed)  # a generator is returned as it is
+    drawn = qmc.Sobol(len(scene.tolerances), rng=rng).random_base2(
         max(1, (samples - 1).bit_length())
     )[:samples]
     for tolerance, column in zip(scene.tolerances, drawn.T, strict=True):

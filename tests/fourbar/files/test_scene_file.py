@@ -1,15 +1,18 @@
 """Bad input: exit status 2, one line that names file, key and value, no traceback, nothing written."""
 
+import io
 import os
 import random
 import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import IO, Any
 
 import pytest
 
 from fourbar.cli import status
 from fourbar.errors import BAD_INPUT, FourBarError, InputError
-from fourbar.files import loads, read_text
+from fourbar.files import load, loads, read_text
 from fourbar.files.scene_file import LARGEST_FILE
 
 GOOD = """title = "good"
@@ -216,12 +219,18 @@ def test_a_huge_file_is_not_read(
     )
 
 
-@pytest.mark.posix
-def test_a_pipe_is_not_waited_for(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    os.mkfifo(tmp_path / "pipe")
-    refused(["analyze", str(tmp_path / "pipe")], ["ordinary file"], tmp_path, capsys)
+@pytest.mark.parametrize(
+    "encode", [io.StringIO, lambda text: io.BytesIO(text.encode())]
+)
+def test_an_open_file_is_read(encode: Callable[[str], IO[Any]], tmp_path: Path) -> None:
+    (tmp_path / "scene.toml").write_text(GOOD)
+    assert load(encode(GOOD)) == load(tmp_path / "scene.toml")
+
+
+@pytest.mark.parametrize("content", [b"\xff\xfe\x00", b"x" * (LARGEST_FILE + 1)])
+def test_a_stream_that_holds_no_scene_is_refused(content: bytes) -> None:
+    with pytest.raises(InputError, match="scene file = 'stream'"):
+        load(io.BytesIO(content))
 
 
 @pytest.mark.parametrize("name", ["a\nb\x1b[31m.toml", "n" * 300])

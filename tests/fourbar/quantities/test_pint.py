@@ -49,5 +49,5 @@ def test_what_is_no_length_is_refused(quantity: object, sentence: str) -> None:
 
 def test_hertz_are_no_speed() -> None:
     """pint converts 10 Hz to 10 rad/s, a sixth of the speed that is meant."""
-    with pytest.raises(InputError, match='did you mean "10.0 rev/s"'):
+    with pytest.raises(InputError, match=r'did you mean "10\.0 rev/s"'):
         fourbar.Motion(0.0, 10.0 * ureg.hertz)

@@ -25,14 +25,16 @@ QUASI = 0.02
 """Of a standard deviation from 2048 quasi-random samples: a random sample would scatter by 1/sqrt(2 N) = 0.016."""
 
 
-def spread(*stated: Tolerance, samples: int = 2048, **motion: Any) -> Any:
+def spread(
+    *stated: Tolerance, samples: int = 2048, seed: Any = 0, **motion: Any
+) -> Any:
     linkage = FourBar(0.3, Bar(0.1, 0.2), Bar(0.25, 0.5), Bar(0.22, 0.4))
     case = Scene(
         linkage,
         Motion(**({"theta_2": Sweep(0.3, 6.0, 6), "omega_2": 10.0} | motion)),
         tolerances=stated,
     )
-    return tolerances(case, samples)
+    return tolerances(case, samples, seed)
 
 
 def test_a_number_that_the_torque_is_proportional_to() -> None:
@@ -85,6 +87,22 @@ def test_the_same_seed_gives_the_same_samples_in_blocks_of_any_size(
             np.testing.assert_allclose(
                 expected, piece, rtol=1e-12, atol=1e-12, err_msg=name
             )
+
+
+def test_a_generator_draws_the_samples_of_its_seed() -> None:
+    loose = Tolerance("lengths.input", 5e-5)
+    by_seed = spread(loose, samples=64, seed=7)
+    by_generator = spread(loose, samples=64, seed=np.random.default_rng(7))
+    for name, expected in by_seed.spreads.items():
+        np.testing.assert_array_equal(expected.low, by_generator.spreads[name].low)
+    assert by_generator.seed is None
+    assert "(a generator's)" in repr(by_generator)
+
+
+@pytest.mark.parametrize("seed", [-1, True, 1.5, "1", None])
+def test_what_is_no_seed_is_refused(seed: Any) -> None:
+    with pytest.raises(InputError, match="Generator"):
+        spread(Tolerance("lengths.input", 5e-5), samples=64, seed=seed)
 
 
 def test_members_that_come_apart_are_counted_and_first_order_is_not_trusted_there() -> (
