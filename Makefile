@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
-LONG := kills package machines engines simulators problems benchmark free fuzz accuracy suites
+LONG := kills package oldest prereleases machines engines simulators problems benchmark free fuzz accuracy suites
 
 .PHONY: validate test test-all check long-test $(LONG:%=long-%) models docs setup clean
 
@@ -25,7 +25,7 @@ check: setup
 	$(BIN)/mypy
 
 # everything that `make test-all` samples, in full; each part ends within one hour on two cores. Minutes of two idle cores: kills
-# at most 16, suites 6, package 3; from the processor's time of a share: machines 7 for each kernel that the
+# at most 16, suites 6, package 3, oldest and prereleases 8 each; from the processor's time of a share: machines 7 for each kernel that the
 # processor has, free 15, fuzz 14, accuracy 12; the others below 5
 long-test: $(LONG:%=long-%)
 $(LONG:%=long-%): setup
@@ -34,6 +34,14 @@ long-kills:
 	KILLS=50 $(BIN)/python -m pytest tests/whole/test_kills.py
 long-package:
 	PACKAGE=all $(BIN)/python -m pytest tests/whole/test_package.py
+# every test with the lowest versions that pyproject.toml declares, and with the newest that are not released yet
+long-oldest long-prereleases: long-%:
+	$(BIN)/python -m pip install --quiet uv
+	$(BIN)/uv venv --quiet --clear --python $(BIN)/python build/$*
+	$(BIN)/uv pip install --quiet --python build/$* $(VERSIONS_$*) --editable ".[test]" --editable lab
+	build/$*/bin/python -m pytest -n 2 --dist worksteal
+VERSIONS_oldest := --resolution lowest-direct
+VERSIONS_prereleases := --prerelease allow
 long-machines:
 	MACHINES=all $(BIN)/python -m pytest tests/whole/test_machines.py
 long-engines:
