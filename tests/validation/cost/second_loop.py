@@ -1,0 +1,458 @@
+"""Simulate a four-bar a second time, from MuJoCo's documentation alone, and judge it by Newton's law.
+
+Nothing of `fourbar_validation` is used: not its MJCF, its assembly, its stepping, its reading of forces, or its
+comparison. Of `fourbar` only the description of a scene is read, none of its formulas.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+import fourbar
+
+Array = NDArray[np.float64]
+TURNS_AT_LEAST = 0.1
+"""Part of a bar's greatest speed above which a couple on it is judged: it has poles where the bar stands still."""
+SAMPLES = 720
+"""States of a revolution that are read, at most; every step's where there are fewer steps."""
+
+
+@dataclass(frozen=True)
+class LoopSettings:
+    """Settings of MuJoCo, in the words of its documentation."""
+
+    steps_per_revolution: float
+    integrator: str = "RK4"
+    solref_steps: float | None = None
+    """solref[0] in timesteps; None leaves solref, solimp and the solver as MuJoCo has them."""
+    impedance: float = 0.9999
+    pad: float | None = None
+    weight_factor: float = 1.0
+    """Factor on body_invweight0 after compilation."""
+    flywheel: float = 1e5
+    """Armature of the crank's joint over the linkage's own inertia."""
+
+
+class Loop:
+    """Four bars as plain numbers, and what acts on them."""
+
+    def __init__(self, scene: fourbar.Scene) -> None:
+        self.d, self.a, self.b, self.c = map(float, scene.linkage.lengths)
+        self.theta_1 = float(scene.linkage.ground_angle)
+        bars = (scene.linkage.input, scene.linkage.coupler, scene.linkage.output)
+        self.masses = [float(bar.mass) for bar in bars]
+        self.inertias = []
+        self.centres = []
+        """Mass centres from the bars' first pins, along the bars."""
+        for bar in bars:
+            slender = bar.mass * bar.length**2 / 12.0
+            inertia = slender if bar.inertia is None else bar.inertia
+            distance, angle = bar.centre or (0.5 * bar.length, 0.0)
+            self.inertias.append(float(inertia))
+            self.centres.append(complex(distance * np.exp(1j * angle)))
+        self.gravity = 0j
+        for effect in scene.effects:
+            assert isinstance(effect, fourbar.Gravity), "the second loop knows no other"
+            self.gravity = complex(
+                effect.magnitude * np.exp(1j * effect.angle)
+            )
+        self.loads = scene.loads
+        self.drive: int | fourbar.LinearDrive = scene.drive or scene.drive_bar
+        self.branch = 1.0 if scene.motion.branch == 1 else -1.0
+
+    def assemble(self, theta_2: float) -> tuple[float, float]:
+        """Intersect the circles about A and O4; the branch is the side of the diagonal on which B lies."""
+        pin_A = self.a * np.exp(1j * theta_2)
+        pin_O4 = self.d * np.exp(1j * self.theta_1)
+        diagonal = pin_O4 - pin_A
+        along = (self.b**2 - self.c**2 + abs(diagonal) ** 2) / (2.0 * abs(diagonal))
+        across = math.sqrt(self.b**2 - along**2)
+        direction = diagonal / abs(diagonal)
+        for side in (1.0, -1.0):
+            pin_B = pin_A + direction * (along + 1j * side * across)
+            theta_3 = float(np.angle(pin_B - pin_A))
+            theta_4 = float(np.angle(pin_B - pin_O4))
+            if math.copysign(1.0, math.sin(theta_4 - theta_3)) == self.branch:
+                return theta_3, theta_4
+        raise AssertionError("the circles do not meet")
+
+    def rates(
+        self, angles: Array, omega_2: float, alpha_2: float
+    ) -> tuple[Array, Array]:
+        """Differentiate the closure a e^(i t2) + b e^(i t3) - c e^(i t4) = const. twice."""
+        arms = np.array([self.a, self.b, -self.c]) * np.exp(1j * angles)
+        matrix = np.array(
+            [(1j * arms[1:]).real, (1j * arms[1:]).imag], dtype=np.float64
+        )
+
+        def others(right: complex) -> Array:
+            return np.linalg.solve(matrix, [right.real, right.imag])
+
+        speeds = np.array([omega_2, *others(-1j * arms[0] * omega_2)])
+        centripetal = complex(np.sum(arms * speeds**2))
+        accelerations = np.array(
+            [alpha_2, *others(centripetal - 1j * arms[0] * alpha_2)]
+        )
+        return speeds, accelerations
+
+    def outside_forces(self, angles: Array) -> list[tuple[complex, float]]:
+        """Return force and couple about the first pin of gravity and loads on bars 2, 3 and 4."""
+        sums = []
+        for number in range(3):
+            turned = np.exp(1j * angles[number])
+            force = self.masses[number] * self.gravity
+            couple = _cross(self.centres[number] * turned, force)
+            for load in self.loads:
+                if load.bar != number + 2:
+                    continue
+                push, arm = self.load_vectors(load, number, angles)
+                force += push
+                couple += _cross(arm, push) + float(load.moment)
+            sums.append((force, couple))
+        return sums
+
+    def load_vectors(
+        self, load: fourbar.Load, number: int, angles: Array
+    ) -> tuple[complex, complex]:
+        """Return a load's force in world axes and its arm from the bar's first pin."""
+        turned = np.exp(1j * angles[number])
+        push = _polar(load.force or (0.0, 0.0))
+        if load.frame == "bar":
+            push *= turned
+        place = self.centres[number] + _polar(load.at)
+        return complex(push), complex(place * turned)
+
+    def drive_direction(self, angles: Array) -> tuple[list[complex], list[float]]:
+        """Return the forces and couples about the first pins by which the drive of size one acts on bars 2, 3, 4."""
+        forces, couples = [0j, 0j, 0j], [0.0, 0.0, 0.0]
+        if isinstance(self.drive, int):
+            couples[self.drive - 2] = 1.0
+            return forces, couples
+        ends = []
+        for end in (self.drive.start, self.drive.end):
+            arm = _polar((end.distance, end.angle))
+            if end.bar == 1:
+                ends.append((1, 0j, arm * np.exp(1j * self.theta_1)))
+                continue
+            arm = arm * np.exp(1j * angles[end.bar - 2])
+            ends.append((end.bar, arm, self.first_pins(angles)[end.bar - 2] + arm))
+        line = ends[1][2] - ends[0][2]
+        line /= abs(line)
+        for (bar, arm, _), push in zip(ends, (-line, line), strict=True):
+            if bar > 1:
+                forces[bar - 2] += push
+                couples[bar - 2] += _cross(arm, push)
+        return forces, couples
+
+    def first_pins(self, angles: Array) -> list[complex]:
+        """Return O2, A and O4."""
+        return [
+            0j,
+            self.a * np.exp(1j * angles[0]),
+            self.d * np.exp(1j * self.theta_1),
+        ]
+
+    def right_forces(
+        self, theta_2: float, omega_2: float, alpha_2: float
+    ) -> dict[str, Array]:
+        """Solve Newton's and Euler's laws of the three bars for F12, F32, F43, F14 and the drive."""
+        angles = np.array([theta_2, *self.assemble(theta_2)])
+        speeds, accelerations = self.rates(angles, omega_2, alpha_2)
+        outside = self.outside_forces(angles)
+        pushes, couples = self.drive_direction(angles)
+        arms = np.array([self.a, self.b, self.c]) * np.exp(1j * angles)
+        pin_A_acceleration = arms[0] * (1j * accelerations[0] - speeds[0] ** 2)
+        matrix, right = np.zeros((9, 9)), np.zeros(9)
+        # unknowns: F12 0:2, F32 2:4, F43 4:6, F14 6:8, drive 8; F23 = -F32, F34 = -F43
+        signs = (
+            {0: (1.0, 0j), 2: (1.0, arms[0])},
+            {2: (-1.0, 0j), 4: (1.0, arms[1])},
+            {6: (1.0, 0j), 4: (-1.0, arms[2])},
+        )
+        for number in range(3):
+            centre = self.centres[number] * np.exp(1j * angles[number])
+            base = pin_A_acceleration if number == 1 else 0j
+            of_centre = base + centre * (
+                1j * accelerations[number] - speeds[number] ** 2
+            )
+            row = 3 * number
+            for column, (sign, arm) in signs[number].items():
+                matrix[row, column] = matrix[row + 1, column + 1] = sign
+                matrix[row + 2, column] = -sign * arm.imag
+                matrix[row + 2, column + 1] = sign * arm.real
+            matrix[row, 8] = pushes[number].real
+            matrix[row + 1, 8] = pushes[number].imag
+            matrix[row + 2, 8] = couples[number]
+            inertial = self.masses[number] * of_centre
+            spin = self.inertias[number] * accelerations[number]
+            force, couple = outside[number]
+            right[row] = (inertial - force).real
+            right[row + 1] = (inertial - force).imag
+            right[row + 2] = spin + _cross(centre, inertial) - couple
+        found = np.linalg.solve(matrix, right)
+        return {
+            "F12": found[0:2],
+            "F32": found[2:4],
+            "F43": found[4:6],
+            "F14": found[6:8],
+            "torque": found[8:9],
+        }
+
+    def write(self, settings: LoopSettings, timestep: float, wheel: float) -> str:
+        """Write the MJCF: crank and coupler in series, the rocker by itself, `connect` between two sites."""
+        lengths = (self.a, self.b, self.c)
+
+        def bar(number: int) -> str:
+            centre = self.centres[number]
+            inertia = " ".join([repr(self.inertias[number])] * 3)
+            armature = f' armature="{wheel!r}"' if number == 0 else ""
+            return (
+                f'<inertial pos="{centre.real!r} {centre.imag!r} 0" '
+                f'mass="{self.masses[number]!r}" diaginertia="{inertia}"/>'
+                f'<joint name="pin{number}" axis="0 0 1"{armature}/>'
+            )
+
+        def closing_site(number: int) -> str:
+            site = f'<site name="B{number}" pos="{lengths[number]!r} 0 0"/>'
+            if settings.pad is None:
+                return site
+            place = settings.pad * lengths[number]
+            return (
+                f'<body><inertial pos="{place!r} 0 0" mass="0" diaginertia="0 0 0"/>'
+                f"{site}</body>"
+            )
+
+        softness = option = ""
+        if settings.solref_steps is not None:
+            d = settings.impedance
+            softness = (
+                f'solref="{settings.solref_steps * timestep!r} 1" '
+                f'solimp="{d!r} {d!r} 0.001 0.5 2"'
+            )
+            option = 'solver="Newton" tolerance="0" iterations="10"'
+        gravity = f"{self.gravity.real!r} {self.gravity.imag!r} 0"
+        ground = _polar((self.d, self.theta_1))
+        sites: list[list[str]] = [[], [], []]
+        motors = []
+        for index, load in enumerate(self.loads):
+            number = load.bar - 2
+            place = self.centres[number] + _polar(load.at)
+            sites[number].append(
+                f'<site name="load{index}" pos="{place.real!r} {place.imag!r} 0"/>'
+            )
+            push = _polar(load.force or (0.0, 0.0))
+            frame = "" if load.frame == "bar" else 'refsite="world"'
+            motors.append(
+                f'<general site="load{index}" {frame} gaintype="fixed" gainprm="0" '
+                f'biastype="affine" biasprm="1 0 0" gear="{push.real!r} {push.imag!r} '
+                f'0 0 0 {float(load.moment)!r}"/>'
+            )
+        return f"""
+        <mujoco>
+          <option timestep="{timestep!r}" integrator="{settings.integrator}"
+                  gravity="{gravity}" {option}/>
+          <worldbody>
+            <site name="world"/>
+            <body name="bar0">{bar(0)}{"".join(sites[0])}
+              <body name="bar1" pos="{self.a!r} 0 0">
+                {bar(1)}{"".join(sites[1])}{closing_site(1)}
+              </body>
+            </body>
+            <body name="bar2" pos="{ground.real!r} {ground.imag!r} 0">
+              {bar(2)}{"".join(sites[2])}{closing_site(2)}
+            </body>
+          </worldbody>
+          <equality><connect site1="B2" site2="B1" {softness}/></equality>
+          <actuator>{"".join(motors)}</actuator>
+        </mujoco>"""
+
+
+@dataclass(frozen=True)
+class Sample:
+    """What was read of one state."""
+
+    theta_2: float
+    omega_2: float
+    alpha_2: float
+    forces: dict[str, Array]
+
+
+class Simulation:
+    """A crank with a heavy flywheel carries the loop through its sweep."""
+
+    def __init__(self, scene: fourbar.Scene, settings: LoopSettings) -> None:
+        self.loop = Loop(scene)
+        self.settings = settings
+        self.sweep = np.asarray(fourbar.solve(scene, "position").theta_2)
+        self.omega = float(scene.motion.omega_2)  # type: ignore[arg-type]
+        assert float(scene.motion.alpha_2) == 0.0, "the flywheel keeps its speed"
+        self.timestep = 2.0 * math.pi / settings.steps_per_revolution / abs(self.omega)
+        size = self.loop.a + self.loop.b + self.loop.c
+        own = sum(self.loop.inertias) + sum(self.loop.masses) * size**2
+        self.wheel = settings.flywheel * own
+        text = self.loop.write(settings, self.timestep, self.wheel)
+        self.model = mujoco.MjModel.from_xml_string(text)
+        self.model.body_invweight0[:] *= settings.weight_factor
+        self.data = mujoco.MjData(self.model)
+
+    def run(self, settle: bool = False) -> list[Sample]:
+        """Step through the sweep, one turn ahead of it to settle, and read states on the way."""
+        first = self.sweep[0] if self.omega > 0.0 else self.sweep[-1]
+        span = float(np.ptp(self.sweep))
+        sign = math.copysign(1.0, self.omega)
+        start = float(first) - (2.0 * math.pi * sign if settle else 0.0)
+        angles = np.array([start, *self.loop.assemble(start)])
+        speeds, _ = self.loop.rates(angles, self.omega, 0.0)
+        self.data.qpos[:] = angles[0], angles[1] - angles[0], angles[2]
+        self.data.qvel[:] = speeds[0], speeds[1] - speeds[0], speeds[2]
+        n = self.settings.steps_per_revolution
+        steps = math.floor((span / (2.0 * math.pi) + (1.0 if settle else 0.0)) * n)
+        stride = max(1, round(n / SAMPLES))
+        samples = []
+        for step in range(steps + 1):
+            passed = step >= n if settle else True
+            if passed and step % stride == 0:
+                samples.append(self.read())
+            mujoco.mj_step(self.model, self.data)
+        return samples
+
+    def read(self) -> Sample:
+        """Read one state: the drive is the one that gives the crank the acceleration which the flywheel gives it."""
+        mujoco.mj_forward(self.model, self.data)
+        alpha_2 = float(self.data.qacc[0])
+        angles = np.array(
+            [
+                self.data.qpos[0],
+                self.data.qpos[0] + self.data.qpos[1],
+                self.data.qpos[2],
+            ]
+        )
+        speeds = np.array(
+            [
+                self.data.qvel[0],
+                self.data.qvel[0] + self.data.qvel[1],
+                self.data.qvel[2],
+            ]
+        )
+        unit = self.generalized_drive(angles)
+        answers = []
+        wheel_torque = np.array([self.wheel * alpha_2, 0.0, 0.0])
+        scale = self.drive_scale(unit)
+        probe = mujoco.MjData(self.model)
+        for amount in (0.0, scale):
+            probe.qpos[:], probe.qvel[:] = self.data.qpos, self.data.qvel
+            probe.qfrc_applied[:] = wheel_torque + amount * unit
+            mujoco.mj_forward(self.model, probe)
+            answers.append((probe.qacc.copy(), probe.efc_force[:2].copy()))
+        (rest, rest_closing), (pushed, pushed_closing) = answers
+        part = (alpha_2 - rest[0]) / (pushed[0] - rest[0])
+        acceleration = rest + part * (pushed - rest)
+        closing = rest_closing + part * (pushed_closing - rest_closing)
+        turned = np.array(
+            [acceleration[0], acceleration[0] + acceleration[1], acceleration[2]]
+        )
+        drive = part * scale
+        return Sample(
+            float(self.data.qpos[0]),
+            float(self.data.qvel[0]),
+            alpha_2,
+            self.balance(angles, speeds, turned, closing, drive),
+        )
+
+    def generalized_drive(self, angles: Array) -> Array:
+        """Return the forces on the three joints by which the drive of size one acts, by virtual work."""
+        pushes, couples = self.loop.drive_direction(angles)
+        crank = self.loop.a * np.exp(1j * angles[0])
+        # bar 3 turns with both joints and is carried by A; a force on it acts on the crank through A
+        on_crank = couples[0] + couples[1] + _cross(crank, pushes[1])
+        return np.array([on_crank, couples[1], couples[2]])
+
+    def drive_scale(self, unit: Array) -> float:
+        """Return an amount that changes the crank's acceleration well above round-off."""
+        return self.wheel / float(np.abs(unit).max())
+
+    def balance(
+        self,
+        angles: Array,
+        speeds: Array,
+        accelerations: Array,
+        closing: Array,
+        drive: float,
+    ) -> dict[str, Array]:
+        """Find each pin's force from Newton's law of its bar."""
+        loop = self.loop
+        outside = loop.outside_forces(angles)
+        pushes, _ = loop.drive_direction(angles)
+        inertial = []
+        for number in range(3):
+            centre = loop.centres[number] * np.exp(1j * angles[number])
+            of_centre = centre * (1j * accelerations[number] - speeds[number] ** 2)
+            if number == 1:
+                crank = loop.a * np.exp(1j * angles[0])
+                of_centre += crank * (1j * accelerations[0] - speeds[0] ** 2)
+            inertial.append(loop.masses[number] * of_centre)
+        needed = [
+            inertial[number] - outside[number][0] - drive * pushes[number]
+            for number in range(3)
+        ]
+        force_34 = complex(closing[0], closing[1])
+        force_14 = needed[2] - force_34
+        force_23 = needed[1] + force_34
+        force_12 = needed[0] + force_23
+        forces = {
+            "F12": force_12,
+            "F32": -force_23,
+            "F43": -force_34,
+            "F14": force_14,
+        }
+        arrays = {
+            name: np.array([force.real, force.imag]) for name, force in forces.items()
+        }
+        return {**arrays, "torque": np.array([drive])}
+
+
+def measure(
+    scene: fourbar.Scene, settings: LoopSettings, settle: bool = False
+) -> dict[str, float]:
+    """Return the worst error of the drive and of each pin's force over its largest value in the sweep."""
+    simulation = Simulation(scene, settings)
+    samples = simulation.run(settle)
+    loop = simulation.loop
+    right = [loop.right_forces(s.theta_2, s.omega_2, s.alpha_2) for s in samples]
+    turning = list(_mark_turning(loop, samples))
+    errors = {}
+    for name in ("torque", "F12", "F32", "F43", "F14"):
+        sizes = [float(np.linalg.norm(row[name])) for row in right]
+        misses = [
+            float(np.linalg.norm(sample.forces[name] - row[name]))
+            for sample, row in zip(samples, right, strict=True)
+        ]
+        kept = turning if name == "torque" else [True] * len(samples)
+        worst = max(miss for miss, keep in zip(misses, kept, strict=True) if keep)
+        errors[name] = worst / max(sizes)
+    return errors
+
+
+def _mark_turning(loop: Loop, samples: list[Sample]) -> Iterator[bool]:
+    if loop.drive not in (3, 4):
+        yield from [True] * len(samples)
+        return
+    speeds = []
+    for sample in samples:
+        angles = np.array([sample.theta_2, *loop.assemble(sample.theta_2)])
+        rates, _ = loop.rates(angles, sample.omega_2, sample.alpha_2)
+        speeds.append(abs(float(rates[loop.drive - 2])))
+    for speed in speeds:
+        yield speed > TURNS_AT_LEAST * max(speeds)
+
+
+def _polar(pair: tuple[float, float]) -> complex:
+    return complex(pair[0] * np.exp(1j * pair[1]))
+
+
+def _cross(arm: complex, force: complex) -> float:
+    return float((arm.conjugate() * force).imag)
