@@ -52,7 +52,7 @@ def time_relative_costs(setup: TrialSetup) -> dict[tuple[str, bool], float]:
     """Time a step by integrator and pads, relative to RK4 with pads: medians of interleaved rounds."""
     kinds = [("RK4", True), ("RK4", False), *((name, False) for name in FIRST_ORDER)]
     clocks = {
-        kind: setup.seconds_per_step(change_kind(kind, make_settings(628.0, 20.0)))
+        kind: setup.make_clocks(change_kind(kind, make_settings(628.0, 20.0)))[0]
         for kind in kinds
     }
     times = time_in_turns(
@@ -183,7 +183,7 @@ def measure_case(
         dense, TrialSetup(dense, command(dense)).try_out(advice.best.settings)
     ).worst
     cheapest = find_cheapest(TrialSetup(searched, command(searched)), required, costs)
-    cost = float(advice.best.steps)
+    cost = advice.best.steps * advice.best.step_cost
     return AdviceCase(
         index,
         required,

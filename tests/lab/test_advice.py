@@ -30,9 +30,7 @@ def test_the_search_knows_when_nothing_serves() -> None:
     setup = TrialSetup(scene, command(scene))
     assert find_cheapest(setup, 1e-3, {("RK4", True): 1.0}) is not None
     trials: list[object] = []
-    setup.try_out = lambda settings, build=None: (
-        trials.append(settings) or hopeless(scene)
-    )  # type: ignore[method-assign,func-returns-value]
+    setup.try_out = lambda settings: trials.append(settings) or hopeless(scene)  # type: ignore[method-assign,func-returns-value]
     assert find_cheapest(setup, 1e-3, {("RK4", True): 1.0}) is None and len(trials) > 50
 
 

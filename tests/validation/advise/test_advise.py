@@ -42,11 +42,45 @@ def test_figures_of_the_crank_rocker(omega: float, required: float, most: int) -
         for attempt in advice.attempts
         if attempt.errors.worst <= advise.MARGIN * required
     ]
-    assert (
-        advice.best.steps
-        == min(attempt.steps for attempt in serves)
-        < max(attempt.steps for attempt in serves)
-    )
+    assert advice.best in serves
+    work = [attempt.steps * attempt.step_cost for attempt in serves]
+    # readings count too, so that the fewest steps alone need not be the cheapest
+    assert advice.best.steps * advice.best.step_cost <= 1.2 * min(work) < max(work)
+
+
+def test_the_solver_is_searched_too() -> None:
+    """A solver that stops by itself takes a third of a step less, at the same error and speed."""
+    scene, required = turning(10.0, 72), 1e-4
+    setup = TrialSetup(scene, advise.choose_positions(scene))
+    advice = advise.advise(scene, required, setup)
+    settings = advice.best.settings
+    assert settings != replace(settings, tolerance=0.0, iterations=10)
+    assert advice.best.step_cost < 0.9
+    # the speed ripples by less than the error that is required
+    assert settings.flywheel * required >= 1.0
+    tight = replace(settings, tolerance=0.0, iterations=10, flywheel=1e5)
+    error = matters.judge_trial(scene, setup.try_out(tight)).worst
+    assert error == pytest.approx(advice.best.errors.worst, rel=0.5)
+
+
+def test_a_drive_elsewhere_is_judged_between_the_steps_too() -> None:
+    """Fourteen steps a turn hold the torque of bar 4 within 0.7 % where they are read, and miss 9 % between."""
+    scene = fourbar.load(MODELS / "drag_link.toml")
+    setup = TrialSetup(scene, advise.choose_positions(scene))
+    trial = setup.try_out(advise.make_settings(14.0, 3.0))
+    at_steps = compute_errors(scene, trial.at, trial.quantities).worst
+    assert at_steps < 0.01
+    assert matters.judge_trial(scene, trial).worst > 0.05
+
+
+def test_no_curve_is_drawn_through_a_pole() -> None:
+    """On the crank-rocker the torque of bar 4 has poles where the rocker reverses."""
+    scene = replace(turning(), drive_bar=4)
+    setup = TrialSetup(scene, advise.choose_positions(scene))
+    trial = setup.try_out(advise.make_settings(160.0, 20.0))
+    stretches = matters.split_at_poles(scene, trial.at)
+    assert len(stretches) == 3
+    assert matters.judge_trial(scene, trial).worst < 0.1
 
 
 @pytest.mark.slow
@@ -220,7 +254,7 @@ def test_what_matters_for_a_scene_is_measured_and_stated_with_its_reason() -> No
         fourbar.FourBar(0.11, *bars), motion, effects=(fourbar.Gravity(),)
     )
     for scene, setting, why in ((hood, "the stiffness by pads", "lighter of coupler and output"),
-                                (turning(10.0, 36), "the timestep", "fourth power")):  # fmt: skip
+                                (turning(10.0, 36), "the timestep", "at the steps themselves")):  # fmt: skip
         setup = TrialSetup(scene, advise.choose_positions(scene))
         first, *others = influences = matters.measure_influences(
             scene, setup, advise.make_settings(40.0, 12.0)

@@ -116,7 +116,7 @@ def test_a_study_of_cost_next_to_the_report_is_part_of_it(tmp_path: Path) -> Non
     folder = tmp_path / "cost" / "demo"
     folder.mkdir(parents=True)
     (folder / "cost.csv").touch()
-    (folder / "sources.svg").write_text("<svg onload='alert(1)'/>")
+    (folder / "work-precision-torque.svg").write_text("<svg onload='alert(1)'/>")
     (folder / "work-precision-force.svg").write_bytes(bytes(LARGEST + 1))
     _, text = report([demo(draw=False)], sections=collect_sections(None, tmp_path))
     assert "The study of demo" in text and 'href="cost/demo/cost.md"' in text

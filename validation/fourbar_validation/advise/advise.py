@@ -4,8 +4,9 @@ The laws of the study (`guess`) say where to look, and short runs of the scene i
 the softness of the closure plays no part above 1e-9 (1e-6 in a slow linkage), so that tc may be long.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import click
@@ -25,10 +26,12 @@ from fourbar_validation.advise.matters import (
 from fourbar_validation.advise.worst_errors import WorstErrors
 from fourbar_validation.engines.mujoco.trial import (
     FEWEST_STEPS,
+    FLYWHEEL,
     LONGEST,
     ORDER,
     SHORTEST,
     TrialSetup,
+    describe_settings,
     guess,
     make_settings,
 )
@@ -45,6 +48,58 @@ MOST_STEPS = 16_000
 """Most steps of one run, a fifth of a second. An error that needs more steps counts as not reachable."""
 LEAST_GAIN = 0.8
 """More steps that leave the error above this part of what it was have met a floor."""
+ROUNDS, TIMED_STEPS, TIMED_READINGS = 5, 200, 30
+"""Timings of each kind of step, and what is timed at once."""
+CHEAPER = 0.97
+"""A kind of step is taken for cheaper below this part of the work: less is the noise of its timing."""
+Kind = Callable[[Settings], Settings]
+"""Function that changes what a step costs: solver, flywheel, integrator, pads."""
+
+
+def _solve_once(settings: Settings) -> Settings:
+    """Stop after one iteration of Newton's method."""
+    return replace(settings, iterations=1)
+
+
+def _stop_by_tolerance(tolerance: float, settings: Settings) -> Settings:
+    """Let the solver stop by itself. MuJoCo divides the tolerance by the flywheel's inertia."""
+    return replace(settings, tolerance=tolerance, iterations=100)
+
+
+def _lighten(flywheel: float, settings: Settings) -> Settings:
+    """Leave the tolerance to MuJoCo, which is tight enough beside a light flywheel."""
+    return replace(_stop_by_tolerance(1e-8, settings), flywheel=flywheel)
+
+
+def _leave_out_pads(kind: Kind, settings: Settings) -> Settings:
+    return replace(kind(settings), pad=None)
+
+
+def _integrate(integrator: str, settings: Settings) -> Settings:
+    """Integrate by first order, with a closure as stiff as it carries."""
+    return replace(
+        settings,
+        integrator=integrator,
+        iterations=1,
+        time_constant_steps=SHORTEST,
+    )
+
+
+FIRST_ORDER = ("Euler", "implicitfast")
+KINDS: dict[str, Kind] = {
+    **{
+        f"tolerance {tolerance:g}": partial(_stop_by_tolerance, tolerance)
+        for tolerance in (1e-8, 1e-10, 1e-12, 1e-14)
+    },
+    **{
+        f"flywheel {flywheel:g}": partial(_lighten, flywheel)
+        for flywheel in (1e2, 1e3, 1e4)
+    },
+    "one iteration": _solve_once,
+    "no pads": partial(_leave_out_pads, partial(_stop_by_tolerance, 1e-12)),
+    **{name: partial(_integrate, name) for name in FIRST_ORDER},
+}
+"""What is tried beside RK4 with tolerance 0, ten iterations and pads."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,8 +108,17 @@ class Attempt:
 
     settings: Settings
     steps: int
+    readings: int
+    """States that are read: one a position, or one a step where these are fewer."""
     errors: WorstErrors
     steps_per_revolution: float
+    step_cost: float = 1.0
+    """CPU time of a step, in steps of RK4 with tolerance 0, ten iterations and pads."""
+
+    @property
+    def description(self) -> str:
+        """Return the settings in one line."""
+        return describe_settings(self.settings, self.steps_per_revolution)
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,17 +145,17 @@ class Advice:
     @property
     def reason(self) -> str:
         """Write the attempt in one line for the reader."""
-        s, e = self.best.settings, self.best.errors
-        errors = f"torque {e.torque:.1e}, worst pin force {e.force:.1e}"
-        setting = (
-            f"RK4, {self.best.steps} steps ({self.best.steps_per_revolution:.0f} per revolution), "
-            f"tc = {s.time_constant_steps:.3g} steps, pads {s.pad}, tolerance 0, flywheel {s.flywheel:g}"
+        e = self.best.errors
+        errors = (
+            f"Errors at the steps and between them: torque {e.torque:.1e}, "
+            f"worst pin force {e.force:.1e}"
         )
+        setting = f"{self.best.description} ({self.best.steps} steps in all)"
         if self.reached:
-            return f"{setting}. Errors: {errors}; required: {self.required:g}."
+            return f"{setting}. {errors}; required: {self.required:g}."
         return (
             f"No setting of plain MJCF within {MOST_STEPS} steps was found to reach {self.required:g}. "
-            f"The best was {setting}. Errors: {errors}. "
+            f"The best was {setting}. {errors}. "
             "The formulas, and inverse dynamics of either engine with loop multipliers, reach round-off."
         )
 
@@ -128,26 +192,77 @@ class _CheapestSearch:
     def __init__(self, scene: Scene, error: float, setup: TrialSetup) -> None:
         self.scene, self.error, self.setup = scene, error, setup
         self.attempts: list[Attempt] = []
+        self.reading_cost = 0.0
+        """CPU time of a reading, in steps as those of `Attempt.step_cost`."""
 
     def advice(self) -> Advice:
-        """Find the cheapest that serves, by bisection in steps, then with shorter and longer time constants."""
+        """Find the cheapest that serves.
+
+        By bisection in steps, then with shorter and longer time constants, then by cheaper
+        kinds of step.
+        """
         first, tc = guess(self.error)
         self._bisect(tc, first)
         for factor in (0.5, 2.0, 4.0):
             constant = min(max(tc * factor, SHORTEST), LONGEST)
             if constant != tc:
                 self._polish(constant)
-        served = self._is_served()
-        best = (
-            min(served, key=lambda a: a.steps)
-            if served
-            else _find_nearest(self.attempts)
-        )
+        if self._list_served():
+            self._try_kinds()
+        served = self._list_served()
+        best = min(served, key=self._work) if served else _find_nearest(self.attempts)
         return Advice(self.error, best, tuple(self.attempts), bool(served))
+
+    def _work(self, attempt: Attempt) -> float:
+        """Return the CPU time of a run with its readings, in steps."""
+        return attempt.steps * attempt.step_cost + attempt.readings * self.reading_cost
+
+    def _try_kinds(self) -> None:
+        """Try each kind of step with as many steps as would be cheaper, and with fewer if they serve."""
+        start = min(self._list_served(), key=lambda attempt: attempt.steps)
+        settings = start.settings
+        costs = self._time_kinds(settings)
+        for name in sorted(KINDS, key=costs.__getitem__):
+            cheapest = min(map(self._work, self._list_served()))
+            left = CHEAPER * cheapest - start.readings * self.reading_cost
+            part = left / (costs[name] * start.steps)
+            # with fewer steps than positions each step has a reading
+            both = costs[name] + self.reading_cost
+            part = max(part, CHEAPER * cheapest / (both * start.steps))
+            if name not in FIRST_ORDER:
+                # of the same order: what serves needs no fewer steps by much
+                part = min(part, 1.0)
+            n = settings.steps_per_revolution * part
+            tc = settings.time_constant_steps
+            if n < FEWEST_STEPS or part < 1.0 / CLOSE_ENOUGH:
+                continue
+            kind, cost = KINDS[name], costs[name]
+            flywheel = kind(settings).flywheel
+            if flywheel < FLYWHEEL and flywheel * self.error < 1.0:
+                continue  # the speed ripples by the inverse of the flywheel
+            if self._serves(self._try(n, tc, kind, cost)):
+                self._bisect(tc, n / CLOSE_ENOUGH, serves=n, kind=kind, cost=cost)
+
+    def _time_kinds(self, settings: Settings) -> dict[str, float]:
+        """Time a step of each kind, and a reading, in steps of the settings; the least of interleaved rounds."""
+        variants = {
+            "": settings,
+            **{name: kind(settings) for name, kind in KINDS.items()},
+        }
+        clocks = {name: self.setup.make_clocks(s) for name, s in variants.items()}
+        times: dict[str, list[float]] = {name: [] for name in variants}
+        readings = []
+        for _ in range(ROUNDS):
+            for name, (time_steps, _) in clocks.items():
+                times[name].append(time_steps(TIMED_STEPS) / TIMED_STEPS)
+            readings.append(clocks[""][1](TIMED_READINGS) / TIMED_READINGS)
+        base = min(times.pop(""))
+        self.reading_cost = min(readings) / base
+        return {name: min(values) / base for name, values in times.items()}
 
     def _polish(self, tc: float) -> None:
         """Try whether another time constant serves with fewer steps, or serves at all."""
-        served = self._is_served()
+        served = self._list_served()
         if not served:
             self._bisect(tc, _find_nearest(self.attempts).settings.steps_per_revolution)
             return
@@ -156,12 +271,19 @@ class _CheapestSearch:
         if n >= FEWEST_STEPS and self._serves(self._try(n, tc)):
             self._bisect(tc, n / CLOSE_ENOUGH, serves=n)
 
-    def _bisect(self, tc: float, n: float, serves: float | None = None) -> None:
+    def _bisect(
+        self,
+        tc: float,
+        n: float,
+        serves: float | None = None,
+        kind: Kind | None = None,
+        cost: float = 1.0,
+    ) -> None:
         """Narrow down the least steps per revolution that serve with one time constant."""
         fails: float | None = None
         last: Attempt | None = None
         for _ in range(MOST_TRIALS):
-            attempt = self._try(n, tc)
+            attempt = self._try(n, tc, kind, cost)
             ratio = attempt.errors.worst / (MARGIN * self.error)
             step = ratio ** (1.0 / ORDER) if ratio < float("inf") else 2.0
             if self._serves(attempt):
@@ -198,20 +320,27 @@ class _CheapestSearch:
     def _serves(self, attempt: Attempt) -> bool:
         return attempt.errors.worst <= MARGIN * self.error
 
-    def _is_served(self) -> list[Attempt]:
+    def _list_served(self) -> list[Attempt]:
         return [attempt for attempt in self.attempts if self._serves(attempt)]
 
-    def _try(self, n: float, tc: float) -> Attempt:
+    def _try(
+        self, n: float, tc: float, kind: Kind | None = None, cost: float = 1.0
+    ) -> Attempt:
         settings = make_settings(n, tc)
+        if kind is not None:
+            settings = kind(settings)
         steps = self.setup.steps(settings)
         if steps > MOST_STEPS:
-            settings = make_settings(n * MOST_STEPS / steps, tc)
+            fewer = settings.steps_per_revolution * MOST_STEPS / steps
+            settings = replace(settings, steps_per_revolution=fewer)
         trial = self.setup.try_out(settings)
         attempt = Attempt(
             settings,
             max(trial.steps, 1),
+            trial.readings,
             judge_trial(self.scene, trial),
             trial.steps_per_revolution,
+            cost,
         )
         self.attempts.append(attempt)
         return attempt

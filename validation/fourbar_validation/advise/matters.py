@@ -14,8 +14,15 @@ from fourbar_validation.advise.worst_errors import (
     NO_ANSWER,
     WorstErrors,
     compute_errors,
+    mark_far_from_poles,
 )
-from fourbar_validation.engines.mujoco.trial import LONGEST, SHORTEST, Trial, TrialSetup
+from fourbar_validation.compare.answer import Array
+from fourbar_validation.engines.mujoco.trial import (
+    LONGEST,
+    SHORTEST,
+    Trial,
+    TrialSetup,
+)
 
 MATTERS = 2.0
 """A setting that a change of a factor of two, or its loss, makes the error grow by less does not matter."""
@@ -25,6 +32,10 @@ IN_LINE = 0.3
 """|sin(theta_4 - theta_3)| below which bars 3 and 4 speed up so much that the timestep feels it."""
 MUJOCO_TOLERANCE = 1e-8
 """MuJoCo's own default."""
+
+
+Reason = Callable[[TrialSetup, float, float], str]
+"""Function from the setup, the growth of the error, and that of the error at the steps alone, to its cause."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,15 +62,9 @@ def judge_trial(scene: Scene, trial: Trial) -> WorstErrors:
     if trial.broken:
         return NO_ANSWER
     errors = [compute_errors(scene, trial.at, trial.quantities)]
-    if (
-        scene.drive_bar == 2
-    ):  # the torque of another bar has poles, through which no curve can be drawn
-        errors += [
-            between
-            for segment in trial.segments
-            for between in compute_errors_between(scene, trial, *segment)
-        ]
-    return WorstErrors(*map(max, *errors)) if len(errors) > 1 else errors[0]
+    for samples, steps in trial.segments:
+        errors += compute_errors_between(scene, trial, samples, steps)
+    return WorstErrors(*map(max, zip(*errors, strict=True)))
 
 
 def compute_errors_between(
@@ -67,7 +72,9 @@ def compute_errors_between(
 ) -> Iterator[WorstErrors]:
     """Compute errors amid the steps of a segment, where they are fewer than its positions: by a spline.
 
-    A largest force that lies between two steps is not seen at either of them.
+    A largest force that lies between two steps is not seen at either of them. A drive on bar 3
+    or 4, and a cylinder, has poles, through which no curve can be drawn: each stretch between
+    them has a spline of its own.
     """
     theta_2, first = np.unique(trial.at.theta_2[samples], return_index=True)
     n = samples.stop - samples.start
@@ -75,8 +82,6 @@ def compute_errors_between(
         len(theta_2) <= steps or not np.isfinite(theta_2).all()
     ):  # each gap has a position of its own
         return
-    from scipy.interpolate import make_interp_spline
-
     made = {
         "omega_2": trial.at.omega_2,
         "alpha_2": trial.at.alpha_2,
@@ -88,30 +93,81 @@ def compute_errors_between(
     ):
         yield NO_ANSWER
         return
+    branch = trial.at.branch[samples][first]
+    at_steps = Command(theta_2, branch, read["omega_2"], read["alpha_2"])
     places = np.linspace(theta_2[0], theta_2[-1], 2 * n)
+    for stretch in split_at_poles(scene, at_steps):
+        inside = (theta_2[stretch.start] <= places) & (
+            places <= theta_2[stretch.stop - 1]
+        )
+        if not inside.any():
+            continue
+        yield _compute_stretch(
+            scene,
+            at_steps.branch[0],
+            theta_2[stretch],
+            {name: values[stretch] for name, values in read.items()},
+            places[inside],
+        )
+
+
+def split_at_poles(scene: Scene, command: Command) -> list[slice]:
+    """Split positions into stretches of two or more in which the drive is far from a pole."""
+    far = np.flatnonzero(mark_far_from_poles(scene, command))
+    stretches = np.split(far, np.flatnonzero(np.diff(far) > 1) + 1)
+    return [slice(rows[0], rows[-1] + 1) for rows in stretches if len(rows) > 1]
+
+
+def _compute_stretch(
+    scene: Scene,
+    branch: int,
+    theta_2: Array,
+    read: dict[str, Array],
+    places: Array,
+) -> WorstErrors:
+    """Compute errors at some places of the splines through what was read at the steps."""
+    from scipy.interpolate import make_interp_spline
+
     degree = min(SPLINE, len(theta_2) - 1)
     curves = {
         name: make_interp_spline(theta_2, values, degree)(places)
         for name, values in read.items()
     }
-    branch = np.full(places.shape, trial.at.branch[samples][0], dtype=np.int8)
-    command = Command(places, branch, curves.pop("omega_2"), curves.pop("alpha_2"))
-    yield compute_errors(scene, command, curves)
+    command = Command(
+        places,
+        np.full(places.shape, branch, dtype=np.int8),
+        curves.pop("omega_2"),
+        curves.pop("alpha_2"),
+    )
+    return compute_errors(scene, command, curves)
 
 
 def measure_influences(
     scene: Scene, setup: TrialSetup, settings: Settings
 ) -> list[SettingInfluence]:
     """List every setting changed alone, the one that matters most first."""
-    before = judge_trial(scene, setup.try_out(settings)).worst
+    before, before_at_steps = _measure(scene, setup, settings)
     influences = []
     for name, changed, varied, why in _describe_changes(scene, settings):
-        worst = judge_trial(scene, setup.try_out(varied)).worst
+        worst, at_steps = _measure(scene, setup, varied)
         times = worst / before if before > 0.0 and math.isfinite(before) else math.nan
-        influences.append(SettingInfluence(name, changed, worst, times, why(setup)))
+        growth = at_steps / before_at_steps if before_at_steps > 0.0 else math.nan
+        reason = why(setup, times, growth)
+        influences.append(SettingInfluence(name, changed, worst, times, reason))
     return sorted(
         influences, key=lambda one: -one.times if one.times == one.times else math.inf
     )
+
+
+def _measure(
+    scene: Scene, setup: TrialSetup, settings: Settings
+) -> tuple[float, float]:
+    """Return the worst error at the steps and between them, and that at the steps alone."""
+    trial = setup.try_out(settings)
+    if trial.broken:
+        return math.inf, math.inf
+    at_steps = compute_errors(scene, trial.at, trial.quantities)
+    return judge_trial(scene, trial).worst, at_steps.worst
 
 
 def write_sentence(influences: list[SettingInfluence]) -> str:
@@ -123,7 +179,7 @@ def write_sentence(influences: list[SettingInfluence]) -> str:
 
 def _describe_changes(
     scene: Scene, settings: Settings
-) -> Iterator[tuple[str, str, Settings, Callable[[TrialSetup], str]]]:
+) -> Iterator[tuple[str, str, Settings, Reason]]:
     """Say what is changed to what, and what a growth of the error would come from."""
     steps, tc = settings.steps_per_revolution, settings.time_constant_steps
     window = max(settings.steps_per_window // 2, 1)
@@ -137,7 +193,7 @@ def _describe_changes(
             "the closure's time constant",
             "half as long",
             stiff,
-            lambda _: (
+            lambda *_: (
                 "a closure of few steps is a spring that RK4 follows badly, in proportion to (h/tc)^4"
             ),
         )
@@ -147,14 +203,14 @@ def _describe_changes(
             "the closure's time constant",
             "twice as long",
             slow,
-            lambda _: _find_yielding(scene, "a slow closure"),
+            lambda *_: _find_yielding(scene, "a slow closure"),
         )
     if settings.pad is not None:
         yield (
             "the stiffness by pads",
             "left out",
             replace(settings, pad=None),
-            lambda _: _find_yielding(scene, "without pads the closure"),
+            lambda *_: _find_yielding(scene, "without pads the closure"),
         )
     if settings.tolerance == 0.0:
         loose = replace(settings, tolerance=MUJOCO_TOLERANCE)
@@ -162,13 +218,14 @@ def _describe_changes(
             "the solver's tolerance",
             f"at MuJoCo's own {MUJOCO_TOLERANCE:g}",
             loose,
-            lambda _: (
+            lambda *_: (
                 "MuJoCo divides it by the inertia of the flywheel, next to which the linkage is small"
             ),
         )
 
 
-def _explain_timestep(setup: TrialSetup) -> str:
+def _explain_timestep(setup: TrialSetup, times: float, growth: float) -> str:
+    """Say what of the growth comes from the steps, and what from the curve drawn between them."""
     motion = solve(setup.scene, "position", at=setup.command)
     sines = np.abs(motion.sin_mu)
     nearest = int(np.nanargmin(sines))
@@ -178,7 +235,12 @@ def _explain_timestep(setup: TrialSetup) -> str:
             for x in (math.asin(sines[nearest]), float(setup.command.theta_2[nearest]))
         )
         return f"bars 3 and 4 come within {near:.2g} deg of one line at theta_2 = {angle:.4g} deg and speed up there"
-    return "the error of RK4 goes as the fourth power of it"
+    if times > MATTERS * growth:
+        return (
+            f"between fewer steps a curve misses more: at the steps themselves the "
+            f"error grows {growth:.2g} times"
+        )
+    return f"the error of the steps themselves grows {growth:.2g} times"
 
 
 def _find_yielding(scene: Scene, what: str) -> str:

@@ -5,20 +5,24 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fourbar.quantities import OK
 from fourbar.scene import Command, Scene
+from fourbar.solution import Solution
 from fourbar.solve import solve
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.compare.compare import mark_turning
 from fourbar_validation.compare.scales import scale_of
 from fourbar_validation.compare.tolerance import find_error
+from fourbar_validation.engines.description import list_speeds, name_driving
 
 
 class WorstErrors(NamedTuple):
     """Worst relative errors over the positions; inf where there is no answer."""
 
     torque: float
+    """Of the drive: its torque, or the force of a cylinder."""
     F12: float
     F32: float
     F43: float
@@ -44,27 +48,51 @@ def compute_errors(
 ) -> WorstErrors:
     """Compute the errors of an answer at the motion that its engine really made.
 
-    The torque on bar 3 or 4 has poles where that bar stands still: it is judged where the bar turns
-    at more than a tenth of its greatest speed, as in the regression report.
+    A drive on bar 3 or 4, and a cylinder, has a pole where that bar or the stroke stands
+    still, and the pin forces have it with the drive. As in the regression report they are
+    judged where it moves at more than a tenth of its greatest speed; their scale is that
+    of the same positions.
     """
     if not np.isfinite(command.theta_2).all():
         return NO_ANSWER
     formulas = solve(scene, "force", at=command)
-    judged = formulas.status_code == OK
+    judged = (formulas.status_code == OK) & _mark_far(scene, formulas)
     if not judged.any():
         return NO_ANSWER
+    if not judged.all():
+        command = _take_rows(command, judged)
+        formulas = solve(scene, "force", at=command)
     worst = {}
-    for name in QUANTITIES:
-        ours, counted = getattr(formulas, name), judged
-        if name == "torque" and scene.drive_bar != 2:
-            counted = judged & mark_turning(
-                getattr(formulas, f"omega_{scene.drive_bar}")
-            )
-        error = find_error(
-            name, ours, quantities[name], scale_of(name, scene, formulas, ours)
-        )
-        worst[name] = find_greatest(error[counted])
+    for field in QUANTITIES:
+        name = name_driving(scene) if field == "torque" else field
+        ours = getattr(formulas, name)
+        scale = scale_of(name, scene, formulas, ours)
+        error = find_error(name, ours, quantities[name][judged], scale)
+        worst[field] = find_greatest(error)
     return WorstErrors(**worst)
+
+
+def mark_far_from_poles(scene: Scene, command: Command) -> NDArray[np.bool_]:
+    """Mark where the driven bar, or the stroke, moves fast enough to be far from a pole of the drive, (n,)."""
+    return _mark_far(scene, solve(scene, "velocity", at=command))
+
+
+def _mark_far(scene: Scene, formulas: Solution) -> NDArray[np.bool_]:
+    if scene.drive_bar == 2:
+        return np.ones(len(formulas), dtype=bool)
+    speeds = {3: formulas.omega_3, 4: formulas.omega_4}
+    speed = speeds.get(scene.drive_bar, formulas.stroke_speed)
+    assert speed is not None
+    return mark_turning(speed)
+
+
+def _take_rows(command: Command, rows: NDArray[np.bool_]) -> Command:
+    """Return the command at some of its positions."""
+    n = len(command.theta_2)
+    speed, acceleration = (
+        np.broadcast_to(values, n)[rows] for values in list_speeds(command)
+    )
+    return Command(command.theta_2[rows], command.branch[rows], speed, acceleration)
 
 
 def find_greatest(errors: Array | Sequence[float]) -> float:

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
 from pathlib import Path
 
 import click
@@ -11,12 +10,9 @@ from fourbar.errors import FAILED, HOLDS
 from fourbar.scene import Scene
 from fourbar.scene import command as command_of
 from fourbar.writing import write_text
-from fourbar_validation.advise.matters import (
-    MATTERS,
-    measure_influences,
-    write_sentence,
-)
+from fourbar_validation.advise.matters import MATTERS, measure_influences
 from fourbar_validation.compare.rows import write_csv
+from fourbar_validation.cost.conclusion import conclude, find_cheapest, list_stepped
 from fourbar_validation.cost.laws import (
     ErrorLaw,
     find_pareto,
@@ -25,7 +21,7 @@ from fourbar_validation.cost.laws import (
     write_laws,
 )
 from fourbar_validation.cost.series import BEST
-from fourbar_validation.cost.study import COLUMNS, STEPPED, CostPoint, CostStudy
+from fourbar_validation.cost.study import COLUMNS, CostPoint, CostStudy, list_cells
 from fourbar_validation.engines.mujoco.trial import TrialSetup
 from fourbar_validation.places import MODELS
 from fourbar_validation.report.machine import describe_setup
@@ -36,7 +32,7 @@ from fourbar_validation.scenes.suites import read_scene_files
 DEFAULT_SCENES = (MODELS / "crank_rocker.toml",)
 WANTED = (1e-3, 1e-6)
 """Errors whose price the table of several scenes has."""
-HEAD = ("setting", "error", "RK4 steps", "ms/turn", "+-")
+HEAD = ("setting", "error", "ms per simulated second", "ms a revolution")
 
 
 @click.command(name="cost")
@@ -48,7 +44,12 @@ HEAD = ("setting", "error", "RK4 steps", "ms/turn", "+-")
     default=Path("results/cost"),
     show_default=True,
 )
-def cost(scenes: tuple[Path, ...], out: Path) -> int:
+@click.option(
+    "--verbose",
+    is_flag=True,
+    help="Print the cheapest settings of every error, the laws and the warnings too.",
+)
+def cost(scenes: tuple[Path, ...], out: Path, verbose: bool) -> int:
     """Measure what accuracy costs in time: every method, on SCENES (default: the crank-rocker).
 
     An interrupted study is resumed where it stopped. Exit status 1 where the law of any quantity does not hold, or
@@ -65,41 +66,39 @@ def cost(scenes: tuple[Path, ...], out: Path) -> int:
         setup = TrialSetup(scene, command_of(scene))
         study = CostStudy(name, scene, out / name)
         curves = dict(
-            track(study.points(), name, total=len(study), console=Console(stderr=True))
+            track(
+                study.points(),
+                name,
+                total=len(study),
+                console=Console(stderr=True),
+                transient=True,
+            )
         )
         laws = fit_laws(curves)
-        ranked = measure_influences(scene, setup, BEST)
+        influences = measure_influences(scene, setup, BEST)
         fitted += [law for law in laws if law.decided]
-        written = write(study, curves, laws, scene.title or name)
-        Console().print(
-            make_table(HEAD, list_front(curves), title=f"{name}: what accuracy costs")
-        )
-        lines = [
-            *write_laws(laws),
-            *(f"warning: {line}" for line in list_warnings(curves)),
-        ]
-        lines += [
-            *(f"left out: {line}" for line in study.left_out),
-            write_sentence(ranked),
-        ]
-        click.echo("\n".join(lines))
+        title = scene.title or name
+        conclusion = conclude(curves, laws, influences)
+        write(study, curves, laws, title, conclusion)
+        click.echo(write_subtitle(scene, title))
+        click.echo("\n".join(conclusion))
+        if verbose:
+            print_details(study, curves, laws)
+        click.echo(f"Pictures, laws and every point: {out / name / 'cost.md'}")
         held = sum(law.holds for law in laws if law.decided)
-        most = ranked[0].setting if ranked[0].times >= MATTERS else "none by itself"
+        matters = influences and influences[0].times >= MATTERS
         rows.append(
             (
                 name,
-                *find_cheapest(curves),
+                *(write_price(curves, error) for error in WANTED),
                 f"{held} of {sum(law.decided for law in laws)}",
-                most,
+                influences[0].setting if matters else "none by itself",
             )
-        )
-        click.echo(
-            f"Written to {out / name}: {', '.join(sorted(path.name for path in written))}."
         )
     if len(rows) > 1:
         head = (
             "scene",
-            *(f"RK4 steps for {error:g}" for error in WANTED),
+            *(f"ms for {error:g}" for error in WANTED),
             "laws hold",
             "matters most",
         )
@@ -109,11 +108,29 @@ def cost(scenes: tuple[Path, ...], out: Path) -> int:
     return HOLDS if fitted and all(law.holds for law in fitted) else FAILED
 
 
+def print_details(
+    study: CostStudy,
+    curves: Mapping[str, Sequence[CostPoint]],
+    laws: Sequence[ErrorLaw],
+) -> None:
+    """Print the cheapest settings of every error, the laws, the warnings and what was left out."""
+    from rich.console import Console
+
+    Console().print(make_table(HEAD, list_front(curves)))
+    lines = [
+        *write_laws(laws),
+        *(f"warning: {line}" for line in list_warnings(curves)),
+        *(f"left out: {line}" for line in study.left_out),
+    ]
+    click.echo("\n".join(lines))
+
+
 def write(
     study: CostStudy,
     curves: Mapping[str, Sequence[CostPoint]],
     laws: Sequence[ErrorLaw],
     title: str,
+    conclusion: Sequence[str],
 ) -> list[Path]:
     """Write cost.csv, cost.md and the pictures."""
     from fourbar_validation.cost.pictures import draw
@@ -121,6 +138,7 @@ def write(
     pictures = draw(curves, write_subtitle(study.scene, title), study.folder)
     what = {
         "title": title,
+        "conclusion": conclusion,
         "setup": describe_setup(),
         "pictures": [path.stem for path in pictures if path.suffix == ".svg"],
         "laws": write_laws(laws),
@@ -129,12 +147,11 @@ def write(
         "warnings": list_warnings(curves),
         "left_out": study.left_out,
     }
+    rows = (list_cells(point) for points in curves.values() for point in points)
     texts = {
-        "cost.csv": write_csv(
-            COLUMNS, (asdict(p).values() for points in curves.values() for p in points)
-        )
+        "cost.csv": write_csv(COLUMNS, rows),
+        "cost.md": render("fourbar_validation.cost", "cost.md.j2", **what),
     }
-    texts["cost.md"] = render("fourbar_validation.cost", "cost.md.j2", **what)
     for name, text in texts.items():
         write_text(study.folder / name, text)
     return [*(study.folder / name for name in texts), *pictures]
@@ -148,33 +165,21 @@ def write_subtitle(scene: Scene, title: str) -> str:
     return f"{title}{omega}{', ' + ' and '.join(acting) if acting else ''}"
 
 
-def find_cheapest(curves: Mapping[str, Sequence[CostPoint]]) -> list[str]:
-    """Find the least work of a revolution, in RK4 steps, for each of WANTED; a dash where nothing reaches it."""
-    points = [
-        p
-        for name, row in curves.items()
-        if "slow" not in name
-        for p in row
-        if p.kind == STEPPED
-    ]
-    work = ([p.rk4_steps for p in points if p.worst <= error] for error in WANTED)
-    return [f"{min(steps):.0f}" if steps else "-" for steps in work]
+def write_price(curves: Mapping[str, Sequence[CostPoint]], error: float) -> str:
+    """Write the least ms of a simulated second within an error; a dash where nothing reaches it."""
+    point = find_cheapest(curves, "worst", error)
+    return "-" if point is None else f"{1e3 * point.seconds_per_second:.2g}"
 
 
 def list_front(curves: Mapping[str, Sequence[CostPoint]]) -> list[tuple[str, ...]]:
     """List the Pareto front of everything stepped, by the worse of torque and force, under HEAD."""
-    points = [
-        p
-        for name, row in curves.items()
-        if "slow" not in name
-        for p in row
-        if p.kind == STEPPED
+    return [
+        (
+            point.name,
+            f"{point.errors.worst:.0e}",
+            f"{1e3 * point.seconds_per_second:.2f}",
+            f"{1e3 * point.seconds_per_revolution:.2f}",
+        )
+        for point in find_pareto(list_stepped(curves), "worst")
+        if math.isfinite(point.seconds_per_second)
     ]
-    rows: list[tuple[str, ...]] = []
-    for p in find_pareto(points, "worst"):
-        scatter = (
-            "-" if math.isnan(p.scatter) else f"{100.0 * p.scatter:.0f} %"
-        )  # a dash where there was one timing
-        of_work = f"{p.rk4_steps:.0f}", f"{1e3 * p.seconds_per_revolution:.2f}", scatter
-        rows.append((f"{p.curve}: {p.setting}", f"{p.worst:.0e}", *of_work))
-    return rows

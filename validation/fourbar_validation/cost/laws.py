@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,6 +23,8 @@ FEWEST = 3
 JUMP = 10.0
 """An error so many times larger than at either of the two coarser settings is no part of a law, where it has met no
 floor: between neighbours of a ladder the laws here change it by 10 or less, and downwards."""
+MIXES = 1.0 / 30.0
+"""Part of the least error above which what does not depend on the setting flattens a slope."""
 FIRST_ORDER, FOURTH_ORDER = 1.0, 4.0
 EXPECTED_ORDER = dict.fromkeys(
     ("Euler", "implicit", "implicitfast", "discrete"), FIRST_ORDER
@@ -42,11 +44,22 @@ class ErrorLaw:
     points: int
     jumps: tuple[str, ...] = ()
     """Settings where the error jumps up as the steps get finer; no law holds then, whatever the other points fit."""
+    constant: float = 0.0
+    """Part of the least fitted error that does not depend on the setting."""
+
+    @property
+    def mixed(self) -> bool:
+        """Return whether a part that does not depend on the setting flattens the slope."""
+        return (
+            self.constant > MIXES
+            and self.points >= FEWEST
+            and self.exponent < self.expected - WITHIN
+        )
 
     @property
     def decided(self) -> bool:
         """Return whether enough points are left for a fit with an uncertainty, or a jump rules the law out."""
-        return self.points >= FEWEST or bool(self.jumps)
+        return (self.points >= FEWEST and not self.mixed) or bool(self.jumps)
 
     @property
     def holds(self) -> bool:
@@ -60,11 +73,17 @@ class ErrorLaw:
     def __str__(self) -> str:
         if self.jumps:
             return f"FAILS, {'; '.join(self.jumps)}"
+        if self.mixed:
+            return (
+                f"no order expected, {self.exponent:.2f}: sag and softness mix, of which "
+                f"softness alone makes {100.0 * self.constant:.0f} % of the least error"
+            )
         if not self.decided:
             return (
                 f"no fit, {self.points} points above the floor and below {TOO_LARGE:g}"
             )
-        return f"{'holds' if self.holds else 'FAILS'}, {self.exponent:.2f} +- {self.sigma:.2f}"
+        verdict = "holds" if self.holds else "FAILS"
+        return f"{verdict}, {self.exponent:.2f} (uncertain by {self.sigma:.2f})"
 
 
 def write_laws(all_laws: Sequence[ErrorLaw]) -> list[str]:
@@ -96,7 +115,7 @@ def fit(x: Sequence[float], y: Sequence[float]) -> tuple[float, float]:
 
 def find_floor(points: Sequence[CostPoint], quantity: str) -> float | None:
     """Find the error that more steps no longer lessen; None where it still falls at the end of the ladder."""
-    errors = [getattr(point, quantity) for point in _list_by_steps(points)]
+    errors = [_read(point, quantity) for point in _list_by_steps(points)]
     if (
         len(errors) < 2
         or not math.isfinite(errors[-1])
@@ -107,15 +126,17 @@ def find_floor(points: Sequence[CostPoint], quantity: str) -> float | None:
 
 
 def find_steps_at_floor(points: Sequence[CostPoint], quantity: str) -> CostPoint | None:
-    """Find the first point of a ladder beyond which more steps buy nothing."""
-    least = find_floor(points, quantity)
-    if least is None:
+    """Find the first point of a ladder from which on its error stays near its last one."""
+    floor = find_floor(points, quantity)
+    if floor is None:
         return None
-    return next(
-        point
-        for point in _list_by_steps(points)
-        if getattr(point, quantity) <= least / FLOORED
-    )
+    ladder = _list_by_steps(points)
+    first = ladder[-1]
+    for point in reversed(ladder):
+        if not FLOORED * floor <= _read(point, quantity) <= floor / FLOORED:
+            break
+        first = point
+    return first
 
 
 def _list_by_steps(points: Sequence[CostPoint]) -> list[CostPoint]:
@@ -127,9 +148,9 @@ def find_jumps(points: Sequence[CostPoint], quantity: str) -> list[CostPoint]:
     jumps = []
     for i, point in enumerate(points[1:], 1):
         value, before = (
-            getattr(point, quantity),
+            _read(point, quantity),
             [
-                getattr(point_before, quantity)
+                _read(point_before, quantity)
                 for point_before in points[max(i - 2, 0) : i]
             ],
         )
@@ -150,7 +171,6 @@ def fit_laws(curves: Mapping[str, Sequence[CostPoint]]) -> list[ErrorLaw]:
     ladders = [
         ("softness in (1-d)", curves.get("softness d", ()), 1.0),
         ("sag at 0.1 rad/s in (1-d)", curves.get("sag d, slow", ()), 1.0),
-        ("sag at 0.1 rad/s in tc", curves.get("sag tc, slow", ()), 2.0),
         ("MuJoCo at one state in (1-d)/d", one_state, 1.0),
     ]
     for integrator, order in EXPECTED_ORDER.items():
@@ -168,6 +188,11 @@ def fit_laws(curves: Mapping[str, Sequence[CostPoint]]) -> list[ErrorLaw]:
         for name, points, n in ladders
         for quantity in QUANTITIES
         if points
+    ]
+    laws += [
+        _fit_sag(curves, quantity)
+        for quantity in QUANTITIES
+        if curves.get("sag tc, slow")
     ]
     return laws + [
         law
@@ -192,26 +217,39 @@ def _fit_law(
     leaps = tuple(
         _measure_leap(p, ordered, quantity) for p in find_jumps(ordered, quantity)
     )
-    used = [
-        p for p in ordered if ABOVE_FLOOR * least < getattr(p, quantity) < TOO_LARGE
-    ]
+    used = [p for p in ordered if ABOVE_FLOOR * least < _read(p, quantity) < TOO_LARGE]
     if len(used) < FEWEST:
         return ErrorLaw(name, quantity, math.nan, math.inf, expected, len(used), leaps)
     x = [1.0 / p.setting_value if by_steps else p.setting_value for p in used]
-    slope, sigma = fit(x, [getattr(p, quantity) for p in used])
+    slope, sigma = fit(x, [_read(p, quantity) for p in used])
     return ErrorLaw(name, quantity, slope, sigma, expected, len(used), leaps)
 
 
+def _read(point: CostPoint, quantity: str) -> float:
+    """Return the error of a quantity at the steps: between them the laws are those of a spline."""
+    return float(getattr(point.at_steps, quantity))
+
+
 def _measure_leap(point: CostPoint, ladder: Sequence[CostPoint], quantity: str) -> str:
-    before = getattr(ladder[ladder.index(point) - 1], quantity)
-    setting = point.setting.removeprefix(f"{point.curve}, ")
-    return f"jumps from {before:.1e} to {getattr(point, quantity):.1e} at {setting}"
+    before = _read(ladder[ladder.index(point) - 1], quantity)
+    return f"jumps from {before:.1e} to {_read(point, quantity):.1e} at {point.setting}"
+
+
+def _fit_sag(curves: Mapping[str, Sequence[CostPoint]], quantity: str) -> ErrorLaw:
+    """Fit the sag over the time constant: of second order where softness by itself is small next to it."""
+    points = curves["sag tc, slow"]
+    law = _fit_law("sag at 0.1 rad/s in tc", quantity, points, 2.0)
+    least = min(_read(point, quantity) for point in points)
+    alone = curves.get("softness alone, slow", ())
+    if not alone or not 0.0 < least < math.inf:
+        return law
+    return replace(law, constant=_read(alone[0], quantity) / least)
 
 
 def _fit_stiff(curves: Mapping[str, Sequence[CostPoint]], quantity: str) -> ErrorLaw:
     """Fit RK4's floor: at a time constant of k steps it goes as k^-4, whatever the timestep."""
     ladders = (
-        (tc, curves.get(f"RK4, pads, tc = {tc:g} h", ()))
+        (tc, curves.get(f"RK4, pads, tc = {tc:g} steps", ()))
         for tc in (3.0, 10.0, 30.0, 100.0)
     )
     floors = {
@@ -254,20 +292,13 @@ def list_warnings(curves: Mapping[str, Sequence[CostPoint]]) -> list[str]:
         ]
         warnings += [f"{name}: {line}" for line in _group(leaps)]
         floored = [
-            (q, p)
+            (q, _describe_floor(ladder, q))
             for q in QUANTITIES
-            if (p := find_steps_at_floor(ladder, q)) is not None
+            if find_floor(ladder, q) is not None
         ]
-        if floored:
-            beyond = (
-                f"{q} beyond {p.steps_per_revolution:.0f} ({find_floor(ladder, q):.1e})"
-                for q, p in floored
-            )
-            warnings.append(
-                f"{name}: more steps per revolution buy nothing: {', '.join(beyond)}"
-            )
+        warnings += [f"{name}: {line}" for line in _group(floored)]
         never = [
-            q for q in QUANTITIES if not any(getattr(p, q) < TOO_LARGE for p in ladder)
+            q for q in QUANTITIES if not any(_read(p, q) < TOO_LARGE for p in ladder)
         ]
         if never:
             warnings.append(
@@ -276,14 +307,33 @@ def list_warnings(curves: Mapping[str, Sequence[CostPoint]]) -> list[str]:
     return warnings
 
 
+def _describe_floor(ladder: Sequence[CostPoint], quantity: str) -> str:
+    """Say where more steps no longer lessen an error, and where it was less on the way."""
+    floor = find_floor(ladder, quantity)
+    first = find_steps_at_floor(ladder, quantity)
+    assert floor is not None and first is not None
+    text = f"{floor:.1e} from {first.steps_per_revolution:.0f} steps a revolution on"
+    least = min(ladder, key=lambda point: _read(point, quantity))
+    if _read(least, quantity) < FLOORED * floor:
+        text += (
+            f", but for {_read(least, quantity):.1e} at "
+            f"{least.steps_per_revolution:.0f}, where two errors cancel"
+        )
+    return text
+
+
 def find_pareto(points: Sequence[CostPoint], quantity: str) -> list[CostPoint]:
-    """Find the points that no other beats in both error and cost, from cheap to accurate."""
+    """Find the points that no other beats in both error and cost, from cheap to accurate.
+
+    The error is that at the steps and between them, as the advice judges it.
+    """
     front: list[CostPoint] = []
     for point in sorted(
-        points, key=lambda p: (p.seconds_per_revolution, getattr(p, quantity))
+        points, key=lambda p: (p.seconds_per_second, getattr(p.errors, quantity))
     ):
-        if math.isfinite(getattr(point, quantity)) and (
-            not front or getattr(point, quantity) < getattr(front[-1], quantity)
+        error = getattr(point.errors, quantity)
+        if math.isfinite(error) and (
+            not front or error < getattr(front[-1].errors, quantity)
         ):
             front.append(point)
     return front

@@ -1,12 +1,14 @@
-"""List what the study tries: one setting at a time around the recommended settings and around MuJoCo's defaults."""
+"""List what the study tries: one setting at a time around the recommended settings and MuJoCo's defaults."""
 
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from functools import partial
 
 from fourbar.mjcf import Settings
 from fourbar.scene import Scene
 from fourbar_validation.engines.mujoco import drives
+from fourbar_validation.engines.mujoco.closed_loop import ClosedLoop
 from fourbar_validation.engines.mujoco.trial import FLYWHEEL, Build
 
 STEPS = (20, 40, 80, 160, 320, 640, 1280, 2560)
@@ -16,6 +18,12 @@ MIDDLE = 640
 """Steps per revolution where a setting other than the timestep changes."""
 IMPEDANCES = (0.9, 0.97, 0.99, 0.997, 0.999, 0.9997, 0.9999)
 TIME_CONSTANTS = (3.0, 5.0, 10.0, 20.0, 40.0, 80.0)
+SAGGING_CONSTANTS = (3.0, 4.0, 5.0, 7.0, 10.0)
+"""Steps of the time constant: longer ones follow the load through a turn too late."""
+SAGGING = 0.999
+"""Impedance at which a slow linkage sags well above the truncation."""
+MANY_STEPS = 10240
+"""Steps per revolution at which a time constant of ten steps is too short to sag."""
 TOLERANCES = (0.0, 1e-16, 1e-14, 1e-12, 1e-10, 1e-8, 1e-6)
 REGULARISATIONS = (1.0, 1e-2, 1e-4, 1e-6, 1e-8)
 PADS = (None, 1e-1, 1e-2, 1e-3, 1e-4)
@@ -35,7 +43,10 @@ class Spot:
 
     label: str
     settings: Settings
-    build: Build | None = None
+    closure: Build | None = None
+    """Builds every loop of a trial, if the closure is under test."""
+    drive: Build | None = None
+    """Builds the loop that is stepped, if no flywheel carries it."""
     x: float = math.nan
     """The value of the curve's setting, where it is not the steps."""
 
@@ -68,18 +79,19 @@ def trace(
     label: str,
     values: Iterable[float],
     settings: Callable[[float], Settings],
-    build: Callable[[float], Build | None] = lambda _: None,
+    closure: Build | None = None,
+    drive: Build | None = None,
 ) -> Curve:
-    """Make a curve over the values of a setting, each with its label, settings and build."""
-    return Curve(
-        name, tuple(Spot(label.format(x), settings(x), build(x), x) for x in values)
-    )
+    """Make a curve over the values of a setting, each with its label and settings."""
+    spots = [Spot(label.format(x), settings(x), closure, drive, x) for x in values]
+    return Curve(name, tuple(spots))
 
 
 def trace_steps(
     name: str,
     settings: Settings,
-    build: Build | None = None,
+    closure: Build | None = None,
+    drive: Build | None = None,
     steps: Iterable[int] = STEPS,
     held: float | None = None,
 ) -> Curve:
@@ -93,7 +105,7 @@ def trace_steps(
         tc = settings.time_constant_steps if held is None else held * n
         return replace(settings, steps_per_revolution=n, time_constant_steps=tc)
 
-    return trace(name, name + ", {:g}/rev", steps, at, lambda _: build)
+    return trace(name, "{:g} steps a revolution", steps, at, closure, drive)
 
 
 def design_curves(scene: Scene) -> list[Curve]:
@@ -103,24 +115,27 @@ def design_curves(scene: Scene) -> list[Curve]:
         for name in INTEGRATORS
     ]
     for suffix, tc, held in (
-        ("pads, tc = 10 h", 10.0, None),
+        ("pads, tc = 10 steps", 10.0, None),
         ("tc held", 20.0, PART_OF_TURN),
     ):
         for name in INTEGRATORS:
             settings = replace(BEST, integrator=name, time_constant_steps=tc)
             curves.append(
                 trace_steps(
-                    f"{name}, {suffix}", settings, None, _choose_ladder(name), held
+                    f"{name}, {suffix}",
+                    settings,
+                    steps=_choose_ladder(name),
+                    held=held,
                 )
             )
     for tc in (3.0, 30.0, 100.0):
         curves.append(
             trace_steps(
-                f"RK4, pads, tc = {tc:g} h", replace(BEST, time_constant_steps=tc)
+                f"RK4, pads, tc = {tc:g} steps", replace(BEST, time_constant_steps=tc)
             )
         )
-    curves.append(trace_steps("RK4, no pads, tc = 10 h", PLAIN))
-    curves += [*_vary_softness(), *_vary_tolerance()]
+    curves.append(trace_steps("RK4, no pads, tc = 10 steps", PLAIN))
+    curves += [*_vary_softness(), *_vary_sag(), *_vary_tolerance()]
     return curves + (_vary_drives() if scene.motion.alpha_2 == 0.0 else [])
 
 
@@ -138,7 +153,7 @@ def _vary_default_closure(integrator: str, speed: float) -> Curve:
         f"{integrator}, MuJoCo's defaults",
         settings,
         drives.restore_defaults,
-        _choose_ladder(integrator),
+        steps=_choose_ladder(integrator),
     )
     spots = list(curve.spots)
     if integrator == "Euler":
@@ -148,7 +163,7 @@ def _vary_default_closure(integrator: str, speed: float) -> Curve:
                 "MuJoCo's defaults",
                 replace(settings, steps_per_revolution=n),
                 drives.restore_defaults,
-                n,
+                x=n,
             )
         )
     return replace(
@@ -157,42 +172,65 @@ def _vary_default_closure(integrator: str, speed: float) -> Curve:
 
 
 def _vary_softness() -> list[Curve]:
-    by_d = tuple(
-        Spot(f"d = {d:g}", replace(PLAIN, impedance=d), None, 1.0 - d)
-        for d in IMPEDANCES
-    )
-
-    def by_tc(name: str, impedance: float) -> Curve:
-        return trace(
-            name,
-            "tc = {:g} h",
-            TIME_CONSTANTS,
-            lambda tc: replace(PLAIN, impedance=impedance, time_constant_steps=tc),
-        )
-
     pads = (
         Spot(
             "no pads" if f is None else f"pads {f:g}",
             replace(BEST, pad=f),
-            None,
-            f or 1.0,
+            x=f or 1.0,
         )
         for f in PADS
     )
+    edited = (
+        Spot(
+            f"body_invweight0 x {factor:g}",
+            replace(BEST, pad=None),
+            partial(_soften, factor),
+            x=factor,
+        )
+        for factor in REGULARISATIONS
+    )
+    by_tc = trace(
+        "softness tc",
+        "tc = {:g} steps",
+        TIME_CONSTANTS,
+        lambda tc: replace(PLAIN, time_constant_steps=tc),
+    )
     return [
-        Curve("softness d", by_d),
-        by_tc("softness tc", PLAIN.impedance),
-        Curve("sag d, slow", by_d, slow=True),
-        replace(by_tc("sag tc, slow", 0.999), slow=True),
-        Curve("sag d, slow, nothing acts", by_d, slow=True, bare=True),
-        trace(
-            "regularisation edited",
-            "body_invweight0 x {:g}",
-            REGULARISATIONS,
-            lambda _: replace(BEST, pad=None),
-            lambda factor: lambda text, _: drives.Softened(text, factor),
-        ),
+        Curve("softness d", _list_impedances()),
+        by_tc,
+        Curve("regularisation edited", tuple(edited)),
         Curve("pads", tuple(pads)),
+    ]
+
+
+def _soften(factor: float, text: str, _: float) -> ClosedLoop:
+    return drives.Softened(text, factor)
+
+
+def _list_impedances() -> tuple[Spot, ...]:
+    return tuple(
+        Spot(f"d = {d:g}", replace(PLAIN, impedance=d), x=1.0 - d) for d in IMPEDANCES
+    )
+
+
+def _vary_sag() -> list[Curve]:
+    """Vary what a loop at rest would sag by, and what is left of the error where the time constant is short."""
+    by_tc = trace(
+        "sag tc, slow",
+        "tc = {:g} steps",
+        SAGGING_CONSTANTS,
+        lambda tc: replace(PLAIN, impedance=SAGGING, time_constant_steps=tc),
+    )
+    short = Spot(
+        f"{MANY_STEPS} steps a revolution",
+        replace(PLAIN, impedance=SAGGING, steps_per_revolution=MANY_STEPS),
+        x=MANY_STEPS,
+    )
+    return [
+        Curve("sag d, slow", _list_impedances(), slow=True),
+        replace(by_tc, slow=True),
+        Curve("softness alone, slow", (short,), slow=True),
+        Curve("sag d, slow, nothing acts", _list_impedances(), slow=True, bare=True),
     ]
 
 
@@ -217,7 +255,7 @@ def _vary_drives() -> list[Curve]:
     light = replace(BEST, flywheel=1.0)
     fast = replace(light, integrator="implicitfast", time_constant_steps=3.0)
     curves = [
-        trace_steps(f"flywheel {f:g}, RK4", replace(BEST, flywheel=f))
+        trace_steps(f"RK4, flywheel {f:g}", replace(BEST, flywheel=f))
         for f in (1e2, 1e4, 1e6, 1e8)
     ]
     tried: list[tuple[str, Build]] = [
@@ -229,6 +267,7 @@ def _vary_drives() -> list[Curve]:
         ("gentle velocity actuator, RK4", drives.GentleVelocityActuator),
     ]
     for name, drive in tried:
-        carried = (light, drive) if name.endswith("RK4") else (fast, drive, MORE_STEPS)
-        curves.append(trace_steps(name, *carried))
+        explicit = name.endswith("RK4")
+        settings, steps = (light, STEPS) if explicit else (fast, MORE_STEPS)
+        curves.append(trace_steps(name, settings, drive=drive, steps=steps))
     return curves

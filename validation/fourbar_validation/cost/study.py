@@ -3,7 +3,7 @@
 import math
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
 from statistics import median
@@ -17,26 +17,29 @@ from fourbar.formulas.mobility import turns_fully
 from fourbar.scene import Command, Scene
 from fourbar.scene import command as command_of
 from fourbar_validation.advise.advise import advise
+from fourbar_validation.advise.matters import judge_trial
 from fourbar_validation.advise.worst_errors import (
     NO_ANSWER,
+    QUANTITIES,
     WorstErrors,
     compute_errors,
 )
-from fourbar_validation.compare.answer import Adapter
 from fourbar_validation.cost import formulas
-from fourbar_validation.cost.series import BEST, SLOW, Curve, Spot, design_curves
+from fourbar_validation.cost.series import SLOW, Curve, Spot, design_curves
 from fourbar_validation.engines.mujoco.trial import Trial, TrialSetup
 from fourbar_validation.report.machine import list_versions
 from fourbar_validation.run.store import Store
 
-ROUNDS, ANSWERS = 7, 3
-"""Timings of each setting, and of an engine that answers position by position."""
+ROUNDS = 7
+"""Timings of each setting."""
 TIMED_STEPS = 200
 """Steps per timing: some 3 ms of RK4, so that a round of a curve passes within one spell of the machine."""
+TIMED_READINGS = 50
+"""Readings per timing."""
 REQUIRED = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 2e-9)
 """Errors for which the advice is drawn."""
 ONE_STATE = (0.9, 0.99, 0.999, 0.9999)
-VERSION = 7
+VERSION = 8
 """Version of what is tried; parts made with another version are made again."""
 EXACT, STEPPED, FORMULAS = "exact", "stepped", "formulas"
 T = TypeVar("T")
@@ -55,33 +58,45 @@ class CostPoint:
     steps: int
     """Number of steps of one run through the scene; of positions if nothing is stepped."""
     steps_per_revolution: float
-    torque: float
-    F12: float
-    F32: float
-    F43: float
-    F14: float
+    errors: WorstErrors
+    """At the steps and between them."""
+    at_steps: WorstErrors
+    """At the steps alone, where the laws of the steps are those of the engine."""
+    seconds_per_second: float
+    """CPU seconds of torque and pin forces at the scene's positions, in a simulated second."""
     seconds_per_revolution: float
-    """CPU; of an exact method: the scene's positions in one revolution."""
-    seconds_per_sample: float
-    """CPU, of reading a sample; of an exact method: of a position."""
-    rk4_steps: float
-    """seconds_per_revolution in steps of the recommended RK4 model."""
+    """The same in a revolution of the input."""
     scatter: float
-    """Scatter of seconds_per_revolution: half the interquartile range of its timings over their median."""
+    """The middle one of the timings less the least, over the least, which is the one that counts."""
     broken: str = ""
 
     @property
-    def force(self) -> float:
-        """Return the error of the worst pin force."""
-        return max(self.F12, self.F32, self.F43, self.F14)
-
-    @property
-    def worst(self) -> float:
-        """Return the largest of the errors."""
-        return max(self.torque, self.force)
+    def name(self) -> str:
+        """Return the curve and the setting."""
+        return f"{self.curve}, {self.setting}"
 
 
-COLUMNS = tuple(field.name for field in fields(CostPoint))
+COLUMNS = (
+    *("curve", "kind", "setting", "setting_value", "steps", "steps_per_revolution"),
+    *QUANTITIES,
+    *(f"{quantity}_at_steps" for quantity in QUANTITIES),
+    *("seconds_per_second", "seconds_per_revolution", "scatter", "broken"),
+)
+
+
+def list_cells(point: CostPoint) -> list[Any]:
+    """List the values of a point under COLUMNS."""
+    p = point
+    return [
+        *(p.curve, p.kind, p.setting, p.setting_value, p.steps),
+        *(p.steps_per_revolution, *p.errors, *p.at_steps),
+        *(p.seconds_per_second, p.seconds_per_revolution, p.scatter, p.broken),
+    ]
+
+
+def _read_point(row: dict[str, Any]) -> CostPoint:
+    errors = {name: WorstErrors(*row[name]) for name in ("errors", "at_steps")}
+    return CostPoint(**{**row, **errors})
 
 
 class CostStudy:
@@ -95,7 +110,7 @@ class CostStudy:
         self.units: dict[str, Callable[[], list[CostPoint]]] = {
             "formulas": self._time_formulas,
             "inverse": self._time_inverse,
-            "one state": self._time_one_state,
+            "one state": self._try_one_state,
             "recommended": self._try_recommended,
             **{
                 curve.name: partial(self._try_curve, curve)
@@ -119,7 +134,7 @@ class CostStudy:
                 if number in done:
                     points, reasons = store.read(number)
                     self.left_out += reasons
-                    yield name, [CostPoint(**row) for row in points]
+                    yield name, [_read_point(row) for row in points]
                     continue
                 reasons = []
                 try:
@@ -176,37 +191,46 @@ class CostStudy:
         setup: TrialSetup,
         settled: bool = False,
     ) -> list[CostPoint]:
-        """Try each spot: errors, and the CPU time of its steps next to that of the recommended model, interleaved."""
-        trials = [setup.try_out(spot.settings, spot.build) for spot in spots]
+        """Try each spot: its errors, and CPU time of steps and readings, interleaved with those of the others."""
+        trials = [
+            setup.try_out(spot.settings, spot.closure, spot.drive) for spot in spots
+        ]
+        readings = [trial.readings for trial in trials]
         if settled:
             for trial in trials:
                 _leave_out_first(trial)
-        clocks = [setup.seconds_per_step(spot.settings, spot.build) for spot in spots]
-        per_step, reference = _time_interleaved(
-            clocks,
-            setup.seconds_per_step(BEST),
-            [min(t.steps, TIMED_STEPS) or 1 for t in trials],
-        )
-        points = []
-        for spot, trial, (cost, scatter) in zip(spots, trials, per_step, strict=True):
-            # the laws are those of the steps themselves: between them the advice judges
-            errors = (
-                NO_ANSWER
-                if trial.broken
-                else compute_errors(setup.scene, trial.at, trial.quantities)
+        clocks: dict[tuple[str, int], Callable[[], float]] = {}
+        for number, (spot, trial) in enumerate(zip(spots, trials, strict=True)):
+            time_steps, time_readings = setup.make_clocks(
+                spot.settings, spot.closure, spot.drive
             )
-            n = trial.steps_per_revolution or spot.settings.steps_per_revolution
-            samples = max(len(trial.at.theta_2), 1)
+            steps = min(trial.steps, TIMED_STEPS) or 1
+            clocks["step", number] = partial(_divide, time_steps, steps)
+            clocks["reading", number] = partial(_divide, time_readings, TIMED_READINGS)
+        times = time_in_turns(clocks, ROUNDS)
+        points = []
+        for number, (spot, trial) in enumerate(zip(spots, trials, strict=True)):
+            step, scatter = summarise_timings(times["step", number])
+            reading, _ = summarise_timings(times["reading", number])
+            total = step * trial.steps + reading * readings[number]
+            at_steps = errors = NO_ANSWER
+            if not trial.broken:
+                at_steps = compute_errors(setup.scene, trial.at, trial.quantities)
+                errors = judge_trial(setup.scene, trial)
             points.append(
                 CostPoint(
-                    *(name, STEPPED, spot.label, spot.x, trial.steps, n, *errors),
-                    *(
-                        cost * n,
-                        trial.reading / samples,
-                        cost * n / reference,
-                        scatter,
-                        trial.broken,
-                    ),
+                    name,
+                    STEPPED,
+                    spot.label,
+                    spot.x,
+                    trial.steps,
+                    trial.steps_per_revolution or spot.settings.steps_per_revolution,
+                    errors,
+                    at_steps,
+                    total / setup.simulated_seconds,
+                    total / setup.revolutions,
+                    scatter,
+                    trial.broken,
                 )
             )
         return points
@@ -216,12 +240,9 @@ class CostStudy:
         setup, spots = self.setup(), []
         for required in REQUIRED:
             advice = advise(self.scene, required, setup)
-            settings = advice.best.settings
             if advice.reached:
-                label = (
-                    f"required {required:g}: tc = {settings.time_constant_steps:.3g} h"
-                )
-                spots.append(Spot(label, settings, None, required))
+                label = advice.best.description
+                spots.append(Spot(label, advice.best.settings, x=required))
             else:
                 self.left_out.append(f"recommended: {advice.reason}")
         return self._try_spots("recommended", tuple(spots), setup)
@@ -236,31 +257,24 @@ class CostStudy:
         n: int,
         setting_value: float = math.nan,
     ) -> CostPoint:
-        """Make a point of a method that answers each position by itself."""
-        span = float(np.ptp(self.command.theta_2)) or 2.0 * math.pi
-        per_revolution = 2.0 * math.pi / span * max(len(self.command.theta_2) - 1, 1)
-        reference, (seconds, scatter) = self._time_rk4_step(), summarise_timings(times)
-        cost = seconds / n * per_revolution
+        """Make a point of a method that answers each position by itself, from timings of n positions."""
+        setup = self.setup()
+        positions = sum(map(len, setup.segments))
+        seconds, scatter = summarise_timings(times) if times else (math.nan, math.nan)
+        total = seconds / n * positions
         return CostPoint(
             name,
             kind,
             label,
             setting_value,
             n,
-            per_revolution,
-            *errors,
-            cost,
-            seconds / n,
-            cost / reference,
+            positions / setup.revolutions,
+            errors,
+            errors,
+            total / setup.simulated_seconds,
+            total / setup.revolutions,
             scatter,
         )
-
-    def _time_rk4_step(self) -> float:
-        try:
-            clock = self.setup().seconds_per_step(BEST)
-        except LimitError:
-            return math.nan
-        return median(clock(TIMED_STEPS) / TIMED_STEPS for _ in range(ROUNDS))
 
     def _time_formulas(self) -> list[CostPoint]:
         few = formulas.choose_few(self.command)
@@ -286,67 +300,54 @@ class CostStudy:
         return points
 
     def _time_inverse(self) -> list[CostPoint]:
-        from fourbar_validation.engines.mujoco.inverse import MujocoInverse
-        from fourbar_validation.engines.pinocchio import PinocchioInverse
+        """Time the exact engines in a plain loop over their own calls, from position to position."""
+        from fourbar_validation.cost.plain_loops import PLAIN_LOOPS
 
-        return [
-            self._time_answer("inverse", engine)
-            for engine in (PinocchioInverse(), MujocoInverse())
-        ]
-
-    def _time_answer(
-        self,
-        curve: str,
-        engine: Adapter,
-        label: str = "",
-        setting_value: float = math.nan,
-    ) -> CostPoint:
-        """Time an engine that answers each position."""
-        answer = engine.answer(self.scene, self.command)
-        if answer.refusal is not None:
-            raise LimitError(f"{engine.name}: {answer.refusal}")
-        assert answer.assembled is not None
-        rows = np.flatnonzero(answer.assembled)
+        points = []
+        rows = sorted(row for segment in self.setup().segments for row in segment)
         command = self.command._replace(
             angle=self.command.theta_2[rows], branch=self.command.branch[rows]
         )
-        errors = compute_errors(
-            self.scene,
-            command,
-            {name: value[rows] for name, value in answer.quantities.items()},
-        )
-        times = [
-            time_call(partial(engine.answer, self.scene, self.command))
-            for _ in range(ANSWERS)
-        ]
-        return self._make_point(
-            curve,
-            EXACT,
-            label or engine.name,
-            errors,
-            times,
-            len(self.command.theta_2),
-            setting_value,
-        )
+        for label, make in PLAIN_LOOPS.items():
+            try:
+                loop = make(self.scene)
+            except LimitError as error:
+                self.left_out.append(f"{label}: {error}")
+                continue
+            errors = compute_errors(self.scene, command, loop.answer(command))
+            times = [time_call(partial(loop.answer, command)) for _ in range(ROUNDS)]
+            points.append(
+                self._make_point("inverse", EXACT, label, errors, times, len(rows))
+            )
+        return points
 
-    def _time_one_state(self) -> list[CostPoint]:
+    def _try_one_state(self) -> list[CostPoint]:
+        """Try MuJoCo at single states by several impedances; their order counts, no time is measured."""
         from fourbar_validation.engines.mujoco.forward import MujocoOneState
 
-        points = [
-            self._time_answer(
-                "one state",
-                MujocoOneState((d,)),
-                f"MuJoCo at one state, d = {d:g}",
-                (1.0 - d) / d,
-            )
+        tried = [
+            (f"MuJoCo at one state, d = {d:g}", MujocoOneState((d,)), (1.0 - d) / d)
             for d in ONE_STATE
         ]
-        return [
-            *points,
-            self._time_answer(
-                "one state", MujocoOneState(), "MuJoCo at one state, extrapolated", 0.0
-            ),
-        ]
+        tried.append(("MuJoCo at one state, extrapolated", MujocoOneState(), 0.0))
+        points = []
+        for label, engine, softness in tried:
+            answer = engine.answer(self.scene, self.command)
+            if answer.refusal is not None:
+                raise LimitError(f"{engine.name}: {answer.refusal}")
+            assert answer.assembled is not None
+            rows = np.flatnonzero(answer.assembled)
+            command = self.command._replace(
+                angle=self.command.theta_2[rows], branch=self.command.branch[rows]
+            )
+            quantities = {name: x[rows] for name, x in answer.quantities.items()}
+            errors = compute_errors(self.scene, command, quantities)
+            points.append(
+                self._make_point(
+                    "one state", EXACT, label, errors, (), len(rows), softness
+                )
+            )
+        return points
 
 
 def _leave_out_first(trial: Trial) -> None:
@@ -362,26 +363,13 @@ def _leave_out_first(trial: Trial) -> None:
 
 
 def summarise_timings(times: Sequence[float]) -> tuple[float, float]:
-    """Compute the median of timings, and half of what their middle half spans, over it."""
-    low, middle, high = np.percentile(times, (25, 50, 75)).tolist()
-    return middle, 0.5 * (high - low) / middle
+    """Return the least of timings, and how far the middle one lies above it, as a part of it."""
+    least = min(times)
+    return least, median(times) / least - 1.0
 
 
-def _time_interleaved(
-    clocks: list[Callable[[int], float]],
-    reference: Callable[[int], float],
-    steps: list[int],
-) -> tuple[list[tuple[float, float]], float]:
-    """Time the steps, and their scatter over rounds; all take turns, so that a slow spell hits all of them."""
-    every = list(zip((reference, *clocks), (TIMED_STEPS, *steps), strict=True))
-    times = time_in_turns(
-        {number: partial(clock, n) for number, (clock, n) in enumerate(every)}, ROUNDS
-    )
-    base, *rest = (
-        [seconds / n for seconds in times[number]]
-        for number, (_, n) in enumerate(every)
-    )
-    return [summarise_timings(kept) for kept in rest], median(base)
+def _divide(clock: Callable[[int], float], count: int) -> float:
+    return clock(count) / count
 
 
 def time_call(action: Callable[[], object], calls: int = 1) -> float:

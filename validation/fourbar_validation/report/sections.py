@@ -21,9 +21,9 @@ MUST = (
     "each family of singular and extreme linkages must come out as its statement says. "
 )
 PICTURES = {
-    "work-precision-force.svg": "Error of the worst pin force over the CPU time of a revolution, for every method",
-    "orders.svg": "Error of the driving torque and of each pin force over the time step; a jump is ringed",
-    "sources.svg": "Error over time step, softness of the closure and tolerance of the solver, one at a time",
+    "work-precision-torque.svg": "Error of the driving torque over the CPU time of a simulated second",
+    "work-precision-force.svg": "Error of the worst pin force over the CPU time of a simulated second",
+    "orders.svg": "Error of the driving torque and of each pin force over the timestep; a jump is ringed",
 }
 """Pictures of the study, and what they show."""
 LARGEST = 2_000_000
@@ -132,8 +132,9 @@ def _read_study(folder: Path) -> Section:
                 SectionFigure(alt, f"{alt}.", image=f"data:image/svg+xml;base64,{data}")
             )
     text = (
-        f"What each digit of {folder.name} costs, from the study in {COST}/{folder.name}/. Times are per revolution: "
-        "what is stepped runs through it once and reads nothing, what is exact answers each of the scene's positions. "
+        f"What each digit of {folder.name} costs, from the study in {COST}/{folder.name}/. "
+        "Times are those of torque and pin forces at the scene's positions: of MuJoCo with "
+        "the reading of the forces, of an exact engine in a plain loop that also assembles. "
     )
     links = [(name, f"{COST}/{folder.name}/{name}") for name in ("cost.md", "cost.csv")]
     return Section(

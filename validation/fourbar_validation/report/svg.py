@@ -17,6 +17,12 @@ LIGHT: dict[str, str] = dict(
     re.findall(r"(--[\w-]+): light-dark\((#\w+),", PAGE.read_text(encoding="utf-8"))
 )
 """Colours of a light page by the names of their custom properties."""
+DARK: dict[str, str] = dict(
+    re.findall(
+        r"(--[\w-]+): light-dark\(#\w+, (#\w+)\)", PAGE.read_text(encoding="utf-8")
+    )
+)
+"""Those of a dark page."""
 INK, SOFT, GRID, BAND, ALLOWED, PAPER = (
     LIGHT[f"--{name}"] for name in ("ink", "soft", "grid", "under", "allowed", "paper")
 )
@@ -97,8 +103,19 @@ def write_svg(figure: Any, salt: str) -> str:
     return shrink_svg(draw_svg(figure, salt))
 
 
-def draw_svg(figure: Any, salt: str) -> str:
-    """Draw the figure as matplotlib does, transparent: an SVG that stands by itself."""
+def write_alone(figure: Any, salt: str) -> str:
+    """Draw the figure as a file of its own, on paper that is light or dark as the reader's pages are."""
+    svg = shrink_svg(draw_svg(figure, salt, transparent=False))
+    light, dark = (
+        "".join(f"{name}:{value};" for name, value in colours.items())
+        for colours in (LIGHT, DARK)
+    )
+    rules = f"svg{{{light}}}@media(prefers-color-scheme:dark){{svg{{{dark}}}}}"
+    return svg.replace("<style>", f"<style>{rules}", 1)
+
+
+def draw_svg(figure: Any, salt: str, *, transparent: bool = True) -> str:
+    """Draw the figure as matplotlib does, an SVG that stands by itself."""
     import matplotlib
 
     text = io.StringIO()
@@ -112,7 +129,8 @@ def draw_svg(figure: Any, salt: str) -> str:
         figure.savefig(
             text,
             format="svg",
-            transparent=True,
+            transparent=transparent,
+            facecolor=figure.get_facecolor(),
             metadata={"Date": None, "Creator": None},
         )
     svg = text.getvalue()

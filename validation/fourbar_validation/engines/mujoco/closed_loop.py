@@ -43,6 +43,15 @@ def load_force(model: mujoco.MjModel, data: mujoco.MjData, actuator: int) -> Arr
     )
 
 
+def _split_load(
+    model: mujoco.MjModel, actuator: int
+) -> tuple[int, int, tuple[float, float]]:
+    """Return an actuator, the site whose axes its force is in, and that force of size one in the plane."""
+    site, frame = model.actuator_trnid[actuator]
+    x, y = model.actuator_gear[actuator, :2].tolist()
+    return actuator, int(frame if frame >= 0 else site), (x, y)
+
+
 def open_model(text: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
     """Compile a text and evaluate it at keyframe 0."""
     model = mujoco.MjModel.from_xml_string(text)
@@ -76,6 +85,14 @@ class ClosedLoop(Assembled):
         ]
         self.loads = [
             (i, self.model.site_bodyid[self.model.actuator_trnid[i, 0]]) for i in loads
+        ]
+        # MuJoCo's own memory: to look a row up anew costs more than to copy it
+        self._carried = {
+            name: self.data.cfrc_int[body, 3:5] for name, body in self.body.items()
+        }
+        self._borne = [
+            (*_split_load(self.model, i), CARRIED_BY[self.model.body(body).name])
+            for i, body in self.loads
         ]
         actuators = {self.model.actuator(i).name: i for i in range(self.model.nu)}
         self.drive, self.ram = actuators.get("drive"), actuators.get(CYLINDER)
@@ -144,12 +161,16 @@ class ClosedLoop(Assembled):
 
         That is cfrc_int without the forces of actuators on sites, which MuJoCo counts into it, unlike those of tendons.
         """
-        d = self.data
-        on = {name: d.cfrc_int[body][3:5].copy() for name, body in self.body.items()}
-        for actuator, body in self.loads:
-            force = load_force(self.model, self.data, actuator)[:2]
-            for name in CARRIED_BY[self.model.body(body).name]:
-                on[name] -= force
+        on = {name: force.copy() for name, force in self._carried.items()}
+        for actuator, site, (along, across), names in self._borne:
+            size = float(self.data.actuator_force[actuator])
+            if along == across == 0.0:
+                continue
+            cosine, _, _, sine = self.data.site_xmat[site, :4].tolist()
+            x = size * (cosine * along - sine * across)
+            y = size * (sine * along + cosine * across)
+            for name in names:
+                on[name] -= (x, y)
         return on
 
     def given(self) -> float:
@@ -227,11 +248,13 @@ class ClosedLoop(Assembled):
 
     def work(self, drive_bar: int | None, size: float, correction: float = 0.0) -> None:
         """Let a couple act on the driven bar, N m, or the cylinder's actuator push, N; and a couple on the crank."""
-        self.data.qfrc_applied[:] = (correction, 0.0, 0.0)
+        applied = self.data.qfrc_applied
+        applied[O2], applied[A], applied[O4] = correction, 0.0, 0.0
         if drive_bar is None:
             self.data.ctrl[self.ram] = size
-        else:
-            self.data.qfrc_applied[TURNED_BY[drive_bar]] += size
+            return
+        for joint in TURNED_BY[drive_bar]:
+            applied[joint] += size
 
     def solve_drive(
         self,

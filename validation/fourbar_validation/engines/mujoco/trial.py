@@ -6,7 +6,7 @@ From the laws that the study of cost measured:
     the timestep                   error ~ h^ORDER until a floor                         -> steps
 
 The scene is assembled once by the engine itself; each trial compiles the generated MJCF anew, with
-the drive to be tried, and reports its own motion, torque, pin forces and CPU seconds.
+the drive to be tried, and reports its own motion, torque and pin forces.
 
 A run that is no more precise than wanted has the settings of the laws, confirmed by the error that the engine predicts
 from its own residuals, never by what the formulas say: how wrong it is against them stays a finding.
@@ -22,11 +22,18 @@ import numpy as np
 
 from fourbar.errors import LimitError
 from fourbar.mjcf import Settings, write_mjcf
+from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Answer, Array
 from fourbar_validation.compare.compare import COMPARED, mark_turning
 from fourbar_validation.compare.tolerance import divide, magnitude
-from fourbar_validation.engines.loop import Assembler, make_blank, split_answer
+from fourbar_validation.engines.description import name_driving
+from fourbar_validation.engines.loop import (
+    MADE,
+    Assembler,
+    make_blank,
+    split_answer,
+)
 from fourbar_validation.engines.mujoco.closed_loop import O2, ClosedLoop
 from fourbar_validation.engines.mujoco.runner import (
     LIGHT_FLYWHEEL,
@@ -52,8 +59,10 @@ FEWEST_STEPS = 6.0
 """A revolution cannot be followed by less."""
 FLYWHEEL = 1e5
 """Lighter than the recipe's: the torque, armature times acceleration, is rounded in proportion to it."""
+MOST_READINGS = 100
+"""Readings that are timed at once, at most."""
 Build = Callable[[str, float], ClosedLoop]
-"""Function from the MJCF text and the speed to keep (rad/s) to the loop that is stepped."""
+"""Function from the MJCF text and the speed to keep (rad/s) to a loop."""
 
 
 def guess(error: float) -> tuple[float, float]:
@@ -71,6 +80,19 @@ def make_settings(steps_per_revolution: float, time_constant_steps: float) -> Se
         time_constant_steps=time_constant_steps,
         flywheel=FLYWHEEL,
     )
+
+
+def describe_settings(settings: Settings, steps_per_revolution: float) -> str:
+    """Write in one line what is to be typed into MuJoCo."""
+    parts = [
+        f"{settings.integrator}, {steps_per_revolution:.0f} steps a revolution",
+        f"time constant {settings.time_constant_steps:.3g} steps",
+        "no pads" if settings.pad is None else "pads",
+        f"tolerance {settings.tolerance:g}",
+        f"{settings.iterations} iteration{'s' if settings.iterations > 1 else ''}",
+        f"flywheel {settings.flywheel:g}",
+    ]
+    return ", ".join(parts)
 
 
 @contextmanager
@@ -95,14 +117,19 @@ class Trial:
     steps: int = 0
     steps_per_revolution: float = 0.0
     """Steps per revolution at the fastest speed of the run."""
-    stepping: float = 0.0
-    """CPU seconds in steps."""
-    reading: float = 0.0
-    """CPU seconds in reading the samples."""
     segments: tuple[tuple[slice, int], ...] = ()
     """The samples of each segment, and its steps: several samples are of one step where these are fewer."""
     broken: str = ""
     """Report of the engine on itself, if it lost the motion."""
+
+    @property
+    def readings(self) -> int:
+        """Number of states that are read: one a position, or one a step where these are fewer."""
+        count = 0
+        for rows, steps in self.segments:
+            positions = len(np.unique(self.at.theta_2[rows]))
+            count += min(positions, steps + 1)
+        return count
 
 
 class TrialSetup:
@@ -112,6 +139,11 @@ class TrialSetup:
     """
 
     def __init__(self, scene: Scene, command: Command) -> None:
+        if command.bar != 2 or command.stroke is not None:
+            raise LimitError(
+                "settings are tried along a sweep of theta_2, not of another bar or of "
+                "a stroke"
+            )
         if (
             scene.motion.free is not None
             or not np.any(command.omega_2)
@@ -123,10 +155,6 @@ class TrialSetup:
         if scene.motion.law is not None:
             raise LimitError(
                 "settings are tried at a constant alpha_2, not along a motion law"
-            )
-        if scene.drive is not None:
-            raise LimitError(
-                "settings are tried for a couple on a bar, not for a linear drive (drive.from, drive.to)"
             )
         self.omega, self.alpha = (
             float(np.max(command.omega_2)),  # type: ignore[arg-type]
@@ -162,9 +190,49 @@ class TrialSetup:
             keyframe=False,
         )
 
+    def build_loops(
+        self,
+        settings: Settings,
+        timestep: float,
+        closure: Build | None = None,
+        drive: Build | None = None,
+    ) -> tuple[ClosedLoop, ClosedLoop | None]:
+        """Build the loop that is stepped, and the one that a drive elsewhere is read from.
+
+        Both are closed alike: at a state that a soft closure has reached, another closure
+        asks for other forces. Pads stiffen the closure of a crank with a flywheel alone, so
+        with pads the second loop has a light one; otherwise it is the linkage by itself.
+        """
+        text = self.text(settings, timestep)
+        loop = (drive or closure or _keep_text)(text, self.omega)
+        if self.scene.drive_bar == 2:
+            return loop, None
+        flywheel = 0.0
+        if settings.pad is not None and drive is None:
+            flywheel = min(settings.flywheel, LIGHT_FLYWHEEL)
+        light = self.text(replace(settings, flywheel=flywheel), timestep)
+        return loop, (closure or _keep_text)(light, self.omega)
+
     def motion_segment(self, segment: list[int]) -> Steady:
         """Choose how the input moves through a segment."""
         return Steady(self.command.theta_2, segment, self.omega, self.alpha)
+
+    @property
+    def simulated_seconds(self) -> float:
+        """Time in which the linkage passes all segments."""
+        total = 0.0
+        for segment in self.segments:
+            run = self.motion_segment(segment).run
+            total += run.time(run.stop)
+        return total
+
+    @property
+    def revolutions(self) -> float:
+        """Revolutions of the input through all segments."""
+        turned = sum(
+            float(np.ptp(self.command.theta_2[segment])) for segment in self.segments
+        )
+        return turned / (2.0 * np.pi)
 
     def steps(self, settings: Settings) -> int:
         """Count the steps of one run, without making it."""
@@ -176,17 +244,30 @@ class TrialSetup:
             total += round(run.time(run.stop) / run.timestep(settings))
         return total
 
-    def try_out(self, settings: Settings, build: Build | None = None) -> Trial:
-        """Run through every segment of positions that assembles and read at the step nearest to each."""
+    def try_out(
+        self,
+        settings: Settings,
+        closure: Build | None = None,
+        drive: Build | None = None,
+    ) -> Trial:
+        """Run through every segment that assembles; read at the step nearest to each position.
+
+        Parameters
+        ----------
+        closure : builds every loop from its text: how the four-bar is closed.
+        drive : builds the loop that is stepped, if no flywheel carries it.
+        """
         samples = [index for segment in self.segments for index in segment]
-        out, trial, first = make_blank(len(samples)), Trial(self.command), 0
+        names = (*MADE, name_driving(self.scene), *PIN_FORCES)
+        out = make_blank(len(samples), names)
+        trial, first = Trial(self.command), 0
         with silence():
             for segment in self.segments:
                 before, rows = trial.steps, slice(first, first + len(segment))
                 self._run(
                     segment,
                     settings,
-                    build or _keep_text,
+                    (closure, drive),
                     {name: x[rows] for name, x in out.items()},
                     trial,
                 )
@@ -201,25 +282,19 @@ class TrialSetup:
         self,
         segment: list[int],
         settings: Settings,
-        build: Build,
+        builds: tuple[Build | None, Build | None],
         out: dict[str, Array],
         trial: Trial,
     ) -> None:
         motion_segment = self.motion_segment(segment)
         timestep = motion_segment.run.timestep(settings)
-        loop = build(self.text(settings, timestep), self.omega)
-        light = None
-        if self.scene.drive_bar != 2:
-            light = ClosedLoop(
-                self.text(replace(settings, flywheel=LIGHT_FLYWHEEL), timestep)
-            )
+        loop, light = self.build_loops(settings, timestep, *builds)
         run = SimulatedRun(
             self.scene, loop, light, motion_segment, self.start[segment[0]], timestep
         )
+        driving = name_driving(self.scene)
         for row, index in enumerate(segment):
-            began = time.process_time()
             run.to(index)
-            stepped = time.process_time()
             loop.forward()
             d = loop.data
             if run.stepper.lost() or loop.bad() or not np.isfinite(d.qacc).all():
@@ -234,32 +309,59 @@ class TrialSetup:
                 "alpha_2": d.qacc[O2],
             }
             for name, value in (
-                motion | pins | {"torque": np.nan if torque is None else torque}
+                motion | pins | {driving: np.nan if torque is None else torque}
             ).items():
                 out[name][row] = value
-            trial.stepping += stepped - began
-            trial.reading += time.process_time() - stepped
         trial.steps += run.stepper.done
         trial.steps_per_revolution = max(
             trial.steps_per_revolution, 2.0 * np.pi / motion_segment.fastest / timestep
         )
 
-    def seconds_per_step(
-        self, settings: Settings, build: Build | None = None
-    ) -> Callable[[int], float]:
-        """Measure CPU seconds of steps from the start of the longest segment, where each call starts again."""
-        segment = max(self.segments, key=len)
-        timestep = self.motion_segment(segment).run.timestep(settings)
-        loop = (build or _keep_text)(self.text(settings, timestep), self.omega)
+    def make_clocks(
+        self,
+        settings: Settings,
+        closure: Build | None = None,
+        drive: Build | None = None,
+    ) -> tuple[Callable[[int], float], Callable[[int], float]]:
+        """Make clocks of so many steps, and of reading a state so often, CPU seconds.
 
-        def clock(steps: int) -> float:
-            loop.set_state(self.start[segment[0]], self.omega)
+        Each call of the first starts again at the start of the longest segment.
+        """
+        segment = max(self.segments, key=len)
+        motion_segment = self.motion_segment(segment)
+        timestep = motion_segment.run.timestep(settings)
+        loop, light = self.build_loops(settings, timestep, closure, drive)
+        start = self.start[segment[0]]
+        run = SimulatedRun(self.scene, loop, light, motion_segment, start, timestep)
+        data = loop.data
+        forces = np.empty((MOST_READINGS, *data.cfrc_int.shape))
+        closing = np.empty((MOST_READINGS, 2))
+        accelerations = np.empty(MOST_READINGS)
+
+        def time_steps(count: int) -> float:
+            loop.set_state(start, self.omega)
             with silence():
                 began = time.process_time()
-                mujoco.mj_step(loop.model, loop.data, steps)
+                mujoco.mj_step(loop.model, loop.data, count)
                 return time.process_time() - began
 
-        return clock
+        def time_readings(count: int) -> float:
+            loop.set_state(start, self.omega)
+            with silence():
+                mujoco.mj_step(loop.model, loop.data)
+                began = time.process_time()
+                for row in range(count):
+                    loop.forward()
+                    if light is not None:
+                        run.read()
+                        continue
+                    # kept as they are: arithmetic on whole arrays later takes no time
+                    forces[row] = data.cfrc_int
+                    closing[row] = data.efc_force[:2]
+                    accelerations[row] = data.qacc[O2]
+                return time.process_time() - began
+
+        return time_steps, time_readings
 
 
 def _keep_text(text: str, _: float) -> ClosedLoop:

@@ -1,0 +1,137 @@
+"""Say in a few lines what a study of cost found: what digits cost, what the defaults pay, what matters."""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+
+from fourbar_validation.advise.matters import SettingInfluence, write_sentence
+from fourbar_validation.cost.laws import ErrorLaw, find_floor
+from fourbar_validation.cost.study import EXACT, FORMULAS, STEPPED, CostPoint
+
+DEFAULT = "MuJoCo's defaults"
+"""Label of the point that a new user gets."""
+DEFAULT_LADDER = "Euler, MuJoCo's defaults"
+FOUR_DIGITS, SIX_DIGITS = 1e-4, 1e-6
+DIGITS = {FOUR_DIGITS: "Four digits", SIX_DIGITS: "Six digits"}
+NAMES = {"torque": "driving torque", "force": "worst pin force"}
+Curves = Mapping[str, Sequence[CostPoint]]
+
+
+def list_stepped(curves: Curves) -> list[CostPoint]:
+    """List the points of all settings that were stepped through time at the scene's own speed."""
+    return [
+        point
+        for name, row in curves.items()
+        if "slow" not in name
+        for point in row
+        if point.kind == STEPPED
+    ]
+
+
+def find_cheapest(curves: Curves, quantity: str, error: float) -> CostPoint | None:
+    """Find the cheapest stepped point within an error, at the steps and between them."""
+    points = [
+        point
+        for point in list_stepped(curves)
+        if getattr(point.errors, quantity) <= error
+    ]
+    return min(points, key=lambda point: point.seconds_per_second, default=None)
+
+
+def find_default(curves: Curves) -> CostPoint | None:
+    """Find the point that a new user gets."""
+    points = (
+        point for row in curves.values() for point in row if point.setting == DEFAULT
+    )
+    return next(points, None)
+
+
+def write_time(point: CostPoint) -> str:
+    """Write the time of a simulated second, and of a revolution."""
+    second, revolution = point.seconds_per_second, point.seconds_per_revolution
+    return f"{1e3 * second:.2g} ms ({1e3 * revolution:.2g} ms a revolution)"
+
+
+def write_short(value: float) -> str:
+    """Format one digit and its power of ten."""
+    mantissa, _, exponent = f"{value:.0e}".partition("e")
+    return f"{mantissa}e{int(exponent)}"
+
+
+def conclude(
+    curves: Curves, laws: Sequence[ErrorLaw], influences: list[SettingInfluence]
+) -> list[str]:
+    """Write the conclusion, at most ten lines."""
+    return [
+        "CPU time of a simulated second, with the reading of torque and pin forces:",
+        *_write_digits(curves),
+        *_write_defaults(curves),
+        write_sentence(influences),
+        *_write_exact(curves),
+        _write_laws(laws),
+    ]
+
+
+def _write_digits(curves: Curves) -> Iterator[str]:
+    for error, quantity, what in (
+        (FOUR_DIGITS, "torque", "of the driving torque"),
+        (FOUR_DIGITS, "force", "of every pin force"),
+        (SIX_DIGITS, "force", "of every pin force"),
+    ):
+        point = find_cheapest(curves, quantity, error)
+        if point is None:
+            yield f"{DIGITS[error]} {what}: no setting that was tried reaches them."
+        else:
+            yield f"{DIGITS[error]} {what}: {write_time(point)} by {point.name}."
+
+
+def _write_defaults(curves: Curves) -> Iterator[str]:
+    point = find_default(curves)
+    if point is None:
+        return
+    if point.broken:
+        yield f"MuJoCo's defaults lose the motion: {point.broken}."
+        return
+    errors = point.errors
+    text = (
+        f"MuJoCo's defaults (Euler, 2 ms): {write_time(point)} for an error of "
+        f"{write_short(errors.torque)} in the torque, {write_short(errors.force)} in the "
+        "worst pin force"
+    )
+    floors = [
+        find_floor(curves.get(DEFAULT_LADDER, ()), quantity)
+        for quantity in ("torque", "F12", "F32", "F43", "F14")
+    ]
+    if None not in floors:
+        least = min(floor for floor in floors if floor is not None)
+        text += (
+            f"; no timestep brings them all below {write_short(least)}, "
+            "because their closure is soft"
+        )
+    yield text + "."
+
+
+def _write_exact(curves: Curves) -> Iterator[str]:
+    points = [
+        point
+        for row in curves.values()
+        for point in row
+        if point.kind != STEPPED and math.isfinite(point.seconds_per_second)
+    ]
+    for kind, what in ((EXACT, "Position by position"), (FORMULAS, "The formulas")):
+        exact = [p for p in points if p.kind == kind and p.errors.worst < SIX_DIGITS]
+        if exact:
+            cheapest = min(exact, key=lambda point: point.seconds_per_second)
+            error = write_short(cheapest.errors.worst)
+            yield f"{what}: {write_time(cheapest)}, error {error}, by {cheapest.setting}."
+
+
+def _write_laws(laws: Sequence[ErrorLaw]) -> str:
+    decided = [law for law in laws if law.decided]
+    failing = dict.fromkeys(law.name for law in decided if not law.holds)
+    held = sum(law.holds for law in decided)
+    text = f"{held} of {len(decided)} laws of the error hold"
+    if mixed := sum(law.mixed for law in laws):
+        text += f"; {mixed} more have no order, because two sources of error mix"
+    if failing:
+        text += f"; not: {', '.join(failing)}"
+    return text + "."
