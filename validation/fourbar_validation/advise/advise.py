@@ -26,10 +26,10 @@ from fourbar_validation.advise.matters import (
 from fourbar_validation.advise.worst_errors import WorstErrors
 from fourbar_validation.engines.mujoco.trial import (
     FEWEST_STEPS,
-    FLYWHEEL,
     LONGEST,
     ORDER,
     SHORTEST,
+    Trial,
     TrialSetup,
     describe_settings,
     guess,
@@ -61,14 +61,9 @@ def _solve_once(settings: Settings) -> Settings:
     return replace(settings, iterations=1)
 
 
-def _stop_by_tolerance(tolerance: float, settings: Settings) -> Settings:
-    """Let the solver stop by itself. MuJoCo divides the tolerance by the flywheel's inertia."""
-    return replace(settings, tolerance=tolerance, iterations=100)
-
-
 def _lighten(flywheel: float, settings: Settings) -> Settings:
     """Leave the tolerance to MuJoCo, which is tight enough beside a light flywheel."""
-    return replace(_stop_by_tolerance(1e-8, settings), flywheel=flywheel)
+    return replace(settings, tolerance=1e-8, iterations=100, flywheel=flywheel)
 
 
 def _leave_out_pads(kind: Kind, settings: Settings) -> Settings:
@@ -88,15 +83,11 @@ def _integrate(integrator: str, settings: Settings) -> Settings:
 FIRST_ORDER = ("Euler", "implicitfast")
 KINDS: dict[str, Kind] = {
     **{
-        f"tolerance {tolerance:g}": partial(_stop_by_tolerance, tolerance)
-        for tolerance in (1e-8, 1e-10, 1e-12, 1e-14)
-    },
-    **{
         f"flywheel {flywheel:g}": partial(_lighten, flywheel)
         for flywheel in (1e2, 1e3, 1e4)
     },
     "one iteration": _solve_once,
-    "no pads": partial(_leave_out_pads, partial(_stop_by_tolerance, 1e-12)),
+    "no pads": partial(_leave_out_pads, partial(_lighten, 1e2)),
     **{name: partial(_integrate, name) for name in FIRST_ORDER},
 }
 """What is tried beside RK4 with tolerance 0, ten iterations and pads."""
@@ -112,6 +103,8 @@ class Attempt:
     """States that are read: one a position, or one a step where these are fewer."""
     errors: WorstErrors
     steps_per_revolution: float
+    speed_error: float
+    """Greatest deviation of the speed from the commanded one, relative."""
     step_cost: float = 1.0
     """CPU time of a step, in steps of RK4 with tolerance 0, ten iterations and pads."""
 
@@ -150,7 +143,11 @@ class Advice:
             f"Errors at the steps and between them: torque {e.torque:.1e}, "
             f"worst pin force {e.force:.1e}"
         )
-        setting = f"{self.best.description} ({self.best.steps} steps in all)"
+        setting = (
+            f"{self.best.description} ({self.best.steps} steps in all); the flywheel "
+            f"lets the speed vary by {self.best.speed_error:.1e} of itself, and the "
+            "forces are those of the motion made"
+        )
         if self.reached:
             return f"{setting}. {errors}; required: {self.required:g}."
         return (
@@ -237,9 +234,6 @@ class _CheapestSearch:
             if n < FEWEST_STEPS or part < 1.0 / CLOSE_ENOUGH:
                 continue
             kind, cost = KINDS[name], costs[name]
-            flywheel = kind(settings).flywheel
-            if flywheel < FLYWHEEL and flywheel * self.error < 1.0:
-                continue  # the speed ripples by the inverse of the flywheel
             if self._serves(self._try(n, tc, kind, cost)):
                 self._bisect(tc, n / CLOSE_ENOUGH, serves=n, kind=kind, cost=cost)
 
@@ -340,10 +334,20 @@ class _CheapestSearch:
             trial.readings,
             judge_trial(self.scene, trial),
             trial.steps_per_revolution,
+            _find_speed_error(self.setup, trial),
             cost,
         )
         self.attempts.append(attempt)
         return attempt
+
+
+def _find_speed_error(setup: TrialSetup, trial: Trial) -> float:
+    """Find the greatest deviation of the speed from the commanded one, relative."""
+    theta_2, omega_2 = trial.at.theta_2, trial.at.omega_2
+    first = theta_2.min() if setup.omega > 0.0 else theta_2.max()
+    squared = setup.omega**2 + 2.0 * setup.alpha * (theta_2 - first)
+    due = np.sqrt(np.maximum(squared, 0.0))
+    return float(np.max(np.abs(np.abs(omega_2) - due)) / np.max(due))
 
 
 def _find_nearest(attempts: Sequence[Attempt]) -> Attempt:
