@@ -14,6 +14,7 @@ import mujoco
 import numpy as np
 import pinocchio as pin
 
+from fourbar.effects import Gravity
 from fourbar.errors import LimitError
 from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import PIN_FORCES
@@ -115,6 +116,12 @@ class PinocchioLoop(PlainLoop):
         super().__init__(tree, scene)
         self.ends = tree.frame["end3"], tree.frame["end4"]
         self.at = [self.data.oMf[frame].translation for frame in self.ends]
+        # what only weighs needs no forces from outside, and its field stays
+        self.loaded = bool(scene.loads) or any(
+            not isinstance(effect, Gravity) for effect in scene.effects
+        )
+        tree.act()
+        self.model.gravity = pin.Motion(np.array([*tree.field, 0.0]), AT_REST)
         self.on = [
             (self.data.oMi[joint].rotation, self.data.f[joint].linear)
             for joint in (tree.joint[bar] for bar in MOVING_BARS)
@@ -144,8 +151,18 @@ class PinocchioLoop(PlainLoop):
 
     def inverse(self, q: Array, v: Array, a: Array) -> Array:
         """Return the generalized forces that the motion needs beside what acts."""
-        self.tree.q[:], self.tree.v, self.tree.a = q, v, a
-        return np.asarray(self.tree.torques())
+        tree = self.tree
+        if not self.loaded:
+            return np.asarray(pin.rnea(self.model, self.data, q, v, a))
+        tree.v, tree.a = v, a
+        tree.act()
+        for bar, (x, y, moment) in tree.wrenches.items():
+            force, couple = tree.external_force[bar]
+            (cosine, minus_sine), _ = tree.turned_to[bar].tolist()
+            force[0] = cosine * x - minus_sine * y
+            force[1] = minus_sine * x + cosine * y
+            couple[2] = moment
+        return np.asarray(pin.rnea(self.model, self.data, q, v, a, tree.external))
 
     def read(self, loop_force: Array, forces: dict[str, Array]) -> None:
         """Write the pin forces, the loop's force carried on to the ground."""

@@ -1,0 +1,142 @@
+"""The page on the cost of accuracy: its numbers are computed again, and its pictures drawn again from few points."""
+
+import math
+import re
+import runpy
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from fourbar.files import load
+from fourbar.mjcf import Settings
+from fourbar.scene import command
+from fourbar.show.plot.style import apply_style
+from fourbar_validation.advise.matters import judge_trial
+from fourbar_validation.advise.worst_errors import WorstErrors, compute_errors
+from fourbar_validation.cost import pictures, study
+from fourbar_validation.cost.conclusion import DEFAULT
+from fourbar_validation.cost.cost import write_subtitle
+from fourbar_validation.cost.series import BEST, DEFAULT_TIMESTEP, design_curves
+from fourbar_validation.engines.mujoco import drives
+from fourbar_validation.engines.mujoco.trial import TrialSetup, make_settings
+from fourbar_validation.report.svg import write_alone
+
+ROOT = Path(__file__).parents[2]
+DOCS = ROOT / "docs"
+PAGE = (DOCS / "cost.md").read_text(encoding="utf-8")
+SCENE = load(ROOT / "models" / "crank_rocker.toml")
+PRINTED = 0.06
+"""Two printed digits, of the error and of the settings, hold an error to this part."""
+DRAWS = runpy.run_path(str(DOCS / "cost.py"))
+
+
+def read_rows() -> list[list[str]]:
+    """Read the table of settings."""
+    table = PAGE.partition("<!-- data settings -->")[2].partition("<!-- end -->")[0]
+    lines = table.strip().splitlines()[2:]
+    return [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
+
+
+ROWS = read_rows()
+
+
+def read_settings(text: str, steps: float) -> Settings:
+    """Read settings as the page words them."""
+    constant = float(re.findall(r"tc = (\S+) steps", text)[0])
+    tolerance = float(re.findall(r"tolerance ([^,]+)", text)[0])
+    return replace(
+        make_settings(steps, constant),
+        pad=None if "no pads" in text else "fitted",
+        tolerance=tolerance,
+        iterations=10 if tolerance == 0.0 else 100,
+        flywheel=float(re.findall(r"flywheel (\S+)", text)[0]),
+    )
+
+
+def compute_row(text: str, steps: float, folder: Path) -> WorstErrors:
+    """Compute the errors of a row of the table."""
+    if "defaults" not in text:
+        setup = TrialSetup(SCENE, command(SCENE))
+        return judge_trial(SCENE, setup.try_out(read_settings(text, steps)))
+    if "Euler" in text:
+        steps = 2.0 * math.pi / float(SCENE.motion.omega_2) / DEFAULT_TIMESTEP  # type: ignore[arg-type]
+    integrator = text.partition(",")[0]
+    settings = replace(
+        BEST, pad=None, integrator=integrator, steps_per_revolution=steps
+    )
+    setup = study.CostStudy("page", SCENE, folder).setup(settled=True)
+    trial = setup.try_out(settings, drives.restore_defaults)
+    study._leave_out_first(trial)
+    return compute_errors(SCENE, trial.at, trial.quantities)
+
+
+@pytest.mark.parametrize("row", ROWS, ids=[row[0] for row in ROWS])
+def test_the_errors_of_the_table_are_computed_again(
+    row: list[str], tmp_path: Path
+) -> None:
+    text, steps, torque, force, _ = row
+    errors = compute_row(text, float(steps), tmp_path)
+    assert errors.torque == pytest.approx(float(torque), rel=PRINTED)
+    assert errors.force == pytest.approx(float(force), rel=PRINTED)
+
+
+def test_the_first_sentences_are_those_of_the_table() -> None:
+    six = next(row for row in ROWS if row[1] == "102")
+    default = next(row for row in ROWS if row[0] == "Euler, MuJoCo's defaults")
+    assert float(six[3]) < 1e-6
+    assert f"Six digits of every pin force cost {six[4]} ms" in PAGE
+    assert f"pay the same {default[4]} ms for two digits" in PAGE
+    assert 1e-3 < float(default[3]) < 1e-2
+
+
+def read_words(svg: str) -> set[str]:
+    """Read what is written in a picture, but for lines with numbers."""
+    texts = re.findall(r"<text[^>]*>([^<]*)</text>", svg)
+    return {text for text in texts if text.strip() and not re.search(r"\d", text)}
+
+
+@pytest.mark.slow
+def test_the_pictures_are_those_that_few_points_draw(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(study, "ROUNDS", 2)
+    monkeypatch.setattr(study, "REQUIRED", (1e-2, 1e-4))
+    looks = (
+        pictures.METHODS,
+        pictures.INTEGRATORS,
+        pictures.TIMESTEPS,
+        pictures.SOFTNESS,
+        pictures.SOLVERS,
+    )
+    wanted = {look.curve for group in looks for look in group.values()}
+    made = study.CostStudy("page", SCENE, tmp_path)
+    curves = {}
+    for curve in design_curves(SCENE):
+        if curve.name in wanted:
+            spots = [spot for spot in curve.spots[2:] if spot.label == DEFAULT]
+            few = replace(curve, spots=(*curve.spots[:2], *spots))
+            curves[curve.name] = made._try_curve(few)
+    curves["recommended"] = made._try_recommended()
+    curves["inverse"] = made._time_inverse()
+    curves["formulas"] = made._time_formulas()
+    with apply_style():
+        title = write_subtitle(SCENE, SCENE.title)
+        drawn = pictures.make_pictures(curves, title)
+        for name in DRAWS["STUDIED"]:
+            kept = (DOCS / "cost" / f"{name}.svg").read_text(encoding="utf-8")
+            assert read_words(write_alone(drawn[name], name)) == read_words(kept), name
+    two, four = curves["recommended"]
+    assert 1.0 < four.seconds_per_second / two.seconds_per_second < 4.0
+    assert max(two.errors.worst, 100.0 * four.errors.worst) < 1e-2
+    (formulas, *_) = curves["formulas"]
+    assert formulas.seconds_per_second < four.seconds_per_second * 3.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["hard", "effects"])
+def test_the_other_pictures_are_those_that_are_drawn(name: str) -> None:
+    with apply_style():
+        drawn = write_alone(DRAWS[f"draw_{name}"](), name)
+    kept = (DOCS / "cost" / f"{name}.svg").read_text(encoding="utf-8")
+    assert read_words(drawn) == read_words(kept)
