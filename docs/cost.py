@@ -34,6 +34,8 @@ STUDIED = (
 """Pictures of the study that the page shows."""
 SHOWN = "torque"
 """Quantity whose error is drawn over the condition."""
+NO_DIGITS = K * EPS
+"""Condition at which the limit allows any number."""
 
 
 def draw_hard() -> Any:
@@ -62,11 +64,12 @@ def draw_hard() -> Any:
             label = None if engine.name in seen else engine.name
             axes.plot(condition[rows], curve[1], label=label, **style)
             seen.add(engine.name)
-    ends = np.array([1e-12, 1.0])
+    ends = np.array([NO_DIGITS, 1.0])
     axes.plot(ends, K * EPS / ends, color=INK, lw=1.5, label="limit K eps/condition")
     axes.set_xlabel("condition (1 is best)")
     axes.set_ylabel("error of the torque, of its own size")
     set_axes(axes)
+    axes.set_xlim(0.3 * NO_DIGITS, 2.0)
     axes.set_ylim(1e-18, 10.0)
     return figure
 
@@ -90,7 +93,7 @@ def draw_effects() -> Any:
     effects = read_effects()
     figure = make_figure(
         3.4,
-        "Dry friction is the dear one: what each effect\nadds to a step of MuJoCo",
+        "Dry friction costs most: what each effect\nadds to a step of MuJoCo",
         "processor time of an RK4 step, %",
     )
     axes = figure.add_axes((0.24, 0.1, 0.7, 0.62))

@@ -400,7 +400,7 @@ def draw_solver(curves: Curves, title: str) -> Any:
     figure, axes = _draw_single(
         curves,
         title,
-        "Newton's solver needs a small tolerance\nbeside a flywheel; the others do not converge",
+        "Beside a heavy flywheel Newton's solver needs\na tolerance of 0",
         SOLVERS,
         lambda point: point.setting_value or NONE,
         "tolerance of the solver",
