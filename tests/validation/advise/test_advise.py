@@ -255,7 +255,7 @@ def test_what_matters_for_a_scene_is_measured_and_stated_with_its_reason() -> No
         fourbar.FourBar(0.11, *bars), motion, effects=(fourbar.Gravity(),)
     )
     for scene, setting, why in ((hood, "the stiffness by pads", "lighter of coupler and output"),
-                                (turning(10.0, 36), "the timestep", "at the steps themselves")):  # fmt: skip
+                                (turning(10.0, 36), "the timestep", "the steps themselves")):  # fmt: skip
         setup = TrialSetup(scene, advise.choose_positions(scene))
         first, *others = influences = matters.measure_influences(
             scene, setup, advise.make_settings(40.0, 12.0)

@@ -26,7 +26,6 @@ from fourbar_validation.advise.worst_errors import (
 )
 from fourbar_validation.cost import conclusion, formulas, laws, pictures, study
 from fourbar_validation.cost.cost import cost, list_front
-from fourbar_validation.cost.plain_loops import PLAIN_LOOPS
 from fourbar_validation.cost.series import BEST
 from fourbar_validation.engines.mujoco import drives
 from fourbar_validation.engines.mujoco.forward import MujocoOneState
@@ -376,7 +375,7 @@ def test_no_order_is_expected_where_sag_and_softness_mix() -> None:
 
     def fit(constant: float, order: float) -> laws.ErrorLaw:
         rungs = [
-            point(tc, constant + 1e-4 * tc**order, "sag tc, slow") for tc in (3, 5, 10)
+            point(tc, constant + 1e-5 * tc**order, "sag tc, slow") for tc in (3, 5, 10)
         ]
         alone = point(10240, constant, "softness alone, slow")
         curves = {"sag tc, slow": rungs, "softness alone, slow": [alone]}
@@ -389,9 +388,9 @@ def test_no_order_is_expected_where_sag_and_softness_mix() -> None:
 
     assert fit(0.0, 2.0).holds
     assert not fit(0.0, 1.0).holds and fit(0.0, 1.0).decided
-    mixed = fit(1e-3, 2.0)
+    mixed = fit(1e-4, 2.0)
     assert mixed.mixed and not mixed.decided and "no order expected" in str(mixed)
-    steep = fit(1e-3, 3.0)
+    steep = fit(1e-4, 3.5)
     assert steep.decided and not steep.holds
 
 
@@ -537,9 +536,9 @@ def test_the_least_of_timings_counts_and_the_middle_one_tells_their_scatter() ->
 
 def test_the_front_is_listed_by_what_lies_between_the_steps_too() -> None:
     """A point that is right at its steps alone is not on the front."""
-    worse = replace(point(5, 0.5), at_steps=WorstErrors(*[1e-9] * len(QUANTITIES)))
+    worse = replace(point(6, 0.5), at_steps=WorstErrors(*[1e-9] * len(QUANTITIES)))
     assert list_front({"c": [worse, point(10, 1e-2), point(20, 1e-3)]}) == [
-        ("c, 5 steps a revolution", "5e-01", "0.01", "0.01"),
+        ("c, 6 steps a revolution", "5e-01", "0.01", "0.01"),
         ("c, 10 steps a revolution", "1e-02", "0.02", "0.01"),
         ("c, 20 steps a revolution", "1e-03", "0.04", "0.02"),
     ]
@@ -549,7 +548,8 @@ def test_names_in_a_picture_cover_no_other_and_are_not_cut() -> None:
     near = {"kind": study.EXACT, "seconds_per_second": 0.3}
     curves = {
         "inverse": [
-            replace(point(1, 1e-12), setting=name, **near) for name in PLAIN_LOOPS
+            replace(point(1, 1e-12), setting=name, **near)
+            for name in (study.PINOCCHIO, study.MUJOCO_INVERSE)
         ],
         "Euler": [
             replace(point(20, 0.2), setting=conclusion.DEFAULT, seconds_per_second=0.3)
@@ -563,40 +563,3 @@ def test_names_in_a_picture_cover_no_other_and_are_not_cut() -> None:
         box.overlaps(next_box) for box, next_box in combinations(boxes, 2)
     )
     assert all(figure.bbox.x0 <= box.x0 <= box.x1 <= figure.bbox.x1 for box in boxes)
-
-
-def test_statement_and_conclusion_have_one_criterion() -> None:
-    """A setting counts by its error at the steps and between them, here and on the front."""
-    curves = {
-        "recommended": [point(30, 5e-5)],
-        "d": [replace(point(300, 4e-3), setting=conclusion.DEFAULT)],
-        "RK4": [replace(point(10, 0.1), at_steps=WorstErrors(*[1e-9] * 5))],
-    }
-    assert pictures.write_statement(curves, "torque") == (
-        "Four digits of torque cost 0.06 ms a simulated second;\n"
-        "the defaults pay 0.6 ms for an error of 4e-3"
-    )
-    lines = conclusion.conclude(curves, [], [])
-    assert len(lines) <= 11
-    assert (
-        "Four digits of every pin force: 0.06 ms (0.03 ms a revolution) by "
-        "recommended, 30 steps a revolution." in lines
-    )
-    assert (
-        "Six digits of every pin force: no setting that was tried reaches them."
-        in lines
-    )
-
-
-def test_plain_loops_answer_to_round_off() -> None:
-    for scene in (
-        turning(positions=24),
-        crank_rocker(drive_bar=3),
-        thesis(np.radians([100.0, 135.0])),
-    ):
-        rows = command(scene)
-        for make in PLAIN_LOOPS.values():
-            assert compute_errors(scene, rows, make(scene).answer(rows)).worst < 1e-11
-    sliding = crank_rocker(effects=(fourbar.PinFriction.at(A=(0.2, 0.02)),))
-    with pytest.raises(fourbar.LimitError, match="loads of pins"):
-        PLAIN_LOOPS["Pinocchio, rnea and multipliers"](sliding)

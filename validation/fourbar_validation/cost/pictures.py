@@ -17,7 +17,14 @@ from fourbar_validation.cost.conclusion import (
     write_short,
 )
 from fourbar_validation.cost.laws import TOO_LARGE, find_jumps, find_pareto
-from fourbar_validation.cost.study import EXACT, FORMULAS, STEPPED, CostPoint
+from fourbar_validation.cost.study import (
+    EXACT,
+    FORMULAS,
+    MUJOCO_INVERSE,
+    PINOCCHIO,
+    STEPPED,
+    CostPoint,
+)
 from fourbar_validation.report.svg import LIGHT, write_alone
 
 Curves = Mapping[str, Sequence[CostPoint]]
@@ -273,8 +280,8 @@ SHORT = {
     "formulas, double": "formulas",
     "formulas, single": "formulas, float32",
     "13x13": "13 equations",
-    "Pinocchio, rnea and multipliers": "Pinocchio",
-    "MuJoCo, mj_inverse and multipliers": "MuJoCo, mj_inverse",
+    PINOCCHIO: "Pinocchio",
+    MUJOCO_INVERSE: "MuJoCo, mj_inverse",
 }
 """Short names of methods at their marks."""
 

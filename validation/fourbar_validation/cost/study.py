@@ -27,6 +27,7 @@ from fourbar_validation.advise.worst_errors import (
 from fourbar_validation.cost import formulas
 from fourbar_validation.cost.series import SLOW, Curve, Spot, design_curves
 from fourbar_validation.engines.mujoco.trial import Trial, TrialSetup
+from fourbar_validation.engines.plain_loop import PlainLoop
 from fourbar_validation.report.machine import list_versions
 from fourbar_validation.run.store import Store
 
@@ -42,6 +43,8 @@ ONE_STATE = (0.9, 0.99, 0.999, 0.9999)
 VERSION = 8
 """Version of what is tried; parts made with another version are made again."""
 EXACT, STEPPED, FORMULAS = "exact", "stepped", "formulas"
+PINOCCHIO = "Pinocchio, rnea and multipliers"
+MUJOCO_INVERSE = "MuJoCo, mj_inverse and multipliers"
 T = TypeVar("T")
 
 
@@ -301,14 +304,19 @@ class CostStudy:
 
     def _time_inverse(self) -> list[CostPoint]:
         """Time the exact engines in a plain loop over their own calls, from position to position."""
-        from fourbar_validation.cost.plain_loops import PLAIN_LOOPS
+        from fourbar_validation.engines.mujoco.plain_loop import MujocoInverseLoop
+        from fourbar_validation.engines.pinocchio_plain_loop import PinocchioLoop
 
+        loops: dict[str, Callable[[Scene], PlainLoop]] = {
+            PINOCCHIO: PinocchioLoop,
+            MUJOCO_INVERSE: MujocoInverseLoop,
+        }
         points = []
         rows = sorted(row for segment in self.setup().segments for row in segment)
         command = self.command._replace(
             angle=self.command.theta_2[rows], branch=self.command.branch[rows]
         )
-        for label, make in PLAIN_LOOPS.items():
+        for label, make in loops.items():
             try:
                 loop = make(self.scene)
             except LimitError as error:

@@ -13,7 +13,7 @@ from fourbar_validation.cost.series import BEST, PLAIN
 from fourbar_validation.engines.mujoco import drives
 from fourbar_validation.engines.mujoco.trial import Build, TrialSetup
 from fourbar_validation.scenes.suites import MODELS
-from tests.validation.cost.second_loop import LoopSettings, measure
+from tests.support.second_loop import LoopSettings, measure
 
 AGREES = 0.05
 """Part by which two loops may differ that read the same run at positions of their own."""

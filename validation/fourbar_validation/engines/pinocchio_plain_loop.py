@@ -1,0 +1,75 @@
+"""A plain loop over Pinocchio's own calls."""
+
+import numpy as np
+import pinocchio as pin
+
+from fourbar.effects import Gravity
+from fourbar.linkage import MOVING_BARS
+from fourbar.scene import Scene
+from fourbar_validation.compare.answer import Array
+from fourbar_validation.engines.pinocchio import WORLD, PinocchioTree
+from fourbar_validation.engines.plain_loop import PlainLoop, carry_loop_force
+
+AT_REST = np.zeros(3)
+
+
+class PinocchioLoop(PlainLoop):
+    """Over Pinocchio's joint Jacobians, frame accelerations and rnea."""
+
+    def __init__(self, scene: Scene) -> None:
+        tree = PinocchioTree(scene)
+        super().__init__(tree, scene)
+        self.ends = tree.frame["end3"], tree.frame["end4"]
+        self.at = [self.data.oMf[frame].translation for frame in self.ends]
+        # what only weighs needs no forces from outside, and its field stays
+        self.loaded = bool(scene.loads) or any(
+            not isinstance(effect, Gravity) for effect in scene.effects
+        )
+        tree.act()
+        self.model.gravity = pin.Motion(np.array([*tree.field, 0.0]), AT_REST)
+        self.on = [
+            (self.data.oMi[joint].rotation, self.data.f[joint].linear)
+            for joint in (tree.joint[bar] for bar in MOVING_BARS)
+        ]
+
+    def look(self, q: Array) -> tuple[float, float, Array]:
+        """Return the gap, m, and its derivative, (2, 3)."""
+        model, data, (one, two) = self.model, self.data, self.ends
+        pin.computeJointJacobians(model, data, q)
+        pin.updateFramePlacements(model, data)
+        jacobian = (
+            pin.getFrameJacobian(model, data, one, WORLD)[:2]
+            - pin.getFrameJacobian(model, data, two, WORLD)[:2]
+        )
+        x, y, _ = (self.at[0] - self.at[1]).tolist()
+        return x, y, jacobian
+
+    def drift(self, q: Array, v: Array) -> tuple[float, float]:
+        """Return the acceleration of the gap where the joints do not accelerate."""
+        model, data, (one, two) = self.model, self.data, self.ends
+        pin.forwardKinematics(model, data, q, v, AT_REST)
+        x, y, _ = (
+            pin.getFrameClassicalAcceleration(model, data, one, WORLD).linear
+            - pin.getFrameClassicalAcceleration(model, data, two, WORLD).linear
+        ).tolist()
+        return x, y
+
+    def inverse(self, q: Array, v: Array, a: Array) -> Array:
+        """Return the generalized forces that the motion needs beside what acts."""
+        tree = self.tree
+        if not self.loaded:
+            return np.asarray(pin.rnea(self.model, self.data, q, v, a))
+        tree.v, tree.a = v, a
+        tree.act()
+        for bar, (x, y, moment) in tree.wrenches.items():
+            force, couple = tree.external_force[bar]
+            (cosine, minus_sine), _ = tree.turned_to[bar].tolist()
+            force[0] = cosine * x - minus_sine * y
+            force[1] = minus_sine * x + cosine * y
+            couple[2] = moment
+        return np.asarray(pin.rnea(self.model, self.data, q, v, a, tree.external))
+
+    def read(self, loop_force: Array, forces: dict[str, Array]) -> None:
+        """Write the pin forces, the loop's force carried on to the ground."""
+        on = [(rotation @ force)[:2] for rotation, force in self.on]
+        carry_loop_force(loop_force, on, forces)

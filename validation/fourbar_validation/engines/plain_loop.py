@@ -1,0 +1,110 @@
+"""Ask an engine as a user would: a plain loop over its own calls, for torque and pin forces alone.
+
+Each position is assembled from the one before. With g(q) the gap at pin B and J = dg/dq, one
+position takes Newton's steps on g, the speeds and accelerations of J v = 0 and
+J a + (dJ/dt) v = 0, one inverse dynamics tau(q, v, a), and the multipliers of
+
+    [J^T e_drive] [lambda; T] = tau.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from fourbar.errors import LimitError
+from fourbar.quantities import PIN_FORCES
+from fourbar.scene import Command, Scene
+from fourbar_validation.compare.answer import Array
+from fourbar_validation.engines.description import list_speeds
+from fourbar_validation.engines.loop import Assembler
+from fourbar_validation.engines.tree import solve_closed, solve_multipliers
+
+MOST_STEPS = 20
+"""Newton's steps of one position; from its neighbour two or three are enough."""
+SQUARES_AWAY = 1e-7
+"""A step (rad) after which Newton's method, which squares it, is at round-off."""
+
+
+class PlainLoop:
+    """The loop of one engine; a subclass asks the engine.
+
+    Raises LimitError for a cylinder, and for friction that depends on the pin forces.
+    """
+
+    def __init__(self, tree: Any, scene: Scene) -> None:
+        if scene.drive is not None:
+            raise LimitError("the plain loop has a couple on a bar, no cylinder")
+        if tree.loaded:
+            raise LimitError("the plain loop does not iterate over loads of pins")
+        self.tree, self.model, self.data = tree, tree.model, tree.data
+        self.drive = tree.turns[scene.drive_bar]
+
+    def answer(self, command: Command) -> dict[str, Array]:
+        """Return the torque, (n,), and the pin forces, (n, 2)."""
+        n = len(command.theta_2)
+        torque = np.empty(n)
+        forces = {name: np.empty((n, 2)) for name in PIN_FORCES}
+        speeds, accelerations = (values.tolist() for values in list_speeds(command))
+        start = Assembler(self.tree).find(
+            float(command.theta_2[0]), int(command.branch[0])
+        )
+        if start is None:
+            raise LimitError("the loop does not close at the first position")
+        q = np.array(start)
+        rates = np.zeros(3)
+        for row, theta in enumerate(command.theta_2.tolist()):
+            # along the motion from the position before
+            q = q + rates * (theta - q[0])
+            q[0] = theta
+            jacobian = self.close(q)
+            v = solve_closed(jacobian, speeds[row])
+            rates = v / speeds[row]
+            x, y = self.drift(q, v)
+            a = solve_closed(jacobian, accelerations[row], x=x, y=y)
+            needed = self.inverse(q, v, a)
+            unknowns = solve_multipliers(jacobian, self.drive, needed)
+            torque[row] = unknowns[2]
+            self.read(unknowns[:2], {name: at[row] for name, at in forces.items()})
+        return {"torque": torque, **forces}
+
+    def close(self, q: Array) -> Array:
+        """Close the gap by bars 3 and 4, in place; return the derivative of the gap there."""
+        converged = False
+        for _ in range(MOST_STEPS):
+            x, y, jacobian = self.look(q)
+            if converged:
+                return jacobian
+            (_, a, b), (_, c, d) = jacobian.tolist()
+            determinant = a * d - b * c
+            first = (b * y - d * x) / determinant
+            second = (c * x - a * y) / determinant
+            q[1] += first
+            q[2] += second
+            converged = abs(first) + abs(second) < SQUARES_AWAY
+        raise LimitError("Newton's method did not close the loop")
+
+    def look(self, q: Array) -> tuple[float, float, Array]:
+        """Return the gap, m, and its derivative, (2, 3)."""
+        raise NotImplementedError
+
+    def drift(self, q: Array, v: Array) -> tuple[float, float]:
+        """Return the acceleration of the gap where the joints do not accelerate."""
+        raise NotImplementedError
+
+    def inverse(self, q: Array, v: Array, a: Array) -> Array:
+        """Return the generalized forces that the motion needs beside loads and weights."""
+        raise NotImplementedError
+
+    def read(self, loop_force: Array, forces: dict[str, Array]) -> None:
+        """Write the pin forces: those of the open tree, and the loop's force carried on to the ground."""
+        raise NotImplementedError
+
+
+def carry_loop_force(
+    loop_force: Array, on: list[Array], forces: dict[str, Array]
+) -> None:
+    """Put the loop's force into the forces on bars 2, 3 and 4 at their first pins."""
+    forces["F43"][:] = loop_force
+    forces["F12"][:] = on[0] - loop_force
+    forces["F32"][:] = loop_force - on[1]
+    forces["F14"][:] = on[2] + loop_force
