@@ -43,7 +43,7 @@ JUDGED_BY = {
     "validation/compare/statements/test_statements.py": "validation/compare/statements: limit_positions transmission",
     # adapters: judged against printed figures, each other, and faults put in front of them
     "validation/engines/test_engines.py": "validation/engines: balls description "
-    "limits loaded loop pinocchio prediction tree; lab/engines: drake exudyn exudyn_elements opensim; "
+    "limits loaded loop prediction tree; lab/engines: drake exudyn exudyn_elements opensim; "
     "validation/scenes: random; validation/engines/mujoco: closed_loop inverse",
     "validation/engines/test_guests.py": "validation: engine; validation/engines: keeper processes workers",
     "validation/engines/test_free_body.py": "validation/engines: free_body_closure free_body_effects",
@@ -70,7 +70,7 @@ JUDGED_BY = {
     "lab/test_faults.py": "lab: fault_scenes injection",
     "validation/cost/test_cost.py": "validation/cost: series formulas laws pictures study; "
     "validation/advise: worst_errors",
-    "validation/advise/test_advise.py": "validation/advise: matters; validation/engines/mujoco: trial",
+    "validation/advise/test_advise.py": "validation/advise: matters",
     "lab/test_benchmark.py": "lab/simulators: slider_engines slider_mujoco slider_pinocchio",
     "lab/simulators/test_problems.py": "lab/simulators: slider_crank; validation/check: problem",
     # simulators that need not be there: their scripts run where they are installed
