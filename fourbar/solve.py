@@ -1,16 +1,22 @@
-"""Solver of a scene: block by block over the positions, stage by stage, no further than last_stage."""
+"""Solver of a scene: block by block over the positions, stage by stage, as far as is asked."""
 
 import cmath
-from collections.abc import Iterable, Iterator, KeysView, Mapping
+from collections.abc import Iterator, KeysView, Mapping
 from functools import cache
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fourbar.errors import InputError, expect
-from fourbar.evaluation.case import BLOCK, Case, Evaluated
-from fourbar.evaluation.evaluate import ERROR, FORCE, evaluate, withhold_infinite
+from fourbar.evaluation.case import BLOCK, Case
+from fourbar.evaluation.evaluate import (
+    ERROR,
+    FORCE,
+    Evaluated,
+    evaluate,
+    evaluate_released,
+    withhold_infinite,
+)
 from fourbar.linkage import A_BRANCH, require, require_bar, require_whole
 from fourbar.quantities import (
     ANGLES,
@@ -35,31 +41,21 @@ Part = tuple[Any, ...]
 """Index of some positions in the arrays of all."""
 
 
-class Members(Protocol):
-    """Scenes of m linkages, whose numbers are arrays (`fourbar.vary`); `solve` takes them in place of one scene."""
+class ManyScenes(Protocol):
+    """Scenes of many linkages (`fourbar.vary`), which `solve` takes in place of one."""
 
-    @property
-    def scene(self) -> Scene:
-        """Return the scene, whose other numbers do not vary."""
-
-    @property
-    def at(self) -> Command:
-        """Return the command, (m, n)."""
-
-    def members(
-        self, rows: slice | None, count: int, begins: Scene | None = None
-    ) -> Scene:
-        """Make the scene of some members, or of all as columns, each repeated for `count` positions."""
-
-    def begin(self, rows: slice) -> Scene:
-        """Make the scene with effects that begin where each member's motion does."""
-
-    def refuse(self, arrays: Mapping[str, Array], code: NDArray[np.uint8]) -> None:
-        """Mark the members that no scene could be."""
+    def solve(
+        self,
+        stage: str | None = None,
+        *,
+        out: Mapping[str, Array] | None = None,
+        side: int = 0,
+    ) -> Solution:
+        """Evaluate all of them, as `solve` does."""
 
 
 def solve(
-    scene: Scene | Members,
+    scene: Scene | ManyScenes,
     stage: str | None = None,
     *,
     at: Command | None = None,
@@ -84,20 +80,10 @@ def solve(
         the omega_2 that is needed, or a study, which states its own positions, is given others.
     """
     require_whole("side", side, (-1, 0, 1), "must be -1, 0 or 1")
-    study: Members | None = None
-    stopped_at = None
     if not isinstance(scene, Scene):
-        if not hasattr(scene, "members"):
-            raise InputError("scene", scene, "must be a Scene, or a Study of `vary`")
-        if at is not None:
-            raise InputError(
-                "at",
-                "a command",
-                "a study states its own positions: vary the commanded angle",
-            )
-        study = scene
-        scene, commanded = study.scene, study.at
-    elif at is not None:
+        return _require_study(scene, at).solve(stage, out=out, side=side)
+    stopped_at = None
+    if at is not None:
         _refuse(at)
         commanded = at
     elif scene.motion.free is not None:
@@ -107,140 +93,150 @@ def solve(
         commanded, stopped_at = released.command, released.stopped_at
     else:
         commanded = command(scene)
-    shape = commanded.angle.shape
-    last_stage, names = find_requested(scene, shape, commanded, stage, out)
-    code = np.zeros(shape, dtype=np.uint8)
+    request = find_requested(scene, commanded, stage, out)
     with np.errstate(all="ignore"):
-        arrays = None
-        if (
-            shape == (1,)
-            and study is None
-            and commanded.independent is None
-            and out is None
-        ):
-            arrays = _solve_alone(
-                _begin(scene, commanded, last_stage, side),
-                commanded,
-                last_stage,
-                names,
-                code,
-            )
-        if arrays is None:
-            arrays, evaluated = make_arrays(names, shape, out), None
-            blocks = (
-                _list_members(study, last_stage, side)
-                if study
-                else _list_blocks(scene, commanded, last_stage, side)
-            )
-            for part, case, block in blocks:
-                # kept until the next block is evaluated, so that its memory is used again
-                evaluated = evaluate(case, block, last_stage, names)
-                _store_block(case, evaluated, arrays, code, part)
-    unwrap_angles(arrays, commanded.bar)
-    if commanded.stroke is not None:
-        for name in {
-            "stroke",
-            "stroke_speed",
-        } & arrays.keys():  # as commanded, wherever it has a value
-            arrays[name][...] = getattr(commanded, name) + 0.0 * arrays[name]
-    if study is not None:
-        study.refuse(arrays, code)
-    solution = make_solution(
-        scene if study is None else study.members(None, 1), commanded, code, arrays
-    )
-    solution.scene = scene if study is None else None
-    solution.time, solution.stopped_at = commanded.time, stopped_at
+        if commanded.independent is not None:
+            results = _solve_released(scene, commanded.independent, request)
+        else:
+            case = _begin(scene, commanded, request, side)
+            alone = _solve_alone(case, commanded, request)
+            results = alone or _solve_blocks(case, commanded, request)
+    solution = make_solution(scene, commanded, results)
+    solution.scene, solution.stopped_at = scene, stopped_at
     return solution
 
 
-def _begin(scene: Scene, commanded: Command, last_stage: int, side: int) -> Case:
+class Request(NamedTuple):
+    """What is evaluated, and at how many positions."""
+
+    shape: tuple[int, ...]
+    """Shape of the positions."""
+    last_stage: int
+    """Number of the last stage evaluated."""
+    names: KeysView[str]
+    """Names of the quantities."""
+    out: Mapping[str, Array] | None
+    """Arrays of the caller's to write into."""
+
+    @property
+    def block(self) -> int:
+        """Number of positions evaluated at a time."""
+        return BLOCK if self.last_stage < ERROR else LONG_BLOCK
+
+    @property
+    def asks_forces(self) -> bool:
+        """Return True if forces are evaluated."""
+        return self.last_stage >= FORCE
+
+
+class Results:
+    """Status codes and arrays of all positions, which are filled block by block."""
+
+    def __init__(self, request: Request) -> None:
+        shape, given = request.shape, request.out or {}
+        self.codes = np.zeros(shape, dtype=np.uint8)
+        self.arrays: dict[str, Array] = {}
+        for name in request.names:
+            shape_of_one = shape if name in SCALARS else (*shape, 2)
+            self.arrays[name] = given[name] if name in given else np.empty(shape_of_one)
+
+    def store(self, case: Case, evaluated: Evaluated, part: Part) -> None:
+        """Write what was evaluated; where it is no number, with the status that says so."""
+        withhold_infinite(case, evaluated)
+        shape = self.codes[part].shape
+        self.codes[part] = evaluated.codes.reshape(shape)
+        for name, value in evaluated.values.items():
+            array = self.arrays[name]
+            if len(shape) > 1 and np.ndim(value):
+                value = value.reshape(shape)  # noqa: PLW2901
+            if name in SCALARS:
+                array[part] = value
+            elif array.strides[-1] == array.itemsize:
+                # x and y next to each other: one copy
+                array.view(complex)[*part, 0] = value
+            else:
+                array[*part, 0], array[*part, 1] = value.real, value.imag
+
+
+def _begin(scene: Scene, commanded: Command, request: Request, side: int) -> Case:
     """Make the case of one linkage, with effects that count turns from where the motion begins."""
     case = Case.of(scene, commanded.bar)._replace(side=side)
-    if last_stage < FORCE or not scene.counts_turns:
+    if not request.asks_forces or not scene.counts_turns:
         return case
-    if commanded.independent is not None:
-        return case.with_start(commanded.part(slice(0, 1)))
     stated = command(scene)
     return case.with_start(stated if stated.bar == commanded.bar else commanded)
 
 
-def _list_blocks(
-    scene: Scene, commanded: Command, last_stage: int, side: int
-) -> Iterator[tuple[Part, Case, Command]]:
-    """List the positions of one linkage block by block, those of a released one by their independent angle."""
-    case, free = _begin(scene, commanded, last_stage, side), commanded.independent
-    if free is None:
-        for part in _split(
-            len(commanded.angle), BLOCK if last_stage < ERROR else LONG_BLOCK
-        ):
-            yield (part,), case, commanded.part(part)
-        return
-    for bar in (2, 4):
-        index = np.flatnonzero(free.bar == bar)
-        if index.size:
-            yield (index,), case.freed(bar, free.side[index]), commanded.part(index)
+def _solve_alone(case: Case, commanded: Command, request: Request) -> Results | None:
+    """Solve a single position in plain numbers, for arrays of one entry cost several times as much.
+
+    None for several positions, and where any result is no number: there NumPy goes on
+    with inf and NaN, and statuses follow.
+    """
+    if request.shape != (1,) or request.out is not None:
+        return None
+    position = commanded.part((0,))
+    angle: Any = position.angle.item()  # Python's own numbers halve a formula's time
+    position = position._replace(angle=angle)
+    try:
+        codes, values, _ = evaluate(case, position, request.last_stage, request.names)
+    except ArithmeticError:
+        return None
+    table = np.array([*values.values()], dtype=complex)
+    if not cmath.isfinite(np.vdot(table, table)):
+        return None
+    results = Results.__new__(Results)
+    results.codes = np.array([codes], dtype=np.uint8)
+    vectors = table.view(float).reshape(-1, 1, 2)
+    scalars = vectors[:, :, 0]
+    results.arrays = {
+        name: (scalars if name in SCALARS else vectors)[i]
+        for i, name in enumerate(values)
+    }
+    return results
 
 
-def _list_members(
-    study: Members, last_stage: int, side: int
-) -> Iterator[tuple[Part, Case, Command]]:
-    """List the positions of many linkages block by block, each number repeated for the positions of its member."""
-    (m, n), size = study.at.angle.shape, BLOCK if last_stage < ERROR else LONG_BLOCK
-    for rows in _split(m, max(1, size // n)):
-        begins = study.begin(rows) if last_stage >= FORCE else study.scene
-        for columns in _split(n, size):
-            scene = study.members(rows, columns.stop - columns.start, begins)
-            yield (
-                (rows, columns),
-                Case.of(scene, study.at.bar)._replace(side=side),
-                take_members(study.at, rows, columns),
-            )
+def _solve_blocks(case: Case, commanded: Command, request: Request) -> Results:
+    """Solve the positions of one linkage block by block."""
+    results, evaluated = Results(request), None
+    for part in split(len(commanded.angle), request.block):
+        block = commanded.part(part)
+        # kept until the next block is evaluated, so that its memory is used again
+        evaluated = evaluate(case, block, request.last_stage, request.names)
+        results.store(case, evaluated, (part,))
+    return results
 
 
-def _split(size: int, most: int) -> Iterator[slice]:
+def _solve_released(
+    scene: Scene, independent: Independent, request: Request
+) -> Results:
+    """Solve a released motion, as the commands of bars 2 and 4 that it is made of."""
+    results = Results(request)
+    for index, commanded, side in independent.commands():
+        case = Case.of_released(scene, commanded.bar, side)
+        evaluated = evaluate_released(
+            case, commanded, scene.drive, request.last_stage, request.names
+        )
+        results.store(case, evaluated, (index,))
+    return results
+
+
+def split(size: int, most: int) -> Iterator[slice]:
     """Split so many into slices of as many at most."""
     return (slice(start, min(start + most, size)) for start in range(0, size, most))
 
 
-def take_members(commanded: Command, rows: slice, columns: slice) -> Command:
-    """Take some positions of some members, one after the other, (k,)."""
-    count = columns.stop - columns.start
-
-    def flat(value: Any) -> Any:
-        if np.ndim(value) < 2:
-            return value
-        if value.shape[1] == 1:
-            return value[rows, 0] if count == 1 else np.repeat(value[rows, 0], count)
-        return value[rows, columns].reshape(-1, *value.shape[2:])
-
-    return Command(*(flat(value) for value in commanded))
-
-
-def _store_block(
-    case: Case,
-    evaluated: Evaluated,
-    arrays: Mapping[str, Array],
-    code: NDArray[np.uint8],
-    part: Part,
-) -> None:
-    """Write what was evaluated into the arrays of all positions, where it is no number with the status that says so."""
-    codes, values, _ = evaluated
-    withhold_infinite(case, evaluated)
-    shape = code[part].shape
-    code[part] = codes.reshape(shape)
-    for name, value in values.items():
-        if len(shape) > 1 and np.ndim(value):
-            value = value.reshape(shape)  # noqa: PLW2901
-        if name in SCALARS:
-            arrays[name][part] = value
-        else:
-            array = arrays[name]
-            if (
-                array.strides[-1] == array.itemsize
-            ):  # x and y next to each other: one copy
-                array.view(complex)[*part, 0] = value
-            else:
-                array[*part, 0], array[*part, 1] = value.real, value.imag
+def _require_study(study: object, at: Command | None) -> ManyScenes:
+    """Return a study; InputError for what is none, or where a command is given too."""
+    if not hasattr(study, "solve"):
+        raise InputError("scene", study, "must be a Scene, or a Study of `vary`")
+    if at is not None:
+        raise InputError(
+            "at",
+            "a command",
+            "a study states its own positions: vary the commanded angle",
+        )
+    return study
 
 
 def _refuse(commanded: Command) -> None:
@@ -301,16 +297,16 @@ def find_last_stage(scene: Scene) -> str:
 
 def find_requested(
     scene: Scene,
-    shape: tuple[int, ...],
     commanded: Command,
     stage: str | None,
     out: Mapping[str, Array] | None,
-) -> tuple[int, KeysView[str]]:
-    """Return the number of the last stage evaluated, and the names of the quantities; an InputError as of `solve`.
+) -> Request:
+    """Find what is evaluated for the arguments of `solve`; an InputError as there.
 
-    `shape`: of the positions. If `commanded` is a bar other than the input, theta_2 and sin_mu, whose sign is the
+    If a bar other than the input is commanded, theta_2 and sin_mu, whose sign is the
     branch, are evaluated too.
     """
+    shape = commanded.angle.shape
     if out is None:
         if stage is None:
             stage = "position" if commanded.speed is None else "force"
@@ -351,24 +347,9 @@ def find_requested(
             None,
             f"is needed for the stage {STAGES[last_stage]!r}",
         )
-    return last_stage, names if commanded.bar == 2 else {
-        **dict.fromkeys(names),
-        "theta_2": None,
-        "sin_mu": None,
-    }.keys()
-
-
-def make_arrays(
-    names: Iterable[str], shape: tuple[int, ...], out: Mapping[str, Array] | None
-) -> dict[str, Array]:
-    """Return the arrays to write into: the given ones, and new ones for the rest."""
-    stated = {} if out is None else out
-    return {
-        name: stated[name]
-        if name in stated
-        else np.empty(shape if name in SCALARS else (*shape, 2))
-        for name in names
-    }
+    if commanded.bar != 2:
+        names = {**dict.fromkeys(names), "theta_2": None, "sin_mu": None}.keys()
+    return Request(shape, last_stage, names, out)
 
 
 def _list_stages(points: tuple[str, ...]) -> dict[str, str]:
@@ -382,7 +363,7 @@ def _list_stages(points: tuple[str, ...]) -> dict[str, str]:
 def _list_names(
     last_stage: int, absent: tuple[str, ...], points: tuple[str, ...]
 ) -> KeysView[str]:
-    """List the quantities of the stages up to the last one last_stage."""
+    """List the quantities of the stages up to the last one evaluated."""
     before = STAGES[: last_stage + 1]
     return {
         name: stage
@@ -391,13 +372,15 @@ def _list_names(
     }.keys()
 
 
-def make_solution(
-    scene: Scene,
-    commanded: Command,
-    code: NDArray[np.uint8],
-    quantities_by_name: Mapping[str, Array],
-) -> Solution:
+def make_solution(scene: Scene, commanded: Command, results: Results) -> Solution:
     """Put the arrays of a solution in their places."""
+    codes, quantities_by_name = results.codes, results.arrays
+    unwrap_angles(quantities_by_name, commanded.bar)
+    if commanded.stroke is not None:
+        # as commanded, wherever it has a value
+        for name in {"stroke", "stroke_speed"} & quantities_by_name.keys():
+            stroke = quantities_by_name[name]
+            stroke[...] = getattr(commanded, name) + 0.0 * stroke
     of_points: dict[str, dict[str, Array]] = {start: {} for start in POINT_STAGES}
     for point in scene.points:
         for start, arrays in of_points.items():
@@ -416,9 +399,10 @@ def make_solution(
         }
         branch = np.where(np.abs(sine) > 0.0, np.sign(sine), branch).astype(np.int8)
     solution = Solution(
-        scene.title, scene.drive_bar, code, branch, theta_2=theta_2, **quantities
+        scene.title, scene.drive_bar, codes, branch, theta_2=theta_2, **quantities
     )
     solution.drive, solution.at = scene.drive, commanded
+    solution.time = commanded.time
     solution.points, solution.velocity, solution.acceleration = (
         of_points[""],
         of_points["v_"],
@@ -434,33 +418,6 @@ def unwrap_angles(arrays: Mapping[str, Array], bar: int) -> None:
     for name in ("theta_2", *ANGLES):
         if name in arrays and name != commanded:
             unwrap(arrays[name])
-
-
-def _solve_alone(
-    case: Case,
-    commanded: Command,
-    last_stage: int,
-    names: KeysView[str],
-    code: NDArray[np.uint8],
-) -> dict[str, Array] | None:
-    """Solve a single position in plain numbers, for arrays of one entry cost several times as much.
-
-    None where any is no number: there NumPy goes on with inf and NaN, and statuses follow.
-    """
-    try:
-        codes, values, _ = evaluate(case, commanded.part((0,)), last_stage, names)
-    except ArithmeticError:
-        return None
-    code[0] = codes
-    table = np.array([*values.values()], dtype=complex)
-    if not cmath.isfinite(np.vdot(table, table)):
-        return None
-    vectors = table.view(float).reshape(-1, 1, 2)
-    scalars = vectors[:, :, 0]
-    return {
-        name: (scalars if name in SCALARS else vectors)[i]
-        for i, name in enumerate(values)
-    }
 
 
 def _list_foreign(scene: Scene) -> tuple[str, ...]:

@@ -9,7 +9,12 @@ from fourbar.effects.effect import Actions, SolvedFriction, list_bodies
 from fourbar.formulas.arithmetic import U, angle, is_any, polar, select
 from fourbar.formulas.longer import change_numbers, lengthen
 from fourbar.formulas.motion import Coefficients, State, rates
-from fourbar.formulas.path import Path, meet_change_points, prepare_path
+from fourbar.formulas.path import (
+    NO_DIGIT_LEFT,
+    Path,
+    meet_change_points,
+    prepare_path,
+)
 from fourbar.formulas.pin_forces import (
     Bodies,
     PinForces,
@@ -39,8 +44,6 @@ by at most about 12 U times them."""
 NO_POSITIONS = np.empty(0, dtype=np.intp)
 NO_MOTION = Coefficients(*[np.nan] * 8)
 """Coefficients of NaN, used where only positions are evaluated."""
-Evaluated = tuple[NDArray[np.uint8], dict[str, Any], Position | None]
-"""Status codes and quantities of some positions, vectors as x + i y, and where the drive must balance."""
 
 
 def find_undecided(
@@ -48,6 +51,18 @@ def find_undecided(
 ) -> Any:
     """Mark where doubles cannot decide the sign of a factor of Heron's formula, a constant and 4 a d times a square."""
     return (constant < 0.0) & (abs(factor) < part * (abs(constant) + size))
+
+
+def find_sign(branch: NDArray[np.int8]) -> Any:
+    """Return the branch of each position, or one number where all have the same."""
+    if branch.ndim == 0 or (branch.size and branch.min() == branch.max()):
+        return float(branch.flat[0]) if branch.ndim else float(branch)
+    return branch
+
+
+def find_margin(commanded: Command) -> float:
+    """Return the sine at or below which a commanded position is singular; 0 where its angle is known in many digits."""
+    return NO_DIGIT_LEFT if commanded.remainder is None else 0.0
 
 
 class Dynamics(NamedTuple):
@@ -154,42 +169,6 @@ class Case(NamedTuple):
         lever, most = self.drive.leverage(state, self.sines(state.position))
         return abs(lever) / most
 
-    def state(
-        self,
-        q: Any,
-        position: Position,
-        branch: Any,
-        speed: Any,
-        acceleration: Any,
-        *,
-        moving: bool = True,
-    ) -> State:
-        """Compute positions and, if more is wanted, motion.
-
-        `at`: in the order in which the path reads the loop.
-        """
-        k, path, sine = NO_MOTION, self.path, position.sin_mu
-        if moving:
-            position, k = path.motion(position, branch)
-        else:
-            position, speed, acceleration = path.in_order(position), 0.0, 0.0
-        state = State(
-            self.lengths,
-            self.linkage.ground_angle,
-            q,
-            position,
-            k,
-            speed,
-            rates(k, speed, acceleration),
-        )
-        return (
-            state
-            if path.bar == 2
-            else state._replace(
-                theta_2=angle(position.u2), bar=path.bar, q=q, sine=sine
-            )
-        )
-
     def assemble(
         self,
         q: Any,
@@ -199,36 +178,69 @@ class Case(NamedTuple):
         acceleration: Any,
         *,
         moving: bool = True,
+        condition: Any = None,
+        margin: float = NO_DIGIT_LEFT,
     ) -> State:
-        """Close the loop at a half angle and compute its motion: the one way from an angle to what forces act on."""
-        return self.state(
-            q,
-            self.path.position(q, half, branch),
-            branch,
+        """Close the loop at a half angle: the one way from an angle to what forces act on.
+
+        Parameters
+        ----------
+        moving : False: positions only.
+        condition, margin : as in `Path.close`.
+        """
+        path = self.path
+        if moving:
+            position, k, sine = path.close(
+                q, half, branch, condition=condition, margin=margin
+            )
+        else:
+            position, k = path.position(q, half, branch), NO_MOTION
+            position, sine = path.in_order(position), position.sin_mu
+            speed = acceleration = 0.0
+        return State(
+            self.lengths,
+            self.linkage.ground_angle,
+            q if path.bar == 2 else angle(position.u2),
+            position,
+            k,
             speed,
-            acceleration,
+            rates(k, speed, acceleration),
+            path.bar,
+            q,
+            sine,
+        )
+
+    def at(
+        self, commanded: Command, *, moving: bool = True
+    ) -> tuple[State, NDArray[np.intp]]:
+        """Compute the positions of a command, and their motion.
+
+        `moving`: False: positions only. Returned too are the indices of the positions
+        whose half angle is evaluated in many digits.
+        """
+        half, refined_rows = self.half_angle(commanded.angle, commanded.remainder)
+        state = self.assemble(
+            commanded.angle,
+            half,
+            find_sign(commanded.branch),
+            0.0 if commanded.speed is None else commanded.speed,
+            commanded.acceleration,
             moving=moving,
+            condition=commanded.condition,
+            margin=find_margin(commanded),
         )
+        return state, refined_rows
 
-    def at(self, commanded: Command) -> State:
-        """Compute the positions of a command, and their motion."""
-        half, _ = self.half_angle(commanded.angle, commanded.remainder)
-        speed = 0.0 if commanded.speed is None else commanded.speed
-        return self.assemble(
-            commanded.angle, half, commanded.branch, speed, commanded.acceleration
-        )
-
-    def freed(self, bar: int, side: Any) -> "Case":
-        """Return the case of a linkage that is released, read in the angle of bar 2 or 4, which no couple drives."""
-        path = prepare_path(
-            Loop(*self.linkage.lengths, 0.0, 0.0), self.linkage.ground_angle, bar
-        )
-        path = path._replace(lengths=meet_change_points(path.lengths))
-        return self._replace(drive_bar=bar, path=path, side=side)
+    @classmethod
+    def of_released(cls, scene: Scene, bar: int, side: Any) -> "Case":
+        """Collect the numbers of a released linkage, read in the angle of bar 2 or 4, which no couple drives."""
+        case = cls.of(scene, bar)
+        path = case.path._replace(lengths=meet_change_points(case.path.lengths))
+        return case._replace(drive_bar=bar, drive=None, path=path, side=side)
 
     def started(self, start: Command) -> "Case":
         """Return a copy whose path-dependent effects begin at this position; it may hold many linkages."""
-        state = self.at(start)
+        state, _ = self.at(start)
         return self._replace(
             terms=tuple(term.counted_from(state, start.branch) for term in self.terms)
         )
@@ -440,4 +452,4 @@ class _FreeBodies(NamedTuple):
 def compute_state(scene: Scene, commanded: Command) -> State:
     """Compute the positions of a command and their motion, for what shows them."""
     with np.errstate(all="ignore"):
-        return Case.of(scene, commanded.bar).at(commanded)
+        return Case.of(scene, commanded.bar).at(commanded)[0]

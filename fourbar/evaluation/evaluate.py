@@ -6,14 +6,14 @@ most a thousandth as much as doubles.
 """
 
 import cmath
-from collections.abc import Callable, KeysView, Mapping
+from collections.abc import Callable, Mapping, Set
 from functools import reduce
-from typing import Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.evaluation.case import NO_POSITIONS, Case, Dynamics, Evaluated
+from fourbar.evaluation.case import Case, Dynamics, find_margin, find_sign
 from fourbar.formulas.arithmetic import U, angle, is_any, select
 from fourbar.formulas.longer import lengthen, shorten
 from fourbar.formulas.motion import State
@@ -21,7 +21,9 @@ from fourbar.formulas.path import NO_DIGIT_LEFT
 from fourbar.formulas.position import HalfAngle
 from fourbar.quantities import (
     ANGLES,
+    COUPLE,
     JAMMED,
+    LINE,
     LINE_QUANTITIES,
     NO_DIRECTION,
     NO_LEVER,
@@ -38,90 +40,82 @@ from fourbar.quantities import (
 from fourbar.scene import Command
 from fourbar.scene.numbers import POINT_STAGES
 
+if TYPE_CHECKING:
+    from fourbar.effects import LinearDrive
+
 FORCE, ERROR = STAGES.index("force"), STAGES.index("error")
 WITHOUT_FORCES = (NO_DIRECTION, WOUND, NO_LEVER)
 """Statuses of positions at which an effect or the drive has no value, and so the forces have none."""
 
 
+class Evaluated(NamedTuple):
+    """Some positions as they were evaluated."""
+
+    codes: NDArray[np.uint8]
+    """Status codes."""
+    values: dict[str, Any]
+    """Quantities by name, vectors as x + i y."""
+    state: State | None
+    """Positions and motion; None where angles alone were evaluated."""
+
+
 def evaluate(
-    case: Case, command: Command, last_stage: int, names: KeysView[str]
+    case: Case, command: Command, last_stage: int, names: Set[str]
 ) -> Evaluated:
     """Evaluate the named quantities at the positions of a command, up to the last stage that they need.
 
-    `command`: positions (n,), or one in plain numbers. In a released motion the independent angle fixes the position,
-    and the drive exerts nothing.
+    `command`: positions (n,), or one in plain numbers.
     """
-    free, branch = command.independent, find_sign(command.branch)
-    q: Any = command.angle
-    speed, acceleration = command.speed, command.acceleration
-    if free is not None:
-        q, speed, acceleration, branch = (
-            free.angle,
-            free.speed,
-            free.acceleration,
-            free.sign,
-        )
-    elif q.ndim == 0:
-        q = q.item()  # with Python's own numbers a formula takes half the time
-    speed = 0.0 if speed is None else speed
-    if free is None:
-        half, refined_rows = case.half_angle(q, command.remainder)
-    else:
-        half, refined_rows = case.path.half_angle(q), NO_POSITIONS
-    of_angles = (
-        command.bar == 2 and len(names) <= len(ANGLES) and set(names) <= set(ANGLES)
-    )
-    if (
-        of_angles
-        and free is None
-        and command.remainder is None
-        and not case.path.may_stay_parallel
-    ):
-        return _evaluate_angles(case, half, branch, names)
-    position = case.path.position(q, half, branch)
-    codes = (
-        _compute_codes(position.sin_mu, half, command)
-        if free is None
-        else np.zeros(q.shape, dtype=np.uint8)
-    )
-    if is_any(codes):  # velocities are 0/0
-        position = position._replace(
-            root=np.where(codes == SINGULAR, np.nan, position.root)
-        )
-    state = case.state(q, position, branch, speed, acceleration, moving=last_stage > 0)
-    if free is not None:
-        state = state._replace(theta_2=command.angle)
-    values = list_kinematics(
-        case, state if free is None else state._replace(bar=2), names
-    )
+    if _asks_angles_alone(case, command, names):
+        return _evaluate_angles(case, command, names)
+    state, refined_rows = case.at(command, moving=last_stage > 0)
+    codes = _compute_codes(state.sine, state.position.half, command)
+    values = list_kinematics(case, state, names)
     if command.condition is not None and "condition" in names:
         values["condition"] = values["condition"] * command.condition
     if last_stage >= FORCE:
-        acting = case if free is None else case._replace(drive=None)
-        dynamics = acting.dynamics(state, acceleration, case.side)
-        counted = command.branch if free is None else None
+        acceleration = command.acceleration
+        dynamics = case.dynamics(state, acceleration, case.side)
         error_bars = {}
         if last_stage == ERROR:
             error_bars = compute_error_bars(
-                acting, command, state, acceleration, branch, dynamics, refined_rows
+                case, command, state, dynamics, refined_rows
             )
         codes, forces = _list_forces(
-            acting, state, acceleration, counted, codes, names, dynamics, error_bars
+            case, command, state, codes, names, dynamics, error_bars
         )
-        if free is not None:
-            forces |= {name: np.zeros(codes.shape) for name in (*case.names, "power")}
         values |= {name: value for name, value in forces.items() if name in names}
-    return codes, values, state.position
+    return Evaluated(codes, values, state)
+
+
+def evaluate_released(
+    case: Case,
+    command: Command,
+    drive: "LinearDrive | None",
+    last_stage: int,
+    names: Set[str],
+) -> Evaluated:
+    """Evaluate instants of a released motion, whose drive exerts nothing.
+
+    Results are those of a command of theta_2, in whichever bar's angle they are read.
+    """
+    codes, values, state = evaluate(case, command, last_stage, names)
+    if state is not None:
+        by_input = state._replace(bar=2, sine=state.position.sin_mu)
+        others = names & {"theta_4", "condition", *LINE_QUANTITIES}
+        values |= list_kinematics(case._replace(drive=drive), by_input, others)
+    if last_stage >= FORCE:
+        of_drive = {"power", *(COUPLE if drive is None else LINE)}
+        values |= {name: np.zeros(codes.shape) for name in of_drive & names}
+    return Evaluated(codes, values, state)
 
 
 def _compute_codes(
-    sine: Any, half: HalfAngle, command: Command | None, unit: float = 1.0
+    sine: Any, half: HalfAngle, command: Command, unit: float = 1.0
 ) -> Any:
     """Compute the status of each position from the sine of the transmission angle, times `unit`."""
-    size, margin = abs(sine), NO_DIGIT_LEFT * unit
-    if command is not None and command.remainder is not None:
-        margin = 0.0  # known in many digits
-    elif command is not None and command.condition is not None:
+    size, margin = abs(sine), find_margin(command) * unit
+    if command.condition is not None:
         size = np.where(np.isnan(size), size, np.minimum(size, command.condition))
     if type(size) is float and size > margin:
         return OK
@@ -129,45 +123,38 @@ def _compute_codes(
     if not np.min(size, initial=np.inf) > margin:  # NaN where the loop does not close
         codes[size <= margin] = SINGULAR
         codes[np.isnan(sine)] = NOT_ASSEMBLED
-        codes[np.isnan(half.kk)] = (
-            OVERFLOW  # theta_2 - theta_1 overflows, so the loop cannot be evaluated
-        )
+        # theta_2 - theta_1 overflows, so the loop cannot be evaluated
+        codes[np.isnan(half.kk)] = OVERFLOW
     return codes
 
 
-def find_sign(branch: NDArray[np.int8]) -> Any:
-    """Return the branch of each position, or one number where all have the same."""
-    if branch.ndim == 0 or (branch.size and branch.min() == branch.max()):
-        return float(branch.flat[0]) if branch.ndim else float(branch)
-    return branch
+def _asks_angles_alone(case: Case, command: Command, names: Set[str]) -> bool:
+    """Return True if theta_3 and theta_4 are all that is wanted, for which bars need no vectors."""
+    angles_alone = len(names) <= len(ANGLES) and names <= set(ANGLES)
+    of_input = command.bar == 2 and command.remainder is None
+    return angles_alone and of_input and not case.path.may_stay_parallel
 
 
-def _evaluate_angles(
-    case: Case, half: HalfAngle, branch: Any, names: KeysView[str]
-) -> Evaluated:
+def _evaluate_angles(case: Case, command: Command, names: Set[str]) -> Evaluated:
     """Evaluate theta_3 and theta_4 alone, without the vectors of the bars."""
-    theta_3, theta_4, root = case.path.angles(half, branch)
-    codes = _compute_codes(
-        root, half, None, 2.0 * case.path.lengths.b * case.path.lengths.c
-    )
+    half, _ = case.half_angle(command.angle, None)
+    theta_3, theta_4, root = case.path.angles(half, find_sign(command.branch))
+    unit = 2.0 * case.path.lengths.b * case.path.lengths.c
+    codes = _compute_codes(root, half, command, unit)
     angles = {"theta_3": theta_3, "theta_4": theta_4}
-    return codes, {name: angles[name] for name in names}, None
+    return Evaluated(codes, {name: angles[name] for name in names}, None)
 
 
 def _list_forces(
     case: Case,
+    command: Command,
     state: State,
-    acceleration: Any,
-    branch: NDArray[np.int8] | None,
     codes: Any,
-    names: KeysView[str],
+    names: Set[str],
     dynamics: Dynamics,
     error_bars: dict[str, Any],
 ) -> tuple[Any, dict[str, Any]]:
-    """List the quantities of the force stage, error bars included, and the statuses with those of the effects.
-
-    `branch`: the branch of each position, by which effects count turns; None for a released motion.
-    """
+    """List the quantities of the force stage, error bars included, and the statuses with those of the effects."""
     drive_names = case.names
     values: dict[str, Any] = {
         **dynamics.pins._asdict(),
@@ -188,7 +175,7 @@ def _list_forces(
             0.0 if dynamics.residual is None else dynamics.residual
         )
     if drive_names.low in names or drive_names.high in names:
-        *ends, held = case.drive_interval(state, acceleration, dynamics.drive)
+        *ends, held = case.drive_interval(state, command.acceleration, dynamics.drive)
         values |= zip(drive_names[2:], ends, strict=True)
         if held is not None and dynamics.status is not None:
             dynamics = dynamics._replace(
@@ -197,7 +184,7 @@ def _list_forces(
     without: list[Any] = [
         status
         for term in case.terms
-        if (status := term.status(state, branch)) is not None
+        if (status := term.status(state, command.branch)) is not None
     ]
     if dynamics.status is not None:
         without.append(dynamics.status)
@@ -222,8 +209,6 @@ def compute_error_bars(
     case: Case,
     command: Command,
     state: State,
-    acceleration: Any,
-    sign: Any,
     dynamics: Dynamics,
     refined_rows: NDArray[np.intp],
 ) -> dict[str, Any]:
@@ -231,18 +216,14 @@ def compute_error_bars(
 
     Parameters
     ----------
-    state, acceleration, dynamics : evaluation in doubles, to which the error bars belong.
-    sign : branch, the sign of the root.
+    state, dynamics : evaluation in doubles, to which the error bars belong.
     refined_rows : indices of the positions whose half angle is evaluated in many digits.
     """
-    longer, driven_angle = (
-        case.lengthened(),
-        state.theta_2 if state.q is None else state.q,
-    )
+    longer, branch = case.lengthened(), find_sign(command.branch)
     lost, remainder = command.lost, command.remainder
     if lost is None:
         lost = np.array([0.0 if remainder is None else float(remainder), 0.0, 0.0])
-    numbers = enumerate((driven_angle, state.speed, acceleration))
+    numbers = enumerate((state.q, state.speed, command.acceleration))
     q, speed, longer_acceleration = (
         lengthen(number) + lost[..., place] for place, number in numbers
     )
@@ -256,12 +237,20 @@ def compute_error_bars(
             case.path.unit,
             half,
             refined_rows,
-            driven_angle,
+            state.q,
             remainder,
             case.path.bar,
             left_out,
         )
-    near = longer.assemble(q, half, sign, speed, longer_acceleration)
+    near = longer.assemble(
+        q,
+        half,
+        branch,
+        speed,
+        longer_acceleration,
+        condition=command.condition,
+        margin=find_margin(command),
+    )
     longer_dynamics = longer.dynamics(near, longer_acceleration, case.side)
     pairs = zip(
         (*dynamics.pins, dynamics.drive),
@@ -296,13 +285,12 @@ def is_finite(values: Mapping[str, Any]) -> bool:
 
 def withhold_infinite(case: Case, evaluated: Evaluated) -> None:
     """Apply `withhold` to evaluated positions if any of their values is not finite."""
-    codes, values, driven = evaluated
+    codes, values, state = evaluated
     if not is_finite(values):
         in_line: Any = False
-        if driven is not None and case.drive is None:
-            in_line = (
-                np.abs(case.path.drive_sine(driven, case.drive_bar)) <= NO_DIGIT_LEFT
-            )
+        if state is not None and case.drive is None:
+            sine = case.path.drive_sine(state.position, case.drive_bar)
+            in_line = np.abs(sine) <= NO_DIGIT_LEFT
         withhold(values, codes, np.broadcast_to(in_line, codes.shape))
 
 
@@ -353,9 +341,7 @@ SCALAR_FORMULAS: dict[str, Callable[[State], Any]] = {
     "theta_3": lambda state: state.q if state.bar == 3 else angle(state.position.u3),
     "theta_4": lambda state: state.q if state.bar == 4 else angle(state.position.u4),
     "sin_mu": lambda state: state.position.sin_mu,
-    "condition": lambda state: abs(
-        state.position.sin_mu if state.bar == 2 else state.sine
-    ),
+    "condition": lambda state: abs(state.sine),
     "omega_2": lambda state: state.moving.omega_2,
     "omega_3": lambda state: state.moving.omega_3,
     "omega_4": lambda state: state.moving.omega_4,
@@ -370,7 +356,7 @@ PLACES = frozenset(
 """Names of the vectors that come before the forces, at the pins and mass centres of the linkage."""
 
 
-def list_kinematics(case: Case, state: State, names: KeysView[str]) -> dict[str, Any]:
+def list_kinematics(case: Case, state: State, names: Set[str]) -> dict[str, Any]:
     """List the named quantities that come before the forces, those of the scene's own points included."""
     values = {
         name: formula(state)

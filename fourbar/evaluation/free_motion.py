@@ -128,7 +128,7 @@ def release(scene: Scene) -> Released:
         motion = released.command
         with np.errstate(all="ignore"):
             begun = Case.of(scene).with_start(motion.part(slice(0, 1)))
-            state = begun.at(motion)
+            state, _ = begun.at(motion)
             for term in begun.terms:
                 codes = term.status(state, motion.branch) if term.counts_turns else None
                 if codes is not None and codes.any():
@@ -185,7 +185,9 @@ class _Reading:
     def _by(
         self, q: float, half: HalfAngle, branch: float
     ) -> tuple[Position, Coefficients]:
-        position, k = self.path.motion(self.path.position(q, half, branch), branch)
+        # a motion may start at a limit of the bar that it is read from: coefficients are
+        # then infinite, and another bar is taken
+        position, k, _ = self.path.close(q, half, branch, margin=-1.0)
         return (
             (_make_plain(position), _make_plain(k))
             if self.path.may_stay_parallel

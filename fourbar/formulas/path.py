@@ -118,6 +118,30 @@ class Path(NamedTuple):
             theta_3, theta_4 = np.pi - theta_3, np.pi - theta_4
         return theta_3, theta_4, root
 
+    def close(
+        self,
+        q: Number,
+        half: HalfAngle,
+        branch: Number,
+        *,
+        condition: Number = None,
+        margin: float = NO_DIGIT_LEFT,
+    ) -> tuple[Position, Coefficients, Number]:
+        """Close the loop at a half angle; return positions, coefficients by q, and the sine.
+
+        The sine is that between the two other moving bars. Coefficients are NaN where
+        they are 0/0: where it, or the condition of the command, is no larger than `margin`;
+        nowhere if that is negative.
+        """
+        position = self.position(q, half, branch)
+        singular = abs(position.sin_mu) <= margin
+        if condition is not None:
+            singular = singular | (condition <= margin)
+        if is_any(singular):
+            root = np.where(singular, np.nan, position.root)
+            position = position._replace(root=root)
+        return *self.motion(position, branch), position.sin_mu
+
     def motion(
         self, position: Position, branch: Number
     ) -> tuple[Position, Coefficients]:
@@ -227,13 +251,8 @@ def compute_state(
     with np.errstate(all="ignore"):
         lengths = loop(*linkage.lengths)
         reading = prepare_path(lengths, linkage.ground_angle)
-        position = reading.position(theta_2, reading.half_angle(theta_2), branch)
-        position, k = reading.motion(
-            position._replace(
-                root=np.where(find_singular(position), np.nan, position.root)
-            ),
-            branch,
-        )
+        half = reading.half_angle(theta_2)
+        position, k, _ = reading.close(theta_2, half, branch)
         return State(
             lengths,
             linkage.ground_angle,

@@ -202,6 +202,22 @@ class Independent(NamedTuple):
     side: Array
     """Fraction of its torque, -1 to 1, with which dry friction holds at a standstill; +-1: it moves on; else 0."""
 
+    def commands(self) -> "list[tuple[NDArray[np.intp], Command, Array]]":
+        """List the commands of bars 2 and 4 that the motion is made of, each with its instants and their side."""
+        commands: list[tuple[NDArray[np.intp], Command, Array]] = []
+        for bar in (2, 4):
+            index = np.flatnonzero(self.bar == bar)
+            if index.size:
+                released = Command(
+                    self.angle[index],
+                    self.sign[index].astype(np.int8),
+                    self.speed[index],
+                    self.acceleration[index],
+                    bar=bar,
+                )
+                commands.append((index, released, self.side[index]))
+        return commands
+
 
 class Command(NamedTuple):
     """Command of one bar, the input unless another is named, at each of n independent positions."""

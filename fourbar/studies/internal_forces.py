@@ -218,7 +218,7 @@ def _collect(scene: Scene, solution: Solution, bar: int) -> _Beam:
     described, n = scene.linkage.bar(bar), len(solution)
     with np.errstate(all="ignore"):
         case = Case.of(scene, solution.at.bar).with_start(solution.at)
-        state = case.at(solution.at)
+        state, _ = case.at(solution.at)
         recorder = _Recorder(state, scene, bar)
         _record_pins(recorder, solution)
         _record_drive(recorder, scene, solution)

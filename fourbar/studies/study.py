@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from fourbar.effects.effect import Effect
 from fourbar.errors import InputError, expect
 from fourbar.evaluation.case import Case
+from fourbar.evaluation.evaluate import evaluate
 from fourbar.formulas.mobility import follow_smooth_path
 from fourbar.formulas.position import loop, reorder_lengths
 from fourbar.linkage import convert_to_unit
@@ -18,8 +19,8 @@ from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import FromLimit
 from fourbar.scene.numbers import find_unit
 from fourbar.scene.scene import command_stroke
-from fourbar.solution import Array
-from fourbar.solve import take_members
+from fourbar.solution import Array, Solution
+from fourbar.solve import Results, find_requested, make_solution, split
 from fourbar.studies.keys import (
     COMMAND_KEYS,
     command_key,
@@ -61,21 +62,46 @@ class Study:
             + list_names("varied", self.values)
         )
 
-    def members(
-        self, rows: slice | None, count: int, begins: Scene | None = None
-    ) -> Scene:
+    def solve(
+        self,
+        stage: str | None = None,
+        *,
+        out: Mapping[str, Array] | None = None,
+        side: int = 0,
+    ) -> Solution:
+        """Evaluate every member; parameters and errors as of `fourbar.solve`, shapes (m, n) and (m, n, 2)."""
+        commanded = self.at
+        request = find_requested(self.scene, commanded, stage, out)
+        results, evaluated = Results(request), None
+        (m, n), block = request.shape, request.block
+        with np.errstate(all="ignore"):
+            for rows in split(m, max(1, block // n)):
+                begins = self.begin(rows) if request.asks_forces else self.scene
+                for columns in split(n, block):
+                    scene = self.members(rows, columns.stop - columns.start, begins)
+                    case = Case.of(scene, commanded.bar)._replace(side=side)
+                    positions = take_members(commanded, rows, columns)
+                    # kept until the next block is evaluated, so that its memory is used again
+                    evaluated = evaluate(
+                        case, positions, request.last_stage, request.names
+                    )
+                    results.store(case, evaluated, (rows, columns))
+        solution = make_solution(self.columns(), commanded, results)
+        self.refuse(results)
+        return solution
+
+    def columns(self) -> Scene:
+        """Make the scene of all members, each number that varies as a column (m, 1)."""
+        columns = {key: values[:, None] for key, values in self.values.items()}
+        return replace_numbers(self.scene, columns)
+
+    def members(self, rows: slice, count: int, begins: Scene) -> Scene:
         """Make the scene of some members whose numbers are arrays, each repeated for `count` positions.
 
-        `rows`: None: of all, as columns (m, 1). `begins`: the scene with effects that know where the motion begins.
+        `begins`: the scene with effects that know where the motion begins.
         """
-        if rows is None:
-            return replace_numbers(
-                self.scene,
-                {key: values[:, None] for key, values in self.values.items()},
-            )
-        scene = self.scene if begins is None else begins
         scene = replace_numbers(
-            scene,
+            begins,
             {key: _repeat(values[rows], count) for key, values in self.values.items()},
         )
         for index, turns in _find_turns(scene.effects).items():
@@ -93,14 +119,16 @@ class Study:
             return scene
         count, n = rows.stop - rows.start, commanded.angle.shape[1]
         flat = take_members(commanded, rows, slice(0, n)).angle
-        half, _ = Case.of(self.members(rows, n), commanded.bar).half_angle(flat, None)
+        half, _ = Case.of(self.members(rows, n, scene), commanded.bar).half_angle(
+            flat, None
+        )
         assembled = ((half.outer >= 0.0) & (half.inner >= 0.0)).reshape(count, n)
         first = np.argmax(assembled, axis=1)
         begins = assembled.any(axis=1) & (np.ptp(commanded.branch[rows], axis=1) == 0)
         angle = np.where(begins, commanded.angle[rows][np.arange(count), first], np.nan)
         start = Command(angle, commanded.branch[rows, 0], 0.0, 0.0, bar=commanded.bar)
         counted = (
-            Case.of(self.members(rows, 1), commanded.bar)
+            Case.of(self.members(rows, 1, scene), commanded.bar)
             .started(start)
             .terms[len(scene.loads) :]
         )
@@ -108,12 +136,26 @@ class Study:
             scene = replace_place(scene, ("effects", index, "turns"), turns)
         return scene
 
-    def refuse(self, arrays: Mapping[str, Array], code: NDArray[np.uint8]) -> None:
+    def refuse(self, results: Results) -> None:
         """Mark the members that a scene would refuse, and the strokes that a cylinder cannot have."""
-        code[np.isnan(self.at.angle)] = NOT_ASSEMBLED
-        code[self.invalid] = INVALID
-        for array in arrays.values():
+        results.codes[np.isnan(self.at.angle)] = NOT_ASSEMBLED
+        results.codes[self.invalid] = INVALID
+        for array in results.arrays.values():
             array[self.invalid] = np.nan
+
+
+def take_members(commanded: Command, rows: slice, columns: slice) -> Command:
+    """Take some positions of some members, one after the other, (k,)."""
+    count = columns.stop - columns.start
+
+    def flat(value: Any) -> Any:
+        if np.ndim(value) < 2:
+            return value
+        if value.shape[1] == 1:
+            return _repeat(value[rows, 0], count)
+        return value[rows, columns].reshape(-1, *value.shape[2:])
+
+    return Command(*(flat(value) for value in commanded))
 
 
 def _find_turns(effects: Iterable[Effect]) -> dict[int, Any]:

@@ -55,14 +55,8 @@ def evaluate_single(scene: Scene, command: Command) -> Quantities:
         speed, growth = (
             np.float32(value) for value in (command.omega_2 or 0.0, command.alpha_2)
         )
-        position = path.position(theta_2, path.half_angle(theta_2), command.branch)
-        state = case.state(
-            theta_2,
-            change_numbers(position, _round_single),
-            command.branch,
-            speed,
-            growth,
-        )
+        half = path.half_angle(theta_2)
+        state = case.assemble(theta_2, half, command.branch, speed, growth)
         state = change_numbers(state, _round_single)
         dynamics = case.dynamics(state, growth)
     assert dynamics.drive.dtype == np.float32
