@@ -106,7 +106,7 @@ def solve(
     return solution
 
 
-class Request(NamedTuple):
+class Requested(NamedTuple):
     """What is evaluated, and at how many positions."""
 
     shape: tuple[int, ...]
@@ -132,7 +132,7 @@ class Request(NamedTuple):
 class Results:
     """Status codes and arrays of all positions, which are filled block by block."""
 
-    def __init__(self, request: Request) -> None:
+    def __init__(self, request: Requested) -> None:
         shape, given = request.shape, request.out or {}
         self.codes = np.zeros(shape, dtype=np.uint8)
         self.arrays: dict[str, Array] = {}
@@ -158,7 +158,7 @@ class Results:
                 array[*part, 0], array[*part, 1] = value.real, value.imag
 
 
-def _begin(scene: Scene, commanded: Command, request: Request, side: int) -> Case:
+def _begin(scene: Scene, commanded: Command, request: Requested, side: int) -> Case:
     """Make the case of one linkage, with effects that count turns from where the motion begins."""
     case = Case.of(scene, commanded.bar)._replace(side=side)
     if not request.asks_forces or not scene.counts_turns:
@@ -167,7 +167,7 @@ def _begin(scene: Scene, commanded: Command, request: Request, side: int) -> Cas
     return case.with_start(stated if stated.bar == commanded.bar else commanded)
 
 
-def _solve_alone(case: Case, commanded: Command, request: Request) -> Results | None:
+def _solve_alone(case: Case, commanded: Command, request: Requested) -> Results | None:
     """Solve a single position in plain numbers, for arrays of one entry cost several times as much.
 
     None for several positions, and where any result is no number: there NumPy goes on
@@ -196,7 +196,7 @@ def _solve_alone(case: Case, commanded: Command, request: Request) -> Results | 
     return results
 
 
-def _solve_blocks(case: Case, commanded: Command, request: Request) -> Results:
+def _solve_blocks(case: Case, commanded: Command, request: Requested) -> Results:
     """Solve the positions of one linkage block by block."""
     results, evaluated = Results(request), None
     for part in split(len(commanded.angle), request.block):
@@ -208,7 +208,7 @@ def _solve_blocks(case: Case, commanded: Command, request: Request) -> Results:
 
 
 def _solve_released(
-    scene: Scene, independent: Independent, request: Request
+    scene: Scene, independent: Independent, request: Requested
 ) -> Results:
     """Solve a released motion, as the commands of bars 2 and 4 that it is made of."""
     results = Results(request)
@@ -300,7 +300,7 @@ def find_requested(
     commanded: Command,
     stage: str | None,
     out: Mapping[str, Array] | None,
-) -> Request:
+) -> Requested:
     """Find what is evaluated for the arguments of `solve`; an InputError as there.
 
     If a bar other than the input is commanded, theta_2 and sin_mu, whose sign is the
@@ -349,7 +349,7 @@ def find_requested(
         )
     if commanded.bar != 2:
         names = {**dict.fromkeys(names), "theta_2": None, "sin_mu": None}.keys()
-    return Request(shape, last_stage, names, out)
+    return Requested(shape, last_stage, names, out)
 
 
 def _list_stages(points: tuple[str, ...]) -> dict[str, str]:
