@@ -134,9 +134,9 @@ def test_the_pictures_are_those_that_few_points_draw(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["hard", "effects"])
+@pytest.mark.parametrize("name", ["hard", "effects", "small-hard", "small-effects"])
 def test_the_other_pictures_are_those_that_are_drawn(name: str) -> None:
     with apply_style():
-        drawn = write_alone(DRAWS[f"draw_{name}"](), name)
+        drawn = write_alone(DRAWS[f"draw_{name.replace('-', '_')}"](), name)
     kept = (DOCS / "cost" / f"{name}.svg").read_text(encoding="utf-8")
     assert read_words(drawn) == read_words(kept)
