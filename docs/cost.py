@@ -169,12 +169,13 @@ def draw_small_accuracy(study: Path) -> Any:
         x, y, _ = zip(*points, strict=True)
         colour, marker = LIGHT[look[0]], look[1]
         axes.loglog(x, y, color=colour, marker=marker, ms=3.5, lw=1.2)
+        beside = len(x) // 2
         axes.annotate(
             name,
-            (x[-1], y[-1]),
-            xytext=(0, 5),
+            (x[beside], y[beside]),
+            xytext=(-5, -9) if curve == "recommended" else (0, 6),
             textcoords="offset points",
-            ha="right",
+            ha="right" if curve == "recommended" else "left",
             fontsize=7.5,
             color=colour,
         )
@@ -194,6 +195,8 @@ def draw_small_accuracy(study: Path) -> Any:
                     fontsize=7.5,
                     color=INK,
                 )
+    low, high = axes.get_xlim()
+    axes.set_xlim(low, 2.0 * high)
     axes.set_ylim(1e-17, 3.0)
     set_small(axes, "ms of a simulated second")
     return figure
