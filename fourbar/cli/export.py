@@ -1,8 +1,10 @@
 """The commands that write files: pictures, models for simulators; and the workbench."""
 
+from collections.abc import Callable
+from functools import wraps
 from itertools import chain, count
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -13,6 +15,27 @@ from fourbar.solution import Conversion
 
 if TYPE_CHECKING:
     from fourbar.mjcf.document import Drive
+    from fourbar.mjcf.plane import Plane
+
+
+def plane_options(command: Callable[..., None]) -> Callable[..., None]:
+    """Add --axis and --origin, given to the command as `plane`."""
+
+    @wraps(command)
+    def placed(axis: str, origin: str, **others: Any) -> None:
+        from fourbar.mjcf.plane import Plane
+
+        direction = given.read_three("--axis", axis, "1")
+        command(plane=Plane(direction, given.read_three("--origin", origin)), **others)
+
+    for name, default, text in (
+        ("--origin", "0 0 0", "Place of pin O2 in the world, m or with units."),
+        ("--axis", "0 0 1", "Direction of the pins' axes in the world."),
+    ):
+        placed = click.option(
+            name, default=default, show_default=True, metavar='"X Y Z"', help=text
+        )(placed)
+    return placed
 
 
 without_loads_option = click.option(
@@ -154,6 +177,7 @@ def animate(
     show_default=True,
     help="What drives it: a flywheel keeps omega_2; a motor takes the couple or force of your controller.",
 )
+@plane_options
 @given.text_option(".xml", ".mjcf", required=True)
 def mjcf(
     scene: Path | None,
@@ -161,6 +185,7 @@ def mjcf(
     omega: str | None,
     simulator: str,
     drive: "Drive",
+    plane: "Plane",
     out: Path,
 ) -> None:
     """Write a scene, or four lengths, as MJCF for MuJoCo and its kin."""
@@ -176,7 +201,8 @@ def mjcf(
 
     if scene is not None:
         with given.open_scene(scene) as described:
-            given.print_to(writer.write_mjcf_for(described, simulator, drive), out)
+            text = writer.write_mjcf_for(described, simulator, drive, plane)
+            given.print_to(text, out)
     elif lengths is not None:
         speed = (
             {}
@@ -184,7 +210,8 @@ def mjcf(
             else {"omega": given.read_number("--omega", omega, "rad/s")}
         )
         made = writer.make_scene(*given.read_lengths(lengths), **speed)
-        given.print_to(writer.write_mjcf_for(made, simulator, drive), out)
+        text = writer.write_mjcf_for(made, simulator, drive, plane)
+        given.print_to(text, out)
         to_output = out == STANDARD_STREAM
         for line in writer.list_defaults(made):
             click.echo(line, err=to_output)
@@ -201,25 +228,31 @@ def mjcf(
     help="Simulator that will load the file.",
 )
 @without_loads_option
+@plane_options
 @given.text_option(".sdf", ".world", ".xml", required=True)
-def sdf(scene: Path, reader: str, without_loads: bool, out: Path) -> None:
+def sdf(
+    scene: Path, reader: str, without_loads: bool, plane: "Plane", out: Path
+) -> None:
     """Write a scene as SDF for Gazebo or Drake."""
     from fourbar.mjcf.assembly import write_sdf as written
 
     with given.open_scene(scene) as described:
-        given.print_to(written(described, reader, without_loads=without_loads), out)
+        text = written(described, reader, without_loads=without_loads, plane=plane)
+        given.print_to(text, out)
 
 
 @click.command()
 @given.scene_argument
 @without_loads_option
+@plane_options
 @given.text_option(".usda", ".usd", required=True)
-def usd(scene: Path, without_loads: bool, out: Path) -> None:
+def usd(scene: Path, without_loads: bool, plane: "Plane", out: Path) -> None:
     """Write a scene as USD text (.usda) for Newton."""
     from fourbar.mjcf.assembly import write_usd as written
 
     with given.open_scene(scene) as described:
-        given.print_to(written(described, without_loads=without_loads), out)
+        text = written(described, without_loads=without_loads, plane=plane)
+        given.print_to(text, out)
 
 
 @click.command()

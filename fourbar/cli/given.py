@@ -183,6 +183,15 @@ def read_position(scene: Scene, text: str) -> tuple[str, float]:
     return name, read_number("--at", value, unit)
 
 
+def read_three(key: str, text: str, unit: str = "m") -> tuple[float, float, float]:
+    """Read a vector of the command line: three numbers, bare or with units, between spaces or commas."""
+    parts = text.replace(",", " ").split()
+    if len(parts) != 3:
+        raise InputError(key, text, 'must be three numbers, like "0.3 0 1"')
+    x, y, z = (read_number(key, part, unit) for part in parts)
+    return x, y, z
+
+
 def print_to(text: str, out: Path | None) -> None:
     """Print to standard output, or write a file atomically."""
     from fourbar.writing import write_text

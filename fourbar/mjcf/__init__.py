@@ -10,3 +10,5 @@ from fourbar.mjcf.document import write_mjcf as write_mjcf
 from fourbar.mjcf.document import write_mjcf_for as write_mjcf_for
 from fourbar.mjcf.model import RECIPE as RECIPE
 from fourbar.mjcf.model import Settings as Settings
+from fourbar.mjcf.plane import LEVEL as LEVEL
+from fourbar.mjcf.plane import Plane as Plane

@@ -3,14 +3,15 @@
 import cmath
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 from xml.etree import ElementTree as ET
 
 from fourbar.errors import LimitError, clean_line
 from fourbar.linkage import BAR_NAMES, FIRST_PIN, MOVING_BARS
 from fourbar.mjcf.document import NOTES, Start, find_start
-from fourbar.mjcf.model import join, require_carriable
+from fourbar.mjcf.model import join, require_carriable, write_rounded
+from fourbar.mjcf.plane import LEVEL, Plane
 from fourbar.scene import Scene, require_input
 
 PARENT = {2: 1, 3: 2, 4: 1}
@@ -95,7 +96,12 @@ def assemble(
 
 
 def write_comment(
-    scene: Scene, form: str, reader: str, assembly: Assembly, at_B: str = ""
+    scene: Scene,
+    form: str,
+    reader: str,
+    assembly: Assembly,
+    at_B: str = "",
+    plane: Plane = LEVEL,
 ) -> str:
     """Say in what state the file stands, and where its reader's numbers are."""
     notes, bar = NOTES["assembled"], scene.drive_bar
@@ -109,6 +115,13 @@ def write_comment(
         notes["drive"].format(bar=bar, joint=joint),
         *([notes["without_loads"]] if scene.loads else []),
     ]
+    if plane.is_moved:
+        axes = ", ".join(f"({write_rounded(*axis)})" for axis in plane.rotation.T)
+        origin, gravity = plane.origin, plane.turn(*assembly.gravity)
+        tilted = notes["tilted"].strip()
+        lines.append(
+            tilted.format(axes=axes, origin=join(*origin), gravity=join(*gravity))
+        )
     return "\n".join([*lines, notes[reader].strip()])
 
 
@@ -128,6 +141,7 @@ def write_sdf(
     start: Start | None = None,
     *,
     without_loads: bool = False,
+    plane: Plane = LEVEL,
 ) -> str:
     """Write the SDF 1.9 text of a scene: a world with gravity, four links, and the pins as joints.
 
@@ -136,6 +150,7 @@ def write_sdf(
     reader : who closes the loop how: "gazebo" by a fourth joint, "drake" by its own ball constraint.
     start : the assembled state to stand in; None: that of `find_start`.
     without_loads : leave the scene's loads out, for the program to apply; otherwise they are refused.
+    plane : where the linkage stands in the world.
 
     Raises
     ------
@@ -159,11 +174,16 @@ def write_sdf(
         {"version": "1.9", **({"xmlns:drake": DRAKE} if reader == "drake" else {})},
     )
     at_B = f", joint B {omega_2 + at_A - omega_4!r} rad/s" if reader == "gazebo" else ""
-    for line in write_comment(scene, "SDF", reader, assembled, at_B).splitlines():
+    for line in write_comment(
+        scene, "SDF", reader, assembled, at_B, plane
+    ).splitlines():
         root.append(ET.Comment(f" {line} "))
     world = ET.SubElement(root, "world", name="four_bar")
-    ET.SubElement(world, "gravity").text = join(*gravity, 0.0)
+    ET.SubElement(world, "gravity").text = join(*plane.turn(*gravity))
     model = ET.SubElement(world, "model", name=clean_line(scene.title) or "four-bar")
+    if plane.is_moved:
+        place = join(*plane.origin, *plane.roll_pitch_yaw)
+        ET.SubElement(model, "pose").text = place
     _add_link(model, BAR_NAMES[1], 0j, 0.0, 1.0, 1.0, 0j)
     _add_joint(model, "ground_on_world", "fixed", "world", BAR_NAMES[1])
     for number in MOVING_BARS:
@@ -253,7 +273,11 @@ def _add_joint(
 
 
 def write_usd(
-    scene: Scene, start: Start | None = None, *, without_loads: bool = False
+    scene: Scene,
+    start: Start | None = None,
+    *,
+    without_loads: bool = False,
+    plane: Plane = LEVEL,
 ) -> str:
     """Write the USD text (.usda) of a scene: three rigid bodies, four revolute joints, the fourth closing the loop.
 
@@ -277,8 +301,8 @@ def write_usd(
         point3f physics:centerOfMass = {_place(bar.to_centre)}
         float3 physics:diagonalInertia = ({", ".join([repr(inertia[number])] * 3)})
         quatf physics:principalAxes = (1, 0, 0, 0)
-        double3 xformOp:translate = {_place(foot[number])}
-        quatd xformOp:orient = {_write_turn(turn[number])}
+        double3 xformOp:translate = {_write(plane.place(*_split(foot[number])))}
+        quatd xformOp:orient = {_write(plane.turn_on(turn[number]))}
         uniform token[] xformOpOrder = ["xformOp:translate", "xformOp:orient"]
     }}
 """
@@ -295,21 +319,28 @@ def write_usd(
             "B": complex(length[4]),
             "O4": foot[4],
         }[pin]
+        relative = turn[follower] - turn[one]
+        on_first, turn_on_first = (*_split(on_one), 0.0), LEVEL.turn_on(relative)
+        if one == 1:  # the world, whose axes are not the plane's
+            on_first = plane.place(*_split(on_one))
+            turn_on_first = plane.turn_on(relative)
         joints.append(
             f"""    def PhysicsRevoluteJoint "{pin}"
     {{
         uniform token physics:axis = "Z"
         {"" if one == 1 else f"rel physics:body0 = </four_bar/{BAR_NAMES[one]}>"}
         rel physics:body1 = </four_bar/{BAR_NAMES[follower]}>
-        point3f physics:localPos0 = {_place(on_one)}
-        quatf physics:localRot0 = {_write_turn(turn[follower] - turn[one])}
+        point3f physics:localPos0 = {_write(on_first)}
+        quatf physics:localRot0 = {_write(turn_on_first)}
         point3f physics:localPos1 = {_place(complex(along))}
         quatf physics:localRot1 = (1, 0, 0, 0)
         bool physics:excludeFromArticulation = {"true" if pin == "B" else "false"}
     }}
 """
         )
-    notes = json.dumps(write_comment(scene, "USD", "newton", assembled))
+    comment = write_comment(scene, "USD", "newton", assembled, plane=plane)
+    notes = json.dumps(comment)
+    down = plane.turn(x / pull, y / pull) if pull else (0.0, -1.0, 0.0)
     return f"""#usda 1.0
 (
     doc = {notes}
@@ -321,7 +352,7 @@ def write_usd(
 
 def PhysicsScene "physics"
 {{
-    vector3f physics:gravityDirection = ({x / pull if pull else 0.0!r}, {y / pull if pull else -1.0!r}, 0)
+    vector3f physics:gravityDirection = {_write(down)}
     float physics:gravityMagnitude = {pull!r}
 }}
 
@@ -334,10 +365,15 @@ def Xform "four_bar" (
 """
 
 
+def _split(point: complex) -> tuple[float, float]:
+    return point.real, point.imag
+
+
 def _place(point: complex) -> str:
-    return f"({point.real!r}, {point.imag!r}, 0)"
+    return _write((*_split(point), 0.0))
 
 
-def _write_turn(angle: float) -> str:
-    """Write the quaternion (w, x, y, z) of a turn about z."""
-    return f"({math.cos(0.5 * angle)!r}, 0, 0, {math.sin(0.5 * angle)!r})"
+def _write(numbers: Iterable[float]) -> str:
+    """Write a tuple of USD, every digit; whole zeros short."""
+    texts = (repr(number) if number else "0" for number in numbers)
+    return f"({', '.join(texts)})"

@@ -25,6 +25,7 @@ from fourbar.mjcf.model import (
     make_servo,
     require_carriable,
 )
+from fourbar.mjcf.plane import LEVEL, Plane
 from fourbar.quantities import OK
 from fourbar.scene import Command, Scene, command, require_input
 from fourbar.scene.motion import Motion
@@ -64,6 +65,7 @@ def write_mjcf(
     keyframe: bool = True,
     start: "Start | None" = None,
     drive: Drive = "flywheel",
+    plane: Plane = LEVEL,
 ) -> str:
     """Write the MJCF text of a scene: it runs on its own in MuJoCo.
 
@@ -76,6 +78,7 @@ def write_mjcf(
     start : the assembled state to open with; None: that of `find_start`.
     drive : "flywheel" keeps the input at omega_2; "motor" leaves the driven bar to a controller, "none" likewise
         without an actuator: then nothing is added to the linkage's inertia.
+    plane : where the linkage stands in the world.
 
     Raises
     ------
@@ -141,8 +144,16 @@ def write_mjcf(
         ET.SubElement(
             frame, "key", name="start", qpos=join(*start.qpos), qvel=join(*start.qvel)
         )
+    _move(root, plane)
     ET.indent(root)
     return ET.tostring(root, encoding="unicode") + "\n"
+
+
+def _move(root: ET.Element, plane: Plane) -> None:
+    """Move the model into its plane, and say so in a comment."""
+    if plane.is_moved:
+        plane.move_mjcf(root)
+        root.insert(0, ET.Comment(f" {NOTES['mjcf']['tilted']} "))
 
 
 def _is_passive(drive: Drive, reader: str) -> bool:
@@ -436,7 +447,10 @@ OWN_MOTORS = ("genesis", "newton")
 
 
 def write_mjcf_for(
-    scene: Scene, simulator: str = "mujoco", drive: Drive = "flywheel"
+    scene: Scene,
+    simulator: str = "mujoco",
+    drive: Drive = "flywheel",
+    plane: Plane = LEVEL,
 ) -> str:
     """Write the MJCF text of a scene for one simulator, its comments naming where torque and pin force are read.
 
@@ -454,7 +468,8 @@ def write_mjcf_for(
             drive,
             f"only mujoco, warp and mjx read it; leave it out for {simulator}",
         )
-    return write_mjcf(scene, SIMULATORS[simulator], simulator, drive=drive)
+    settings = SIMULATORS[simulator]
+    return write_mjcf(scene, settings, simulator, drive=drive, plane=plane)
 
 
 PER_METRE = 1.0

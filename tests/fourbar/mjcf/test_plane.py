@@ -1,0 +1,135 @@
+"""A linkage in a tilted plane: the same motion and forces, turned, in each form of file."""
+
+import re
+from xml.etree import ElementTree as ET
+
+import numpy as np
+import pytest
+
+import fourbar
+from fourbar.errors import InputError
+from fourbar.mjcf import Plane, write_mjcf
+from fourbar.mjcf.assembly import write_sdf, write_usd
+from tests.support.robots import rotation
+from tests.whole.test_imports import ROOT
+
+AXES = [(0.3, 0.0, 1.0), (-2.0, 5.0, 1.0), (0.0, 1.0, 0.0), (0.0, 0.0, -3.0)]
+ORIGIN = (1.0, -2.0, 0.5)
+
+
+def scene() -> fourbar.Scene:
+    return fourbar.load(ROOT / "models" / "crank_rocker.toml")
+
+
+@pytest.mark.parametrize("axis", AXES)
+def test_the_frame_turns_z_to_the_axis_by_the_shortest_way(
+    axis: tuple[float, float, float],
+) -> None:
+    plane = Plane(axis)
+    turn = plane.rotation
+    unit = np.array(axis) / np.linalg.norm(axis)
+    assert np.allclose(turn @ [0.0, 0.0, 1.0], unit, atol=1e-15)
+    assert np.allclose(turn @ turn.T, np.eye(3), atol=1e-15)
+    assert np.linalg.det(turn) == pytest.approx(1.0)
+    assert np.allclose(rotation(plane.quaternion), turn, atol=1e-15)
+    # the trace of a rotation is 1 + 2 cos of its angle, which is that between z and the axis
+    assert np.trace(turn) == pytest.approx(1.0 + 2.0 * unit[2])
+    roll, pitch, yaw = plane.roll_pitch_yaw
+    parts = [
+        rotation((np.cos(0.5 * angle), *(np.sin(0.5 * angle) * np.eye(3)[i])))
+        for i, angle in enumerate((roll, pitch, yaw))
+    ]
+    assert np.allclose(parts[2] @ parts[1] @ parts[0], turn, atol=1e-15)
+    half = plane.turn_on(0.7)
+    about_z = rotation((np.cos(0.35), 0.0, 0.0, np.sin(0.35)))
+    assert np.allclose(rotation(half), turn @ about_z, atol=1e-15)
+
+
+@pytest.mark.parametrize("axis", [(0.0, 0.0, 0.0), (1.0, 2.0), (1.0, 0.0, np.nan), "z"])
+def test_what_is_no_direction_is_refused(axis: object) -> None:
+    with pytest.raises(InputError, match="axis"):
+        Plane(axis)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("axis", AXES)
+def test_mujoco_moves_and_loads_a_tilted_linkage_alike(
+    axis: tuple[float, float, float],
+) -> None:
+    mujoco = pytest.importorskip("mujoco")
+
+    plane = Plane(axis, ORIGIN)
+    answers = []
+    for place in (Plane(), plane):
+        model = mujoco.MjModel.from_xml_string(write_mjcf(scene(), plane=place))
+        data = mujoco.MjData(model)
+        mujoco.mj_resetDataKeyframe(model, data, 0)
+        mujoco.mj_step(model, data, 50)
+        mujoco.mj_forward(model, data)
+        mujoco.mj_rnePostConstraint(model, data)
+        turn = place.rotation
+        bodies = [model.body(name).id for name in ("input", "coupler", "output")]
+        # back into the linkage's axes; across the plane a loop of hinges is overdetermined
+        forces = (data.cfrc_int[bodies, 3:] @ turn)[:, :2]
+        tip = turn.T @ (data.site("B3").xpos - place.origin)
+        closing = (turn.T @ data.efc_force[:3])[:2]
+        answers.append((data.qpos.copy(), forces, tip, closing))
+    for level, tilted in zip(*answers, strict=True):
+        size = np.abs(level).max()
+        assert np.allclose(tilted, level, rtol=0.0, atol=1e-7 * size)
+
+
+@pytest.mark.parametrize("axis", AXES)
+def test_an_sdf_has_its_model_and_gravity_turned(
+    axis: tuple[float, float, float],
+) -> None:
+    plane = Plane(axis, ORIGIN)
+    trees = [
+        ET.fromstring(write_sdf(scene(), without_loads=True, plane=place))
+        for place in (Plane(), plane)
+    ]
+    level, tilted = trees
+    assert level.find("world/model/pose") is None
+    numbers = list(map(float, tilted.findtext("world/model/pose", "").split()))
+    assert numbers == [*ORIGIN, *plane.roll_pitch_yaw]
+    gravity = [
+        np.array(list(map(float, tree.findtext("world/gravity", "").split())))
+        for tree in trees
+    ]
+    assert np.allclose(gravity[1], plane.rotation @ gravity[0], atol=1e-15)
+    poses = [[link.findtext("pose") for link in tree.iter("link")] for tree in trees]
+    assert poses[0] == poses[1]
+
+
+@pytest.mark.parametrize("axis", [(0.0, 0.0, 1.0), *AXES])
+def test_the_joints_of_a_usd_meet_wherever_the_plane_is(
+    axis: tuple[float, float, float],
+) -> None:
+    plane = Plane(axis, ORIGIN)
+    text = write_usd(scene(), without_loads=True, plane=plane)
+
+    def read(name: str, block: str) -> np.ndarray:
+        found = re.search(rf"{name} = \(([^)]*)\)", block)
+        assert found
+        return np.array([float(number) for number in found[1].split(",")])
+
+    bodies = {
+        name: (read("translate", block), rotation(read("orient", block)))
+        for name, block in re.findall(
+            r'\n    def Xform "(\w+)" \((.*?)\n    }', text, re.S
+        )
+    }
+    world = (np.zeros(3), np.eye(3))
+    joints = re.findall(r'RevoluteJoint "(\w+)"(.*?)\n    }', text, re.S)
+    assert len(joints) == 4
+    for pin, block in joints:
+        meets, turns = [], []
+        for side in (0, 1):
+            body = re.search(rf"body{side} = </four_bar/(\w+)>", block)
+            place, turn = bodies[body[1]] if body else world
+            meets.append(place + turn @ read(f"localPos{side}", block))
+            turns.append(turn @ rotation(read(f"localRot{side}", block)))
+        assert np.allclose(*meets, atol=1e-12), pin
+        assert np.allclose(*(turn[:, 2] for turn in turns), atol=1e-12), pin
+        assert np.allclose(turns[0][:, 2], plane.rotation[:, 2], atol=1e-12), pin
+    down = read("gravityDirection", text)
+    assert np.allclose(down, plane.rotation @ [0.0, -1.0, 0.0], atol=1e-12)
