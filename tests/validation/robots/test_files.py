@@ -7,7 +7,7 @@ import pytest
 from fourbar.errors import InputError
 from fourbar_validation.engines.mujoco.robots.compiled import (
     compile_robot,
-    require_masses,
+    list_unknown_parts,
 )
 from fourbar_validation.robots.files import read_robot
 
@@ -83,8 +83,16 @@ def test_a_missing_mesh_that_is_the_mass_is_said(tmp_path: Path) -> None:
     assert robot.unknown_masses == (body,)
     assert "masses of arm are unknown" in robot.notes[1]
     with pytest.raises(InputError, match="--assets DIR"):
-        require_masses(robot, {body})
-    require_masses(robot, set())
+        list_unknown_parts(robot, {body})
+    assert list_unknown_parts(robot, set()) == []
+
+
+def test_a_part_without_a_mass_is_named(tmp_path: Path) -> None:
+    part = '<geom size="0.1"/><body name="part"><geom type="mesh" mesh="part"/></body>'
+    robot = compile_robot(read_robot(make(tmp_path, inertial=INERTIAL + part)))
+    body = robot.model.body("part").id
+    assert list_unknown_parts(robot, {body}) == ["part"]
+    assert robot.model.body("part").mass[0] == 0.0
 
 
 def test_no_file_outside_is_opened(tmp_path: Path) -> None:

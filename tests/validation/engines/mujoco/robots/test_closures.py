@@ -185,7 +185,13 @@ def test_a_weld_of_three_hinges_leaves_no_freedom() -> None:
     text = Planar().text().replace("<connect", "<weld")
     assert "a weld that leaves no freedom: three hinges" in closure_of(text).reason
     pin = text.replace("<weld", '<weld torquescale="0"')
-    assert closure_of(pin).loop is not None
+    # the anchor of a weld is in the frame of the second body
+    pins = Planar().pins
+    x, y = np.subtract(pins["B"], pins["A"])
+    closed_at = (pins["O4"][0] + x, pins["O4"][1] + y)
+    assert loop_of(pin).lengths[2:] == pytest.approx(
+        (math.dist(pins["A"], closed_at), math.hypot(x, y))
+    )
 
 
 def test_axes_that_a_file_rounds_are_parallel_and_measured() -> None:

@@ -70,7 +70,32 @@ def test_a_rest_pose_outside_the_ranges_is_closed_inside_them() -> None:
     crank = posed.data.qpos[model.joint("crank").qposadr[0]]
     assert math.radians(15.0) - 1e-9 <= crank <= math.radians(60.0)
     assert gap(model, posed.data.qpos) < 1e-9
-    assert "crank is outside its range in the rest pose" in posed.notes[0]
+    assert posed.notes[0] == "outside their ranges in the rest pose of the file: crank"
+
+
+def test_a_file_without_joints_or_equalities_has_a_pose() -> None:
+    for inside in (
+        "<body><geom size='1'/></body>",
+        "<body><joint/><geom size='1'/></body>",
+    ):
+        model = compiled(f"<mujoco><worldbody>{inside}</worldbody></mujoco>")
+        posed = pose_robot(model, PoseOptions())
+        assert np.array_equal(posed.data.qpos, model.qpos0)
+        assert not posed.notes
+
+
+def test_closing_does_not_leave_the_range_of_a_joint() -> None:
+    joints = {"crank": "20deg"}
+    free = pose_robot(compiled(FOOT.read_text()), PoseOptions(joints=joints))
+    model = free.model
+    address = model.joint("ankle").qposadr[0]
+    turned = math.degrees(free.data.qpos[address])
+    end = 0.5 * turned
+    bounds = f"{min(end, -50.0)} {max(end, 0.0)}" if turned > 0 else f"{end} 40"
+    text = FOOT.read_text().replace('range="-50 40"', f'range="{bounds}"')
+    posed = pose_robot(compiled(text), PoseOptions(joints=joints))
+    assert math.degrees(posed.data.qpos[address]) == pytest.approx(end)
+    assert any("no pose near this one" in note for note in posed.notes)
 
 
 def test_a_keyframe_is_a_pose() -> None:

@@ -76,9 +76,17 @@ def compile_robot(file: RobotFile) -> CompiledRobot:
     return CompiledRobot(model, tuple(notes), masses)
 
 
-def require_masses(robot: CompiledRobot, bodies: set[int]) -> None:
-    """Raise an InputError if the mass of one of these bodies is unknown."""
+def list_unknown_parts(robot: CompiledRobot, bodies: set[int]) -> list[str]:
+    """List those of some bodies whose mass is unknown, and that are parts of another body.
+
+    Raises
+    ------
+    InputError : a body that has joints of its own is among them: nothing else of it is known.
+    """
+    model = robot.model
     unknown = [number for number in robot.unknown_masses if number in bodies]
+    parts = [model.body(number).name for number in unknown]
+    unknown = [number for number in unknown if model.body_jntnum[number]]
     if unknown:
         name = robot.model.body(unknown[0]).name
         raise InputError(
@@ -87,6 +95,7 @@ def require_masses(robot: CompiledRobot, bodies: set[int]) -> None:
             "states no inertial and its mesh is missing: its mass is unknown; "
             "--assets DIR says where the meshes are",
         )
+    return parts
 
 
 def _take_out_meshes(spec: mujoco.MjSpec, file: RobotFile) -> tuple[set[str], set[str]]:
@@ -102,8 +111,7 @@ def _take_out_meshes(spec: mujoco.MjSpec, file: RobotFile) -> tuple[set[str], se
         for geom in geoms:
             left_out.add(file.missing[gone[geom.meshname].file])
             spec.delete(geom)
-        if body.name in unknown:
-            body.explicitinertial = False
+        if body.name in unknown and body.joints:
             size = [STAND_IN, 0.0, 0.0]
             kind = mujoco.mjtGeom.mjGEOM_SPHERE
             body.add_geom(type=kind, size=size, mass=LIGHT)

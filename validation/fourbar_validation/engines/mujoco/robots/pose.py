@@ -66,10 +66,11 @@ def pose_robot(model: mujoco.MjModel, options: PoseOptions) -> PosedRobot:
             raise InputError("--pose", f"{name}={text}", "must be a hinge or a slide")
         stated[model.jnt_qposadr[joint]] = _read_position(name, text, unit)
         fixed.add(joint)
-    outside = find_outside(model, stated)
-    notes = [f"{name_joint(model, joint)} is outside its range" for joint in outside]
-    notes = [f"{', '.join(notes)} {origin}"] if notes else []
     closing = _Closing(model, fixed)
+    tied = {*closing.joints, *fixed}
+    outside = [joint for joint in find_outside(model, stated) if joint in tied]
+    names = _list_some([name_joint(model, joint) for joint in outside])
+    notes = [f"outside their ranges {origin}: {names}"] if outside else []
     before = closing.size(stated)
     if before <= CLOSED and not set(outside) - fixed:
         return PosedRobot(model, _evaluate(model, stated), stated, tuple(notes))
@@ -190,6 +191,8 @@ class _Closing:
     def _residuals(self) -> tuple[Array, Array]:
         """Return residuals of the equalities and their derivatives, (m,) and (m, nv)."""
         data = self.data
+        if not data.nefc:
+            return np.zeros(0), np.zeros((0, self.model.nv))
         rows = data.efc_type[: data.nefc] == mujoco.mjtConstraint.mjCNSTR_EQUALITY
         jacobian = data.efc_J.reshape(-1, self.model.nv)[: data.nefc]
         return data.efc_pos[: data.nefc][rows].copy(), jacobian[rows].copy()

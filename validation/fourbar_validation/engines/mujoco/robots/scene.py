@@ -35,7 +35,7 @@ from fourbar_validation.engines.mujoco.robots.closures import (
 from fourbar_validation.engines.mujoco.robots.compiled import (
     CompiledRobot,
     compile_robot,
-    require_masses,
+    list_unknown_parts,
 )
 from fourbar_validation.engines.mujoco.robots.loop import (
     PAIRS,
@@ -194,7 +194,9 @@ class _SceneOfLoop:
         self.across = np.cross(self.normal, self.along)
         self.carried = list_carried(self.model, loop)
         bodies = {body for carried in self.carried.values() for body in carried}
-        require_masses(compiled, bodies)
+        parts = list_unknown_parts(compiled, bodies)
+        if parts:
+            self._leave_out(f"the mass of {', '.join(parts)}, whose mesh is missing")
         gravity = self.model.opt.gravity * is_enabled(self.model, "gravity")
         self.gravity = np.asarray(gravity, float)
 
