@@ -17,12 +17,11 @@ from fourbar.errors import InputError
 from fourbar.formulas.mobility import (
     MARGIN,
     find_intervals,
-    follow_smooth_path,
     turns_fully,
 )
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, Bar, FourBar
 from fourbar.scene import Scene
-from fourbar.scene.motion import Motion, Sweep
+from fourbar.scene.motion import CROSSED, OPEN, Motion, Sweep
 from fourbar.solve import solve
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.engines.mujoco.robots.ancestry import climb, name_joint
@@ -52,9 +51,9 @@ from fourbar_validation.engines.mujoco.robots.pose import (
 
 DIGITS = 12
 """Significant digits of a number of the scene; those beyond are round-off of the compiler."""
-FLAT = 1e-3
-"""Sine of theta_4 - theta_3 below which the pose does not tell the assembly: a loop that is
-closed to 1e-12 m leaves about as much of an angle open there."""
+FLAT = 2e-3
+"""rad; where the outputs of both assemblies are nearer the pose does not tell which it is: a
+loop that is closed to 1e-12 m leaves about half as much open where its bars are in line."""
 STEPS = 120
 """Intervals of the sweep."""
 SAMPLES = 720
@@ -241,8 +240,8 @@ class _SceneOfLoop:
         whole = math.tau * math.ceil((-math.pi - path.start) / math.tau)
         start, stop = (round_angle(end + whole) for end in (path.start, path.stop))
         theta_2 = Sweep(start, stop, STEPS) if stop > start else start
-        branch = self._find_branch(linkage, path.start)
-        motion = Motion(theta_2, speed, branch=branch, through="follow")
+        branch = self._find_branch(linkage, self.loop.angles[1] + whole)
+        motion = Motion(theta_2, speed, branch=branch)
         effects = tuple(self._list_effects(armature, path.betas))
         self._remark_what_is_left_out(lumps)
         return Scene(
@@ -443,8 +442,8 @@ class _SceneOfLoop:
         self, linkage: FourBar, angles: Array, in_pose: int
     ) -> dict[str, Array]:
         """Return the angle between the bars of each pin along theta_2, continuous, rad."""
-        branch = self._find_branch(linkage, float(angles[0]))
-        motion = Motion(angles, branch=branch, through="follow")
+        branch = self._find_branch(linkage, self.loop.angles[1])
+        motion = Motion(angles, branch=branch)
         solution = solve(Scene(linkage, motion), "position")
         thetas = {
             1: np.full_like(angles, linkage.ground_angle),
@@ -455,16 +454,25 @@ class _SceneOfLoop:
         return {pin: thetas[j] - thetas[i] for pin, (i, j) in PAIRS.items()}
 
     def _find_branch(self, linkage: FourBar, theta_2: float) -> int:
-        """Return the sign of sin(theta_4 - theta_3) at theta_2 on the smooth path from the pose."""
-        _, in_pose, theta_3, theta_4 = self.loop.angles
-        sine = math.sin(theta_4 - theta_3)
-        sign = -1 if sine < -FLAT else 1
-        if abs(sine) <= FLAT:
+        """Return the branch whose output stands as in the pose.
+
+        `theta_2`: that of the pose, counted in the turns of the sweep.
+        """
+        apart = []
+        for branch in (OPEN, CROSSED):
+            motion = Motion(np.array([theta_2]), branch=branch)
+            theta_4 = float(solve(Scene(linkage, motion), "position").theta_4[0])
+            away = math.remainder(theta_4 - self.loop.angles[3], math.tau)
+            apart.append(abs(away) if math.isfinite(away) else math.inf)
+        if not abs(apart[0] - apart[1]) > FLAT:
             text = "the bars of pin B are in line in this pose: open is taken"
-            if f"{text}; --pose states another" not in self.remarks:
-                self.remarks.append(f"{text}; --pose states another")
-        path = np.array([in_pose, theta_2])
-        return int(follow_smooth_path(linkage, path, sign)[1])
+            self._remark(f"{text}; --pose states another")
+            return OPEN
+        return OPEN if apart[0] < apart[1] else CROSSED
+
+    def _remark(self, text: str) -> None:
+        if text not in self.remarks:
+            self.remarks.append(text)
 
     def _remark_what_is_left_out(self, lumps: dict[int, _Lump]) -> None:
         """Name what acts on the loop and is not in the scene."""
