@@ -318,7 +318,7 @@ def examine(seed: int, index: int) -> list[str]:
     return list_findings(draw_fuzz_scene(seed, index))
 
 
-def _find_lost(_: int, error: Exception, __: object) -> list[str]:
+def _find_lost(_: int, error: BaseException, __: object) -> list[str]:
     return [f"{LOST} {say_error(error)}"]
 
 

@@ -31,16 +31,14 @@ class Few:
 
 
 class Unlucky:
-    """Agrees, once its process was killed, or waited in vain for a lock, as often as the folder LIVES has files."""
+    """Kills its process as often as the folder LIVES has files, and then agrees."""
 
     name = "unlucky"
 
     def answer(self, scene: Scene, command: Command) -> Answer:
         for life in sorted(Path(os.environ["LIVES"]).iterdir()):
             life.unlink()
-            if life.name.startswith("killed"):
-                os.kill(os.getpid(), signal.SIGKILL)
-            os._exit(1)
+            os.kill(os.getpid(), signal.SIGKILL)
         return Answer("unlucky", "exact", refusal="declined")
 
 

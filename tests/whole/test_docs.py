@@ -194,7 +194,7 @@ def test_the_engine_of_the_guide_agrees(
     scenes = (
         "models/crank_rocker.toml models/double_rocker.toml"  # which begins at a limit
     )
-    line = f"run {scenes} --witness closure:Closure --engines free-body --no-pictures --out out"
+    line = f"run {scenes} --guest closure:Closure --engines free-body --no-pictures --out out"
     assert harness(line.split()) == HOLDS
     rows = [
         row

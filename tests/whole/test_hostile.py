@@ -22,9 +22,9 @@ from fourbar_validation.compare.rows import COLUMNS, FAILS
 from fourbar_validation.compare.tolerance import EQUIVALENCE
 from fourbar_validation.engines.processes import WORKER_MEMORY, bound_memory
 from fourbar_validation.engines.registry import Engine
+from fourbar_validation.engines.table import choose_engines
 from fourbar_validation.report.terminal import print_table
 from fourbar_validation.run import pool
-from fourbar_validation.run.command import choose_engines
 from fourbar_validation.run.run import RunOptions, run
 from fourbar_validation.scenes.suites import LARGEST_LIST, read_suite
 from tests.support.here import judge_here
@@ -328,17 +328,19 @@ class Greedy:
         return Answer("greedy", "exact", refusal="declined")
 
 
+@pytest.mark.linux
 def test_a_system_that_sets_no_limit_of_memory_goes_on_without(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    resource = pytest.importorskip("resource")
+    import resource
+
     asked = []
 
-    def refuse(*limit: object) -> None:  # as macOS does
+    def refuse(*limit: object) -> None:
         asked.append(limit)
         raise ValueError("current limit exceeds maximum limit")
 
-    monkeypatch.setattr(resource, "setrlimit", refuse)
+    monkeypatch.setattr(resource, "prlimit", refuse)
     bound_memory()
     assert asked
 

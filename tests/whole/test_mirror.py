@@ -45,7 +45,7 @@ JUDGED_BY = {
     "validation/engines/test_engines.py": "validation/engines: balls description "
     "limits loaded loop prediction tree; lab/engines: drake exudyn exudyn_elements opensim; "
     "validation/scenes: random; validation/engines/mujoco: closed_loop inverse",
-    "validation/engines/test_guests.py": "validation: engine; validation/engines: keeper processes workers",
+    "validation/engines/test_guests.py": "validation: engine; validation/engines: processes workers",
     "validation/engines/test_free_body.py": "validation/engines: free_body_closure free_body_effects",
     "validation/scenes/test_hard_families.py": "validation/engines: exact; validation/engines/mujoco: shipped",
     "validation/report/test_sections.py": "validation/report: hard_picture",

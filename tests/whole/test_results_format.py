@@ -30,10 +30,10 @@ from fourbar_validation.engines.registry import (
     WORK,
     load_further,
 )
+from fourbar_validation.engines.table import choose_engines
 from fourbar_validation.regression.change import WHOLE
 from fourbar_validation.regression.record import ACCEPTED, find_baseline
 from fourbar_validation.run.answers import check_statements
-from fourbar_validation.run.command import choose_engines
 from fourbar_validation.run.judge import CHECKS
 from fourbar_validation.run.released import FORWARD, FULL
 from fourbar_validation.run.run import RunOptions, run

@@ -17,12 +17,12 @@ from fourbar_validation.engines.environments import (
     Entry,
     make_environment,
     read_engines,
-    start_engines,
+    start_engine,
 )
 from fourbar_validation.engines.guests import adjust_engines
 from fourbar_validation.engines.registry import ENGINES
+from fourbar_validation.engines.table import choose_engines, fill_table
 from fourbar_validation.regression.record import describe_run
-from fourbar_validation.run.command import choose_engines
 from fourbar_validation.run.judge import judge
 from tests.support.guests import end_guests
 from tests.support.scenes import crank_rocker
@@ -79,7 +79,7 @@ def test_two_versions_are_judged_side_by_side(
         for version, factor in (("1.0", "1.0"), ("1.1", "1.001"))
     ]
     (tmp_path / "engines.toml").write_text("\n".join(tables))
-    engines = choose_engines("free-body, toy 1.0, toy 1.1", ENGINES, [tmp_path])
+    engines = choose_engines("free-body, toy 1.0, toy 1.1", fill_table([tmp_path]))
     assert [engine.name for engine in engines] == ["free-body", "toy 1.0", "toy 1.1"]
     assert describe_run(engines, "").versions.items() >= {
         ("toy 1.0", "1.0"),
@@ -119,8 +119,8 @@ def test_an_environment_that_cannot_be_made_is_one_line(
 
 
 def test_an_adapter_of_ours_is_held_to_what_it_is_held_to_here() -> None:
-    (guest,) = start_engines([Entry("mine", adapter="mujoco-simulated")], ENGINES)
     (ours,) = [engine for engine in ENGINES if engine.name == "mujoco-simulated"]
+    guest = start_engine(Entry("mine", adapter="mujoco-simulated"), like=ours)
     assert (guest.name, guest.tolerance, guest.through_time, guest.residuals) == (
         "mine",
         ours.tolerance,
@@ -136,11 +136,14 @@ def test_an_engine_is_asked_for_its_steps_an_error_or_a_setting() -> None:
     scene = crank_rocker(
         motion=fourbar.Motion(fourbar.Sweep(0.1, 6.38, 8), 10.0), loads=()
     )
-    (guest,) = start_engines([entry], ENGINES)
-    (wanted,) = adjust_engines([guest], 1e-3)
-    refused, exact = start_engines(
-        [replace(entry, setting="fast"), Entry("free", adapter="free-body")], ENGINES
+    simulated, free_body = (
+        next(engine for engine in ENGINES if engine.name == name)
+        for name in ("mujoco-simulated", "free-body")
     )
+    guest = start_engine(entry, like=simulated)
+    (wanted,) = adjust_engines([guest], 1e-3)
+    refused = start_engine(replace(entry, setting="fast"), like=simulated)
+    exact = start_engine(Entry("free", adapter="free-body"), like=free_body)
     commanded = list_positions(scene)
     assert guest.start().answer(scene, commanded).setting == "RK4 96/rev"
     answer = wanted.start().answer(scene, commanded)

@@ -22,7 +22,7 @@ from fourbar_validation.compare.columns import read_columns
 from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES
 from fourbar_validation.engines import guests, processes
 from fourbar_validation.engines.registry import ENGINES, load_further
-from fourbar_validation.run.command import Request, select_scenes
+from fourbar_validation.run.command import Request, select_engines
 from fourbar_validation.run.judge import judge
 from fourbar_validation.run.run import RunOptions, run
 from fourbar_validation.scenes.suites import read_scene_files
@@ -88,6 +88,7 @@ AFTER_HELLO = (
     + LAST
     + "        continue\n    import os, signal, time\n"
 )
+ANSWERS = '{\n            "answers": {name'
 WHOLE = '    text = json.dumps({"id": question["id"], **reply})\n'
 SAY = "    print(text, flush=True)\n"
 NO_JSON, ENDLESS = (
@@ -152,13 +153,13 @@ PROGRAMS: dict[str, tuple[str, str, str]] = {
         NO_JSON,
     ),
     "empty refusal": (
-        '{"answers": {name',
-        '{"refusal": " "} or {"answers": {name',
+        ANSWERS,
+        f'{{"refusal": " "}} or {ANSWERS}',
         "refusal = ",
     ),
     "own words": (
-        '{"answers": {name',
-        '{"error": "no\\nlicence"} or {"answers": {name',
+        ANSWERS,
+        f'{{"error": "no\\nlicence"}} or {ANSWERS}',
         "no licence",
     ),
     "mid-line": (
@@ -176,11 +177,6 @@ PROGRAMS: dict[str, tuple[str, str, str]] = {
         LAST,
         f"{AFTER_HELLO}    x = [b'x' * 10**6 * i for i in range(999)]\n",
         "exit status 1: MemoryEr",
-    ),
-    "kills its parent": (
-        LAST,
-        f"{AFTER_HELLO}    os.kill(os.getppid(), 9)\n",
-        "was killed",
     ),
     "kills itself": (LAST, f"{AFTER_HELLO}    os.kill(os.getpid(), 9)\n", "was killed"),
     "crashes": (
@@ -201,14 +197,7 @@ SILENT: dict[str, tuple[str, str]] = {
         f"{AFTER_HELLO}    while True: print('x' * 2**20, file=sys.stderr)\n",
     ),
 }
-FORK = """
-    import os, time
-    if question["ask"] == "answer" and os.fork() == 0:
-        os.setsid()
-        if os.fork() == 0:
-            time.sleep(1000)
-        os._exit(0)
-"""
+KILLS_ITS_PARENT = (LAST, f"{AFTER_HELLO}    os.kill(os.getppid(), 9)\n")
 FINE: dict[str, tuple[str, str]] = {
     "byte by byte": (
         LAST,
@@ -218,7 +207,6 @@ FINE: dict[str, tuple[str, str]] = {
         LAST,
         f"    import time; time.time = time.monotonic = lambda: 0.0\n{LAST}",
     ),
-    "leaves its session": (LAST, FORK + LAST),
     "deaf": (
         LAST,
         f"{LAST}    if question['ask'] == 'answer': import os; os.close(2)\n",
@@ -293,9 +281,9 @@ def test_a_program_that_is_silent_ends_at_its_limit(
 
 @pytest.mark.linux
 def test_what_is_killed_from_outside_is_asked_again(tmp_path: Path) -> None:
-    """As often as it may be killed but once."""
+    """Once."""
     lives = tmp_path / "lives"
-    lives.write_text("xxxx")
+    lives.write_text("x")
     body = f"    n = os.path.getsize({str(lives)!r})\n"
     body += f"    if n: os.truncate({str(lives)!r}, n - 1); os.kill(os.getpid(), 9)\n"
     by_engine = judged(
@@ -416,9 +404,9 @@ def test_names_stand_apart() -> None:
 )
 def test_what_is_not_there_is_refused_in_one_line(entry: str, part: str) -> None:
     with pytest.raises(InputError) as error:
-        select_scenes(Request(witness=(entry,)))
+        select_engines(Request(guest=(entry,)))
     assert (
-        str(error.value).startswith("--witness = ")
+        str(error.value).startswith("--guest = ")
         and part in str(error.value)
         and "\n" not in str(error.value)
     )
@@ -467,14 +455,12 @@ def test_a_run_with_guests_ends_with_their_rows_and_none_of_their_processes(
     for name in ("scene", "second"):
         save(SCENE, tmp_path / f"{name}.toml")
     silent = write_program(tmp_path, "silent", SILENT["silent"])
-    leaves = write_program(tmp_path, "leaves", FINE["leaves its session"])
-    classes = [f"--witness={HERE}{name}" for name in ("Right", "Prints")]
+    classes = [f"--guest={HERE}{name}" for name in ("Right", "Prints")]
     began = time.monotonic()
     done = command_line(
         tmp_path,
         "--time-limit=5",
-        f"--witness={silent}",
-        f"--witness={leaves}",
+        f"--guest={silent}",
         *classes,
     )
     assert done.returncode == 1 and time.monotonic() - began < 200.0, done.stderr
@@ -484,7 +470,7 @@ def test_a_run_with_guests_ends_with_their_rows_and_none_of_their_processes(
         rows.setdefault(row.engine, set()).add(
             (row.verdict, row.reason if row.quantity == "all" else "")
         )
-    for name in ("formulas", "free-body", "right", "leaves"):
+    for name in ("formulas", "free-body", "right"):
         assert rows[name] == {(AGREES, "")}, name
     assert rows["silent"] == {(FAILS, "no answer within 5 s")}
     assert rows["prints"] == {
@@ -495,6 +481,27 @@ def test_a_run_with_guests_ends_with_their_rows_and_none_of_their_processes(
     if sys.platform == "linux":
         time.sleep(2.0)
         assert not list_processes(f"MARK_OF_TEST={tmp_path}")
+
+
+@pytest.mark.slow
+@pytest.mark.linux
+@pytest.mark.timeout(200)
+def test_a_guest_that_kills_its_worker_turns_no_other_engine_red(
+    tmp_path: Path,
+) -> None:
+    kills = write_program(tmp_path, "kills its parent", KILLS_ITS_PARENT)
+    plain = write_program(tmp_path, "plain")
+    save(SCENE, tmp_path / "scene.toml")
+    suite = read_scene_files([tmp_path / "scene.toml"])
+    engines = (*FREE_BODY, *guests.read_guests([kills, plain], ["free-body"]))
+    summary = run(suite, tmp_path / "out", engines, RunOptions(1, drawn=False))
+    rows = list(read_columns(tmp_path / "out" / "results.csv"))
+    (failing,) = [row for row in rows if row.verdict == FAILS]
+    assert failing.engine == "kills its parent"
+    assert failing.reason.startswith("the engine crashed its process")
+    for name in ("formulas", "free-body", "plain"):
+        assert any(row.engine == name and row.verdict == AGREES for row in rows)
+    assert summary.counts.status == 1
 
 
 def test_a_report_shows_the_versions_that_guests_state(tmp_path: Path) -> None:

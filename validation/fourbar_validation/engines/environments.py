@@ -7,7 +7,7 @@ import shutil
 import sys
 import sysconfig
 import tomllib
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass, replace
 from importlib.metadata import requires
 from pathlib import Path
@@ -189,25 +189,24 @@ def prepare_program(entry: Entry, seconds: float | None = None) -> Program:
     return Program((program, *entry.command[1:]), seconds)
 
 
-def start_engines(
-    entries: Sequence[Entry], engines: Sequence[Engine], seconds: float | None = None
-) -> tuple[Guest, ...]:
-    """Make the environments of engines and read each hello; an adapter of ours is held to what it is held to here."""
-    programs = [
-        (entry.adapter or entry.name, entry.name, prepare_program(entry, seconds))
-        for entry in entries
-    ]
-    held = {engine.name: engine for engine in engines}
-    guests = []
-    for entry, guest in zip(entries, name_guests(programs, held), strict=True):
-        kept = HELD if entry.adapter in held else ()
-        same = replace(
-            guest, **{name: getattr(held[entry.adapter], name) for name in kept}
-        )
-        steps = {"steps_per_turn": entry.steps[-1]} if entry.steps else {}
-        guests.append(
-            same.at_setting(name=entry.setting, **steps)
-            if entry.setting or steps
-            else same
-        )
-    return tuple(guests)
+def start_engine(
+    entry: Entry,
+    taken: Collection[str] = (),
+    seconds: float | None = None,
+    like: Engine | None = None,
+) -> Guest:
+    """Make the environment of an engine and read its hello.
+
+    `taken`: names that others have. `like`: the adapter of ours that answers there; the
+    engine is then held to what that one is held to here.
+    """
+    program = prepare_program(entry, seconds)
+    (guest,) = name_guests([(entry.adapter or entry.name, entry.name, program)], taken)
+    if like is not None:
+        guest = replace(guest, **{name: getattr(like, name) for name in HELD})
+    setting: dict[str, Any] = {}
+    if entry.setting:
+        setting["name"] = entry.setting
+    if entry.steps:
+        setting["steps_per_turn"] = entry.steps[-1]
+    return guest.at_setting(**setting) if setting else guest

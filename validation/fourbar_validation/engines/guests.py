@@ -108,9 +108,7 @@ def name_guests(
             if CLASS.fullmatch(entry) and trouble.startswith(
                 f"exit status {NOT_FOUND}: "
             ):
-                raise InputError(
-                    "--witness", entry, trouble.partition(": ")[2]
-                ) from None
+                raise InputError("--guest", entry, trouble.partition(": ")[2]) from None
         name = stem = chosen or hello.name
         for count in range(2, 2 + len(names)):
             if name not in names:
@@ -166,10 +164,10 @@ def make_program(entry: str, seconds: float | None = None) -> Program:
     try:
         command = shlex.split(entry)
     except ValueError as error:
-        raise InputError("--witness", entry, f"is no command line: {error}") from None
+        raise InputError("--guest", entry, f"is no command line: {error}") from None
     if not command or (program := shutil.which(command[0])) is None:
         raise InputError(
-            "--witness",
+            "--guest",
             entry,
             "must be module:Class, or the command line of a program that is there",
         )

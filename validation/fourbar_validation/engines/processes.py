@@ -3,6 +3,7 @@
 import ctypes
 import json
 import os
+import signal
 import subprocess
 import sys
 import tempfile
@@ -18,21 +19,25 @@ from fourbar_validation.compare.answer import EngineError
 from fourbar_validation.compare.rows import make_plain, write_one_line
 
 WORKER_MEMORY = 8 * 2**30
-"""Bytes of address space of one process; a scene takes a hundredth, most of it libraries."""
+"""Bytes of data of one process, a guest too; a scene takes a hundredth."""
 
 
-def bound_memory() -> None:
-    """Bound this process's address space; where the system cannot, nothing happens."""
+def bound_memory(process: int = 0) -> None:
+    """Bound the data of a process (0: this one) and of what it starts from now on.
+
+    The address space is not bounded: libraries reserve more of that than they use.
+    Only Linux has this limit; elsewhere nothing happens.
+    """
     try:
-        import resource
-    except ImportError:  # only systems of the Unix family have it
+        from resource import RLIMIT_DATA, prlimit
+    except ImportError:
         return
-    _, hard = resource.getrlimit(resource.RLIMIT_AS)
-    with suppress(ValueError, OSError):  # macOS knows the limit and sets none
-        resource.setrlimit(
-            resource.RLIMIT_AS,
-            (WORKER_MEMORY if hard < 0 else min(WORKER_MEMORY, hard), hard),
-        )
+    with suppress(
+        ValueError, OSError
+    ):  # a hard limit below it, or a process that ended
+        _, hard = prlimit(process, RLIMIT_DATA)
+        soft = WORKER_MEMORY if hard < 0 else min(WORKER_MEMORY, hard)
+        prlimit(process, RLIMIT_DATA, (soft, hard))
 
 
 class Ended(NamedTuple):
@@ -163,11 +168,8 @@ MOST_ERRORS = 10**8
 """Bytes that a program may write to its standard error for one answer."""
 KILLED = (-9, 137)
 """Exit status of a program that was killed: its own, or its shell's."""
-ATTEMPTS = 5
-"""A guest that is killed from outside is asked so often before it is given up."""
 ENDING = 5.0
 """Seconds for a program that is told to end; then it is killed."""
-KEEPER = str(Path(__file__).with_name("keeper.py"))
 Question = dict[str, Any]
 """A question or an answer, as an object of JSON."""
 Ask = Callable[[Question, int], Question]
@@ -217,22 +219,30 @@ class Running:
         positions: int,
         greet: Callable[[Ask], None] | None = None,
     ) -> Question:
-        """Ask, and ask anew a program that is killed from outside; one that fails is ended.
+        """Ask, and ask once more a program that was killed; one that fails is ended.
 
-        `greet` asks what a program that is started must be asked first, and raises where the answer is wrong.
+        `greet` asks what a program that is started must be asked first, and raises
+        where the answer is wrong.
         """
         with self._lock:
-            attempts = 0
-            while True:
-                attempts += 1
-                try:
-                    if greet is not None and self._process is None:
-                        greet(self._ask)
-                    return self._ask(question, positions)
-                except BaseException as error:
-                    self.end()
-                    if not isinstance(error, _KilledError) or attempts == ATTEMPTS:
-                        raise
+            try:
+                return self._greet_and_ask(question, positions, greet)
+            except _KilledError:  # perhaps from outside, for example out of memory
+                return self._greet_and_ask(question, positions, greet)
+
+    def _greet_and_ask(
+        self,
+        question: Question,
+        positions: int,
+        greet: Callable[[Ask], None] | None,
+    ) -> Question:
+        try:
+            if greet is not None and self._process is None:
+                greet(self._ask)
+            return self._ask(question, positions)
+        except BaseException:
+            self.end()
+            raise
 
     def _ask(self, question: Question, positions: int) -> Question:
         """Send a question and return the object that answers it, also one that says why it has no answer."""
@@ -288,31 +298,17 @@ class Running:
         return data
 
     def _start(self) -> "subprocess.Popen[bytes]":
-        command = list(self.program.command)
-        if os.name == "posix":
-            command = [
-                sys.executable,
-                "-I",
-                "-S",
-                KEEPER,
-                str(os.getpid()),
-                str(WORKER_MEMORY),
-                *command,
-            ]
         self._errors = tempfile.TemporaryFile(buffering=0)  # noqa: SIM115 - as long as the program
-        environment, pipe = (
-            {**os.environ, **dict(self.program.variables)},
-            subprocess.PIPE,
-        )
         self._process = subprocess.Popen(
-            command,
+            self.program.command,
             bufsize=2**16,
-            stdin=pipe,
-            stdout=pipe,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
             stderr=self._errors,
-            env=environment,
+            env={**os.environ, **dict(self.program.variables)},
             start_new_session=True,
         )
+        bound_memory(self._process.pid)
         self._number, self._stopped = 0, ""
         return self._process
 
@@ -379,12 +375,21 @@ class Running:
 
 
 def _stop(process: "subprocess.Popen[bytes]") -> None:
-    process.terminate()
-    try:
+    """End a program and what it started in its session."""
+    _signal(process, "SIGTERM")
+    with suppress(subprocess.TimeoutExpired):
         process.wait(ENDING)
-    except subprocess.TimeoutExpired:
-        process.kill()
-        process.wait()
+    _signal(process, "SIGKILL")
+    process.wait()
+
+
+def _signal(process: "subprocess.Popen[bytes]", name: str) -> None:
+    """Send a signal to a program and all that is left of its session."""
+    if os.name == "posix":
+        with suppress(OSError):  # all of them have ended
+            os.killpg(process.pid, getattr(signal, name))
+    elif process.poll() is None:
+        process.terminate()
 
 
 def _make_object(pairs: list[tuple[str, Any]]) -> Question:

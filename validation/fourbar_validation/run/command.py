@@ -1,6 +1,5 @@
 """`python -m validation run`: what is judged, by whom, how, and against what."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -12,15 +11,9 @@ from fourbar.errors import FAILED, DependencyError, InputError
 from fourbar.writing import require_file, write_text
 from fourbar_validation.compare.columns import read_columns
 from fourbar_validation.compare.rows import FAILS
-from fourbar_validation.engines.environments import read_engines, start_engines
-from fourbar_validation.engines.guests import Guest, adjust_engines, read_guests
-from fourbar_validation.engines.registry import (
-    ENGINES,
-    HARD_ENGINES,
-    Engine,
-    hold_fully,
-    load_further,
-)
+from fourbar_validation.engines.guests import adjust_engines
+from fourbar_validation.engines.registry import Engine, hold_fully
+from fourbar_validation.engines.table import choose_engines, fill_table
 from fourbar_validation.regression.accept import (
     FORMS,
     add_output_options,
@@ -53,6 +46,8 @@ EXCLUDED = (
     ("suite", "random", "has its own scenes; leave out scene files and --random"),
 )
 """Option, what it cannot be combined with, and why."""
+HARD = "hard"
+"""Name of the suite of hard cases."""
 OF_RANDOM = ("seed", "type")
 """Options that say which random linkages are drawn."""
 
@@ -71,7 +66,7 @@ class Request:
     type: str | None = None
     workers: int = WORKERS
     against: str | None = None
-    witness: tuple[str, ...] = ()
+    guest: tuple[str, ...] = ()
     time_limit: float | None = None
     sample_shipped: int = SAMPLE
     verbose: bool = False
@@ -171,7 +166,7 @@ class Request:
     help="Compare with an accepted name or an earlier run's folder.",
 )
 @click.option(
-    "--witness",
+    "--guest",
     metavar="MODULE:CLASS|COMMAND",
     multiple=True,
     help="An engine of your own, a class or a program, to judge with the others (docs/protocol.md).",
@@ -180,7 +175,7 @@ class Request:
     "--time-limit",
     type=click.FloatRange(min=0.0, min_open=True),
     metavar="SECONDS",
-    help="End a --witness that takes longer for one answer; left out: a minute, and more for many positions.",
+    help="End a guest that takes longer for one answer; left out: a minute, and more for many positions.",
 )
 @click.option(
     "--sample-shipped",
@@ -207,12 +202,9 @@ def command(**stated: Any) -> int:
 
     request = Request(**stated)
     request.require_consistent()
-    suite, engines = select_scenes(request)
-    if request.error is not None:
-        engines = adjust_engines(engines, request.error)
-    folders = [path.parent for path in request.scenes]
-    chosen = choose_engines(request.engines, engines, folders, request.time_limit)
-    present, missing = find_askable(chosen, by_name=request.engines is not None)
+    suite = select_scenes(request)
+    engines = select_engines(request)
+    present, missing = find_askable(engines, by_name=request.engines is not None)
     options = RunOptions(
         request.workers, not request.no_pictures, request.sample_shipped
     )
@@ -243,30 +235,31 @@ def command(**stated: Any) -> int:
     return summary.counts.status
 
 
-def select_scenes(request: Request) -> tuple[Suite, tuple[Engine, ...]]:
-    """Select the scenes, and all engines that may answer there: of the harness, further ones, and guests."""
-    engines: tuple[Engine, ...] = (*ENGINES, *load_further())
-    if hard := request.suite == "hard":
-        engines = (*HARD_ENGINES, *map(hold_fully, load_further()))
-    guests: tuple[Engine, ...] = read_guests(
-        request.witness, [engine.name for engine in engines], request.time_limit
-    )
-    suite: Suite
+def select_scenes(request: Request) -> Suite:
+    """Select the scenes."""
+    if request.suite == HARD:
+        return Hard()
+    if request.suite is not None:
+        return read_suite(Path(request.suite))
+    if request.random is not None:
+        types = read_linkage_types(request.type or ALL_TYPES)
+        return Random(request.random, request.seed or 0, types)
+    if request.scenes:
+        return read_scene_files(request.scenes)
+    return read_default_suite()
+
+
+def select_engines(request: Request) -> tuple[Engine, ...]:
+    """Select the engines that are to answer, and say what each is held to."""
+    hard = request.suite == HARD
+    folders = [path.parent for path in request.scenes]
+    table = fill_table(folders, request.guest, request.time_limit, balls=hard)
+    engines = choose_engines(request.engines, table)
     if hard:
-        suite, guests = Hard(), tuple(map(hold_fully, guests))
-    elif request.suite is not None:
-        suite = read_suite(Path(request.suite))
-    elif request.random is not None:
-        suite = Random(
-            request.random,
-            request.seed or 0,
-            read_linkage_types(request.type or ALL_TYPES),
-        )
-    else:
-        suite = (
-            read_scene_files(request.scenes) if request.scenes else read_default_suite()
-        )
-    return suite, (*engines, *guests)
+        engines = tuple(map(hold_fully, engines))
+    if request.error is not None:
+        engines = adjust_engines(engines, request.error)
+    return engines
 
 
 def read_linkage_types(text: str) -> tuple[DrawnType, ...]:
@@ -282,45 +275,6 @@ def read_linkage_types(text: str) -> tuple[DrawnType, ...]:
             text,
             f"must be {UNEVEN_TYPE} or a comma-separated list of {allowed}",
         ) from None
-
-
-def choose_engines(
-    named: str | None,
-    engines: tuple[Engine, ...] = ENGINES,
-    folders: Sequence[Path] = (),
-    seconds: float | None = None,
-) -> tuple[Engine, ...]:
-    """Choose the engines named in a comma-separated list, and the guests, which are named by being given.
-
-    Without a list these are all but those that need not be installed. A name that is no engine's is sought in the
-    engines.toml of these folders and of the package; `seconds`: in which such an engine must answer.
-    """
-    if named is None:
-        further = {engine.name for engine in load_further()}
-        return tuple(
-            engine
-            for engine in engines
-            if engine.name not in further or not engine.missing()
-        )
-    offered = {engine.name: engine for engine in engines}
-    names = [name.strip() for name in named.split(",") if name.strip()]
-    described = read_engines(folders)
-    for name in names or [named]:
-        if name not in offered and name not in described:
-            raise InputError(
-                "--engines", name, "must be among " + ", ".join([*offered, *described])
-            )
-    chosen = tuple(
-        engine
-        for name, engine in offered.items()
-        if name in names or isinstance(engine, Guest)
-    )
-    return (
-        *chosen,
-        *start_engines(
-            [described[name] for name in names if name not in offered], engines, seconds
-        ),
-    )
 
 
 def find_askable(

@@ -61,7 +61,7 @@ def judge_job(job: Job) -> Record:
     )
 
 
-def judge_by_engine(job: Job, _: Exception, attempt: processes.Attempt) -> Record:
+def judge_by_engine(job: Job, _: BaseException, attempt: processes.Attempt) -> Record:
     """Judge a scene that broke down one engine at a time; those at fault have a row that says of what."""
     record: Record | None = None
     breakdowns = []
