@@ -38,7 +38,7 @@ JUDGED_BY = {
     "fourbar/show/test_page.py": "fourbar/show: tolerances",
     "fourbar/show/plot/test_plot.py": "fourbar/show/plot: curves figures freebody labels linkage studies style view",
     # a comparison is tested by engines with given answers
-    "validation/run/test_judge.py": "validation/compare: answer compare effects; "
+    "validation/run/test_judge.py": "validation/compare: answer effects; "
     "validation/run: answers command identities question run",
     "validation/compare/statements/test_statements.py": "validation/compare/statements: limit_positions transmission",
     # adapters: judged against printed figures, each other, and faults put in front of them
@@ -46,6 +46,7 @@ JUDGED_BY = {
     "limits loaded loop prediction tree; lab/engines: drake exudyn exudyn_elements opensim; "
     "validation/scenes: random; validation/engines/mujoco: closed_loop inverse",
     "validation/engines/test_guests.py": "validation: engine; validation/engines: processes workers",
+    "validation/engines/test_environments.py": "validation/engines: table",
     "validation/engines/test_free_body.py": "validation/engines: free_body_closure free_body_effects",
     "validation/scenes/test_hard_families.py": "validation/engines: exact; validation/engines/mujoco: shipped",
     "validation/report/test_sections.py": "validation/report: hard_picture",

@@ -318,39 +318,81 @@ class Comparison:
     def _judge(
         self, quantity: str, ours: Array, theirs: Array, mask: Mask, note: str
     ) -> tuple[Row, int]:
-        """Judge the errors at the positions of `mask`; return the row, and the number of positions with a verdict."""
-        size, condition = self._scale(quantity)
-        allowed = self.held.tolerance.allowed(condition)
-        if self.held.predicted is not None:
-            allowed, size = np.where(size == 0.0, 0.0, allowed), replace_zero_size(size)
-        error = find_error(quantity, ours, theirs, size)
-        beyond, settled = mask & (error > allowed), np.zeros_like(mask)
-        retried = np.full_like(error, np.nan)
-        if self.held.nearby is not None and beyond.any():
-            retried = find_error(quantity, ours, self._answered_nearby[quantity], size)
-            error = np.where(beyond, np.fmin(error, retried), error)
-            settled = beyond & (retried <= allowed)
-        predict: Callable[[Mask], Array] | None = None
-        if (predicted := self.held.predicted) is not None:
+        """Judge the errors at the positions of `mask`.
 
-            def predict(positions: Mask) -> Array:
-                share = divide(predicted(quantity, positions), size)
-                return np.where(np.isfinite(retried), np.fmin(share, allowed), share)
-
-        worst = _judge_errors(
-            error, condition, mask, allowed, self.held.tolerance, predict
-        )
-        reason, i = worst.reason, worst.position
-        if settled.any():
-            reason += f"; {np.count_nonzero(settled)} positions within the rounding of theta_2"
-        numbers = (error[i], worst.allowed, self.formulas.theta_2[i], condition[i])
+        Return the row, and the number of positions with a verdict.
+        """
+        errors = self._measure(quantity, ours, theirs, mask)
+        errors = self._take_again(quantity, ours, errors)
+        worst = judge_errors(errors, self._predict(quantity, errors))
+        i = worst.position
         row = self._row(
             quantity,
             worst.verdict,
-            reason + note,
-            **dict(zip(NUMBERS, numbers, strict=True)),
+            worst.reason + note,
+            error=errors.error[i],
+            allowed=worst.allowed,
+            theta_2=self.formulas.theta_2[i],
+            condition=errors.condition[i],
         )
         return row, worst.decided
+
+    def _measure(
+        self, quantity: str, ours: Array, theirs: Array, mask: Mask
+    ) -> "Errors":
+        """Measure the errors of a quantity, and what is allowed at each position.
+
+        A quantity whose scale is 0 vanishes with all its terms. Nothing is relative to
+        it: its error is in its own unit, and none is allowed.
+        """
+        scale, condition = self._scale(quantity)
+        vanishes = scale == 0.0
+        unit = replace_zero_size(scale)
+        tolerance = self.held.tolerance
+        decidable = mask
+        if tolerance.conditioned:
+            decidable = mask & (condition * NOTHING_TO_TELL > EPS)
+        return Errors(
+            error=find_error(quantity, ours, theirs, unit),
+            allowed=np.where(vanishes, 0.0, tolerance.allowed(condition)),
+            unit=unit,
+            relative=~vanishes,
+            condition=condition,
+            mask=mask,
+            decidable=decidable,
+            reason=tolerance.name,
+        )
+
+    def _take_again(self, quantity: str, ours: Array, errors: "Errors") -> "Errors":
+        """Ask again within the rounding of theta_2 where an error is beyond the allowed one."""
+        beyond = errors.mask & (errors.error > errors.allowed)
+        if self.held.nearby is None or not beyond.any():
+            return errors
+        theirs = self._answered_nearby[quantity]
+        again = find_error(quantity, ours, theirs, errors.unit)
+        return errors._replace(
+            error=np.where(beyond, np.fmin(errors.error, again), errors.error),
+            again=again,
+            settled=int(np.count_nonzero(beyond & (again <= errors.allowed))),
+        )
+
+    def _predict(self, quantity: str, errors: "Errors") -> Array | None:
+        """Predict the errors that are beyond the allowed ones, in the unit of the errors.
+
+        None where nothing predicts them. A position that was asked again needs no more
+        than what is allowed there: the prediction knows nothing of theta_2's rounding.
+        """
+        predicted = self.held.predicted
+        if predicted is None:
+            return None
+        beyond = errors.beyond
+        if not beyond.any():
+            return np.zeros_like(errors.error)
+        share = divide(predicted(quantity, beyond), errors.unit)
+        if errors.again is not None:
+            was_asked = np.isfinite(errors.again)
+            share = np.where(was_asked, np.fmin(share, errors.allowed), share)
+        return np.nan_to_num(share, nan=0.0, posinf=np.inf)
 
     def _scale(self, quantity: str) -> tuple[Array, Array]:
         """Return size and condition of a quantity at each position, each the stricter of formulas and reference."""
@@ -365,7 +407,46 @@ class Comparison:
         return self.scales[quantity]
 
 
-class _Worst(NamedTuple):
+class Errors(NamedTuple):
+    """Errors of one quantity, each (n,), all in one unit."""
+
+    error: Array
+    allowed: Array
+    unit: Array
+    """What they are divided by: the scale, or 1 of the quantity's unit where that is 0."""
+    relative: Mask
+    """Positions at which they are parts of the quantity's scale."""
+    condition: Array
+    mask: Mask
+    """Positions that are compared."""
+    decidable: Mask
+    """Positions of the mask at which digits are left to decide by."""
+    reason: str
+    """Why this much is allowed."""
+    again: Array | None = None
+    """Errors of a second answer within the rounding of theta_2; NaN where not asked."""
+    settled: int = 0
+    """Number of positions at which that answer agrees."""
+
+    @property
+    def beyond(self) -> Mask:
+        """Positions at which the error is beyond the allowed one, or is no number."""
+        excessive = self.decidable & ~(self.error <= self.allowed)
+        return np.asarray(excessive | (self.mask & ~np.isfinite(self.error)))
+
+    @property
+    def notes(self) -> str:
+        """Positions that were not judged, or were asked again, as the end of a reason."""
+        notes = ""
+        if undecided := int(np.count_nonzero(self.mask & ~self.decidable)):
+            limit = f"eps/condition > {NOTHING_TO_TELL:g}"
+            notes += f"; {undecided} positions with {limit} not judged"
+        if self.settled:
+            notes += f"; {self.settled} positions within the rounding of theta_2"
+        return notes
+
+
+class Worst(NamedTuple):
     """Verdict on a quantity, and the position where its error is worst."""
 
     position: int
@@ -376,85 +457,46 @@ class _Worst(NamedTuple):
     """Number of positions that have a verdict."""
 
 
-def _judge_errors(
-    error: Array,
-    condition: Array,
-    mask: Mask,
-    allowed: Array,
-    tolerance: ErrorBound,
-    predict: Callable[[Mask], Array] | None,
-) -> _Worst:
-    """Judge errors at the positions of `mask` by the allowed error, and larger ones by the predicted error.
+def judge_errors(errors: Errors, predicted: Array | None) -> Worst:
+    """Judge errors by the allowed error, and larger ones by DEGRADED times the predicted one.
 
-    NaN at any of them fails. `allowed` is 0 where the quantity vanishes; the error is in the quantity's unit there.
+    An error that is no number fails. `predicted` is None where nothing predicts it.
     """
-    decidable = (
-        mask & (condition * NOTHING_TO_TELL > EPS) if tolerance.conditioned else mask
-    )
-    undecided = int(np.count_nonzero(mask & ~decidable))
-    note = (
-        f"; {undecided} positions with eps/condition > {NOTHING_TO_TELL:g} not judged"
-        if undecided
-        else ""
-    )
-    beyond = (decidable & ~(error <= allowed)) | (mask & ~np.isfinite(error))
-    if not (decidable | beyond).any():
-        index = int(np.flatnonzero(mask)[0])
-        return _Worst(
-            index,
-            UNDECIDED,
-            f"eps/condition = {EPS / condition[index]:.1e}",
-            allowed[index],
-            0,
-        )
+    beyond = errors.beyond
+    if not (errors.decidable | beyond).any():
+        index = int(np.flatnonzero(errors.mask)[0])
+        why = f"eps/condition = {EPS / errors.condition[index]:.1e}"
+        return Worst(index, UNDECIDED, why, errors.allowed[index], 0)
     if not beyond.any():
-        index = int(np.argmax(np.where(decidable, find_used(error, allowed), -1.0)))
-        return _Worst(
-            index,
-            AGREES,
-            tolerance.name + note,
-            allowed[index],
-            int(np.count_nonzero(decidable)),
-        )
-    predicted = np.zeros_like(error)
-    if predict is not None:
-        predicted = np.nan_to_num(predict(beyond), nan=0.0, posinf=np.inf)
-    bound = np.maximum(allowed, TIMES_PREDICTED * predicted)
-    ratio = find_used(error, bound)
+        used = find_used(errors.error, errors.allowed)
+        index = int(np.argmax(np.where(errors.decidable, used, -1.0)))
+        decided = int(np.count_nonzero(errors.decidable))
+        why = errors.reason + errors.notes
+        return Worst(index, AGREES, why, errors.allowed[index], decided)
+    expected = np.zeros_like(errors.error) if predicted is None else predicted
+    bound = np.maximum(errors.allowed, TIMES_PREDICTED * expected)
+    used = find_used(errors.error, bound)
     # where a first-order prediction reaches the value itself, no digit is left to judge
-    lost = (
-        beyond
-        & np.isfinite(error)
-        & np.where(allowed > 0.0, predicted >= 1.0, predicted == np.inf)
-    )
-    ratio[lost] = np.minimum(ratio[lost], 1.0)
-    index = int(np.argmax(np.where(beyond, ratio, -1.0)))
-    if math.isnan(error[index]):
-        verdict, reason = FAILS, "NaN"
+    hopeless = np.where(errors.relative, expected >= 1.0, expected == np.inf)
+    lost = beyond & np.isfinite(errors.error) & hopeless
+    used[lost] = np.minimum(used[lost], 1.0)
+    index = int(np.argmax(np.where(beyond, used, -1.0)))
+    error, foreseen = errors.error[index], expected[index]
+    if math.isnan(error):
+        verdict, why = FAILS, "NaN"
     elif lost[index]:
-        verdict, reason = (
-            UNDECIDED,
-            f"an error of {predicted[index]:.1e} of the value is predicted",
-        )
-    elif predict is None:
-        verdict, reason = FAILS, tolerance.name
-    elif ratio[index] <= 1.0:
-        verdict, reason = (
-            DEGRADED,
-            f"{error[index]:.1e} of {predicted[index]:.1e} predicted for this position",
-        )
+        verdict = UNDECIDED
+        why = f"an error of {foreseen:.1e} of the value is predicted"
+    elif predicted is None:
+        verdict, why = FAILS, errors.reason
+    elif used[index] <= 1.0:
+        verdict = DEGRADED
+        why = f"{error:.1e} of {foreseen:.1e} predicted for this position"
     else:
-        verdict, reason = (
-            FAILS,
-            f"{error[index]:.1e} where {predicted[index]:.1e} was predicted",
-        )
-    return _Worst(
-        index,
-        verdict,
-        reason + note,
-        bound[index],
-        int(np.count_nonzero(decidable & ~lost)),
-    )
+        verdict = FAILS
+        why = f"{error:.1e} where {foreseen:.1e} was predicted"
+    decided = int(np.count_nonzero(errors.decidable & ~lost))
+    return Worst(index, verdict, why + errors.notes, bound[index], decided)
 
 
 def _mark_stated(quantity: str, formulas: Solution, ours: Array) -> Mask:

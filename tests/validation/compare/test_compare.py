@@ -1,0 +1,135 @@
+"""Prediction, retry and verdict of a quantity, and the unit of an error where nothing is allowed."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+import fourbar
+from fourbar_validation.compare.answer import Answer
+from fourbar_validation.compare.compare import (
+    Comparison,
+    Errors,
+    Held,
+    Predicted,
+    judge_errors,
+)
+from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, UNDECIDED, Row
+from fourbar_validation.compare.tolerance import EPS as LAST_DIGIT
+from fourbar_validation.compare.tolerance import EQUIVALENCE, K
+from tests.support.scenes import crank_rocker
+
+ALLOWED = 1e-14
+
+
+def make_errors(*error: float, condition: float = 1.0, **changes: object) -> Errors:
+    n = len(error)
+    parts: dict[str, object] = {
+        "error": np.array(error),
+        "allowed": np.full(n, ALLOWED),
+        "unit": np.ones(n),
+        "relative": np.ones(n, dtype=bool),
+        "condition": np.full(n, condition),
+        "mask": np.ones(n, dtype=bool),
+        "decidable": np.ones(n, dtype=bool),
+        "reason": "round-off",
+    }
+    return Errors(**{**parts, **changes})  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("predicted", "verdict", "allowed"),
+    [
+        (None, FAILS, ALLOWED),
+        (1e-14, FAILS, 1e-13),
+        (2e-13, DEGRADED, 2e-12),
+        (2.0, UNDECIDED, 20.0),
+    ],
+)
+def test_an_error_beyond_the_allowed_one_is_held_to_its_prediction(
+    predicted: float | None, verdict: str, allowed: float
+) -> None:
+    expected = None if predicted is None else np.array([0.0, predicted, 0.0])
+    worst = judge_errors(make_errors(1e-15, 1e-12, 0.0), expected)
+    assert (worst.position, worst.verdict) == (1, verdict)
+    assert worst.allowed == pytest.approx(allowed)
+
+
+def test_within_what_is_allowed_no_prediction_is_needed() -> None:
+    worst = judge_errors(make_errors(1e-15, 9e-15, 0.0), None)
+    assert (worst.position, worst.verdict, worst.decided) == (1, AGREES, 3)
+
+
+def test_no_number_fails_wherever_it_stands() -> None:
+    nowhere = np.zeros(2, dtype=bool)
+    worst = judge_errors(make_errors(np.nan, 0.0, decidable=nowhere), None)
+    assert (worst.position, worst.verdict, worst.reason[:3]) == (0, FAILS, "NaN")
+    undecided = judge_errors(
+        make_errors(1.0, condition=1e-20, decidable=np.zeros(1, dtype=bool)), None
+    )
+    assert undecided.verdict == UNDECIDED and undecided.decided == 0
+
+
+def test_a_prediction_of_the_whole_value_leaves_no_digit_but_in_a_unit_of_its_own() -> (
+    None
+):
+    """At a scale of 0 a prediction of 2 is 2 N and not twice the value."""
+    vanishing = make_errors(1.0, allowed=np.zeros(1), relative=np.zeros(1, dtype=bool))
+    assert judge_errors(vanishing, np.array([2.0])).verdict == DEGRADED
+    assert judge_errors(make_errors(1.0), np.array([2.0])).verdict == UNDECIDED
+
+
+def compare(
+    change: Callable[[Answer], None],
+    predicted: Predicted | None,
+    nearby: Callable[..., dict[str, np.ndarray]] | None = None,
+) -> dict[str, Row]:
+    """Rows of an answer that is the formulas' own, changed, of a crank at constant speed."""
+    motion = fourbar.Motion(fourbar.Sweep(0.1, 6.38, 8), 10.0)
+    scene = crank_rocker(motion=motion, loads=())
+    solution = fourbar.solve(scene, "force")
+    names = ("theta_3", "theta_4", "alpha_2", "torque")
+    quantities = {name: np.array(getattr(solution, name)) for name in names}
+    answer = Answer("e", "exact", solution.at, solution.assembled, quantities)
+    change(answer)
+    held = Held(EQUIVALENCE, names, predicted, nearby)
+    rows = Comparison("s", scene, answer, solution, held).rows()
+    return {row.quantity: row for row in rows}
+
+
+def nothing(quantity: str, mask: np.ndarray) -> np.ndarray:
+    return np.zeros(len(mask))
+
+
+@pytest.mark.parametrize("predicted", [None, nothing], ids=["unpredicted", "predicted"])
+def test_where_a_quantity_vanishes_its_error_has_its_own_unit_whoever_answers(
+    predicted: Predicted | None,
+) -> None:
+    """alpha_2 is 0: an answer of 1e-3 rad/s^2 is wrong by that, and nothing is allowed."""
+
+    def turn(answer: Answer) -> None:
+        answer.quantities["alpha_2"][3] = 1e-3
+
+    row = compare(turn, predicted)["alpha_2"]
+    assert (row.error, row.allowed, row.verdict) == (1e-3, 0.0, FAILS)
+    row = compare(lambda _: None, predicted)["alpha_2"]
+    assert (row.error, row.allowed, row.verdict) == (0.0, 0.0, AGREES)
+
+
+def test_an_error_within_the_rounding_of_theta_2_is_taken_again() -> None:
+    def shift(answer: Answer) -> None:
+        answer.quantities["torque"] *= 1.0 + 1e-9
+
+    assert compare(shift, nothing)["torque"].verdict == FAILS
+    right = compare(lambda _: None, None)
+    assert right["torque"].error == 0.0
+    solution = fourbar.solve(
+        crank_rocker(
+            motion=fourbar.Motion(fourbar.Sweep(0.1, 6.38, 8), 10.0), loads=()
+        ),
+        "force",
+    )
+    answered = {"torque": solution.torque}
+    again = compare(shift, nothing, lambda mask: answered)["torque"]  # type: ignore[dict-item, return-value]
+    assert again.verdict == AGREES and "within the rounding of theta_2" in again.reason
+    assert K * LAST_DIGIT <= again.allowed < 1e-6
