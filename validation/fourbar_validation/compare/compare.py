@@ -446,7 +446,7 @@ class Errors(NamedTuple):
         return notes
 
 
-class Worst(NamedTuple):
+class WorstPosition(NamedTuple):
     """Verdict on a quantity, and the position where its error is worst."""
 
     position: int
@@ -457,7 +457,7 @@ class Worst(NamedTuple):
     """Number of positions that have a verdict."""
 
 
-def judge_errors(errors: Errors, predicted: Array | None) -> Worst:
+def judge_errors(errors: Errors, predicted: Array | None) -> WorstPosition:
     """Judge errors by the allowed error, and larger ones by DEGRADED times the predicted one.
 
     An error that is no number fails. `predicted` is None where nothing predicts it.
@@ -466,13 +466,13 @@ def judge_errors(errors: Errors, predicted: Array | None) -> Worst:
     if not (errors.decidable | beyond).any():
         index = int(np.flatnonzero(errors.mask)[0])
         why = f"eps/condition = {EPS / errors.condition[index]:.1e}"
-        return Worst(index, UNDECIDED, why, errors.allowed[index], 0)
+        return WorstPosition(index, UNDECIDED, why, errors.allowed[index], 0)
     if not beyond.any():
         used = find_used(errors.error, errors.allowed)
         index = int(np.argmax(np.where(errors.decidable, used, -1.0)))
         decided = int(np.count_nonzero(errors.decidable))
         why = errors.reason + errors.notes
-        return Worst(index, AGREES, why, errors.allowed[index], decided)
+        return WorstPosition(index, AGREES, why, errors.allowed[index], decided)
     expected = np.zeros_like(errors.error) if predicted is None else predicted
     bound = np.maximum(errors.allowed, TIMES_PREDICTED * expected)
     used = find_used(errors.error, bound)
@@ -496,7 +496,7 @@ def judge_errors(errors: Errors, predicted: Array | None) -> Worst:
         verdict = FAILS
         why = f"{error:.1e} where {foreseen:.1e} was predicted"
     decided = int(np.count_nonzero(errors.decidable & ~lost))
-    return Worst(index, verdict, why + errors.notes, bound[index], decided)
+    return WorstPosition(index, verdict, why + errors.notes, bound[index], decided)
 
 
 def _mark_stated(quantity: str, formulas: Solution, ours: Array) -> Mask:
