@@ -1,10 +1,13 @@
 """The effects a scene can call for, one per file; what a scene does not name does not exist.
 
 An effect is a frozen subclass of `Effect` and holds physics alone; docs/extending.md shows one
-being added. Each file is imported when its effect is first named.
+being added. Each file is imported when its effect is first named. A file that is not
+listed here is found in the folder.
 """
 
+from functools import cache
 from importlib import import_module
+from pkgutil import iter_modules
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -32,7 +35,7 @@ FILE_OF = {
     "Springs": "spring",
     "Flywheel": "flywheel",
 }
-"""The effects and their files; a new one is added here."""
+"""The effects that come with the package, in the order in which they are listed, and their files."""
 OTHER_FILES = {
     "Effect": "effect",
     **dict.fromkeys(("Load", "Table"), "load"),
@@ -44,12 +47,34 @@ OTHER_FILES = {
 
 def __getattr__(name: str) -> Any:
     file = FILE_OF.get(name) or OTHER_FILES.get(name)
-    if file is None:
+    if file is not None:
+        value = getattr(import_module(f"fourbar.effects.{file}"), name)
+    else:
+        value = None if name.startswith("_") else list_further().get(name)
+    if value is None:
         raise AttributeError(f"module 'fourbar.effects' has no attribute {name!r}")
-    globals()[name] = value = getattr(import_module(f"fourbar.effects.{file}"), name)
+    globals()[name] = value
     return value
+
+
+@cache
+def list_further() -> "dict[str, type[Effect]]":
+    """List by name the effects of the files in the folder that are not listed above."""
+    base = __getattr__("Effect")
+    known = {*FILE_OF.values(), *OTHER_FILES.values()}
+    further: dict[str, type[Effect]] = {}
+    for file in iter_modules(__path__):
+        if file.name in known:
+            continue
+        module = import_module(f"fourbar.effects.{file.name}")
+        for name, value in vars(module).items():
+            is_kind = isinstance(value, type) and issubclass(value, base)
+            if is_kind and value.__module__ == module.__name__:
+                further[name] = value
+    return further
 
 
 def list_kinds() -> "dict[str, type[Effect]]":
     """List the effects by their keys under ``[effects]``, in the order in which they are listed."""
-    return {kind.key: kind for kind in map(__getattr__, FILE_OF)}
+    kinds = [*map(__getattr__, FILE_OF), *list_further().values()]
+    return {kind.key: kind for kind in kinds}

@@ -8,13 +8,15 @@ from typing import Any, ClassVar, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.errors import InputError, expect
+from fourbar.errors import InputError, LimitError, expect
 from fourbar.formulas.arithmetic import Number, cross, is_any, select
 from fourbar.formulas.motion import State
 from fourbar.formulas.pin_forces import Bodies, Body, PinForces, Wrenches
 from fourbar.linkage import PINS, Declared, FourBar, require
 from fourbar.quantities import Array
 
+Joints = tuple[float, float, float]
+"""Angles of pins O2, A, O4, rad."""
 AT_REST = 50.0 * 2.0**-52
 """A slip below this part of the input's coefficient and of those it is made of is what rounding leaves of zero."""
 
@@ -251,8 +253,8 @@ class SolvedFriction(NamedTuple):
 class Effect:
     """One effect in one file: what it does to the bars, and where it has no value.
 
-    A subclass is a frozen dataclass. What it leaves at the default it does not have. Files, MJCF, engines and
-    scales translate it, each in a table by its key.
+    A subclass is a frozen dataclass. What it leaves at the default it does not have: an engine without a model of
+    the effect refuses the scene, and without a size nothing is compared.
     """
 
     __slots__ = ()
@@ -267,6 +269,53 @@ class Effect:
 
     counts_turns: ClassVar[bool] = False
     """True if the effect depends on where the motion began (`counted_from`)."""
+    in_balls: ClassVar[bool] = False
+    """True if the reference in ball arithmetic has a model of it."""
+    joint_elements: ClassVar[Mapping[str, str]] = {}
+    """Elements of an SDF joint that state its number at a pin, by reader ("gazebo", "drake")."""
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, couple: float) -> Self | None:
+        """Draw one for a random scene, about as strong as a couple, N m; None: random scenes have none."""
+        return None
+
+    def add_to_mjcf(self, model: Any) -> None:
+        """Add it to an MJCF; LimitError where it has no counterpart."""
+        raise LimitError(f"the effect {self.key!r} has no counterpart in MJCF")
+
+    @classmethod
+    def has_mjcf(cls) -> bool:
+        """Return True if it has a counterpart in MJCF."""
+        return cls.add_to_mjcf is not Effect.add_to_mjcf
+
+    def couple_on_drive(self, linkage: FourBar, speed: float) -> float:
+        """Return the couple that it may ask of the drive at a speed (rad/s), N m.
+
+        It lays out the flywheel of an MJCF.
+        """
+        return 0.0
+
+    def unwind(self, linkage: FourBar, q: Joints) -> Joints:
+        """Move the angles of pins O2, A, O4 by the whole turns that it tells apart, rad."""
+        return q
+
+    def act_on_engine(self, bars: Any) -> None:
+        """Apply it to an engine's bars, from the engine's own motion: a second derivation, with nothing of `act`.
+
+        `bars`: of `engines.loaded.Loaded`, with `push`, `twist`, `angle`, `velocity`, `alpha`, `rotate`, `point`.
+        """
+        raise NotImplementedError
+
+    def act_on_free_bodies(self, motion: Any, wrenches: Any) -> None:
+        """Apply it to the free bodies, from their own motion: a second derivation too.
+
+        `motion`, `wrenches`: of `engines.free_body_effects`.
+        """
+        raise NotImplementedError
+
+    def size(self, linkage: FourBar, solution: Any) -> Any:
+        """Return the size of its forces, N, one number or (n,): the scale of what vanishes."""
+        raise NotImplementedError
 
     @property
     def loaded_pins(self) -> tuple[str, ...]:

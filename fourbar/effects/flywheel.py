@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from fourbar.effects.effect import Effect
 from fourbar.linkage import AT_LEAST_ZERO, Declared, check_numbers, require_whole
@@ -21,6 +21,7 @@ class Flywheel(Effect):
     inertia: float
     bar: int = 2
     key: ClassVar[str] = "flywheel"
+    in_balls: ClassVar[bool] = True
     example: ClassVar[str] = 'flywheel = { bar = 2, inertia = "0.02 kg m^2" }'
     numbers: ClassVar[dict[str, Declared]] = {
         "inertia": Declared("kg m^2", AT_LEAST_ZERO)
@@ -40,3 +41,7 @@ class Flywheel(Effect):
     def carried(self) -> Mapping[int, float]:
         """The wheel's inertia on its bar: a rotation has no other."""
         return {self.bar: self.inertia}
+
+    def add_to_mjcf(self, model: Any) -> None:
+        """Add it as inertia of the body, because MuJoCo's armature of pin O2 is the drive."""
+        model.inertia[self.bar] += self.inertia

@@ -1,12 +1,12 @@
 """Dry pin friction of given torque: constant magnitude, against the relative rotation at a pin."""
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from fourbar.effects.effect import Actions, PinRows
 from fourbar.formulas.arithmetic import is_any
 from fourbar.formulas.motion import State
-from fourbar.linkage import AT_LEAST_ZERO, Declared
+from fourbar.linkage import AT_LEAST_ZERO, Declared, FourBar
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,6 +19,8 @@ class Friction(PinRows):
 
     torques: tuple[tuple[str, float], ...]
     key: ClassVar[str] = "friction"
+    in_balls: ClassVar[bool] = True
+    joint_elements: ClassVar[dict[str, str]] = {"gazebo": "friction"}
     example: ClassVar[str] = 'friction = { A = "0.05 N m" }'
     numbers: ClassVar[dict[str, Declared]] = {"": Declared("N m", AT_LEAST_ZERO)}
     dry: ClassVar[bool] = True
@@ -32,3 +34,12 @@ class Friction(PinRows):
         """Add M on bar j = -f sign(omega_j - omega_i), its opposite on bar i."""
         for pin, f in self.torques:
             actions.couple(pin, -f * actions.sense(pin))
+
+    def add_to_mjcf(self, model: Any) -> None:
+        """Set the attribute ``frictionloss`` of the hinge (of a tendon at the cut pin B)."""
+        for pin, f in self.torques:
+            model.add_dry_friction(pin, f)
+
+    def couple_on_drive(self, linkage: FourBar, speed: float) -> float:
+        """Sum the couples of all pins."""
+        return sum((f for _, f in self.torques), 0.0)

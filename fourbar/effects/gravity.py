@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 from fourbar.effects.effect import Actions, Effect
 from fourbar.formulas.arithmetic import is_any, polar, vector
 from fourbar.formulas.motion import State
-from fourbar.linkage import MOVING_BARS, Declared, check_numbers
+from fourbar.linkage import MOVING_BARS, Declared, FourBar, check_numbers
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,6 +17,7 @@ class Gravity(Effect):
     magnitude: float = 9.81
     angle: float = -math.pi / 2
     key: ClassVar[str] = "gravity"
+    in_balls: ClassVar[bool] = True
     example: ClassVar[str] = 'gravity = ["9.81 m/s^2", "-90 deg"]'
     numbers: ClassVar[dict[str, Declared]] = {
         "magnitude": Declared("m/s^2"),
@@ -48,3 +49,15 @@ class Gravity(Effect):
         for number, body in zip(MOVING_BARS, actions.bodies, strict=True):
             if is_any(body.m != 0.0):
                 actions.force(number, body.m * field, body.z)
+
+    def add_to_mjcf(self, model: Any) -> None:
+        """Set the option ``gravity``."""
+        model.option["gravity"] = (*self.vector, 0.0)
+
+    def couple_on_drive(self, linkage: FourBar, speed: float) -> float:
+        """Sum m g L, with L the longest arm at which a weight acts."""
+        longest, total = max(linkage.lengths), 0.0
+        for number in MOVING_BARS:
+            bar = linkage.bar(number)
+            total += bar.mass * max(longest, abs(bar.mass_centre[0]))
+        return total * abs(self.magnitude)

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from fourbar.effects.effect import Actions, Effect
-from fourbar.errors import InputError, expect
+from fourbar.errors import InputError, LimitError, expect
 from fourbar.formulas.arithmetic import (
     PI_LOW,
     angle,
@@ -188,3 +188,15 @@ class Load(Effect):
             if self.table is None
             else total * max(abs(factor) for factor in self.table.factor)
         )
+
+    def add_to_mjcf(self, model: Any) -> None:
+        """Add a constant actuator on a site (force) or on the bar (couple)."""
+        if self.table is not None:
+            raise LimitError(
+                "a load that is a table over theta_2 has no counterpart in MJCF"
+            )
+        model.loads.append(self)
+
+    def couple_on_drive(self, linkage: FourBar, speed: float) -> float:
+        """Return the greatest force at the longest arm."""
+        return self.greatest_force(linkage) * max(linkage.lengths)

@@ -206,6 +206,7 @@ class Springs(Effect):
 
     springs: tuple[Spring, ...]
     key: ClassVar[str] = "springs"
+    in_balls: ClassVar[bool] = True
     example: ClassVar[str] = (
         'springs = [{ from = { bar = 1, at = ["10 cm", "-90 deg"] }, to = { bar = 4, at = ["8 cm", "0 deg"] }, '
         'stiffness = "200 N/m", length = "12 cm", preload = "3 N" }]'
@@ -246,3 +247,12 @@ class Springs(Effect):
             here = coincide & (spring.slack != 0.0)
             codes = select(here, NO_DIRECTION, OK if codes is None else codes)
         return codes
+
+    def add_to_mjcf(self, model: Any) -> None:
+        """Add spatial tendons."""
+        model.springs.extend(self.springs)
+
+    def couple_on_drive(self, linkage: FourBar, speed: float) -> float:
+        """Sum the greatest tensions, at the longest arm."""
+        tensions = (spring.greatest_tension(linkage) for spring in self.springs)
+        return sum(tensions) * max(linkage.lengths)

@@ -3,18 +3,18 @@
 import math
 from copy import copy
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.effects.effect import Actions, PinRows
-from fourbar.errors import expect
+from fourbar.effects.effect import Actions, Joints, PinRows
+from fourbar.errors import LimitError, expect
 from fourbar.formulas.arithmetic import Number, angle, wrap_angle
 from fourbar.formulas.motion import State
 from fourbar.formulas.path import ROLES
 from fourbar.formulas.position import reorder_lengths
-from fourbar.linkage import PINS, POSITIVE, Declared
+from fourbar.linkage import PINS, POSITIVE, Declared, FourBar
 from fourbar.quantities import OK, WOUND, Array
 
 HALF_TURN = math.pi * (1.0 - 1e-12)
@@ -36,6 +36,7 @@ class Torsion(PinRows):
     """Whole turns of each pin where the motion begins, rad; not part of a scene."""
     counts_turns: ClassVar[bool] = True
     key: ClassVar[str] = "torsion"
+    in_balls: ClassVar[bool] = True
     example: ClassVar[str] = (
         'torsion = { B = { stiffness = "2 N m/rad", rest = "30 deg", preload = "0.1 N m" } }'
     )
@@ -87,6 +88,47 @@ class Torsion(PinRows):
         ):
             wound |= np.abs(followed - rest - turns) > HALF_TURN
         return np.where(wound, WOUND, OK).astype(np.uint8)
+
+    def add_to_mjcf(self, model: Any) -> None:
+        """Write the ``stiffness`` of the hinge (of a tendon at the cut pin B), its rest shifted by the preload."""
+        for pin, k, rest, preload in self.springs:
+            turned = model.linkage.ground_angle if pin in ("O2", "O4") else 0.0
+            model.pin[pin]["stiffness"] = k
+            # a tendon's rest is a length
+            model.pin[pin]["springlength" if pin == "B" else "springref"] = (
+                rest + turned - preload / k
+            )
+
+    def couple_on_drive(self, linkage: FourBar, speed: float) -> float:
+        """Return no less than the sum of the couples."""
+        return self.greatest_couple
+
+    def unwind(self, linkage: FourBar, q: Joints) -> Joints:
+        """Return each sprung pin within half a turn of its rest.
+
+        Raises LimitError where the turns of A, B and O4 contradict.
+        """
+        rests = {pin: rest for pin, _, rest, _ in self.springs}
+
+        def turns(pin: str, angle: float, line: float) -> float:
+            if pin not in rests:
+                return 0.0
+            return math.tau * round((rests[pin] + line - angle) / math.tau)
+
+        theta_1 = linkage.ground_angle
+        q2 = q[0] + turns("O2", q[0], theta_1)
+        q3 = q[1] + turns("A", q[1], 0.0)
+        q4 = q[2] + turns("O4", q[2], theta_1)
+        at_B = turns("B", q4 - q2 - q3, 0.0)
+        if at_B and "O4" not in rests:
+            q4 += at_B
+        elif at_B and "A" not in rests:
+            q3 -= at_B
+        elif at_B:
+            raise LimitError(
+                "the springs at A, B and O4 count turns that MuJoCo's joints cannot have at once"
+            )
+        return q2, q3, q4
 
     def _follow_angles(self, state: State, branch: Number) -> list[Array]:
         """Compute theta_j - theta_i of each sprung pin, continuous in the commanded angle on one branch."""

@@ -3,7 +3,7 @@
 import cmath
 import json
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from typing import Any, NamedTuple
 from xml.etree import ElementTree as ET
 
@@ -39,7 +39,7 @@ def assemble(
     scene: Scene,
     start: Start | None,
     form: str,
-    at_pins: Mapping[str, tuple[str, str]],
+    reader: str | None,
     *,
     without_loads: bool = False,
 ) -> Assembly:
@@ -48,7 +48,7 @@ def assemble(
     Parameters
     ----------
     form : the file's, for errors.
-    at_pins : the effects that its joints hold: the name there, and the field of the effect that lists it by pin.
+    reader : whose joints state what acts at the pins, as in `Effect.joint_elements`; None: they state nothing.
     without_loads : leave the loads out, instead of refusing them.
 
     Raises LimitError for a load, a motion law or an effect without a counterpart there, InputError for a bar without
@@ -78,9 +78,9 @@ def assemble(
             gravity = (float(effect.vector[0]), float(effect.vector[1]))
         elif effect.key == "flywheel":
             inertia[effect.bar] += effect.inertia
-        elif effect.key in at_pins:
-            name, field = at_pins[effect.key]
-            for pin, value in getattr(effect, field):
+        elif reader in effect.joint_elements:
+            name = effect.joint_elements[reader]
+            for pin, value in effect.rows:
                 dynamics.setdefault(pin, {})[name] = value
         else:
             raise LimitError(f"the effect {effect.key!r} has no counterpart in {form}")
@@ -125,12 +125,6 @@ def write_comment(
     return "\n".join([*lines, notes[reader].strip()])
 
 
-DAMPING = {"viscous": ("damping", "coefficients")}
-AT_JOINTS = {
-    "gazebo": {**DAMPING, "friction": ("friction", "torques")},
-    "drake": DAMPING,
-}
-"""Attributes of a joint by effect: its element, and the field of the effect."""
 DRAKE = "http://drake.mit.edu"
 """Namespace of the elements that only Drake reads."""
 
@@ -162,9 +156,7 @@ def write_sdf(
     """
     linkage = scene.linkage
     form = f"SDF for {reader}"
-    assembled = assemble(
-        scene, start, form, AT_JOINTS[reader], without_loads=without_loads
-    )
+    assembled = assemble(scene, start, form, reader, without_loads=without_loads)
     turn, foot, numbers, inertia, gravity, dynamics = assembled
     if reader == "drake" and "B" in dynamics:
         raise LimitError("Drake's ball constraint at pin B has no damping")
@@ -286,7 +278,7 @@ def write_usd(
     Source: openusd.org, UsdPhysics.
     """
     linkage = scene.linkage
-    assembled = assemble(scene, start, "USD", {}, without_loads=without_loads)
+    assembled = assemble(scene, start, "USD", None, without_loads=without_loads)
     turn, foot, _, inertia, (x, y), _ = assembled
     pull = math.hypot(x, y)
     bodies = []

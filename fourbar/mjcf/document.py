@@ -13,7 +13,6 @@ from fourbar.effects.effect import PinRows
 from fourbar.errors import InputError, LimitError, NotAssembledError, clean_line
 from fourbar.formulas.mobility import change_points, choose_range, turns_fully
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, FourBar, uniform
-from fourbar.mjcf.effects import find_row, unwind
 from fourbar.mjcf.model import (
     RECIPE,
     Model,
@@ -24,6 +23,7 @@ from fourbar.mjcf.model import (
     make_motor,
     make_servo,
     require_carriable,
+    unwind,
 )
 from fourbar.mjcf.plane import LEVEL, Plane
 from fourbar.quantities import OK
@@ -111,7 +111,7 @@ def write_mjcf(
     model = Model(scene.linkage, settings, timestep)
     model.cylinder = cylinder
     for term in (*scene.effects, *scene.loads):
-        find_row(term).add(term, model)
+        term.add_to_mjcf(model)
     armature = size_flywheel(scene, settings)
     root = ET.Element("mujoco", model=clean_line(scene.title) or "four-bar")
     for line in _write_comments(scene, drive, reader, exerts=model.exerts):
@@ -311,7 +311,7 @@ def _sum_load_inertia(scene: Scene) -> float:
     acceleration = _compute_acceleration_scale(scene)
     speed = math.sqrt(acceleration)
     couples = (
-        find_row(term).couple(term, scene.linkage, speed)
+        term.couple_on_drive(scene.linkage, speed)
         for term in (*scene.loads, *scene.effects)
     )
     return sum(couples) / acceleration

@@ -13,7 +13,9 @@ from fourbar.linkage import BAR_NAMES, FIRST_PIN, MOVING_BARS, PINS, FourBar
 
 if TYPE_CHECKING:
     from fourbar.effects import LinearDrive, Load
+    from fourbar.effects.effect import Joints
     from fourbar.effects.spring import Spring, SpringEnd
+    from fourbar.scene import Scene
 
 
 @dataclass(frozen=True, slots=True)
@@ -515,3 +517,10 @@ class Model:
 def _is_slack_somewhere(spring: "Spring") -> bool:
     """Return True if a rest length of a tendon can express the spring; any other needs an actuator on the tendon."""
     return spring.stiffness > 0.0 and spring.slack <= 0.0
+
+
+def unwind(scene: "Scene", q: "Joints") -> "Joints":
+    """Compute the angles of pins O2, A, O4 as the scene's springs count them, rad."""
+    for effect in scene.effects:
+        q = effect.unwind(scene.linkage, q)
+    return q

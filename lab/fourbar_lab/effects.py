@@ -15,7 +15,6 @@ from fourbar.errors import DependencyError, InputError
 from fourbar.files import loads
 from fourbar.linkage import Bar, FourBar
 from fourbar.mjcf import write_mjcf
-from fourbar.mjcf.effects import NO_MJCF
 from fourbar.scene import Scene, command
 from fourbar.scene.motion import Motion, Sweep
 from fourbar.solve import solve
@@ -67,7 +66,11 @@ EFFECTS |= {
 }
 """Effects by name, each alone on the same linkage; one that is not listed acts as in its example of a scene file."""
 SIMULATION = "mujoco-simulated"
-NO_COUNTERPART = {(SIMULATION, name) for name in (*NO_MJCF, "load over theta_2")}
+NO_COUNTERPART = {
+    (SIMULATION, name)
+    for name, effect in EFFECTS.items()
+    if name == "load over theta_2" or (effect is not None and not effect.has_mjcf())
+}
 DEFAULT_FLAGS = "none, MuJoCo's default flags"
 LEFT_ON = "none, {} left on"
 """One flag of MuJoCo as it is by default, the others as the generated MJCF has them."""

@@ -6,7 +6,6 @@ import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -16,7 +15,6 @@ from fourbar import effects
 from fourbar.errors import InputError, LimitError
 from fourbar.files import dump, loads
 from fourbar.mjcf import write_mjcf
-from fourbar.mjcf.effects import MJCF_OF, NO_MJCF
 from fourbar.scene import Scene, command
 from fourbar.solve import solve
 from fourbar.studies.derivatives import sensitivity
@@ -33,12 +31,6 @@ REFERENCE = (Path(__file__).parents[2] / "docs" / "scene-file.md").read_text(
     encoding="utf-8"
 )
 PAGE, QUANTITY = PAGE.split("\n## A quantity\n")
-TABLES: list[tuple[ModuleType, str]] = [
-    (on_trees, "TERM_OF"),
-    (in_scales, "SIZE_OF"),
-    (free_body_effects, "WRENCH_OF"),
-]
-"""Module and table of each row, in the order of the page."""
 SCENE = """
 [lengths]
 ground = "300 mm"
@@ -60,20 +52,41 @@ def block(language: str, page: str = PAGE, number: int = 0) -> str:
 
 
 @pytest.fixture
-def latch(monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
-    module = ModuleType("fourbar.effects.latch")
-    monkeypatch.setitem(sys.modules, module.__name__, module)
-    exec(block("python"), module.__dict__)
-    monkeypatch.setitem(effects.FILE_OF, "Latch", "latch")
-    for number, (translator, table) in enumerate(TABLES, 1):
-        assert re.search(
-            rf"`{table}` in\s+`{translator.__name__.replace('.', '/')}\.py`", PAGE
-        ), table
-        names = {**vars(translator), table: {}}
-        exec(block("python", number=number), names)
-        monkeypatch.setitem(getattr(translator, table), "latch", names[table]["latch"])
-    yield module.Latch
-    vars(effects).pop("Latch", None)
+def latch(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Any]:
+    """The effect of the page, from its one file in the folder of effects."""
+    (tmp_path / "latch.py").write_text(block("python"), encoding="utf-8")
+    monkeypatch.setattr(effects, "__path__", [*effects.__path__, str(tmp_path)])
+    forget = effects.list_further.cache_clear
+    forget()
+    yield effects.Latch
+    forget()
+    sys.modules.pop("fourbar.effects.latch")
+    del effects.Latch
+
+
+def test_one_file_is_all_that_the_example_needs(latch: Any) -> None:
+    """The page's own test, with nothing registered anywhere."""
+    names: dict[str, Any] = {}
+    exec(block("python", number=1), names)
+    names["test_every_exact_engine_agrees"]()
+    assert "latch" in effects.list_kinds()
+
+
+@pytest.mark.parametrize("method", ["act_on_engine", "act_on_free_bodies", "act"])
+def test_the_test_of_the_page_fails_for_a_mistake_in_one_derivation(
+    latch: Any, method: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    right = getattr(latch, method)
+
+    def twice(*arguments: Any) -> None:
+        right(*arguments)
+        right(*arguments)
+
+    monkeypatch.setattr(latch, method, twice)
+    names: dict[str, Any] = {}
+    exec(block("python", number=1), names)
+    with pytest.raises(AssertionError):
+        names["test_every_exact_engine_agrees"]()
 
 
 def guide_scene() -> Scene:
@@ -99,23 +112,20 @@ def test_the_example_is_read_written_and_agreed_on(latch: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    ("table", "engines"),
-    [(on_trees.TERM_OF, ON_TREES), (free_body_effects.WRENCH_OF, {"free-body"})],
+    ("method", "engines"),
+    [("act_on_engine", ON_TREES), ("act_on_free_bodies", {"free-body"})],
 )
-def test_engines_without_its_row_refuse_the_example(
-    latch: Any,
-    table: dict[str, Any],
-    engines: set[str],
-    monkeypatch: pytest.MonkeyPatch,
+def test_engines_without_a_model_refuse_the_example(
+    latch: Any, method: str, engines: set[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.delitem(table, "latch")
+    monkeypatch.delattr(latch, method)
     assert failing(guide_scene(), EXACT) == []
     reasons = refusals(guide_scene(), EXACT)
     assert reasons.keys() == engines
     assert all("'latch'" in reason for reason in reasons.values())
 
 
-def test_mjcf_has_no_row_of_the_example_and_refuses_it(latch: Any) -> None:
+def test_mjcf_has_no_counterpart_of_the_example_and_refuses_it(latch: Any) -> None:
     assert failing(guide_scene(), SIMULATED) == []
     reasons = refusals(guide_scene(), SIMULATED)
     assert (
@@ -126,20 +136,20 @@ def test_mjcf_has_no_row_of_the_example_and_refuses_it(latch: Any) -> None:
         write_mjcf(guide_scene())
 
 
-def test_without_its_row_nothing_is_judged_by_another_scale(
+def test_without_its_size_nothing_is_judged_by_another_scale(
     latch: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.delitem(in_scales.SIZE_OF, "latch")
+    monkeypatch.delattr(latch, "size")
     rows = judge("scene", guide_scene(), EXACT).rows
     engines = {row.engine for row in rows if row.failed and "'latch'" in row.reason}
     assert engines >= {engine.name for engine in EXACT}
 
 
-def test_without_its_line_a_file_neither_reads_nor_writes_the_example(
+def test_without_its_file_a_scene_neither_reads_nor_writes_the_example(
     latch: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     scene = guide_scene()
-    monkeypatch.delitem(effects.FILE_OF, "Latch")
+    monkeypatch.setattr(effects, "list_further", dict)
     with pytest.raises(InputError, match=r"effects\.latch"):
         guide_scene()
     with pytest.raises(InputError, match=r"effects\.latch"):
@@ -170,23 +180,6 @@ def test_studies_and_sensitivities_know_the_numbers_of_the_example(latch: Any) -
     assert slope == pytest.approx((torque[0] - torque[1]) / (2.0 * step), abs=1e-8)
 
 
-@pytest.mark.parametrize("place", ["act", "term"])
-def test_a_fault_in_the_example_is_caught(
-    latch: Any, place: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    right = latch.act if place == "act" else on_trees.TERM_OF["latch"]
-
-    def three_times(*arguments: Any) -> None:
-        for _ in range(3):
-            right(*arguments)
-
-    if place == "act":
-        monkeypatch.setattr(latch, "act", three_times)
-    else:
-        monkeypatch.setitem(on_trees.TERM_OF, "latch", three_times)
-    assert "torque" in {quantity for _, quantity, _ in failing(guide_scene(), EXACT)}
-
-
 @pytest.mark.parametrize("key", effects.list_kinds())
 def test_the_example_of_each_effect_is_read_and_written_back(key: str) -> None:
     example = effects.list_kinds()[key].example
@@ -196,16 +189,15 @@ def test_the_example_of_each_effect_is_read_and_written_back(key: str) -> None:
     assert example.split("=")[0] in REFERENCE
 
 
-def test_every_effect_has_a_row_in_each_table() -> None:
-    """In MJCF those that have a counterpart; loads have a table of their own in a file."""
+def test_every_effect_of_the_package_has_a_row_in_each_table() -> None:
+    """Loads have a table of their own in a file."""
     keys = {*effects.list_kinds()}
     assert keys == {*free_body_effects.WRENCH_OF}
-    assert (
-        keys | {"load"}
-        == {*on_trees.TERM_OF}
-        == {*in_scales.SIZE_OF}
-        == {*MJCF_OF, *NO_MJCF}
-    )
+    assert keys | {"load"} == {*on_trees.TERM_OF} == {*in_scales.SIZE_OF}
+    without_mjcf = {
+        key for key, kind in effects.list_kinds().items() if not kind.has_mjcf()
+    }
+    assert without_mjcf == {"pin_friction"}
 
 
 def test_the_scene_of_the_reference_names_everything_and_is_agreed_on() -> None:
@@ -221,47 +213,10 @@ def test_the_scene_of_the_reference_names_everything_and_is_agreed_on() -> None:
     assert failing(scene, EXACT) == []
 
 
-NEED_NO_LINE = {
-    "docs/findings.md",
-    *("lab/fourbar_lab/fault_scenes.py", "lab/fourbar_lab/effects.py"),
-}
-"""Files in which a new effect need not be named: fed to injected faults, or measured by its example."""
-
-
-def test_the_guide_names_every_file_that_names_every_effect() -> None:
-    root = Path(__file__).parents[2]
-    kinds = {getattr(effects, name).key: name for name in effects.FILE_OF}
-    files = []
-    for path in (
-        path
-        for top in ("fourbar", "validation", "lab", "docs")
-        for path in (root / top).rglob("*.*")
-    ):
-        if path.suffix in (".py", ".md", ".js"):
-            text, name = (
-                path.read_text(encoding="utf-8"),
-                path.relative_to(root).as_posix(),
-            )
-            files += (
-                [name]
-                if all(
-                    re.search(rf"\b({key}|{kind})\b", text)
-                    for key, kind in kinds.items()
-                )
-                else []
-            )
-    assert len(files) > 8
-    assert not [
-        name
-        for name in files
-        if name not in NEED_NO_LINE and name.removeprefix("validation/") not in PAGE
-    ]
-
-
 def test_each_name_that_the_guide_places_in_a_file_is_there() -> None:
     root = Path(__file__).parents[2]
     places = re.findall(r"`(\w+)`(?: \w+)? (?:in|of) `([\w/]+\.\w+)`", PAGE + QUANTITY)
-    assert len(places) > 9
+    assert len(places) >= 6
     for name, file in places:
         folder = root / ("validation" if file.startswith("fourbar_v") else "")
         path = (

@@ -33,7 +33,7 @@ JUDGED_BY = {
     "fourbar/test_solve.py": "fourbar: linkage solution; fourbar/scene: motion; fourbar/evaluation: case",
     "fourbar/studies/test_study.py": "fourbar/scene: motion; fourbar/studies: keys",
     # parts of one document or picture
-    "fourbar/mjcf/test_mjcf.py": "fourbar/mjcf: document effects model",
+    "fourbar/mjcf/test_mjcf.py": "fourbar/mjcf: document model",
     "fourbar/show/test_animate.py": "fourbar/show/plot: film",
     "fourbar/show/test_page.py": "fourbar/show: tolerances",
     "fourbar/show/plot/test_plot.py": "fourbar/show/plot: curves figures freebody labels linkage studies style view",

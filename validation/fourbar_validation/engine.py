@@ -25,7 +25,7 @@ from fourbar_validation.engines.registry import BALLS, ENGINES, load_further
 from fourbar_validation.report.machine import DISTRIBUTIONS
 
 ALL_BUT_CYLINDER = (
-    *(getattr(effects, name).key for name in effects.FILE_OF),
+    *effects.list_kinds(),
     "loads",
     "drive",
 )

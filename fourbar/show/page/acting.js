@@ -105,7 +105,7 @@ function drawActing(p, i) {
       make(parts.under, "path", { class: "act act-spring", d: pathOf(Array.from({ length: 80 }, (_, n) => ring(at, S * (0.6 + 1.5 * n / 79), n / 79 * 2.5 * TURN, 0, 2)[0])) });
     } else {
       const at = toScreen(p[one.pin]);
-      make(parts.under, "circle", { class: `act act-${one.kind === "flywheel" ? "flywheel" : "pin"}`, cx: at[0], cy: at[1], r: RINGS[one.kind] * S });
+      make(parts.under, "circle", { class: `act act-${one.kind === "flywheel" ? "flywheel" : "pin"}`, cx: at[0], cy: at[1], r: (RINGS[one.kind] ?? 2.1) * S });
     }
   }
 }

@@ -125,7 +125,7 @@ def draw_mechanism(
                     shown.text,
                     shown.label,
                     away,
-                    symbols.COLOURS[symbol.kind],
+                    symbols.COLOURS.get(symbol.kind, symbols.PIN),
                     8.0,
                 )
             )

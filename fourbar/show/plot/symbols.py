@@ -38,9 +38,6 @@ COLOURS = {
     **{
         "cylinder": INK,
         "flywheel": MUTED,
-        "viscous": PIN,
-        "friction": PIN,
-        "pin_friction": PIN,
     },
 }
 LENGTHS = {"force": 7.0, "moment": 2.6, "drive": 3.2, "flywheel": 4.0, "torsion": 2.2}
@@ -54,6 +51,8 @@ NAMED_AT = {
     "torsion": 0.0,
 }
 """Angle around its ring at which a name stands, rad, so that several at one pin do not meet."""
+RING_OF_OTHERS, NAME_OF_OTHERS = 2.1, 1.4
+"""Ring and name of what acts at pins and is not listed."""
 SMALLEST, SHARE = 0.5, 0.12
 """A symbol at a pin is as large as this share of the shortest bar there lets it be, and no smaller than half."""
 ARROWS = {"v": ("#0B6E99", "velocity"), "a": ("#B3261E", "acceleration")}
@@ -234,7 +233,7 @@ def place_of(linkage: FourBar, solution: Solution, index: int, factor: float) ->
 
 def draw(axes: "Axes", symbol: Symbol, place: Place, size: float) -> DrawnSymbol:
     """Draw one symbol at one position; `size` is that of a support."""
-    drawn, colour = DrawnSymbol(text=symbol.name), COLOURS[symbol.kind]
+    drawn, colour = DrawnSymbol(text=symbol.name), COLOURS.get(symbol.kind, PIN)
     if symbol.kind == "gravity":
         _draw_gravity(axes, symbol, drawn)
     elif symbol.end is not None:
@@ -272,7 +271,9 @@ def draw(axes: "Axes", symbol: Symbol, place: Place, size: float) -> DrawnSymbol
         _turn(axes, centre, LENGTHS[symbol.kind] * size, turn, colour, drawn)
     else:
         centre, size = place.pins[symbol.pin], place.small(symbol.pin, size)
-        radius = size * (RING.get(symbol.kind) or LENGTHS[symbol.kind])
+        radius = size * (
+            RING.get(symbol.kind) or LENGTHS.get(symbol.kind, RING_OF_OTHERS)
+        )
         spiral = symbol.kind == "torsion"
         turned = np.linspace(0.0, (2.5 if spiral else 1.0) * math.tau, 90)
         radii = np.linspace(0.3 * radius, radius, 90) if spiral else radius
@@ -283,7 +284,7 @@ def draw(axes: "Axes", symbol: Symbol, place: Place, size: float) -> DrawnSymbol
             colour,
             2.2 if symbol.kind == "flywheel" else 1.2,
         )
-        drawn.away = cmath.rect(1.0, NAMED_AT[symbol.kind])
+        drawn.away = cmath.rect(1.0, NAMED_AT.get(symbol.kind, NAME_OF_OTHERS))
         drawn.label = split_components(centre + radius * drawn.away)
     return drawn
 

@@ -27,7 +27,7 @@ from fourbar_validation.engines.description import (
     find_unknown,
     list_parts,
 )
-from fourbar_validation.engines.effects import TERM_OF, list_acting
+from fourbar_validation.engines.effects import has_term, list_acting
 from fourbar_validation.engines.loop import Exact
 from fourbar_validation.engines.tree import Tree
 
@@ -37,7 +37,7 @@ UP = (0.0, 0.0, 1.0)
 
 def find_refusal(scene: Scene) -> str:
     """Name the declared limit that a scene meets, if any."""
-    if reason := find_unknown(scene, TERM_OF, linear=True):
+    if reason := find_unknown(scene, has_term, linear=True):
         return reason
     for number in FIRST_PIN:
         bar = scene.linkage.bar(number)

@@ -39,7 +39,7 @@ from fourbar_validation.engines.description import (
     place,
     reduce_angle,
 )
-from fourbar_validation.engines.effects import TERM_OF, list_acting
+from fourbar_validation.engines.effects import has_term, list_acting
 from fourbar_validation.engines.loaded import Loaded, Values
 from fourbar_validation.engines.loop import Exact
 
@@ -61,7 +61,7 @@ class ExudynBars(Loaded):
     )
 
     def __init__(self, scene: Scene) -> None:
-        if reason := find_unknown(scene, TERM_OF, linear=True):
+        if reason := find_unknown(scene, has_term, linear=True):
             raise LimitError(reason)
         exu.config.printToConsole = False
         self.container = exu.SystemContainer()

@@ -26,7 +26,7 @@ from fourbar_validation.engines.description import (
     reduce_angle,
     resolve,
 )
-from fourbar_validation.engines.effects import TERM_OF, list_acting
+from fourbar_validation.engines.effects import has_term, list_acting
 from fourbar_validation.engines.loaded import Loaded, Values
 from fourbar_validation.engines.loop import Exact
 
@@ -50,7 +50,7 @@ TURNING = {2: "O2", 4: "O4"}
 
 def find_refusal(scene: Scene) -> str:
     """Name the declared limit that a scene meets, if any."""
-    if reason := find_unknown(scene, TERM_OF, linear=True):
+    if reason := find_unknown(scene, has_term, linear=True):
         return reason
     for number in MOVING_BARS:
         if scene.linkage.bar(number).mass == 0.0:

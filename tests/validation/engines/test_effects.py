@@ -25,7 +25,6 @@ from fourbar.effects import (
     Viscous,
     list_kinds,
 )
-from fourbar.mjcf.effects import NO_MJCF
 from fourbar.scene import Scene
 from fourbar_validation.engines import free_body_effects
 from fourbar_validation.engines.effects import TERM_OF
@@ -63,7 +62,11 @@ SIMULATED = [replace(engine, order=None) for engine in ENGINES if engine.through
 ON_TREES = {"pinocchio-inverse", "mujoco-inverse"}
 """What acts by `TERM_OF`, the table of the engines."""
 INVERSE = {*ON_TREES, "free-body"}
-NO_COUNTERPART = {"mujoco-simulated": NO_MJCF}
+NO_COUNTERPART = {
+    "mujoco-simulated": {
+        key for key, kind in list_kinds().items() if not kind.has_mjcf()
+    }
+}
 """What an engine cannot do; it must say so, and the others remain."""
 
 

@@ -71,14 +71,20 @@ SIZE_OF: dict[str, Callable[[Any, FourBar, Solution], Array | float]] = {
     ),
     "load": lambda load, linkage, _: load.greatest_force(linkage),
 }
-"""Size of the forces of an effect, by its key."""
+"""Size of the forces of an effect, by its key; others bring their own."""
 
 
 def find_size(effect: "Effect", linkage: FourBar, formulas: Solution) -> Array | float:
     """Return the size of an effect's forces, N, (n,) or one for all positions.
 
-    An effect without a row raises FourBarError: nothing is judged by another effect's scale.
+    An effect without one raises FourBarError: nothing is judged by another effect's scale.
     """
-    if effect.key not in SIZE_OF:
-        raise FourBarError(f"the effect {effect.key!r} has no size to judge forces by")
-    return SIZE_OF[effect.key](effect, linkage, formulas)
+    if effect.key in SIZE_OF:
+        return SIZE_OF[effect.key](effect, linkage, formulas)
+    try:
+        size: Array | float = effect.size(linkage, formulas)
+    except NotImplementedError:
+        raise FourBarError(
+            f"the effect {effect.key!r} has no size to judge forces by"
+        ) from None
+    return size

@@ -5,12 +5,12 @@ a point of a bar; the bars as a tree that is open at pin B.
 """
 
 import math
-from collections.abc import Container, Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from fourbar.effects import Gravity
+from fourbar.effects import Effect, Gravity
 from fourbar.linkage import MOVING_BARS, Bar, FourBar
 from fourbar.quantities import COUPLE, LINE, UNKNOWNS
 from fourbar.scene import Command, Scene
@@ -175,8 +175,15 @@ def list_unknowns(scene: Scene, names: Iterable[str] = UNKNOWNS) -> list[str]:
     return [name_driving(scene) if name == COUPLE.value else name for name in names]
 
 
-def find_unknown(scene: Scene, table: Container[str], *, linear: bool = False) -> str:
-    """Give the reason to refuse a scene with an effect that a table has no row for; empty where there is none.
+def declares(effect: Effect, method: str) -> bool:
+    """Return True if an effect defines a method that the base class leaves open."""
+    return getattr(type(effect), method) is not getattr(Effect, method)
+
+
+def find_unknown(
+    scene: Scene, knows: Callable[[Any], bool], *, linear: bool = False
+) -> str:
+    """Give the reason to refuse a scene with an effect that an engine does not know; empty where there is none.
 
     `linear`: whether a drive along a line is known.
     """
@@ -186,7 +193,7 @@ def find_unknown(scene: Scene, table: Container[str], *, linear: bool = False) -
         (
             f"the effect {effect.key!r} has no model here"
             for effect in scene.effects
-            if effect.key not in table
+            if not knows(effect)
         ),
         "",
     )

@@ -12,11 +12,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fourbar.scene import Scene
-from fourbar_validation.engines.description import PINS, find_field, resolve
+from fourbar_validation.engines.description import (
+    PINS,
+    declares,
+    find_field,
+    resolve,
+)
 from fourbar_validation.engines.loaded import Act, Loaded
 
 if TYPE_CHECKING:
     from fourbar.effects import (
+        Effect,
         Flywheel,
         Friction,
         Gravity,
@@ -135,7 +141,12 @@ TERM_OF: dict[str, Callable[[Any, Loaded], None]] = {
     "flywheel": _apply_flywheel,
     "load": _load,
 }
-"""Function that applies an effect at a state of the bars, by the effect's key."""
+"""Function that applies an effect at a state of the bars, by the effect's key; others bring their own."""
+
+
+def has_term(effect: "Effect") -> bool:
+    """Return True if an effect can be applied to an engine's bars."""
+    return effect.key in TERM_OF or declares(effect, "act_on_engine")
 
 
 def list_acting(scene: Scene, bars: Loaded, own: Container[str] = ()) -> list[Act]:
@@ -145,7 +156,8 @@ def list_acting(scene: Scene, bars: Loaded, own: Container[str] = ()) -> list[Ac
     """
     acts: list[Act] = []
     for effect in (*scene.effects, *scene.loads):
-        act = partial(TERM_OF[effect.key], effect, bars)
+        term = TERM_OF.get(effect.key, type(effect).act_on_engine)
+        act = partial(term, effect, bars)
         if effect.key == "gravity":
             act()
         elif effect.key not in own:

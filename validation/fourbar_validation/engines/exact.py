@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 
-from fourbar.effects import Flywheel, Friction, Gravity, Springs, Torsion, Viscous
 from fourbar.formulas.many_digits import DIGITS
 from fourbar.linkage import FourBar
 from fourbar.quantities import VECTORS
@@ -17,14 +16,11 @@ from fourbar_validation.engines.description import SHARED, find_unknown, list_sp
 from fourbar_validation.engines.loop import make_blank
 
 NAME = "ball-arithmetic"
-KNOWN = tuple(
-    kind.key for kind in (Gravity, Viscous, Friction, Springs, Torsion, Flywheel)
-)
 
 
 def find_refusal(scene: Scene) -> str:
     """Give the reason to refuse a scene, if any."""
-    return find_unknown(scene, KNOWN)
+    return find_unknown(scene, lambda effect: effect.in_balls)
 
 
 class BallArithmetic:

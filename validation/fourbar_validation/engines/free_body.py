@@ -33,10 +33,10 @@ from fourbar_validation.engines.free_body_closure import (
     measure_cylinder,
 )
 from fourbar_validation.engines.free_body_effects import (
-    WRENCH_OF,
     BodyMotion,
     BodyWrenches,
     find_wound,
+    has_wrench,
     list_sliding_pins,
     make_vector,
     sum_acting,
@@ -70,7 +70,7 @@ class FreeBody:
 
     def answer(self, scene: Scene, command: Command) -> Answer:
         """Answer, or refuse by naming an effect that it does not know."""
-        if reason := find_unknown(scene, WRENCH_OF, linear=True):
+        if reason := find_unknown(scene, has_wrench, linear=True):
             return Answer(NAME, "exact", refusal=reason)
         if command.bar != 2 and scene.counts_turns:
             return Answer(

@@ -11,10 +11,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fourbar.effects import Effect
 from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.scene import Scene, command
 from fourbar_validation.compare.answer import Array
-from fourbar_validation.engines.description import PINS, find_centre
+from fourbar_validation.engines.description import PINS, declares, find_centre
 from fourbar_validation.engines.free_body_closure import Complex, close, cross
 
 HALF_TURN = math.pi * (1.0 - 1e-12)
@@ -186,7 +187,20 @@ WRENCH_OF: dict[str, Callable[[Any, BodyMotion, BodyWrenches], None]] = {
     "springs": _apply_springs,
     "flywheel": _apply_flywheel,
 }
-"""Function that applies an effect, by the effect's name in a scene file."""
+"""Function that applies an effect, by the effect's name in a scene file; others bring their own."""
+
+
+def has_wrench(effect: Effect) -> bool:
+    """Return True if an effect can be applied to the free bodies."""
+    return effect.key in WRENCH_OF or declares(effect, "act_on_free_bodies")
+
+
+def apply_effect(effect: Effect, motion: BodyMotion, wrenches: BodyWrenches) -> None:
+    """Add what an effect does to the free bodies."""
+    if effect.key in WRENCH_OF:
+        WRENCH_OF[effect.key](effect, motion, wrenches)
+    else:
+        effect.act_on_free_bodies(motion, wrenches)
 
 
 def sum_acting(scene: Scene, motion: BodyMotion) -> BodyWrenches:
@@ -195,7 +209,7 @@ def sum_acting(scene: Scene, motion: BodyMotion) -> BodyWrenches:
     for load in scene.loads:
         apply_load(load, motion, wrenches)
     for effect in scene.effects:
-        WRENCH_OF[effect.key](effect, motion, wrenches)
+        apply_effect(effect, motion, wrenches)
     return wrenches
 
 

@@ -18,7 +18,7 @@ from fourbar_validation.engines.description import (
     list_parts,
     rotate_by,
 )
-from fourbar_validation.engines.effects import TERM_OF, list_acting
+from fourbar_validation.engines.effects import has_term, list_acting
 from fourbar_validation.engines.loop import Assembler, Exact, LimitDetector
 from fourbar_validation.engines.tree import Tree, solve_closed
 
@@ -29,7 +29,7 @@ class PinocchioTree(Tree):
     """The open tree, built from the description."""
 
     def __init__(self, scene: Scene) -> None:
-        if reason := find_unknown(scene, TERM_OF, linear=True):
+        if reason := find_unknown(scene, has_term, linear=True):
             raise LimitError(reason)
         self.model = model = pin.Model()
         self.joint, self.frame = {1: 0}, dict[str, int]()

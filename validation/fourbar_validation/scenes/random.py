@@ -19,6 +19,7 @@ from fourbar.effects import (
     Springs,
     Torsion,
     Viscous,
+    list_kinds,
 )
 from fourbar.formulas.mobility import choose_range
 from fourbar.linkage import MOVING_BARS, PINS, Bar, FourBar
@@ -153,6 +154,8 @@ def draw_scene(
                 )
             )
     effects += _draw_springs(rng, linkage, weight, ranges) if ranges.sprung else []
+    drawn = (kind.draw(rng, couple) for kind in list_kinds().values())
+    effects += [effect for effect in drawn if effect is not None]
     omega = float(rng.choice([-1.0, 1.0])) * ranges.speed(rng)
     alpha = float(rng.choice([0.0, omega**2 * ranges.acceleration(rng)]))
     motion = Motion(0.0, omega, alpha, OPEN if rng.random() < 0.5 else CROSSED)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from fourbar.errors import InputError
 from fourbar.mjcf import RECIPE, Settings, write_mjcf
-from fourbar.mjcf.effects import unwind
+from fourbar.mjcf.model import unwind
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Command, Scene
 from fourbar.scene import command as command_of

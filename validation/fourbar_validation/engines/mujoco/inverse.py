@@ -11,7 +11,7 @@ from fourbar.errors import LimitError
 from fourbar.scene import Scene
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.engines.description import FIRST_PIN, find_unknown, list_parts
-from fourbar_validation.engines.effects import TERM_OF, list_acting
+from fourbar_validation.engines.effects import has_term, list_acting
 from fourbar_validation.engines.limits import LIGHTEST
 from fourbar_validation.engines.loop import Exact
 from fourbar_validation.engines.tree import Tree
@@ -19,7 +19,7 @@ from fourbar_validation.engines.tree import Tree
 
 def find_refusal(scene: Scene) -> str:
     """Name the declared limit that a scene meets, if any."""
-    if reason := find_unknown(scene, TERM_OF, linear=True):
+    if reason := find_unknown(scene, has_term, linear=True):
         return reason
     for part in list_parts(scene.linkage):
         if min(part.mass, part.inertia) < LIGHTEST.boundary:

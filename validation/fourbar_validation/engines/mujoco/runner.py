@@ -27,7 +27,7 @@ from fourbar.effects import Load
 from fourbar.errors import LimitError
 from fourbar.mjcf import RECIPE, Settings, choose_run, write_mjcf
 from fourbar.mjcf.document import FULL_TURN
-from fourbar.mjcf.effects import unwind
+from fourbar.mjcf.model import unwind
 from fourbar.scene import Command, Scene
 from fourbar.scene.motion import Law, Motion
 from fourbar_validation.compare.answer import Array

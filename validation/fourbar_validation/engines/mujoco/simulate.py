@@ -11,8 +11,7 @@ import numpy as np
 from fourbar.errors import InputError, LimitError
 from fourbar.mjcf import RECIPE, Settings, write_mjcf
 from fourbar.mjcf.document import compute_mass_ratio
-from fourbar.mjcf.effects import unwind
-from fourbar.mjcf.model import CYLINDER
+from fourbar.mjcf.model import CYLINDER, unwind
 from fourbar.scene import Command, Scene
 from fourbar.scene.motion import COMMANDS, Motion
 from fourbar_validation.compare.answer import Answer

@@ -20,9 +20,9 @@ from fourbar_validation.compare.tolerance import ErrorBound, divide
 from fourbar_validation.engines.description import find_centre
 from fourbar_validation.engines.free_body import move
 from fourbar_validation.engines.free_body_effects import (
-    WRENCH_OF,
     BodyMotion,
     BodyWrenches,
+    apply_effect,
     apply_load,
     list_sliding_pins,
     make_vector,
@@ -164,7 +164,7 @@ def _free(
         if effect.key == "gravity" and uniform:
             gravity = make_vector((effect.magnitude, effect.angle))  # type: ignore[attr-defined]
         else:
-            WRENCH_OF[effect.key](effect, motion, piece)
+            apply_effect(effect, motion, piece)
     for pin, radius in list_sliding_pins(scene).items():
         piece.twist_at(
             pin,
