@@ -20,6 +20,7 @@ from fourbar.linkage import FourBar as FourBar
 from fourbar.linkage import uniform as uniform
 from fourbar.scene import Scene as Scene
 from fourbar.scene import command as command
+from fourbar.scene.drawing import DrawnPins as DrawnPins
 from fourbar.scene.motion import Free as Free
 from fourbar.scene.motion import FromLimit as FromLimit
 from fourbar.scene.motion import Law as Law
@@ -49,6 +50,7 @@ if _TYPE_CHECKING:
     from fourbar.evaluation.free_motion import Released as Released
     from fourbar.evaluation.free_motion import release as release
     from fourbar.files import dump as dump
+    from fourbar.files import from_pins as from_pins
     from fourbar.files import load as load
     from fourbar.files import save as save
     from fourbar.formulas.points import point_coefficients as point_coefficients
@@ -87,7 +89,7 @@ _EFFECTS = (
 )
 _ON_FIRST_USE = {
     **{name: "fourbar.effects" for name in _EFFECTS},
-    **{name: "fourbar.files" for name in ("dump", "load", "save")},
+    **{name: "fourbar.files" for name in ("dump", "from_pins", "load", "save")},
     **{name: "fourbar.studies.points" for name in ("coupler_curve", "instant_centres")},
     "point_coefficients": "fourbar.formulas.points",
     **{

@@ -393,7 +393,10 @@ def find_unit(name: str) -> str:
 
 
 def find_values(solution: Solution, name: str, units: Conversion = SI) -> Any:
-    """Return a quantity by its name, those of the scene's own points too; None where it was not evaluated."""
+    """Return a quantity by its name, those of the scene's own points too; None where it was not evaluated.
+
+    Places are those in the coordinates of the scene's drawing.
+    """
     values: Array | None
     if name in UNITS:
         values = getattr(solution, name)
@@ -401,7 +404,15 @@ def find_values(solution: Solution, name: str, units: Conversion = SI) -> Any:
         table = {"v_": solution.velocity, "a_": solution.acceleration}.get(name[:2])
         values = solution.points.get(name) if table is None else table.get(name[2:])
     unit = find_unit(name)
+    if values is not None and unit == "m" and not is_scalar(name):
+        values = shift_to_drawing(solution, values)
     return values if values is None or unit not in units else values * units[unit][1]
+
+
+def shift_to_drawing(solution: Solution, places: Array) -> Array:
+    """Shift places, (n, 2), from O2 to the origin of the scene's drawing."""
+    origin = (0.0, 0.0) if solution.scene is None else solution.scene.origin
+    return places + origin if any(origin) else places
 
 
 def unwrap(angles: Array) -> None:

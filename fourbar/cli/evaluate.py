@@ -62,24 +62,35 @@ def classify(
 @click.option(
     "--lengths",
     nargs=4,
-    required=True,
     metavar="D A B C",
     help="Lengths of ground, input, coupler, output, like 300mm.",
 )
 @click.option(
+    "--pins",
+    metavar='"X,Y X,Y X,Y X,Y"',
+    help="Places of the pins O2, A, B, O4 as they are drawn, in place of --lengths.",
+)
+@click.option(
     "--unit",
     metavar="UNIT",
-    help="Unit of lengths that are given without one, like mm.",
+    help="Unit of lengths and coordinates that are given without one, like mm.",
 )
 def new(
-    file: Path | None, out: Path | None, lengths: tuple[str, ...], unit: str | None
+    file: Path | None,
+    out: Path | None,
+    lengths: tuple[str, ...] | None,
+    pins: str | None,
+    unit: str | None,
 ) -> None:
-    """Write a new scene file with these lengths and comments that explain the rest.
+    """Write a new scene file with these lengths, or these pins, and comments that explain the rest.
 
-    Each length has a unit, like 300mm; or --unit mm is the unit of all.
+    Each number has a unit, like 300mm; or --unit mm is the unit of all.
     """
-    from fourbar.files.scene_text import write_new_scene
+    from fourbar.files.scene_text import write_drawn_scene, write_new_scene
     from fourbar.writing import STANDARD_STREAM, write_text
+
+    if (lengths is None) == (pins is None):
+        raise click.UsageError("give --lengths D A B C or --pins, one of the two")
 
     if (file is None) == (out is None):
         raise click.UsageError("name the new file once: FILE, or -o FILE")
@@ -89,24 +100,46 @@ def new(
         raise InputError(
             "FILE", str(file), "file exists; give the new scene another name"
         )
-    bare = [text for text in lengths if given.is_bare(text)]
-    if bare and unit is None:
-        raise InputError(
-            "--lengths",
-            bare[0],
-            "the unit is missing; write each with its own, like 300mm, or --unit mm once",
-        )
-    write_text(
-        file,
-        write_new_scene(
-            [f"{text} {unit}" if text in bare else text for text in lengths]
-        ),
-    )
+    if lengths is not None:
+        texts = [_add_unit("--lengths", text, unit) for text in lengths]
+        write_text(file, write_new_scene(texts))
+    elif pins is not None:
+        write_text(file, write_drawn_scene(_read_pins(pins, unit)))
     if file == STANDARD_STREAM:
         return
     # to be copied into any shell
     shown = str(file) if " " not in str(file) else f'"{file}"'
     click.echo(f"wrote {file}; edit it, then: fourbar analyze {shown}")
+
+
+def _add_unit(option: str, text: str, unit: str | None) -> str:
+    """Add the unit of all numbers to one without its own; InputError where there is none."""
+    if not given.is_bare(text):
+        return text
+    if unit is None:
+        raise InputError(
+            option,
+            text,
+            "the unit is missing; write each with its own, like 300mm, or --unit mm once",
+        )
+    return f"{text} {unit}"
+
+
+def _read_pins(text: str, unit: str | None) -> dict[str, tuple[str, str]]:
+    """Read four pairs like "0,0 0,100 175,50 250,50" as x and y of the pins."""
+    from fourbar.linkage import PINS
+
+    pairs = [pair.split(",") for pair in text.split()]
+    if len(pairs) != len(PINS) or any(len(pair) != 2 for pair in pairs):
+        raise InputError(
+            "--pins",
+            text,
+            'must be x,y of O2, A, B, O4, like "0,0 0,100 175,50 250,50"',
+        )
+    return {
+        pin: (_add_unit("--pins", x, unit), _add_unit("--pins", y, unit))
+        for pin, (x, y) in zip(PINS, pairs, strict=True)
+    }
 
 
 def _choose_form(table: bool, as_json: bool, as_csv: bool, out: Path | None) -> str:
@@ -207,7 +240,7 @@ def analyze(  # noqa: PLR0913 - one for each option
 
     with given.open_scene(scene) as described, given.show_waiting(described):
         bore = _read_pressure(described, pressure)
-        shown = _choose_units(scene, form, units, degrees)
+        shown = _choose_units(form, units, degrees)
         wanted = [given.read_position(described, text) for text in at]
         positions = find_positions(described, wanted) if wanted else None
         solution = solve(described, find_last_stage(described), at=positions)
@@ -221,16 +254,14 @@ def analyze(  # noqa: PLR0913 - one for each option
 
 
 def _choose_units(
-    scene: Path, form: str, units: Conversion | None, degrees: bool | None
+    form: str, units: Conversion | None, degrees: bool | None
 ) -> Conversion:
     """Choose the units of the output: those asked for, otherwise those of the file; JSON and CSV are in SI."""
-    from fourbar.show.units import units_of_file
-
     shown = dict(units or {})
     if form in ("summary", "table"):
         shown = {**DEGREES, **shown}
         if units is None:
-            shown = dict(units_of_file(scene))
+            shown = dict(given.suit_units())
     if degrees:
         shown |= DEGREES
     elif degrees is False:

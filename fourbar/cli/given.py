@@ -13,6 +13,8 @@ from fourbar.linkage import ANY, POSITIVE, require
 from fourbar.scene import Scene
 from fourbar.solution import Conversion
 
+SCENE_TEXT = "fourbar.scene_text"
+"""Key of the scene file's text in the context of a command: standard input is read once."""
 MOST_POSITIONS = 1_000_000
 """Positions that `analyze` prints: about a gigabyte of text."""
 FILE = click.Path(path_type=Path)
@@ -113,11 +115,13 @@ def open_scene(path: Path) -> Iterator[Scene]:
     The output is looked at before anything is solved, which may take minutes. Mistakes that show only then name the
     file too.
     """
-    from fourbar.files import load
+    from fourbar.files import loads, read_text
     from fourbar.scene.motion import require_steps
     from fourbar.writing import require_file
 
-    scene, out = load(path), click.get_current_context().params.get("out")
+    context, text = click.get_current_context(), read_text(path)
+    context.meta[SCENE_TEXT] = text
+    scene, out = loads(text, str(path)), context.params.get("out")
     if out is not None:
         require_file(out, path)
     require_steps(scene.motion, MOST_POSITIONS, "here", str(path))
@@ -151,6 +155,15 @@ def read_lengths(texts: tuple[str, ...]) -> list[float]:
     ]
 
 
+def suit_units() -> Conversion:
+    """Return the units that suit the file of `open_scene`."""
+    import tomllib
+
+    from fourbar.show.units import units_of_scene
+
+    return units_of_scene(tomllib.loads(click.get_current_context().meta[SCENE_TEXT]))
+
+
 def is_bare(text: str) -> bool:
     """Return True if a text is a number without a unit."""
     try:
@@ -174,6 +187,8 @@ def read_position(scene: Scene, text: str) -> tuple[str, float]:
     if name not in PLACES:
         allowed = f"must be one of {', '.join(PLACES)}"
         raise InputError("--at", name, f'{allowed}, like "theta_4=30 deg"')
+    if value.strip() == "drawn":
+        return name, _read_drawn(scene, name, text)
     unit, likely = {"stroke": ("m", "mm"), "time": ("s", "s")}.get(name, ("rad", "deg"))
     value = value.strip()
     if is_bare(value):  # it may have been meant in any unit
@@ -190,6 +205,17 @@ def read_three(key: str, text: str, unit: str = "m") -> tuple[float, float, floa
         raise InputError(key, text, 'must be three numbers, like "0.3 0 1"')
     x, y, z = (read_number(key, part, unit) for part in parts)
     return x, y, z
+
+
+def _read_drawn(scene: Scene, name: str, text: str) -> float:
+    """Return the angle or stroke of the scene's drawing."""
+    from fourbar.files.drawing import find_drawn
+
+    drawing = scene.drawing
+    drawn = None if drawing is None else find_drawn(drawing, scene.drive, name)
+    if drawn is None:
+        raise InputError("--at", text, "needs a scene that states [pins]")
+    return drawn
 
 
 def print_to(text: str, out: Path | None) -> None:

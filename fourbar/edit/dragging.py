@@ -12,12 +12,16 @@ import numpy as np
 
 from fourbar.edit.document import Path, SceneDocument
 from fourbar.errors import InputError
+from fourbar.files.drawing import DRAWN
 from fourbar.linkage import BAR_NAMES, MOVING_BARS
 from fourbar.quantities.units import find_unit, to_si
 from fourbar.scene import Command, Scene
+from fourbar.scene.drawing import DrawnPins
 from fourbar.solve import solve
 
 PINS = ("A", "B", "O4")
+SAME_ANGLE = 1e-9
+"""rad. Difference below which the position shown is the one that is drawn."""
 LEAST_DIGITS = 1e-12
 """Finest grain, relative to the number itself."""
 
@@ -93,7 +97,8 @@ def list_handles(scene: Scene, document: dict[str, Any]) -> list[Handle]:
     for path_of, entry in lines:
         for end in ("from", "to"):
             if isinstance(place := entry.get(end), dict):
-                z = parse_place(place.get("at", ("0 m", "0 rad")))
+                stated = place.get("at", ("0 m", "0 rad"))
+                z = parse_place(stated, scene.drawing, place["bar"])
                 name = f"{end} of {path_of[-2:][0]} {path_of[-1] + 1 if isinstance(path_of[-1], int) else ''}".strip()
                 handles.append(Handle(name, (*path_of, end, "at"), place["bar"], 0j, z))
     return handles
@@ -132,7 +137,10 @@ def drag(
     pins = {"O2": 0j, "A": complex(*shown.A[0]), "B": complex(*shown.B[0])}
     pins["O4"] = cmath.rect(scene.linkage.ground, scene.linkage.ground_angle)
     if isinstance(dragged.what, str):
-        _drag_pin(document, dragged, pins)
+        if scene.drawing is None:
+            _drag_pin(document, dragged, pins)
+        else:
+            _drag_drawn_pin(document, dragged, scene.drawing)
         return
     turned = {
         1: scene.linkage.ground_angle,
@@ -205,8 +213,31 @@ def _drag_pin(
         )
 
 
-def parse_place(stated: Any) -> complex:
-    """Return the place that an entry of the file states, by distance and angle or by x and y, m."""
+def _drag_drawn_pin(
+    document: SceneDocument, dragged: Dragged, drawing: DrawnPins
+) -> None:
+    """Move a pin of the drawing; InputError at another position than the one that is drawn."""
+    if dragged.what not in PINS:
+        raise InputError("drag", dragged.what, "must be one of " + ", ".join(PINS))
+    drawn = drawing.angle(2)
+    if abs(math.remainder(dragged.theta_2 - drawn, 2.0 * math.pi)) > SAME_ANGLE:
+        raise InputError(
+            "drag",
+            dragged.what,
+            f"the pins are those of the drawing: go to theta_2 = {math.degrees(drawn):.6g} deg",
+        )
+    x0, y0 = drawing.O2
+    for axis, x in enumerate((dragged.to.real + x0, dragged.to.imag + y0)):
+        key = ("pins", str(dragged.what), axis)
+        document.put(key, _write_like(document.at(key), x, dragged.grain, "m", "m"))
+
+
+def parse_place(stated: Any, drawing: DrawnPins | None = None, bar: int = 1) -> complex:
+    """Return the place of a bar that an entry of the file states: polar, by x and y, or as drawn, m."""
+    if isinstance(stated, dict) and DRAWN in stated:
+        assert drawing is not None  # the scene was read
+        x, y = (to_si(text, "m") for text in stated[DRAWN])
+        return drawing.into_bar(bar, (x, y))
     if isinstance(stated, dict):
         return complex(to_si(stated["x"], "m"), to_si(stated["y"], "m"))
     return cmath.rect(to_si(stated[0], "m"), to_si(stated[1], "rad"))
@@ -221,9 +252,16 @@ def put_place(
     """
     old = document.at(path)
     before = "xy" if isinstance(old, dict) else "polar"
-    length = document.at((*path, "x" if before == "xy" else 0)) or document.at(
-        ("lengths", "ground")
-    )
+    if isinstance(old, dict) and DRAWN in old:  # a place of its bar from now on
+        by = by or "xy"
+        before = DRAWN
+    first = {"xy": "x", DRAWN: DRAWN}.get(before, 0)
+    length = document.at((*path, first))
+    if isinstance(length, list):
+        length = length[0]
+    if length is None:
+        ground, drawn = (("lengths", "ground"), ("pins", "A", 0))
+        length = document.at(ground) or document.at(drawn)
     if (by or before) == "xy":
         parts: dict[str | int, str] = {
             name: _write_like(document.at((*path, name)) or length, x, grain, "m", "m")

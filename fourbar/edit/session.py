@@ -1,9 +1,7 @@
 """One scene that is being changed: its text, its history, and what is kept of it next to the file."""
 
-import cmath
 import hashlib
 import json
-import math
 import os
 import secrets
 import tomllib
@@ -20,14 +18,15 @@ from fourbar.edit.dragging import Dragged, drag, parse_place, put_place, write_r
 from fourbar.edit.exports import Exports, evaluate_scene
 from fourbar.errors import FourBarError, InputError
 from fourbar.files import loads, read_text
+from fourbar.files.drawing import DRAWN
 from fourbar.files.fields import Reader
 from fourbar.files.scene_file import LARGEST_FILE
-from fourbar.files.scene_text import BRANCHES, write_new_scene
-from fourbar.linkage import BAR_NAMES, POSITIVE
+from fourbar.files.scene_text import BRANCHES, write_drawn_scene, write_new_scene
+from fourbar.linkage import PINS, POSITIVE
 from fourbar.quantities.units import find_unit, to_si
 from fourbar.scene import Scene
 from fourbar.scene.motion import COMMANDS, SIDES, STROKE_COMMAND, require_steps
-from fourbar.show.units import units, units_of_scene
+from fourbar.show.units import find_length, units, units_of_scene
 from fourbar.solution import Conversion, Solution
 from fourbar.solve import solve
 from fourbar.studies.keys import list_entries, read_place
@@ -401,7 +400,7 @@ def _command(session: Session, asked: dict[str, Any]) -> None:
     inset = 1e-3 * (
         values[last] - values[first]
     )  # so that rounding leads to no position beyond
-    ground = find_unit(session.now.plain["lengths"]["ground"], "m")
+    ground = find_unit(find_length(session.now.plain), "m")
     unit, si = (ground, "m") if place == "stroke" else ("deg", "rad")
     factor = to_si(f"1 {si}", unit)
     ends = [
@@ -466,6 +465,8 @@ def _restate(session: Session, asked: dict[str, Any]) -> None:
     stated = session.document.at(path)
     if by not in ("xy", "polar") or stated is None:
         raise InputError(name_entry(path), by, 'must be stated by "xy" or "polar"')
+    if isinstance(stated, dict) and DRAWN in stated:
+        raise InputError(name_entry(path), by, "is stated in the drawing")
     place = parse_place(stated)
     session.change(
         lambda document: put_place(document, path, place, 1e-6 * abs(place), by)
@@ -473,27 +474,24 @@ def _restate(session: Session, asked: dict[str, Any]) -> None:
 
 
 def _draw(session: Session, asked: dict[str, Any]) -> None:
-    """State the lengths, the angle of the ground and the branch of four pins in the plane, given in a unit."""
-    O2, A, B, O4 = (complex(*map(float, pin)) for pin in asked["pins"])
+    """State four pins in the plane, given in a unit, in place of what the file states of them."""
     unit, grain = str(asked["unit"]), float(asked["grain"])
-    bars = dict(zip(BAR_NAMES.values(), (O4 - O2, A - O2, B - A, B - O4), strict=True))
-    lengths = [write_rounded(abs(bar), grain, unit) for bar in bars.values()]
-    text = write_new_scene(lengths) if session.fresh else session.now.text
+    pins = {
+        pin: tuple(write_rounded(float(x), grain, unit) for x in place)
+        for pin, place in zip(PINS, asked["pins"], strict=True)
+    }
+    drawn = write_drawn_scene({pin: (x, y) for pin, (x, y) in pins.items()})
+    text = drawn if session.fresh else session.now.text
 
     def alter(document: SceneDocument) -> None:
         document.become(text)
-        for name, length in zip(bars, lengths, strict=True):
-            document.put(["lengths", name], length)
-        angle = write_rounded(
-            math.degrees(cmath.phase(O4 - O2)),
-            math.degrees(grain / max(abs(O4 - O2), grain)),
-            "deg",
-        )
-        document.put(["lengths", "ground_angle"], angle)
-        document.put(
-            ["motion", "branch"],
-            "open" if ((B - A).conjugate() * (B - O4)).imag >= 0.0 else "crossed",
-        )
+        plain = tomllib.loads(text)
+        for path in (["lengths"], ["motion", "branch"]):
+            holder = plain if len(path) == 1 else plain.get(path[0], {})
+            if path[-1] in holder:
+                document.remove(path)
+        for pin, place in pins.items():
+            document.put(["pins", pin], list(place))
 
     session.change(alter)
 

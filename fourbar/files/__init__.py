@@ -1,5 +1,6 @@
 """Files: scenes in TOML with units, pictures, and how somebody's file is read."""
 
+from fourbar.files.drawing import from_pins as from_pins
 from fourbar.files.scene_file import load as load
 from fourbar.files.scene_file import loads as loads
 from fourbar.files.scene_file import read_text as read_text

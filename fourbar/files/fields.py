@@ -12,6 +12,8 @@ from fourbar.quantities.units import UnitError, to_si
 
 BARE_KEY = re.compile(r"[A-Za-z0-9_-]{1,40}")
 LONGEST_SHOWN = 60
+LIKELY = {"rad": "deg", "m": "mm", "rad/s": "rpm"}
+"""Units that a number without one may have been meant in, where that is not the SI unit."""
 
 
 class Reader:
@@ -116,6 +118,13 @@ class Reader:
 
     def in_si(self, key: str, value: object, unit: str, wanted: str) -> float:
         """Convert a text with a unit to a number in `unit`."""
+        if isinstance(value, (int, float)) and not isinstance(value, bool):
+            like = f"{value:.6g} {LIKELY.get(unit, unit)}"
+            missing = f'the unit is missing; did you mean "{like}"? {wanted}'
+            raise self.refuse(key, value, missing)
+        if value == "drawn":
+            allowed = "stands for what a drawing has, and the scene has no [pins]; "
+            raise self.refuse(key, value, allowed + wanted)
         if not isinstance(value, str):
             raise self.refuse(key, value, wanted)
         try:

@@ -28,6 +28,12 @@ from fourbar.effects.effect import PinRows
 from fourbar.effects.load import FRAMES
 from fourbar.effects.spring import END_POSITION, GAS
 from fourbar.errors import InputError, expect
+from fourbar.files.drawing import (
+    choose_assembly,
+    read_drawing,
+    state_lengths,
+    state_motion,
+)
 from fourbar.files.fields import BARE_KEY, Reader
 from fourbar.files.scene_text import BARS, BRANCHES, SIGMA
 from fourbar.linkage import ANY, BAR_NAMES, MOST_STEPS, PINS, POSITIVE, Bar, FourBar
@@ -69,6 +75,7 @@ TABLES = (
     "title",
     "source",
     "lengths",
+    "pins",
     "bars",
     "motion",
     "drive",
@@ -169,6 +176,9 @@ def _explain_unreadable(text: str, reason: str, shown: str) -> InputError:
 def read_scene(read: Reader, document: dict[str, Any], folder: str) -> Scene:
     """Read the scene of a file's tables; `folder`: of its pictures."""
     top = read.table("", document, TABLES)
+    drawing = read_drawing(read, top)
+    if drawing is not None:
+        top = state_lengths(read, top, drawing)
     drive = read.table("drive", top.get("drive", {}), ("bar", "from", "to"))
     line = None
     if "from" in drive or "to" in drive:
@@ -185,9 +195,12 @@ def read_scene(read: Reader, document: dict[str, Any], folder: str) -> Scene:
             "loads", entries, f"must be written as [[loads]], at most {MOST_LOADS}"
         )
     effects = read.table("effects", top.get("effects", {}), list_kinds())
+    motion = top.get("motion", {})
+    if drawing is not None:
+        motion = state_motion(read, motion, drawing, line)
     scene = Scene(
         _read_linkage(read, top),
-        _read_motion(read, top.get("motion", {})),
+        _read_motion(read, motion),
         None if line else read.whole("drive.bar", drive.get("bar", 2), 2, 4),  # type: ignore[arg-type]
         tuple(
             _load(read, f"loads[{index}]", entry) for index, entry in enumerate(entries)
@@ -198,7 +211,10 @@ def read_scene(read: Reader, document: dict[str, Any], folder: str) -> Scene:
         _read_pictures(read, top.get("bars", {}), folder),
         _read_points(read, top.get("points", {})),
         drive=line,
+        drawing=drawing,
     )
+    if drawing is not None:
+        scene = choose_assembly(scene, drawing)
     scene = replace(scene, coordinates=tuple(read.coordinates.items()))
     return replace(
         scene, tolerances=_read_tolerances(read, scene, top.get("tolerances", {}))
@@ -346,7 +362,7 @@ def _read_places(
     read: Reader, key: str, value: object, unit: str
 ) -> float | Array | Sweep | FromLimit:
     """Read angles or strokes: one, a list of them, a sweep; an angle from a limit position too."""
-    if value is None or isinstance(value, str):
+    if value is None or isinstance(value, (str, int, float)):
         return read.quantity(key, value, unit)
     if isinstance(value, list) and value:
         return np.array(read.quantities(key, value, unit))

@@ -15,6 +15,7 @@ from fourbar.effects import Effect, Gravity, Load, Springs, list_kinds
 from fourbar.effects.effect import PinRows
 from fourbar.effects.spring import END_POSITION
 from fourbar.errors import InputError, expect
+from fourbar.files.drawing import choose_assembly, read_point
 from fourbar.files.fields import (
     Reader,
     convert_to_polar,
@@ -23,8 +24,9 @@ from fourbar.files.fields import (
     write_polar,
     write_quantity,
 )
-from fourbar.linkage import BAR_NAMES, MOVING_BARS, POSITIVE, Bar, FourBar
+from fourbar.linkage import BAR_NAMES, MOVING_BARS, PINS, POSITIVE, Bar, FourBar
 from fourbar.scene import Scene
+from fourbar.scene.drawing import DrawnPins
 from fourbar.scene.motion import BRANCH_NAMES, FromLimit, Law, Motion, Sweep
 from fourbar.studies.keys import list_entries
 from fourbar.writing import write_text
@@ -68,7 +70,7 @@ def dump(scene: Scene) -> str:
     _restore_coordinates({**described, "points": points}, scene.coordinates)
     tables: list[tuple[str, dict[str, Any]]] = [
         ("", top),
-        ("lengths", described["lengths"]),
+        *_write_lengths(scene, described["lengths"], motion),
         *((f"bars.{name}", bars[name]) for name in BARS if name in bars),
         ("motion", motion),
         ("drive", described["drive"]),
@@ -78,6 +80,24 @@ def dump(scene: Scene) -> str:
         ("tolerances", _write_tolerances(scene)),
     ]
     return "\n".join(_write_table(name, entries) for name, entries in tables if entries)
+
+
+def _write_lengths(
+    scene: Scene, lengths: dict[str, Any], motion: dict[str, Any]
+) -> list[tuple[str, dict[str, Any]]]:
+    """Write the pins of a scene that still is as it was drawn, otherwise its lengths; pins state the branch too."""
+    drawing = scene.drawing
+    if drawing is None:
+        return [("lengths", lengths)]
+    drawn = (*(drawing.length(bar) for bar in BAR_NAMES), drawing.angle(1))
+    linkage = scene.linkage
+    assembly = choose_assembly(scene, drawing).motion.branch
+    same = drawn == (*linkage.lengths, linkage.ground_angle)
+    if not same or assembly != scene.motion.branch:
+        return [("lengths", lengths)]
+    del motion["branch"]
+    pins = {pin: [write_quantity(x, "m") for x in drawing.place(pin)] for pin in PINS}
+    return [("pins", pins)]
 
 
 def _restore_coordinates(
@@ -298,7 +318,32 @@ def write_new_scene(lengths: tuple[str, ...] | list[str]) -> str:
     d, a, b, c = (read.quantity(name, text, "m", POSITIVE) for name, text in stated)
     FourBar(d, Bar(a), Bar(b), Bar(c))
     lines = "\n".join(f'{name} = "{text}"' for name, text in stated)
+    lines = f'[lengths]\n{lines}\nground_angle = "0 deg"  # from O2 to O4'
+    return _fill_in(lines, (a, b, c), BRANCH_LINE)
+
+
+BRANCH_LINE = '# branch = "crossed"  # left out: open\n'
+"""Comment on the branch, which pins state."""
+
+
+def write_drawn_scene(pins: dict[str, tuple[str, str]]) -> str:
+    """Write a scene file for four pins, x and y each with its unit.
+
+    Raises InputError as `DrawnPins` does.
+    """
+    read = Reader("--pins")
+    places = {pin: read_point(read, pin, list(texts)) for pin, texts in pins.items()}
+    drawing = DrawnPins(**places)
+    rows = (f'{pin} = ["{x}", "{y}"]' for pin, (x, y) in pins.items())
+    lines = "\n".join(["[pins]  # x and y in the position that is drawn", *rows])
+    a, b, c = (drawing.length(bar) for bar in MOVING_BARS)
+    return _fill_in(lines, (a, b, c), "")
+
+
+def _fill_in(lines: str, lengths: tuple[float, float, float], branch: str) -> str:
+    """Fill in the template of a new scene file; each bar weighs 1 kg/m."""
+    a, b, c = (float(f"{length:.12g}") for length in lengths)
     text = files("fourbar.files").joinpath("new.toml").read_text(encoding="utf-8")
     return Template(text).substitute(
-        lengths=lines, input=repr(a), coupler=repr(b), output=repr(c)
+        linkage=lines, input=repr(a), coupler=repr(b), output=repr(c), branch=branch
     )

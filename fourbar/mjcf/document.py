@@ -66,6 +66,7 @@ def write_mjcf(
     start: "Start | None" = None,
     drive: Drive = "flywheel",
     plane: Plane = LEVEL,
+    origin: tuple[float, float] = (0.0, 0.0),
 ) -> str:
     """Write the MJCF text of a scene: it runs on its own in MuJoCo.
 
@@ -79,6 +80,7 @@ def write_mjcf(
     drive : "flywheel" keeps the input at omega_2; "motor" leaves the driven bar to a controller, "none" likewise
         without an actuator: then nothing is added to the linkage's inertia.
     plane : where the linkage stands in the world.
+    origin : place of O2 in the linkage's plane, m.
 
     Raises
     ------
@@ -139,6 +141,7 @@ def write_mjcf(
         cylinder=cylinder is not None and drive == "flywheel",
         passive=_is_passive(drive, reader),
     )
+    _shift_world(root, origin)
     if start is not None:
         frame = ET.SubElement(root, "keyframe")
         ET.SubElement(
@@ -154,6 +157,19 @@ def _move(root: ET.Element, plane: Plane) -> None:
     if plane.is_moved:
         plane.move_mjcf(root)
         root.insert(0, ET.Comment(f" {NOTES['mjcf']['tilted']} "))
+
+
+def _shift_world(root: ET.Element, origin: tuple[float, float]) -> None:
+    """Shift everything that stands in the world from O2 = (0, 0) to where the drawing has it."""
+    if not any(origin):
+        return
+    world = root.find("worldbody")
+    assert world is not None
+    for element in world:
+        for name in {"pos", "fromto"} & element.attrib.keys() or {"pos"}:
+            numbers = [float(x) for x in element.get(name, "0 0 0").split()]
+            shifted = [x + (*origin, 0.0)[i % 3] for i, x in enumerate(numbers)]
+            element.set(name, join(*shifted))
 
 
 def _is_passive(drive: Drive, reader: str) -> bool:
@@ -469,7 +485,9 @@ def write_mjcf_for(
             f"only mujoco, warp and mjx read it; leave it out for {simulator}",
         )
     settings = SIMULATORS[simulator]
-    return write_mjcf(scene, settings, simulator, drive=drive, plane=plane)
+    return write_mjcf(
+        scene, settings, simulator, drive=drive, plane=plane, origin=scene.origin
+    )
 
 
 PER_METRE = 1.0

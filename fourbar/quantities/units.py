@@ -45,9 +45,15 @@ SIGNS = str.maketrans(
         "′": " ft",
         "’": " ft",
         "'": " ft",
+        "º": "°",
+        "˚": "°",
     }
 )
-"""Other signs of a product, and marks of inches and feet."""
+"""Other signs of a product, marks of inches and feet, and signs that look like that of a degree."""
+TURNING = re.compile(r"\s*\b(c?cw|(?:anti|counter)?-?clockwise)$", re.IGNORECASE)
+"""A sense of turning after a unit: the sign states it."""
+GLUED = re.compile(r"(kg|g|N|lb|oz)(m|mm|cm)(?=$|[\^²*])")
+"""kgm^2: a product without a sign between its factors."""
 RAISED = re.compile("[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+")
 DIGITS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 FRACTION = re.compile(
@@ -96,6 +102,13 @@ def to_si(text: str, unit: str) -> float:
         raise UnitError(f"a comma is no part of a number{hint}")
     if not name:
         raise UnitError("the unit is missing")
+    if turning := TURNING.search(name):
+        sign = "" if turning[1].casefold() not in ("cw", "clockwise") else "-"
+        plain = f"{sign}{number_text[0].lstrip('+-')} {name[: turning.start()]}"
+        raise UnitError(
+            f'the sign says how it turns, counter-clockwise is positive: "{plain}"'
+        )
+    name = GLUED.sub(r"\1 \2", name)
     wanted, wanted_dimension = _find_factor(unit)
     try:
         factor, dimension = _find_factor(name)

@@ -27,6 +27,7 @@ from fourbar.formulas.mobility import (
 )
 from fourbar.linkage import BAR_NAMES, FourBar, require_bar
 from fourbar.quantities import Array
+from fourbar.scene.drawing import DrawnPins
 from fourbar.scene.motion import (
     COMMANDS,
     DEFAULT_STEPS,
@@ -64,6 +65,7 @@ class Scene:
     points : points of bars whose paths are wanted, `Point`.
     tolerances : of numbers by their keys in a scene file, `Tolerance`.
     drive : along a line, `LinearDrive`, in place of a torque on a bar.
+    drawing : the pins as they are drawn, `DrawnPins`: places are shown in its coordinates.
     coordinates : keys of the places that a scene file states by x and y, with these, m; a file is written likewise.
     """
 
@@ -79,12 +81,14 @@ class Scene:
     points: tuple[Point, ...] = ()
     tolerances: tuple[Tolerance, ...] = ()
     drive: "LinearDrive | None" = None
+    drawing: DrawnPins | None = None
     coordinates: tuple[tuple[str, tuple[float, float]], ...] = field(
         default=(), repr=False, compare=False
     )
 
     def __post_init__(self) -> None:
         one = {"linkage": FourBar, "motion": Motion, "title": str, "source": str}
+        expect("drawing", self.drawing, DrawnPins, type(None))
         for name, kind in one.items():
             expect(name, getattr(self, name), kind)
         if self.drive is None:
@@ -176,6 +180,11 @@ class Scene:
             )
         assert isinstance(drive, LinearDrive)
         drive.require_stroke(self.linkage)
+
+    @property
+    def origin(self) -> tuple[float, float]:
+        """Return the place of O2 in the coordinates that places are shown in, m."""
+        return (0.0, 0.0) if self.drawing is None else self.drawing.O2
 
     @property
     def counts_turns(self) -> bool:
@@ -505,7 +514,8 @@ def command(scene: Scene) -> Command:
     if motion.law is not None:
         places = motion.law.times()
     elif stated is None:
-        places = default_places(scene)
+        drawn = None if scene.drawing is None else scene.drawing.angle(bar)
+        places = default_places(scene, drawn)
     elif isinstance(stated, Sweep):
         places = np.linspace(stated.start, stated.stop, stated.steps + 1)
     elif isinstance(stated, FromLimit):

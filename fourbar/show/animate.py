@@ -30,7 +30,12 @@ from fourbar.show.duty import compute_energies
 from fourbar.show.plot.film import write_film
 from fourbar.show.plot.style import format_of, shorten_text
 from fourbar.show.plot.symbols import Symbol, list_acting
-from fourbar.show.plot.view import is_over_time, list_sweep, set_branch
+from fourbar.show.plot.view import (
+    find_drawn_place,
+    is_over_time,
+    list_sweep,
+    set_branch,
+)
 from fourbar.show.tolerances import collect_tolerances
 from fourbar.show.units import choose_unit
 from fourbar.solution import SI, Array, Conversion, Solution
@@ -175,6 +180,8 @@ def _collect_sweep(
             else thinned.places - commanded.places
         )
         start = int(np.argmin(np.abs(away)))
+    elif (drawn := find_drawn_place(scene)) is not None:
+        start = int(np.argmin(np.abs(thinned.places - drawn)))
     theta_2, branches = thinned.angle, {}
     for sign in signs if name == "theta_2" else (motion.branch,):
         branch = (

@@ -11,7 +11,13 @@ from fourbar.formulas.arithmetic import cross
 from fourbar.formulas.path import NO_DIGIT_LEFT
 from fourbar.quantities import DERIVED_NAMES
 from fourbar.show.duty import read_drive, shaking_force, shaking_moment
-from fourbar.solution import Array, Conversion, Solution, find_unit_in
+from fourbar.solution import (
+    Array,
+    Conversion,
+    Solution,
+    find_unit_in,
+    shift_to_drawing,
+)
 from fourbar.studies.points import instant_centres
 
 
@@ -59,6 +65,7 @@ def _locate_centre(solution: Solution, bars: tuple[int, int]) -> Array:
     """Return an instant centre; NaN where its two lines are parallel within rounding."""
     centre = instant_centres(solution)[bars]
     point = np.stack(centre.point, axis=-1)
+    point = shift_to_drawing(solution, point)
     return np.where(np.abs(centre.w)[..., None] <= NO_DIGIT_LEFT, np.nan, point)
 
 

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Mapping
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 from fourbar.errors import InputError
@@ -95,13 +94,6 @@ def suit_units(length: str) -> Conversion:
     )
 
 
-def units_of_file(path: Path) -> Conversion:
-    """Return the units that suit a scene file."""
-    import tomllib
-
-    return units_of_scene(tomllib.loads(path.read_text(encoding="utf-8")))
-
-
 def units_of_scene(document: Mapping[str, Any]) -> Conversion:
     """Return the units that suit the tables of a scene file.
 
@@ -113,7 +105,7 @@ def units_of_scene(document: Mapping[str, Any]) -> Conversion:
         (str(motion.get(f"omega_{bar}", "")), str(motion.get(f"alpha_{bar}", "")))
         for bar in MOVING_BARS
     )
-    return _suit_texts(str(_find_length(document)), tuple(rates))
+    return _suit_texts(str(find_length(document)), tuple(rates))
 
 
 @cache
@@ -145,7 +137,7 @@ def _suit_rotation(stated: str, unit: str) -> Conversion:
     return rates if unit == "rad/s" else {unit: rates[unit]}
 
 
-def _find_length(document: Mapping[str, Any]) -> object:
+def find_length(document: Mapping[str, Any]) -> object:
     """Return the first length of a scene as it is written: lengths.ground, or a coordinate of a pin."""
     if "pins" in document:
         return document["pins"]["A"][0]

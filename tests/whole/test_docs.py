@@ -211,9 +211,9 @@ def test_the_engine_of_the_guide_agrees(
 
 
 def test_the_scene_file_is_one(checkout: Path) -> None:
-    text, _ = blocks(
-        "toml", read("docs/scene-file.md")
-    )  # a scene; an example of each effect
+    # a scene; its pins in place of the lengths; an example of each effect
+    text, pins, _ = blocks("toml", read("docs/scene-file.md"))
+    fourbar.files.loads(pins)
     (checkout / "example.toml").write_text(text)
     scene = fourbar.load(checkout / "example.toml")
     assert set(fourbar.solve(scene).status) == {"ok"}

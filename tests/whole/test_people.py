@@ -9,8 +9,10 @@ import re
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+import fourbar
 from fourbar.cli import status
 from fourbar.errors import HOLDS
 
@@ -150,3 +152,51 @@ def test_pliers_have_their_advantage_without_a_speed(
         1.0 / 0.1332544, rel=PRINTED
     )
     assert row_of(text, "F_jaw/F_handle")[0] == pytest.approx(31.969, rel=PRINTED)
+
+
+def test_four_pins_and_the_speed_of_the_output_as_they_are_drawn(
+    ask: Steps, tmp_path: Path
+) -> None:
+    """A command, an edit of two lines, a command."""
+    ask("new", "pins.toml", "--pins", "0,0 0,100 175,50 250,50", "--unit", "mm")
+    text = (tmp_path / "pins.toml").read_text()
+    assert 'omega_2 = "60 rpm"' in text
+    stated = 'theta_4 = "drawn"\nomega_4 = "2 rad/s"'
+    (tmp_path / "pins.toml").write_text(text.replace('omega_2 = "60 rpm"', stated))
+    text = ask("analyze", "pins.toml")
+    assert row_of(text, "bar 2")[1:] == pytest.approx(
+        [-0.4285714, -4.338192], rel=PRINTED
+    )
+    assert row_of(text, "bar 3")[1:] == pytest.approx(
+        [-0.8571429, -0.104956], rel=PRINTED
+    )
+
+
+COORDINATES = """\
+title = "Four-bar from joint coordinates"
+[pins]
+O2 = ["4.1 cm", "3.75 cm"]
+A = ["1.244 cm", "0.196 cm"]
+B = ["-2.32 cm", "-2.293 cm"]
+O4 = ["0.165 cm", "1.322 cm"]
+[motion]
+omega_2 = "10 rpm"
+[points]
+E = { bar = 3, from_pin = { drawn = ["-2.591 cm", "1.657 cm"] } }
+"""
+
+
+def test_a_linkage_by_the_coordinates_of_its_joints(ask: Steps, tmp_path: Path) -> None:
+    """E stands where it is drawn, in the coordinates of the drawing, and its path goes through it."""
+    (tmp_path / "joints.toml").write_text(COORDINATES)
+    text = ask("analyze", "joints.toml", "--at", "drawn")
+    for name, place in {
+        "A": (1.244, 0.196),
+        "B": (-2.32, -2.293),
+        "E": (-2.591, 1.657),
+    }.items():
+        assert row_of(text, name) == pytest.approx(place, rel=PRINTED)
+    scene = fourbar.load(tmp_path / "joints.toml")
+    curve = fourbar.coupler_curve(scene, "E", steps=4000)
+    x, y = (np.asarray(z) + o for z, o in zip(curve[2:], scene.origin, strict=True))
+    assert np.hypot(x + 0.02591, y - 0.01657).min() < 1e-4

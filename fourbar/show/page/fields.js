@@ -1,5 +1,5 @@
 // ---- the fields of a scene, made from its file ---------------------------------------------------
-const ORDER = ["title", "source", "lengths", "bars", "motion", "drive", "points", "loads", "effects", "tolerances"];
+const ORDER = ["title", "source", "lengths", "pins", "bars", "motion", "drive", "points", "loads", "effects", "tolerances"];
 let offers = null, plain = {}, shape = "", typing = 0;
 const fieldId = path => `field:${path.join("/")}`;
 const entryAt = (node, path) => path.reduce((inner, step) => inner?.[step], node);

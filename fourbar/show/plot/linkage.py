@@ -41,6 +41,32 @@ ON_BAR = 1e-3
 """Fraction of a bar's length: a point nearer than this to the bar's line looks as if it were on it."""
 
 
+def _show_drawing_coordinates(axes: "Axes", view: View, factor: float) -> None:
+    """Write round numbers of the drawing's coordinates at the axes."""
+    from matplotlib.ticker import FuncFormatter, MaxNLocator
+
+    class ShiftedLocator(MaxNLocator):
+        """Ticks at round numbers of the drawing."""
+
+        def __init__(self, shift: float) -> None:
+            super().__init__(nbins="auto", steps=[1, 2, 5, 10])
+            self.shift = shift
+
+        def tick_values(self, vmin: float, vmax: float) -> list[float]:
+            ticks = super().tick_values(vmin + self.shift, vmax + self.shift)
+            return [float(tick) - self.shift for tick in ticks]
+
+    for axis, x in zip((axes.xaxis, axes.yaxis), view.scene.origin, strict=True):
+        if x != 0.0:
+            shift = factor * x
+            axis.set_major_locator(ShiftedLocator(shift))
+            axis.set_major_formatter(
+                FuncFormatter(
+                    lambda v, _, shift=shift: f"{v + shift:.6g}".replace("-", "−")
+                )
+            )
+
+
 def locate_pins(view: View, factor: float = 1.0) -> dict[str, Point]:
     """Locate the pins at the position drawn, in the order O2, A, B, O4, m or what the factor makes of it."""
     place = place_of(view.scene.linkage, view.here, 0, factor)
@@ -291,6 +317,7 @@ def draw_linkage(
     axes.margins(0.08)
     title = f"Linkage at {view.at}, {view.branch_name} branch"
     axes.set(xlabel=f"$x$ ({unit})", ylabel=f"$y$ ({unit})", title=title)
+    _show_drawing_coordinates(axes, view, factor)
     write_path_legend(axes)
 
 
@@ -391,6 +418,7 @@ def draw_coupler_curves(axes: "Axes", view: View, labels: Labels) -> None:
     axes.set_aspect("equal", adjustable="datalim")
     title = f"Coupler curves, {view.branch_name} branch"
     axes.set(xlabel=f"$x$ ({unit})", ylabel=f"$y$ ({unit})", title=title)
+    _show_drawing_coordinates(axes, view, factor)
     heading = (
         "point of the coupler"
         if names

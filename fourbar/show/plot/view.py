@@ -153,6 +153,10 @@ def list_sweep(scene: Scene) -> Command:
     """List the positions as what is commanded rises; a single one is put among those of the default range."""
     stated = command(scene)
     if len(stated.angle) > 1:
+        places = np.sort(stated.places, kind="stable")
+        drawn = find_drawn_place(scene)
+        if drawn is not None and places[0] < drawn < places[-1]:
+            return command_at(scene, np.unique([*places, drawn]))
         return stated.part(np.argsort(stated.places, kind="stable"))
     wide = command_at(scene, default_places(scene, float(stated.angle[0])))
     # the same position may lie whole turns away from the default range
@@ -168,6 +172,16 @@ def list_sweep(scene: Scene) -> Command:
     return command_at(
         scene, places, np.concatenate([wide.branch, stated.branch])[first]
     )
+
+
+def find_drawn_place(scene: Scene) -> float | None:
+    """Return the commanded angle that is drawn, within the default range; None where another range is stated."""
+    if scene.drawing is None or scene.motion.angle is not None:
+        return None
+    places = command(scene).places
+    drawn = scene.drawing.angle(scene.motion.bar)
+    middle = 0.5 * float(places[0] + places[-1])
+    return middle + math.remainder(drawn - middle, math.tau)
 
 
 def choose_common_position(scenes: "list[Scene]") -> float | None:
@@ -206,12 +220,12 @@ def make_view(scene: Scene, position: float | None = None) -> View:
     sweep = solve(scene, at=positions)
     _require_assembled(sweep)
     stated = command(scene)
+    if position is None and len(stated.angle) == 1:
+        position = float(stated.places[0])
     if position is None:
-        position = (
-            float(stated.places[0])
-            if len(stated.angle) == 1
-            else choose_position([sweep])
-        )
+        position = find_drawn_place(scene)
+    if position is None:
+        position = choose_position([sweep])
     branch = positions.branch[[np.argmin(np.abs(positions.places - position))]]
     shown = View(
         scene, sweep, solve(scene, at=command_at(scene, np.array([position]), branch))

@@ -26,10 +26,11 @@ def call_fourbar(
 @pytest.mark.parametrize("name", ["-", "/dev/stdin"])
 @pytest.mark.posix
 def test_a_scene_is_read_from_standard_input(name: str, tmp_path: Path) -> None:
-    of_file = call_fourbar(tmp_path, "analyze", str(SCENE), "--json")
-    of_pipe = call_fourbar(tmp_path, "analyze", name, "--json")
-    assert of_pipe.returncode == 0 and not of_pipe.stderr
-    assert of_pipe.stdout == of_file.stdout
+    for form in ("--json", "--degrees"):  # the block has the units of the file
+        of_file = call_fourbar(tmp_path, "analyze", str(SCENE), form)
+        of_pipe = call_fourbar(tmp_path, "analyze", name, form)
+        assert of_pipe.returncode == 0 and not of_pipe.stderr
+        assert of_pipe.stdout == of_file.stdout
 
 
 @pytest.mark.slow

@@ -1,5 +1,6 @@
 """Texts with units where a scene is described in Python: the same numbers as SI gives, and one line for a mistake."""
 
+import math
 from collections.abc import Callable
 from fractions import Fraction
 from typing import Any
@@ -222,3 +223,28 @@ def test_the_tables_name_every_unit_and_prefix() -> None:
     prefixes = {name for name in names if name.endswith("-")}
     assert names - prefixes == set(UNITS)
     assert prefixes == {f"{prefix}-" for prefix in PREFIXES}
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "value"),
+    [
+        ("45º", "rad", math.pi / 4.0),
+        ("45˚", "rad", math.pi / 4.0),
+        ("10 kgm^2", "kg m^2", 10.0),
+        ("10 kgm²", "kg m^2", 10.0),
+        ("3 Nm", "N m", 3.0),
+    ],
+)
+def test_units_are_read_as_people_write_them(
+    text: str, unit: str, value: float
+) -> None:
+    assert to_si(text, unit) == value
+
+
+@pytest.mark.parametrize(
+    ("text", "plain"),
+    [("84 rad/s cw", "-84 rad/s"), ("84 rpm CW", "-84 rpm"), ("5 rpm ccw", "5 rpm")],
+)
+def test_a_sense_of_turning_is_a_sign(text: str, plain: str) -> None:
+    with pytest.raises(UnitError, match=f'positive: "{plain}"'):
+        to_si(text, "rad/s")

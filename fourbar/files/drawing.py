@@ -1,0 +1,183 @@
+"""A scene file that states a drawing: `[pins]`, places `{ drawn = [x, y] }`, and the word "drawn" in the motion."""
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from fourbar.effects import LinearDrive
+from fourbar.files.fields import Reader
+from fourbar.linkage import BAR_NAMES, MOVING_BARS, PINS, Bar, FourBar
+from fourbar.scene import Scene, command_at
+from fourbar.scene.drawing import DrawnPins
+from fourbar.scene.motion import BRANCH_NAMES, COMMANDS, STROKE_COMMAND, Motion
+from fourbar.solve import solve
+
+DRAWN = "drawn"
+"""Word that stands for the drawn angle, stroke or side; key of a place of the drawing."""
+ANGLES = {names[0]: bar for bar, names in COMMANDS.items()}
+"""Bars by the names of their angles."""
+NUMBERS_OF_BARS = {name: bar for bar, name in BAR_NAMES.items()}
+
+
+def from_pins(
+    O2: tuple[Any, Any], A: tuple[Any, Any], B: tuple[Any, Any], O4: tuple[Any, Any]
+) -> Scene:
+    """Make the scene of a linkage from the places of its four pins, at the position that is drawn.
+
+    The bars have no mass; the branch is the assembly that is drawn.
+
+    Parameters
+    ----------
+    O2, A, B, O4 : (x, y) of each pin, m, or texts with units.
+
+    Raises
+    ------
+    InputError : two pins of a bar lie in one place, or all four in one line.
+
+    >>> scene = from_pins((0.0, 0.0), (0.0, 0.1), (0.175, 0.05), (0.25, 0.05))
+    >>> scene.linkage.input.length, scene.motion.theta_2
+    (0.1, 1.5707963267948966)
+    """
+    drawing = DrawnPins(O2, A, B, O4)
+    two, three, four = (Bar(drawing.length(bar)) for bar in MOVING_BARS)
+    linkage = FourBar(drawing.length(1), two, three, four, drawing.angle(1))
+    scene = Scene(linkage, Motion(drawing.angle(2)), drawing=drawing)
+    return choose_assembly(scene, drawing)
+
+
+def read_drawing(read: Reader, top: dict[str, Any]) -> DrawnPins | None:
+    """Read the table of the pins; None where a scene states lengths."""
+    if "pins" not in top:
+        return None
+    if "lengths" in top:
+        allowed = "must be left out: the pins state the lengths and the ground's angle"
+        raise read.refuse("lengths", top["lengths"], allowed)
+    motion = top.get("motion", {})
+    if isinstance(motion, dict) and "branch" in motion:
+        allowed = "must be left out: the pins state the assembly"
+        raise read.refuse("motion.branch", motion["branch"], allowed)
+    pins = read.table("pins", top["pins"], PINS)
+    places = {pin: read_point(read, f"pins.{pin}", pins.get(pin)) for pin in PINS}
+    return DrawnPins(**places)
+
+
+def read_point(read: Reader, key: str, value: object) -> tuple[float, float]:
+    """Read a place of the drawing, ["x", "y"], m."""
+    if not isinstance(value, list) or len(value) != 2:
+        raise read.refuse(key, value, 'must be two coordinates like ["10 mm", "25 mm"]')
+    x, y = (read.quantity(f"{key}[{axis}]", value[axis], "m") for axis in (0, 1))
+    return x, y
+
+
+def state_lengths(
+    read: Reader, top: dict[str, Any], drawing: DrawnPins
+) -> dict[str, Any]:
+    """State the tables of a drawing by lengths, and each place of it in its bar's frame."""
+    lengths = {
+        name: f"{drawing.length(bar)!r} m" for name, bar in NUMBERS_OF_BARS.items()
+    }
+    lengths["ground_angle"] = f"{drawing.angle(1)!r} rad"
+    stated = {
+        key: _state_places(read, key, value, drawing)
+        for key, value in top.items()
+        if key != "pins"
+    }
+    return {**stated, "lengths": lengths}
+
+
+def _state_places(
+    read: Reader, key: str, value: Any, drawing: DrawnPins, bar: int | None = None
+) -> Any:
+    """State each `{ drawn = [x, y] }` of an entry by its coordinates in the frame of its bar."""
+    if isinstance(value, list):
+        return [
+            _state_places(read, f"{key}[{index}]", entry, drawing, bar)
+            for index, entry in enumerate(value)
+        ]
+    if not isinstance(value, dict):
+        return value
+    if DRAWN in value:
+        entry = read.table(key, value, (DRAWN,))
+        if bar is None:
+            raise read.refuse(
+                key, value, "a place of the drawing needs the bar it is of"
+            )
+        z = drawing.into_bar(bar, read_point(read, f"{key}.{DRAWN}", entry[DRAWN]))
+        return {"x": f"{z.real!r} m", "y": f"{z.imag!r} m"}
+    number = value.get("bar")
+    own = number if isinstance(number, int) and number in BAR_NAMES else bar
+    stated = {}
+    for name, entry in value.items():
+        of_bar = (
+            NUMBERS_OF_BARS[name] if key == "bars" and name in NUMBERS_OF_BARS else own
+        )
+        stated[name] = _state_places(read, f"{key}.{name}", entry, drawing, of_bar)
+    return stated
+
+
+def state_motion(
+    read: Reader, motion: Any, drawing: DrawnPins, line: LinearDrive | None
+) -> Any:
+    """State the word "drawn" of a motion by the angle, the stroke or the side that is drawn."""
+    if not isinstance(motion, dict):
+        return motion
+    stated = dict(motion)
+    if stated.get("side") == DRAWN and line is not None:
+        stated["side"] = _find_side(drawing, line)
+    for name in (*ANGLES, STROKE_COMMAND[0]):
+        place = stated.get(name)
+        drawn = find_drawn(drawing, line, name)
+        if drawn is None:
+            continue
+        text = f"{drawn!r} {'rad' if name in ANGLES else 'm'}"
+        if place == DRAWN:
+            stated[name] = text
+        elif isinstance(place, dict):
+            stated[name] = {
+                end: text if entry == DRAWN else entry for end, entry in place.items()
+            }
+    return stated
+
+
+def find_drawn(drawing: DrawnPins, line: LinearDrive | None, name: str) -> float | None:
+    """Return the drawn angle or stroke of this name, rad or m; None where there is none."""
+    if name in ANGLES:
+        return drawing.angle(ANGLES[name])
+    if name != STROKE_COMMAND[0] or line is None:
+        return None
+    start, end = (drawing.end(*point) for point in (line.start, line.end))
+    return abs(end - start)
+
+
+def _find_side(drawing: DrawnPins, line: LinearDrive) -> str | None:
+    """Find the side of a cylinder's end on its bar; None where it does not join the ground to a bar."""
+    ends = {point.bar: drawing.end(*point) for point in (line.start, line.end)}
+    (bar,) = ends.keys() - {1} or (None,)
+    if 1 not in ends or bar is None:
+        return None
+    pivot = complex(*drawing.place("O2" if bar == 2 else "O4"))
+    across = ((ends[1] - pivot).conjugate() * (ends[bar] - pivot)).imag
+    return "left" if across >= 0.0 else "right"
+
+
+def choose_assembly(scene: Scene, drawing: DrawnPins) -> Scene:
+    """Put a scene on the assembly that is drawn: the one whose pins lie where the drawing has them."""
+    bar = scene.motion.bar
+    O2 = complex(*drawing.place("O2"))
+    wanted = np.array([complex(*drawing.place(pin)) - O2 for pin in ("A", "B")])
+    gaps = dict[float, Scene]()
+    for branch in BRANCH_NAMES:
+        on_branch = replace(scene, motion=scene.motion.replace(branch=branch))
+        stated: dict[str, Any] = {
+            COMMANDS[bar][0]: drawing.angle(bar),
+            "branch": branch,
+        }
+        turned = replace(on_branch, motion=Motion(**stated))
+        at = command_at(turned, np.array([drawing.angle(bar)]))
+        here = solve(turned, "position", at=at)
+        pins = np.array([complex(*here.A[0]), complex(*here.B[0])])
+        gap = float(np.abs(pins - wanted).sum())
+        gaps.setdefault(gap if math.isfinite(gap) else math.inf, on_branch)
+    return gaps[min(gaps)]

@@ -1,0 +1,100 @@
+"""A linkage as it is drawn: the places of its four pins in the plane of the drawing."""
+
+import cmath
+import math
+from dataclasses import dataclass, fields
+
+from fourbar.errors import InputError
+from fourbar.formulas.arithmetic import cross
+from fourbar.linkage import BAR_NAMES, ENDS, FIRST_PIN, PINS, require
+
+IN_LINE = 1e-12
+"""Part of the drawing's size within which four pins lie in one line: a change point."""
+Place = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class DrawnPins:
+    """Places of the pins, each (x, y), m or texts with units.
+
+    Raises InputError where two pins of a bar lie in one place, and where all four lie in one line:
+    on a change point a drawing does not tell one assembly from the other.
+    """
+
+    O2: Place
+    A: Place
+    B: Place
+    O4: Place
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            place = getattr(self, field.name)
+            key = f"pins.{field.name}"
+            if not isinstance(place, (tuple, list)) or len(place) != 2:
+                raise InputError(key, place, "must be a pair (x, y)")
+            x, y = (require(f"{key}.{axis}", place[axis], "m") for axis in (0, 1))
+            object.__setattr__(self, field.name, (x, y))
+        for bar, (first, second) in {1: ("O2", "O4"), **ENDS}.items():
+            if self.vector(bar) == 0.0:
+                name = f"both ends of the {BAR_NAMES[bar]}"
+                raise InputError(
+                    f"pins.{second}",
+                    self.place(second),
+                    f"lies where {first} does: {name}",
+                )
+        size = max(abs(self.vector(bar)) for bar in BAR_NAMES)
+        across = (
+            abs(cross(self.vector(first), self.vector(second)))
+            for first, second in ((1, 2), (1, 4), (2, 3))
+        )
+        if max(across) <= IN_LINE * size * size:
+            raise InputError(
+                "pins",
+                tuple(PINS),
+                "lie in one line: at a change point a drawing tells no assembly; "
+                "draw the linkage in another position",
+            )
+
+    def place(self, pin: str) -> Place:
+        """Return the place of a pin, m."""
+        x, y = getattr(self, pin)
+        return x, y
+
+    def vector(self, bar: int) -> complex:
+        """Return the vector of a bar, from its first pin to its second, m."""
+        first, second = ("O2", "O4") if bar == 1 else ENDS[bar]
+        (x, y), (to_x, to_y) = self.place(first), self.place(second)
+        return complex(to_x - x, to_y - y)
+
+    def length(self, bar: int) -> float:
+        """Return the length of a bar, m."""
+        vector = self.vector(bar)
+        return math.hypot(vector.real, vector.imag)
+
+    def angle(self, bar: int) -> float:
+        """Return the direction of a bar, rad; theta_2 less that of the ground lies in (-pi, pi]."""
+        vector = self.vector(bar)
+        angle = math.atan2(vector.imag, vector.real)
+        if bar != 2:
+            return angle
+        ground = self.angle(1)
+        turned = math.remainder(angle - ground, 2.0 * math.pi)
+        return angle + 2.0 * math.pi * round(
+            (ground + turned - angle) / (2.0 * math.pi)
+        )
+
+    def end(self, bar: int, distance: float, angle: float) -> complex:
+        """Return the place in the drawing of a polar place of a bar, x + i y, m."""
+        return self.from_bar(bar, cmath.rect(distance, angle))
+
+    def into_bar(self, bar: int, place: Place) -> complex:
+        """Return a place of the drawing in the frame of a bar: from its first pin, along + i across, m."""
+        x, y = self.place("O2" if bar == 1 else FIRST_PIN[bar])
+        vector = self.vector(bar)
+        return complex(place[0] - x, place[1] - y) * vector.conjugate() / abs(vector)
+
+    def from_bar(self, bar: int, z: complex) -> complex:
+        """Return the place in the drawing of a point of a bar, x + i y, m."""
+        x, y = self.place("O2" if bar == 1 else FIRST_PIN[bar])
+        vector = self.vector(bar)
+        return complex(x, y) + z * vector / abs(vector)

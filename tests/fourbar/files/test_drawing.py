@@ -1,0 +1,212 @@
+"""A scene as it is drawn: lengths and back, places, words, and what is refused."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fourbar
+from fourbar.errors import InputError
+from fourbar.files import dump, loads
+from fourbar.scene.motion import COMMANDS
+
+EPS = 2.0**-52
+K = 8.0
+"""Roundings of four lengths, two angles and the triangle, each of a few eps of the longest bar."""
+DRAWN = """\
+[pins]
+O2 = ["0 mm", "0 mm"]
+A = ["0 mm", "100 mm"]
+B = ["175 mm", "50 mm"]
+O4 = ["250 mm", "50 mm"]
+"""
+
+
+def random_pins(random: np.random.Generator, kind: str) -> list[complex]:
+    """Draw O2, A, B, O4 at a random place and scale: any four, a parallelogram or a kite."""
+    scale = 10.0 ** random.uniform(-3.0, 3.0)
+    O2, A, B, O4 = random.normal(size=4) + 1j * random.normal(size=4)
+    if kind == "parallelogram":
+        B = A + O4 - O2
+    elif kind == "kite":  # A mirrored in the line from O2 to B
+        along = (B - O2) / abs(B - O2)
+        O4 = O2 + along * ((A - O2) / along).conjugate()
+    shift = 10.0 ** random.uniform(-2.0, 1.0) * np.exp(1j * random.uniform(0.0, 7.0))
+    return [complex(scale * (pin + shift)) for pin in (O2, A, B, O4)]
+
+
+def find_gap(pins: list[complex]) -> float:
+    """Return how far the linkage of a drawing stands from it, in eps of its longest bar and condition."""
+    O2, A, B, _ = pins
+    scene = fourbar.from_pins(*((pin.real, pin.imag) for pin in pins))
+    here = fourbar.solve(scene, "position")
+    found = [complex(*getattr(here, name)[0]) for name in ("A", "B")]
+    gap = max(abs(found[0] - (A - O2)), abs(found[1] - (B - O2)))
+    size = max(scene.linkage.lengths)
+    return gap * float(here.condition[0]) / (EPS * size)
+
+
+@pytest.mark.parametrize(
+    ("kind", "count"), [("any", 60), ("parallelogram", 20), ("kite", 20)]
+)
+def test_a_drawing_turned_into_lengths_comes_back(kind: str, count: int) -> None:
+    random = np.random.default_rng(5)
+    gaps = [find_gap(random_pins(random, kind)) for _ in range(count)]
+    assert max(gaps) < K
+
+
+@pytest.mark.slow
+def test_ten_thousand_drawings_come_back() -> None:
+    random = np.random.default_rng(6)
+    kinds = ["any"] * 9000 + ["parallelogram"] * 500 + ["kite"] * 500
+    gaps = np.array([find_gap(random_pins(random, kind)) for kind in kinds])
+    assert len(gaps) == 10_000 and gaps.max() < K
+
+
+def test_lengths_angles_and_assembly_are_those_of_the_pins() -> None:
+    scene = loads(DRAWN + '[motion]\ntheta_2 = "drawn"\n')
+    d, a, b, c = scene.linkage.lengths
+    assert (d, a) == (math.hypot(0.25, 0.05), 0.1)
+    assert b == pytest.approx(math.hypot(0.175, 0.05), rel=4 * EPS)
+    assert c == pytest.approx(0.075, rel=4 * EPS)
+    assert scene.linkage.ground_angle == math.atan2(0.05, 0.25)
+    assert scene.motion.theta_2 == pytest.approx(0.5 * math.pi, abs=4 * EPS)
+
+
+@pytest.mark.parametrize("bar", (2, 3, 4))
+def test_every_command_is_on_the_assembly_that_is_drawn(bar: int) -> None:
+    scene = loads(f'{DRAWN}[motion]\n{COMMANDS[bar][0]} = "drawn"\n')
+    here = fourbar.solve(scene)
+    assert here.A[0] == pytest.approx([0.0, 0.1], abs=1e-15)
+    assert here.B[0] == pytest.approx([0.175, 0.05], abs=1e-14)
+
+
+def test_places_of_the_drawing_are_where_they_are_drawn() -> None:
+    """Away from the origin: points of all bars, a mass centre, and coordinates as they are printed."""
+    pins = DRAWN.replace('"0 mm", "0 mm"', '"-20 mm", "7 mm"')
+    places = {1: (30.0, 40.0), 2: (-5.0, 60.0), 3: (120.0, 80.0), 4: (200.0, 20.0)}
+    rows = "\n".join(
+        f'P{bar} = {{ bar = {bar}, from_pin = {{ drawn = ["{x} mm", "{y} mm"] }} }}'
+        for bar, (x, y) in places.items()
+    )
+    centre = '[bars.coupler]\nmass = "1 kg"\ncentre = { drawn = ["100 mm", "70 mm"] }\n'
+    text = f'{pins}{centre}[motion]\ntheta_2 = "drawn"\n[points]\n{rows}\n'
+    scene = loads(text)
+    table = fourbar.solve(scene).to_pandas()
+    for bar, place in places.items():
+        shown = [table[f"P{bar}_{axis}"][0] * 1e3 for axis in "xy"]
+        assert shown == pytest.approx(place, abs=1e-10)
+    assert table["G3_x"][0] == pytest.approx(0.1, abs=1e-14)
+    assert [table["A_x"][0], table["A_y"][0]] == pytest.approx([0.0, 0.1], abs=1e-14)
+    assert loads(dump(scene)) == scene and "[pins]" in dump(scene)
+
+
+CYLINDER = """\
+[drive]
+from = { bar = 1, at = { drawn = ["100 mm", "-50 mm"] } }
+to = { bar = 2, at = { drawn = ["10 mm", "60 mm"] } }
+[motion]
+stroke = "drawn"
+side = "drawn"
+"""
+
+
+def test_the_stroke_and_the_side_of_a_cylinder_are_drawn() -> None:
+    scene = loads(DRAWN + CYLINDER)
+    here = fourbar.solve(scene)
+    assert scene.motion.stroke == pytest.approx(math.hypot(0.09, 0.11), rel=4 * EPS)
+    assert here.A[0] == pytest.approx([0.0, 0.1], abs=1e-14)
+    assert here.B[0] == pytest.approx([0.175, 0.05], abs=1e-13)
+
+
+def test_a_scene_that_was_changed_since_is_written_by_its_lengths() -> None:
+    scene = loads(DRAWN)
+    crossed = fourbar.Scene(
+        scene.linkage,
+        scene.motion.replace(branch=-scene.motion.branch),
+        drawing=scene.drawing,
+    )
+    assert "[lengths]" in dump(crossed) and "[pins]" not in dump(crossed)
+
+
+def test_the_default_sweep_holds_the_drawn_position() -> None:
+    """A rocker with two ranges, mirror images in the ground: the one in which it is drawn."""
+    linkage = fourbar.uniform(3.0, 2.5, 2.0, 1.0)
+    assert len(fourbar.circuits(linkage)) == 2
+    for theta_4 in (0.5 * math.pi, -0.5 * math.pi):
+        here = fourbar.solve(fourbar.Scene(linkage, fourbar.Motion(theta_4=theta_4)))
+        A, B = (tuple(pin[0].tolist()) for pin in (here.A, here.B))
+        scene = fourbar.from_pins((0.0, 0.0), A, B, (3.0, 0.0))
+        sweep = fourbar.Scene(
+            scene.linkage,
+            fourbar.Motion(branch=scene.motion.branch),
+            drawing=scene.drawing,
+        )
+        angles = fourbar.command(sweep).angle
+        middle = 0.5 * (angles[0] + angles[-1])
+        away = math.remainder(scene.motion.theta_2 - middle, math.tau)
+        assert abs(away) < 0.5 * (angles[-1] - angles[0])
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (("[pins]", '[lengths]\nground = "1 m"\n[pins]'), "the pins state the lengths"),
+        (('A = ["0 mm", "100 mm"]\n', ""), "pins.A: is missing"),
+        (('"100 mm"', "100"), 'did you mean "100 mm"'),
+        (('"0 mm", "100 mm"', '"0 mm", "0 mm"'), "lies where O2 does"),
+        (('"100 mm"]', '"100 mm", "0 mm"]'), "must be two coordinates"),
+        (
+            ("[pins]", '[motion]\nbranch = "open"\n[pins]'),
+            "the pins state the assembly",
+        ),
+    ],
+)
+def test_a_drawing_that_is_none_is_refused(change: tuple[str, str], says: str) -> None:
+    with pytest.raises(InputError, match=says):
+        loads(DRAWN.replace(*change))
+
+
+def test_a_drawing_on_a_change_point_is_refused() -> None:
+    with pytest.raises(InputError, match="lie in one line: at a change point"):
+        fourbar.from_pins((0, 0), (1, 0), (4, 0), (3, 0))
+
+
+def test_the_word_needs_a_drawing() -> None:
+    lengths = (
+        '[lengths]\nground = "3 m"\ninput = "1 m"\ncoupler = "3 m"\noutput = "2 m"\n'
+    )
+    with pytest.raises(InputError, match=r"the scene has no \[pins\]"):
+        loads(lengths + '[motion]\ntheta_2 = "drawn"\n')
+
+
+def test_a_number_without_a_unit_is_refused_with_the_likely_one() -> None:
+    lengths = (
+        '[lengths]\nground = "3 m"\ninput = "1 m"\ncoupler = "3 m"\noutput = "2 m"\n'
+    )
+    with pytest.raises(InputError, match='the unit is missing; did you mean "45 deg"'):
+        loads(lengths + "[motion]\ntheta_2 = 45\n")
+
+
+def test_mjcf_stands_where_the_drawing_has_it(tmp_path: Path) -> None:
+    mujoco = pytest.importorskip("mujoco", reason="MuJoCo is optional")
+    masses = "".join(
+        f'[bars.{bar}]\nmass = "1 kg"\n' for bar in ("input", "coupler", "output")
+    )
+    pins = DRAWN.replace('"0 mm", "0 mm"', '"-20 mm", "7 mm"')
+    motion = '[motion]\ntheta_2 = "drawn"\nomega_2 = "1 rad/s"\n'
+    from fourbar.mjcf import write_mjcf_for
+
+    model = mujoco.MjModel.from_xml_string(
+        write_mjcf_for(loads(pins + masses + motion))
+    )
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    mujoco.mj_forward(model, data)
+    for name, place in {
+        "O2": (-0.02, 0.007),
+        "A": (0.0, 0.1),
+        "O4": (0.25, 0.05),
+    }.items():
+        assert data.site(name).xpos[:2] == pytest.approx(place, abs=1e-9)
