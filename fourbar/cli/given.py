@@ -60,7 +60,7 @@ own_units_option = click.option(
     "--units",
     callback=_read_units,
     metavar="UNITS",
-    help='Units: SI, imperial or a list like "mm N.mm deg" (default: those of the file).',
+    help='Units: SI, imperial or a list like "mm N.mm deg" (default: those of the file; of CSV and JSON SI).',
 )
 
 

@@ -12,6 +12,17 @@ from fourbar.quantities.units import UnitError, to_si
 
 BARE_KEY = re.compile(r"[A-Za-z0-9_-]{1,40}")
 LONGEST_SHOWN = 60
+FOREIGN = (
+    *("crank", "slider", "rod", "piston", "rail", "cam", "gear", "offset"),
+    *("link5", "bar5", "dyad", "precision_points"),
+)
+"""Keys of mechanisms that are no four-bar linkage, and of their synthesis."""
+ELSEWHERE = (
+    "this is a planar four-bar linkage with pins alone: synthesis is in pylinkage and "
+    "MotionGen, sliders and several loops in PMKS+, any mechanism in MuJoCo, Drake or "
+    "Exudyn; "
+)
+"""Where to go with another mechanism."""
 LIKELY = {"rad": "deg", "m": "mm", "rad/s": "rpm"}
 """Units that a number without one may have been meant in, where that is not the SI unit."""
 
@@ -49,9 +60,8 @@ class Reader:
             )
         for name, entry in value.items():
             if name not in names:
-                allowed = (
-                    f"unknown key; {_suggest(name, names)}allowed: {', '.join(names)}"
-                )
+                hint = ELSEWHERE if name in FOREIGN else _suggest(name, names)
+                allowed = f"unknown key; {hint}allowed: {', '.join(names)}"
                 raise self.refuse(_join_key(key, name), entry, allowed)
         return value
 

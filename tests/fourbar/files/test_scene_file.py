@@ -402,3 +402,9 @@ def test_mutated_files_end_in_a_scene_or_in_one_line() -> None:
         except FourBarError as error:
             assert "\n" not in str(error) and len(str(error)) < LONGEST_LINE, str(error)
     assert 50 < answered < 1950  # the mutations reach both ends
+
+
+@pytest.mark.parametrize("key", ["crank", "slider"])
+def test_another_mechanism_is_told_where_to_go(key: str) -> None:
+    with pytest.raises(InputError, match="sliders and several loops in PMKS"):
+        loads(f'[lengths]\n{key} = "1 m"\n')
