@@ -78,7 +78,7 @@ MISTAKES = [
     ("angle without quotes", '"40 deg"', "40 deg", ['in quotes, like "40 deg"']),
     ("bare length", '"0.1 m"', "0.1", ["lengths.input", "0.1", "with a unit"]),
     ("length without unit", '"0.1 m"', '"0.1"', ["lengths.input", "unit is missing"]),
-    ("bare angle", '"60 deg"', "60", ["motion.theta_2", "60", "135 deg"]),
+    ("bare angle", '"60 deg"', "60", ["motion.theta_2", "the unit is missing", "60 deg"]),
     ("unit without number", '"0.1 m"', '"m"', ["lengths.input", "no finite number"]),
     ("NaN", '"0.1 m"', '"nan m"', ["lengths.input", "nan m", "finite"]),
     ("bare NaN", '"0.1 m"', "nan", ["lengths.input", "nan", "finite"]),
