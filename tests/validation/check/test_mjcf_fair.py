@@ -21,7 +21,7 @@ from fourbar.solve import solve
 from fourbar_validation.check.differences import find_differences
 from fourbar_validation.check.mjcf import ModelReport, examine_model
 from fourbar_validation.compare.answer import Answer
-from fourbar_validation.engines.mujoco.closed_loop import bracket_couple
+from fourbar_validation.engines.mujoco.couple import bracket_couple
 from fourbar_validation.engines.mujoco.theirs import (
     ONE_STATE,
     THROUGH_TIME,

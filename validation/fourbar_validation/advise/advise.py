@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import click
 import numpy as np
@@ -24,6 +25,8 @@ from fourbar_validation.advise.matters import (
     write_sentence,
 )
 from fourbar_validation.advise.worst_errors import WorstErrors
+from fourbar_validation.compare.rows import make_plain
+from fourbar_validation.engines.mujoco.robots.answers import MeasureOptions
 from fourbar_validation.engines.mujoco.trial import (
     FEWEST_STEPS,
     LONGEST,
@@ -36,6 +39,16 @@ from fourbar_validation.engines.mujoco.trial import (
     make_settings,
 )
 from fourbar_validation.report.terminal import make_table
+from fourbar_validation.robots.measure import (
+    measure_robot,
+    read_measure_options,
+    show_advice,
+)
+from fourbar_validation.robots.options import (
+    loop_option,
+    pose_options,
+    speed_option,
+)
 
 MARGIN = 0.7
 """The run must stay within this part of the required error: elsewhere it may be larger."""
@@ -46,6 +59,8 @@ BETWEEN = 180
 MOST_TRIALS = 24
 MOST_STEPS = 16_000
 """Most steps of one run, a fifth of a second. An error that needs more steps counts as not reachable."""
+ROBOTS = (".xml", ".mjcf")
+"""Suffixes of a robot's file."""
 LEAST_GAIN = 0.8
 """More steps that leave the error above this part of what it was have met a floor."""
 ROUNDS, TIMED_STEPS, TIMED_READINGS = 5, 200, 30
@@ -354,10 +369,36 @@ def _find_nearest(attempts: Sequence[Attempt]) -> Attempt:
     return min(attempts, key=lambda a: a.errors.worst)
 
 
+def advise_robot(
+    files: tuple[Path, ...], options: MeasureOptions, assets: Path | None
+) -> int:
+    """Print what to type into a robot's file for an error; return the exit status."""
+    from fourbar.files import load
+
+    scene = load(files[0]) if len(files) == 2 else None
+    measurement = measure_robot(files[-1], options, scene, assets)
+    reached = True
+    for measured in measurement.loops:
+        click.echo(make_plain(f"{measured.name}, driven by {measured.joint}"))
+        assert measured.advice is not None
+        show_advice(measured.advice)
+        reached &= measured.advice.reached
+    for note in measurement.notes:
+        click.echo(make_plain(f"note: {note}"))
+    return 0 if reached else 1
+
+
 @click.command(name="advise")
 @click.argument(
-    "scenes", nargs=-1, required=True, type=click.Path(path_type=Path, dir_okay=False)
+    "scenes",
+    metavar="SCENE... | [SCENE] FILE.xml",
+    nargs=-1,
+    required=True,
+    type=click.Path(path_type=Path, dir_okay=False),
 )
+@loop_option
+@pose_options
+@speed_option
 @click.option(
     "--error",
     "wanted",
@@ -370,11 +411,25 @@ def _find_nearest(attempts: Sequence[Attempt]) -> Attempt:
     type=click.Path(path_type=Path, dir_okay=False),
     help="Write the MJCF of one SCENE.",
 )
-def command(scenes: tuple[Path, ...], wanted: float, output: Path | None) -> int:
+def command(
+    scenes: tuple[Path, ...],
+    loop: str | None,
+    wanted: float,
+    output: Path | None,
+    **robot: Any,
+) -> int:
     """Find the cheapest MuJoCo settings that keep SCENES within an error; exit 1 where none is found for one of them.
 
     Of each scene it says which of the settings matters, and why; of several scenes a table is printed at the end.
+    Of a robot's FILE.xml, and SCENE before it or not, it tries settings in the file itself and prints what to type.
     """
+    if scenes[-1].suffix.lower() in ROBOTS:
+        if output is not None or len(scenes) > 2:
+            raise click.UsageError("of a robot: [SCENE] FILE.xml, without -o")
+        options = read_measure_options(loop, wanted, robot)
+        return advise_robot(scenes, options, robot["assets"])
+    if loop or any(robot.values()):
+        raise click.UsageError("the options of a robot need a FILE.xml")
     from fourbar.files import load
 
     if output is not None and len(scenes) > 1:

@@ -7,6 +7,7 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -29,6 +30,20 @@ from fourbar_validation.compare.tolerance import SIMULATED, ErrorBound, hold_sim
 from fourbar_validation.report.templating import render, write_number
 from fourbar_validation.report.terminal import make_table
 from fourbar_validation.robots.guard import examine_guarded
+from fourbar_validation.robots.measure import (
+    find_worst,
+    measure_robot,
+    read_measure_options,
+    show_measurement,
+)
+from fourbar_validation.robots.mimic import measure_mimic, show_mimic
+from fourbar_validation.robots.options import (
+    FILE,
+    loop_option,
+    pose_options,
+    speed_option,
+    torque_option,
+)
 from fourbar_validation.scenes.suites import read_scene_files
 
 ABOUT_COSTS = (
@@ -257,8 +272,7 @@ def write_markdown(report: ModelReport, mjcf: Path) -> str:
 
 
 @click.command(name="check-mjcf")
-@click.argument("scene", type=click.Path(path_type=Path))
-@click.argument("theirs", metavar="THEIRS.xml", type=click.Path(path_type=Path))
+@click.argument("files", metavar="[SCENE] FILE.xml", nargs=-1, required=True, type=FILE)
 @click.option(
     "--name",
     "names",
@@ -267,12 +281,21 @@ def write_markdown(report: ModelReport, mjcf: Path) -> str:
     help="The body that is the input, coupler or output; B3, B4: the sites of pin B on the coupler and the output, "
     "where no connect or weld closes the loop. Left out: guessed from structure and lengths, and printed.",
 )
+@loop_option
+@pose_options
+@speed_option
+@torque_option
+@click.option(
+    "--mimic",
+    metavar="JOINT",
+    help="Joint whose equality, a polynomial, stands for the loop of SCENE: what it loses.",
+)
 @click.option(
     "--error",
     "wanted",
     type=float,
     metavar="E",
-    help="The relative error that THEIRS.xml may have.",
+    help="The relative error that FILE.xml may have; of a loop in a robot also: what to type to reach it.",
 )
 @click.option(
     "-o",
@@ -280,12 +303,44 @@ def write_markdown(report: ModelReport, mjcf: Path) -> str:
     type=click.Path(path_type=Path, file_okay=False),
     default=Path("results"),
     show_default=True,
+    help="Folder for the report on the MJCF of a four-bar alone.",
 )
 def command(
-    scene: Path, theirs: Path, names: tuple[str, ...], wanted: float | None, out: Path
+    files: tuple[Path, ...],
+    names: tuple[str, ...],
+    loop: str | None,
+    mimic: str | None,
+    wanted: float | None,
+    out: Path,
+    **robot: Any,
 ) -> int:
-    """Compare your own MJCF of SCENE with the generated one: how wrong it is, and what each difference costs."""
-    suite = read_scene_files((scene,))
+    """Compare your own MJCF with a scene: how wrong its torque and pin forces are, and why.
+
+    A four-bar alone is compared with the generated MJCF of SCENE, entry by entry. With --loop, or without SCENE, loops
+    are measured inside the whole robot of FILE.xml; the scene is then taken from the file.
+    """
+    if len(files) > 2:
+        raise click.UsageError("give one FILE.xml, and SCENE before it or not")
+    theirs = files[-1]
+    scene = read_scene_files(files[:1]).scene(0) if len(files) == 2 else None
+    if mimic is not None:
+        if scene is None:
+            raise click.UsageError("--mimic needs the SCENE of the loop")
+        show_mimic(measure_mimic(theirs, mimic, scene))
+        return 0
+    if loop is not None or scene is None:
+        if names:
+            raise click.UsageError("--name is for the MJCF of a four-bar alone")
+        options = read_measure_options(loop, wanted, robot)
+        measurement = measure_robot(theirs, options, scene, robot["assets"])
+        show_measurement(measurement)
+        worst = max(map(find_worst, measurement.loops))
+        return int(wanted is not None and not worst <= wanted)
+    if any(robot.values()):
+        raise click.UsageError(
+            "the options of a robot need --loop, or FILE.xml without SCENE"
+        )
+    suite = read_scene_files(files[:1])
     tolerance = (
         SIMULATED
         if wanted is None

@@ -64,6 +64,12 @@ speed_option = click.option(
     help='Speed of the driven bar, rad/s or with a unit like "60 rpm".',
 )
 
+torque_option = click.option(
+    "--torque",
+    metavar="T",
+    help="Torque of the motor, N m or with a unit, under which the gap and the pin forces are printed.",
+)
+
 
 def read_pose(
     pose: tuple[str, ...], key: str | None, hold: tuple[str, ...], drive: str | None

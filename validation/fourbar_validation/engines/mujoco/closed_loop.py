@@ -334,35 +334,3 @@ def solve_couple(
         couple += (wanted - acceleration(couple)) / slope
     acceleration(couple)
     return float(couple)
-
-
-DOUBLINGS = 40
-"""Times the size of a trial is doubled, to both sides, in search of a couple: beyond 1e12 times it nothing is found."""
-
-
-def bracket_couple(
-    acceleration: Callable[[float], float], wanted: float, trial: float, allowed: float
-) -> float | None:
-    """Solve for the couple under which an acceleration is the wanted one, and which was evaluated last.
-
-    The acceleration is continuous in the couple and need not be linear: dry friction, joint limits and clamped
-    actuators make it piecewise linear. None where no couple gives the acceleration to within `allowed`.
-    """
-    from scipy.optimize import brentq
-
-    def miss(couple: float) -> float:
-        return acceleration(couple) - wanted
-
-    sought = miss(0.0)
-    if sought == 0.0:
-        return 0.0
-    above = below = 0.0
-    for doubling in range(DOUBLINGS):
-        size = abs(trial) * 2.0**doubling
-        for nearer, farther in ((above, size), (below, -size)):
-            if miss(farther) * sought <= 0.0:
-                couple = float(brentq(miss, nearer, farther, xtol=abs(trial) * 1e-15))
-                left = abs(miss(couple))
-                return couple if left <= allowed else None
-        above, below = size, -size
-    return None

@@ -38,10 +38,9 @@ from fourbar_validation.engines.loop import (
 )
 from fourbar_validation.engines.mujoco.closed_loop import (
     WARNINGS,
-    bracket_couple,
     load_force,
-    solve_couple,
 )
+from fourbar_validation.engines.mujoco.couple import find_couple
 from fourbar_validation.engines.mujoco.describe import (
     FREE,
     Described,
@@ -65,16 +64,8 @@ MOST_STEPS = 400_000
 """A revolution at 628 steps per turn is a thousandth of this; more would be minutes."""
 PRICING = 60.0
 """Seconds in which differences are tried one by one; each takes two evaluations."""
-REFINEMENTS = 3
-"""Secant steps after the first: each gains the digits that the one before has."""
 DRIVING = 1e3
 """Armature over the inertia of all else from which it is a flywheel that drives: the speed then ripples by 1e-3."""
-LEAST = 1e-6
-"""Acceleration of the crank, over that of the open tree's joints, below which it is not told from none."""
-MISSED = 1e-9
-"""Part of the acceleration sought that a linear solve may leave: its rounding is 1e-12, also near a change point."""
-NOISE = 1e-3
-"""Part of it that the noise of the file's solver may leave; where the acceleration jumps, all of it is left."""
 NO_BIAS = mujoco.mjtBias.mjBIAS_NONE
 SHARED = "theta_2, omega_2, alpha_2 and the branch; the rest is the file's"
 OWN = "assembly, speeds, accelerations, drive torque and pin forces, by MuJoCo from the file as compiled"
@@ -432,34 +423,18 @@ class UserLoop(Assembled):
         self, acceleration: Callable[[float], float], wanted: float
     ) -> float:
         """Solve for the couple or force of the drive; NaN where none gives the acceleration, which is noted."""
-        free = acceleration(0.0)
-        # without a couple the crank may already accelerate as wanted, to the rounding of the others
-        others = float(np.abs(self.data.qacc_smooth).max()) or 1.0
-        sought = max(abs(wanted - free), LEAST * others)
-        trial = float(self.model.dof_M0.sum()) * sought
-        couple = solve_couple(acceleration, wanted, 0.0, trial, REFINEMENTS)
-        what = (
-            "its cylinder"
-            if self.cylinder is not None
-            else f"a couple on bar {self.scene.drive_bar}"
-        )
+        couple = find_couple(self.model, self.data, acceleration, wanted)
         if couple is None:
+            what = (
+                "its cylinder"
+                if self.cylinder is not None
+                else f"a couple on bar {self.scene.drive_bar}"
+            )
             raise LimitError(f"{what} does not move the crank of this model")
-        if abs(acceleration(couple) - wanted) <= MISSED * sought:
-            return couple
-        # the solver starts from the same accelerations at every trial, or its noise would look like a jump
-        start = self.data.qacc_warmstart.copy()
-
-        def repeatable(size: float) -> float:
-            self.data.qacc_warmstart[:] = start
-            return acceleration(size)
-
-        bracketed = bracket_couple(repeatable, wanted, trial, NOISE * sought)
-        if bracketed is None:
+        if math.isnan(couple):
             theta_2 = math.degrees(self.topology.angles(self.data)[0])
             self.unreached.append(f"{theta_2:.4g}")
-            return math.nan
-        return bracketed
+        return couple
 
     def _count_stops(self) -> None:
         """Collect the joints that are at a limit of their range in this state."""

@@ -1,0 +1,138 @@
+"""A loop inside its robot: MuJoCo asked a second way in the whole model, and the formulas."""
+
+import math
+from functools import cache
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+from fourbar.scene import Command
+from fourbar.solve import solve
+from fourbar_validation.engines.mujoco.robots.answers import QUANTITIES, measure_sizes
+from fourbar_validation.engines.mujoco.robots.closures import find_closures
+from fourbar_validation.engines.mujoco.robots.compiled import compile_robot
+from fourbar_validation.engines.mujoco.robots.inside import HEAVY, LoopInside
+from fourbar_validation.engines.mujoco.robots.loop import LoopScene, PoseOptions
+from fourbar_validation.engines.mujoco.robots.pose import pose_robot
+from fourbar_validation.engines.mujoco.robots.scene import make_scene
+from fourbar_validation.robots.files import read_robot
+
+ROBOTS = Path(__file__).parents[5] / "models" / "robots"
+FILES = ["biped_foot", "gripper"]
+ASKED_TWICE = 1e-6
+"""Relative; the solver of the file stops at a tolerance of 1e-8 of its own."""
+RIGID = 1e-8
+"""Relative; the pose is closed to 1e-12 m and the scene has twelve digits."""
+
+
+@cache
+def open_loop(name: str) -> tuple[LoopInside, LoopScene]:
+    compiled = compile_robot(read_robot(ROBOTS / f"{name}.xml"))
+    posed = pose_robot(compiled.model, PoseOptions())
+    loop = next(
+        closure.loop
+        for closure in find_closures(posed, PoseOptions())
+        if closure.loop is not None
+    )
+    return LoopInside(posed.model, loop), make_scene(compiled, posed, loop, 2.0)
+
+
+def ask_again(inside: LoopInside, theta_2: float, alpha_2: float) -> float:
+    """Find all joint forces at once by `mj_forward` alone, with the hinges that are not driven left to themselves.
+
+    Newton's method on the accelerations of the driven and the held joints; then bisection on the couple.
+    """
+    state = inside.state(theta_2, 2.0)
+    assert state is not None
+    model, data = inside.model, mujoco.MjData(inside.model)
+    moved = [inside.drive, *inside.held]
+    wanted = np.zeros(len(moved))
+    wanted[0] = inside.sense * alpha_2
+    forces = np.zeros(len(moved))
+
+    def accelerate(at: np.ndarray) -> np.ndarray:
+        mujoco.mj_resetData(model, data)
+        data.qpos[:], data.qvel[:] = state.qpos, state.qvel
+        data.qfrc_applied[moved] = at
+        mujoco.mj_forward(model, data)
+        return data.qacc[moved].copy()
+
+    for _ in range(8):
+        left = wanted - accelerate(forces)
+        slopes = np.empty((len(moved), len(moved)))
+        for column in range(len(moved)):
+            more = forces.copy()
+            more[column] += 1e-3
+            slopes[:, column] = (accelerate(more) - wanted + left) / 1e-3
+        forces += np.linalg.solve(slopes, left)
+    low, high = forces[0] - 0.1, forces[0] + 0.1
+    for _ in range(60):
+        forces[0] = 0.5 * (low + high)
+        if accelerate(forces)[0] < wanted[0]:
+            low = forces[0]
+        else:
+            high = forces[0]
+    return float(inside.sense * forces[0])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", FILES)
+def test_the_torque_is_the_one_that_mujoco_gives_when_asked_by_itself(
+    name: str,
+) -> None:
+    inside, _ = open_loop(name)
+    theta_2 = inside.loop.angles[1] + 0.2
+    (row,) = inside.answer_states([theta_2], 2.0, 3.0).rows
+    assert row.soft.torque == pytest.approx(
+        ask_again(inside, theta_2, 3.0), rel=ASKED_TWICE
+    )
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_rigid_pins_in_the_robot_are_the_formulas_of_its_scene(name: str) -> None:
+    """Multipliers on MuJoCo's mass matrix of the whole robot, against a scene of three bars."""
+    inside, made = open_loop(name)
+    angles = inside.loop.angles[1] + np.linspace(-0.3, 0.3, 5)
+    rows = inside.answer_states(angles.tolist(), 2.0, 3.0).rows
+    branch = np.full(len(rows), made.scene.motion.branch, dtype=np.int8)
+    command = Command(angles - _turn_back(inside, made), branch, 2.0, 3.0)
+    formulas = solve(made.scene, "force", at=command)
+    for quantity in QUANTITIES:
+        rigid = np.array([row.rigid.values()[quantity] for row in rows])
+        ours = np.asarray(getattr(formulas, quantity))
+        size = measure_sizes(ours).max()
+        assert measure_sizes(rigid - ours).max() <= RIGID * size
+
+
+def _turn_back(inside: LoopInside, made: LoopScene) -> float:
+    return inside.loop.angles[0] - made.scene.linkage.ground_angle
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", FILES)
+def test_what_holds_the_other_joints_hardly_matters(name: str) -> None:
+    """And what held them too firmly would: the solver then loses the light bars."""
+    inside, _ = open_loop(name)
+    angles = (inside.loop.angles[1] + np.linspace(-0.3, 0.3, 5)).tolist()
+    answers = [
+        inside.answer_through_time(angles, 2.0, 0.0, heavy)
+        for heavy in (HEAVY, 0.1 * HEAVY)
+    ]
+    for quantity in QUANTITIES:
+        one, other = (
+            np.array([row.soft.values()[quantity] for row in answer.rows])
+            for answer in answers
+        )
+        assert np.abs(one - other).max() < 0.01 * np.abs(one).max()
+
+
+@pytest.mark.slow
+def test_a_motor_opens_the_loop_the_more_the_harder_it_pushes() -> None:
+    inside, _ = open_loop("biped_foot")
+    start = [inside.loop.angles[1]]
+    (weak,) = inside.answer_under_torque(start, 2.0, 0.02)
+    (strong,) = inside.answer_under_torque(start, 20.0, 0.02)
+    assert math.isfinite(strong.gap) and strong.gap > 2.0 * weak.gap > 0.0
+    assert np.hypot(*strong.forces["F43"]) > 2.0 * np.hypot(*weak.forces["F43"])

@@ -1,0 +1,39 @@
+"""check-mjcf and advise on a robot's file: what is printed, and the exit status."""
+
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from fourbar_validation.advise.advise import command as advise
+from fourbar_validation.check.mjcf import command as check_mjcf
+
+FOOT = str(Path(__file__).parents[3] / "models" / "robots" / "biped_foot.xml")
+
+
+def call(command: object, *arguments: str) -> Result:
+    return CliRunner().invoke(command, arguments, standalone_mode=False)  # type: ignore[arg-type]
+
+
+@pytest.mark.slow
+def test_a_loop_is_measured_in_its_robot_and_settings_are_advised() -> None:
+    checked = call(check_mjcf, FOOT, "--loop", "rod", "--speed", "2", "--torque", "5")
+    assert checked.return_value == 0, checked.output
+    for words in ("through time", "F43", "gap through time", "under the torque"):
+        assert words in checked.output
+    advised = call(advise, FOOT, "--loop", "rod", "--speed", "2", "--error", "0.01")
+    assert advised.return_value == 0, advised.output
+    assert "Type this for an error within 0.01" in advised.output
+    assert '<connect name="rod" site1="rod_end" site2="heel"' in advised.output
+    assert "pad" not in advised.output and "flywheel" not in advised.output
+
+
+def test_options_that_do_not_go_together_are_refused() -> None:
+    for command, arguments in (
+        (check_mjcf, ("a.toml", FOOT, "b.xml")),
+        (check_mjcf, (FOOT, "--mimic", "crank")),
+        (advise, ("a.toml", "--error", "0.1", "--loop", "rod")),
+        (advise, (FOOT, "--error", "0.1", "-o", "new.xml")),
+    ):
+        result = call(command, *arguments)
+        assert result.exception is not None, arguments

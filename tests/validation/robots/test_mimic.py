@@ -1,0 +1,95 @@
+"""A polynomial in place of a loop: what it loses, and the best of each degree."""
+
+import math
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+import fourbar
+from fourbar.errors import InputError
+from fourbar.linkage import Bar, FourBar
+from fourbar.scene import Command, Scene
+from fourbar.solve import solve
+from fourbar_validation.robots.mimic import fit_minimax, measure_mimic
+
+KNEE = Scene(
+    FourBar(0.3, Bar(0.04, 0.1), Bar(0.295, 0.12), Bar(0.045, 0.9), -0.5 * math.pi),
+    fourbar.Motion(np.radians(np.linspace(-40.0, 40.0, 161)), 5.0),
+    title="knee of a leg",
+)
+FILE = """<mujoco><worldbody>
+<body name="crank"><joint name="c" axis="0 0 1"/>
+<inertial pos="0.02 0 0" mass="0.1" diaginertia="1e-5 1e-5 1e-5"/></body>
+<body name="shank" pos="0 -0.3 0"><joint name="s" axis="0 0 {axis}"/>
+<inertial pos="0.1 0 0" mass="0.9" diaginertia="0.012 0.012 0.012"/></body>
+</worldbody><equality><joint joint1="s" joint2="c" polycoef="{polycoef}"/></equality></mujoco>"""
+
+
+def write(folder: Path, polycoef: str = "0 0.8842 0 0 0", axis: int = 1) -> Path:
+    path = folder / "mimic.xml"
+    path.write_text(FILE.format(polycoef=polycoef, axis=axis))
+    return path
+
+
+def ask_mujoco(path: Path) -> tuple[np.ndarray, np.ndarray]:
+    """Find the follower's position at each of the leader's at which MuJoCo's own equality is satisfied."""
+    model = mujoco.MjModel.from_xml_path(str(path))
+    data = mujoco.MjData(model)
+    leader = np.radians(np.linspace(-40.0, 40.0, 41))
+    follower = []
+    for angle in leader:
+        data.qpos[:] = (angle, 0.0)
+        mujoco.mj_fwdPosition(model, data)
+        follower.append(-data.efc_pos[0])  # the residual is y minus the polynomial
+    return leader, np.array(follower)
+
+
+@pytest.mark.slow
+def test_what_the_file_loses_through_its_own_zero(tmp_path: Path) -> None:
+    report = measure_mimic(write(tmp_path), "s", KNEE)
+    assert math.degrees(report.file.angle) == pytest.approx(1.7507, abs=5e-5)
+    assert report.file.ratio == pytest.approx(0.1267, abs=5e-5)
+    smallest = [math.degrees(best.angle) for best in report.fitted]
+    assert smallest[0] == pytest.approx(0.783, abs=5e-4)
+    assert smallest[2] == pytest.approx(0.0285, abs=5e-5)
+    assert smallest == sorted(smallest, reverse=True)
+    leader, follower = ask_mujoco(write(tmp_path))
+    branch = np.ones(len(leader), np.int8)
+    theta_4 = solve(KNEE, "position", at=Command(leader, branch, None, 0.0)).theta_4
+    off = np.abs(follower - (theta_4 - theta_4[20])).max()
+    assert report.file.angle == pytest.approx(off, rel=1e-9)
+
+
+@pytest.mark.slow
+def test_the_printed_polynomial_does_in_mujoco_what_was_said(tmp_path: Path) -> None:
+    best = measure_mimic(write(tmp_path), "s", KNEE).fitted[2]
+    polycoef = " ".join(f"{number!r}" for number in (*best.coefficients, 0.0))
+    again = measure_mimic(write(tmp_path, polycoef), "s", KNEE)
+    assert again.file.angle == pytest.approx(best.angle, rel=1e-9)
+    opposite = " ".join(f"{-number!r}" for number in (*best.coefficients, 0.0))
+    turned = measure_mimic(write(tmp_path, opposite, axis=-1), "s", KNEE)
+    assert turned.file.angle == pytest.approx(best.angle, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("function", "degree", "smallest"),
+    [(np.square, 1, 0.5), (np.abs, 2, 0.125), (lambda x: x**3, 2, 0.25)],
+)
+def test_the_smallest_largest_error_is_that_of_the_textbooks(
+    function: object, degree: int, smallest: float
+) -> None:
+    """Chebyshev's theorem: x^n is missed by 2^(1-n) by polynomials of degree n - 1, |x| by 1/8 by parabolas."""
+    x = np.linspace(-1.0, 1.0, 2001)
+    y = function(x)  # type: ignore[operator]
+    left = np.polynomial.polynomial.polyval(x, fit_minimax(x, y, degree)) - y
+    assert np.abs(left).max() == pytest.approx(smallest, rel=1e-5)
+
+
+@pytest.mark.slow
+def test_a_joint_that_follows_none_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="follows no other"):
+        measure_mimic(write(tmp_path), "c", KNEE)
+    with pytest.raises(InputError, match="no such joint"):
+        measure_mimic(write(tmp_path), "knee", KNEE)

@@ -1,0 +1,85 @@
+"""The couple under which a joint accelerates as wanted, asked of MuJoCo by trials.
+
+The acceleration is continuous in the couple. Where nothing but pins acts it is linear; dry friction, joint limits and
+clamped actuators make it piecewise linear, and the couple is bracketed.
+"""
+
+import math
+from collections.abc import Callable
+
+import mujoco
+import numpy as np
+
+from fourbar_validation.engines.mujoco.closed_loop import solve_couple
+
+REFINEMENTS = 3
+"""Secant steps after the first: each gains the digits that the one before has."""
+LEAST = 1e-6
+"""Acceleration of the driven joint, over that of the open tree's joints, below which it is not told from none."""
+MISSED = 1e-9
+"""Part of the acceleration sought that a linear solve may leave: its rounding is 1e-12, also near a change point."""
+NOISE = 1e-3
+"""Part of it that the noise of the file's solver may leave; where the acceleration jumps, all of it is left."""
+DOUBLINGS = 40
+"""Times the size of a trial is doubled, to both sides, in search of a couple: beyond 1e12 times it nothing is found."""
+
+
+def find_couple(
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    acceleration: Callable[[float], float],
+    wanted: float,
+) -> float | None:
+    """Find the couple that gives an acceleration, and which was evaluated last; NaN where none gives it.
+
+    None where the acceleration does not depend on the couple.
+
+    Parameters
+    ----------
+    acceleration : evaluates `model` and `data` under a couple, N m, and returns an acceleration, rad/s^2.
+    """
+    free = acceleration(0.0)
+    # without a couple it may already accelerate as wanted, to the rounding of the others
+    others = float(np.abs(data.qacc_smooth).max()) or 1.0
+    sought = max(abs(wanted - free), LEAST * others)
+    trial = float(model.dof_M0.sum()) * sought
+    couple = solve_couple(acceleration, wanted, 0.0, trial, REFINEMENTS)
+    if couple is None or abs(acceleration(couple) - wanted) <= MISSED * sought:
+        return couple
+    # the solver starts from the same accelerations at every trial, or its noise would look like a jump
+    start = data.qacc_warmstart.copy()
+
+    def repeatable(size: float) -> float:
+        data.qacc_warmstart[:] = start
+        return acceleration(size)
+
+    bracketed = bracket_couple(repeatable, wanted, trial, NOISE * sought)
+    return math.nan if bracketed is None else bracketed
+
+
+def bracket_couple(
+    acceleration: Callable[[float], float], wanted: float, trial: float, allowed: float
+) -> float | None:
+    """Solve for the couple under which an acceleration is the wanted one, and which was evaluated last.
+
+    The acceleration is continuous in the couple and need not be linear: dry friction, joint limits and clamped
+    actuators make it piecewise linear. None where no couple gives the acceleration to within `allowed`.
+    """
+    from scipy.optimize import brentq
+
+    def miss(couple: float) -> float:
+        return acceleration(couple) - wanted
+
+    sought = miss(0.0)
+    if sought == 0.0:
+        return 0.0
+    above = below = 0.0
+    for doubling in range(DOUBLINGS):
+        size = abs(trial) * 2.0**doubling
+        for nearer, farther in ((above, size), (below, -size)):
+            if miss(farther) * sought <= 0.0:
+                couple = float(brentq(miss, nearer, farther, xtol=abs(trial) * 1e-15))
+                left = abs(miss(couple))
+                return couple if left <= allowed else None
+        above, below = size, -size
+    return None

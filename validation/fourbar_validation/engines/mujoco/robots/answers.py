@@ -1,0 +1,210 @@
+"""What MuJoCo says of the loops of a robot, as plain data: read without MuJoCo."""
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from fourbar.quantities import PIN_FORCES
+from fourbar.scene import Scene
+from fourbar_validation.compare.answer import Array
+from fourbar_validation.engines.mujoco.robots.loop import PoseOptions
+
+QUANTITIES = ("torque", *PIN_FORCES)
+
+
+@dataclass(frozen=True, slots=True)
+class PinsAndTorque:
+    """Torque on bar 2, N m, and pin forces in the axes of the plane, (2,) each, N."""
+
+    torque: float
+    forces: dict[str, Array]
+
+    def values(self) -> dict[str, Any]:
+        """Return them under one set of names."""
+        return {"torque": self.torque, **self.forces}
+
+
+def measure_sizes(values: Any) -> Array:
+    """Return the sizes of numbers (n,) or of vectors (n, 2), (n,)."""
+    numbers = np.asarray(values, dtype=float)
+    return np.asarray(np.abs(numbers) if numbers.ndim == 1 else np.hypot(*numbers.T))
+
+
+@dataclass(frozen=True, slots=True)
+class InsideRow:
+    """One state of a loop in its robot."""
+
+    theta_2: float
+    omega_2: float
+    alpha_2: float
+    joint: float
+    """Position of the driven joint as the file counts it, rad."""
+    soft: PinsAndTorque
+    """As MuJoCo has them."""
+    rigid: PinsAndTorque
+    """As rigid pins would have them, at the closed state of the same theta_2, omega_2, alpha_2."""
+    gap: float
+    """Distance of the ends of the closure, m."""
+
+
+@dataclass(slots=True)
+class InsideAnswer:
+    """What MuJoCo says of a loop at some states of the whole robot."""
+
+    rows: list[InsideRow] = field(default_factory=list)
+    lost: str = ""
+    """Why the run ended early; empty where it did not."""
+    seconds_per_step: float = math.nan
+    """Processor time of a step of the whole robot, s."""
+
+    def errors(self) -> dict[str, Array]:
+        """Return the size of the error of the torque and of each pin force at each state, (n,), N m and N."""
+        sizes = {}
+        for name in QUANTITIES:
+            soft, rigid = (
+                np.array([getattr(row, which).values()[name] for row in self.rows])
+                for which in ("soft", "rigid")
+            )
+            sizes[name] = measure_sizes(soft - rigid)
+        return sizes
+
+    def scales(self) -> dict[str, float]:
+        """Return the largest torque and the largest of each pin force that rigid pins would have, N m and N."""
+        return {
+            name: float(
+                measure_sizes([row.rigid.values()[name] for row in self.rows]).max()
+            )
+            for name in QUANTITIES
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class TornState:
+    """State of the largest gap under a motor's torque."""
+
+    joint: float
+    """Position of the driven joint, rad."""
+    gap: float
+    """m; infinite where MuJoCo lost the motion."""
+    forces: dict[str, Array]
+
+
+@dataclass(frozen=True, slots=True)
+class RobotSettings:
+    """Settings of the closures of one loop and of the stepping of its robot, as MJCF calls them."""
+
+    solref: tuple[float, ...]
+    solimp: tuple[float, ...]
+    timestep: float
+    integrator: str
+    solver: str
+    iterations: int
+    tolerance: float
+
+    def list_changes(self, other: "RobotSettings") -> dict[str, str]:
+        """List the attributes in which this differs from another, as MJCF writes them."""
+        return {
+            name: _write(getattr(self, name))
+            for name in self.__slots__
+            if getattr(self, name) != getattr(other, name)
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class TriedSettings:
+    """Settings and what they reach in the robot's file."""
+
+    settings: RobotSettings
+    changes: dict[str, str]
+    """Attributes that differ from the file's."""
+    states: float
+    """Worst error of torque and pin forces at single states, of the largest of each; infinite without an answer."""
+    through_time: float
+    """The same at the states of a simulation."""
+    gap: float
+    """Largest gap of the simulation, m."""
+    seconds_per_step: float
+    """Processor time of a step of the whole robot, s."""
+
+    @property
+    def error(self) -> float:
+        """The greater of the two errors."""
+        return max(self.states, self.through_time)
+
+    @property
+    def cost(self) -> float:
+        """Processor time of a simulated second, s."""
+        return self.seconds_per_step / self.settings.timestep
+
+
+@dataclass(frozen=True, slots=True)
+class SettingsAdvice:
+    """What was found for one loop and one wanted error."""
+
+    wanted: float
+    before: TriedSettings
+    alone: tuple[TriedSettings, ...]
+    """Each setting changed by itself, the one that helps most first."""
+    best: TriedSettings
+    """Cheapest combination within the wanted error, or the most accurate one tried."""
+    reached: bool
+    tried: int
+    typed: tuple[str, ...]
+    """The best combination as elements of MJCF."""
+
+
+@dataclass(frozen=True, slots=True)
+class MeasureOptions:
+    """What is asked of the loops of a robot."""
+
+    pose: PoseOptions
+    loop: str | None = None
+    """Name of a closure; None: all four-bars."""
+    speed: float | None = None
+    """Speed of the driven bar, rad/s; None: that of the scene."""
+    torque: float | None = None
+    """Torque of the motor under which the loop may come apart, N m; None: it is not asked."""
+    error: float | None = None
+    """Error for which settings are looked for; None: none are."""
+
+
+@dataclass(frozen=True, slots=True)
+class LoopMeasurement:
+    """What MuJoCo says of one loop in its whole robot."""
+
+    name: str
+    joint: str
+    """Joint that is driven."""
+    scene: Scene
+    """Scene of the loop, in which the formulas are asked."""
+    turned: float
+    """Angle of the scene's axes in the plane of the loop, rad."""
+    remarks: tuple[str, ...]
+    settings: RobotSettings
+    held: int
+    """Number of degrees of freedom that are held."""
+    states: InsideAnswer
+    through_time: InsideAnswer | None
+    refusal: str
+    """Why it was not simulated; empty where it was."""
+    influence: float
+    """What holding the joints a tenth as firmly changes in torque and pin forces, of the largest of each."""
+    torn: tuple[TornState, ...]
+    advice: SettingsAdvice | None
+
+
+@dataclass(frozen=True, slots=True)
+class RobotMeasurement:
+    """What MuJoCo says of the loops of a robot's file."""
+
+    loops: tuple[LoopMeasurement, ...]
+    notes: tuple[str, ...]
+
+
+def _write(value: object) -> str:
+    """Write a value as MJCF does."""
+    if isinstance(value, tuple):
+        return " ".join(f"{number:.6g}" for number in value)
+    return value if isinstance(value, str) else f"{value:.6g}"

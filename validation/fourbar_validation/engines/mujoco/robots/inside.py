@@ -1,0 +1,438 @@
+"""A four-bar inside somebody's whole robot: the torque and the pin forces that MuJoCo gives it there.
+
+No joint is removed, for that would change the softness that is measured: MuJoCo sizes a constraint's softness by the
+bodies of the whole model. The loop's driven hinge moves as commanded, the other joints of the robot stay where they
+are, contacts, joint limits and actuators are off.
+
+At a state the joint forces follow from MuJoCo's own inverse dynamics of its soft constraints. The driven hinge has the
+acceleration alpha, a held joint none, and the accelerations x of the loop's other hinges are those at which
+
+    (M a(x) + c - J^T f(a(x)))_i = 0    at each of these hinges i,
+
+since nothing acts there. The forces that hold the joints are then known, and the couple on the driven hinge is found
+by `mj_forward`, with the solver of the file.
+
+Were the pins rigid, J a = -(dJ/dt) v would hold, with multipliers in the place of f, and dry friction in full: that
+couple and these pin forces are what MuJoCo's are compared with, in the same model.
+"""
+
+import math
+import time
+from collections.abc import Iterable, Sequence
+from copy import copy
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from fourbar.errors import LimitError
+from fourbar_validation.compare.answer import Array
+from fourbar_validation.engines.mujoco.couple import find_couple
+from fourbar_validation.engines.mujoco.robots.ancestry import climb, find_tied_bodies
+from fourbar_validation.engines.mujoco.robots.answers import (
+    InsideAnswer,
+    InsideRow,
+    PinsAndTorque,
+    TornState,
+)
+from fourbar_validation.engines.mujoco.robots.loop import PAIRS, RobotLoop
+from fourbar_validation.engines.mujoco.runner import Stepper
+
+CLOSED = 1e-12
+"""m or rad; residual of the closure at which a state is closed."""
+CLOSING_STEPS = 50
+OPEN = 1e-6
+"""m or rad; a residual that is left above this is a position at which the loop does not close."""
+STRIDE = math.radians(2.0)
+"""Largest turn of the driven hinge from one closed state to the next, so that the assembly is kept."""
+SOLVE_STEPS = 60
+"""Newton steps for the hinges' accelerations; without friction one is enough."""
+BALANCED = 1e-10
+"""Part of the generalized forces that may be left on a hinge on which nothing acts."""
+HEAVY = 1e4
+"""Armature that holds a joint while the model is stepped, over the largest inertia of the robot. It lets the joints
+move by about its inverse; beyond 1e5 MuJoCo's solver loses the light bars beside it: at 1e6 the gap was three times
+too large."""
+LIMIT = int(mujoco.mjtDisableBit.mjDSBL_LIMIT)
+MOST_STEPS = 60_000
+"""Steps of one run; at 0.1 ms a step of a humanoid these are six seconds."""
+FORCE_OF_PIN = {"O2": "F12", "A": "F32", "B": "F43", "O4": "F14"}
+"""Names of the pin forces. F_ij is the force of bar i on bar j."""
+FORCE_ON = {"F12": 2, "F32": 2, "F43": 3, "F14": 4}
+"""The bar that each force acts on."""
+WARNINGS = (
+    mujoco.mjtWarning.mjWARN_BADQPOS,
+    mujoco.mjtWarning.mjWARN_BADQVEL,
+    mujoco.mjtWarning.mjWARN_BADQACC,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class RobotState:
+    """Closed state of a robot."""
+
+    qpos: Array
+    qvel: Array
+    theta_2: float
+
+
+class LoopInside:
+    """A loop of a robot whose driven hinge moves while every other joint of the robot is held."""
+
+    def __init__(self, model: mujoco.MjModel, loop: RobotLoop) -> None:
+        self.loop, self.model = loop, copy(model)
+        self.flags = int(model.opt.disableflags)
+        for name in ("CONTACT", "LIMIT", "ACTUATION"):
+            flag = int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{name}"))
+            self.model.opt.disableflags |= flag
+        self.data = mujoco.MjData(self.model)
+        dofs = {pin: int(model.jnt_dofadr[j]) for pin, j in loop.hinges.items()}
+        self.drive = dofs["O2"]
+        self.passive = [dof for pin, dof in dofs.items() if pin != "O2"]
+        free = {self.drive, *self.passive}
+        self.held = [dof for dof in range(model.nv) if dof not in free]
+        self.sense = loop.senses["O2"]
+        self.address = int(model.jnt_qposadr[loop.joint])
+        # the closure alone, for kinematics: with every row, and a dense derivative
+        self.closure = _copy_for_closures(self.model, loop.closures)
+        self.closing = mujoco.MjData(self.closure)
+        self._last = loop.qpos.copy()
+        rubs = not self.model.opt.disableflags & int(
+            mujoco.mjtDisableBit.mjDSBL_FRICTIONLOSS
+        )
+        self._friction = self.model.dof_frictionloss * rubs
+
+    def angle(self, qpos: Array) -> float:
+        """Return theta_2 of a pose, rad."""
+        turned = qpos[self.address] - self.loop.qpos[self.address]
+        return float(self.loop.angles[1] + self.sense * turned)
+
+    def position(self, theta_2: float) -> float:
+        """Return the position of the driven joint at an angle of bar 2, rad."""
+        turned = theta_2 - self.loop.angles[1]
+        return float(self.loop.qpos[self.address] + self.sense * turned)
+
+    def close(self, theta_2: float) -> Array | None:
+        """Return the pose at an angle of bar 2, reached from the last one in small strides; None where it is open."""
+        start = self.angle(self._last)
+        strides = max(math.ceil(abs(theta_2 - start) / STRIDE), 1)
+        qpos = self._last.copy()
+        for angle in np.linspace(start, theta_2, strides + 1)[1:]:
+            qpos[self.address] = self.position(float(angle))
+            if not self._close_gap(qpos):
+                return None
+        self._last = qpos.copy()
+        return qpos
+
+    def _close_gap(self, qpos: Array) -> bool:
+        """Move the hinges that are not driven until the closure's residual is least; tell whether it is closed."""
+        size = math.inf
+        for _ in range(CLOSING_STEPS):
+            residual, jacobian = self._evaluate_closure(qpos)
+            if np.abs(residual).max() <= CLOSED or np.abs(residual).max() >= size:
+                break
+            size = float(np.abs(residual).max())
+            step = np.linalg.lstsq(jacobian[:, self.passive], -residual, rcond=1e-9)[0]
+            for dof, part in zip(self.passive, step, strict=True):
+                joint = int(self.model.dof_jntid[dof])
+                qpos[self.model.jnt_qposadr[joint]] += part
+        return bool(np.abs(residual).max() <= max(OPEN, self._skew()))
+
+    def _skew(self) -> float:
+        """Return what axes that are not parallel leave of the gap, m."""
+        return self.loop.misaligned * max(self.loop.lengths)
+
+    def _evaluate_closure(self, qpos: Array) -> tuple[Array, Array]:
+        """Return the residual of the closure and its derivative, (m,) and (m, nv)."""
+        data = self.closing
+        data.qpos[:] = qpos
+        mujoco.mj_fwdPosition(self.closure, data)
+        jacobian = data.efc_J.reshape(-1, self.closure.nv)[: data.nefc]
+        return data.efc_pos[: data.nefc].copy(), jacobian.copy()
+
+    def state(self, theta_2: float, omega_2: float) -> RobotState | None:
+        """Return the closed state at an angle and a speed of bar 2; None where the loop does not close."""
+        qpos = self.close(theta_2)
+        if qpos is None:
+            return None
+        _, jacobian = self._evaluate_closure(qpos)
+        qvel = np.zeros(self.model.nv)
+        qvel[self.drive] = self.sense * omega_2
+        due = -jacobian[:, self.drive] * qvel[self.drive]
+        qvel[self.passive] = np.linalg.lstsq(
+            jacobian[:, self.passive], due, rcond=1e-9
+        )[0]
+        return RobotState(qpos, qvel, theta_2)
+
+    def ask(self, qpos: Array, qvel: Array, alpha_2: float) -> InsideRow:
+        """Evaluate a state in which bar 2 accelerates at alpha_2, and solve for the couple on it.
+
+        Raises
+        ------
+        LimitError : the loop does not close at its theta_2, or no couple moves it.
+        """
+        model, data = self.model, self.data
+        qpos, qvel = qpos.copy(), qvel.copy()
+        theta_2, omega_2 = self.angle(qpos), float(self.sense * qvel[self.drive])
+        closed = self.state(theta_2, omega_2)
+        if closed is None:
+            raise LimitError(f"the loop does not close at theta_2 = {theta_2:.6g} rad")
+        rigid, accelerations = self._solve_rigid(closed, alpha_2)
+        mujoco.mj_resetData(model, data)
+        data.qpos[:], data.qvel[:] = qpos, qvel
+        held = self._balance(accelerations)[self.held]
+        mujoco.mj_resetData(model, data)
+        data.qpos[:], data.qvel[:] = qpos, qvel
+        data.qfrc_applied[self.held] = held
+
+        def acceleration(couple: float) -> float:
+            data.qfrc_applied[self.drive] = self.sense * couple
+            mujoco.mj_forward(model, data)
+            return float(self.sense * data.qacc[self.drive])
+
+        couple = find_couple(model, data, acceleration, alpha_2)
+        if couple is None:
+            raise LimitError(f"a couple on {self.name} does not move it in this robot")
+        mujoco.mj_rnePostConstraint(model, data)
+        soft = PinsAndTorque(couple, self._read_forces(data))
+        gap = self._measure_gap(qpos)
+        joint = float(qpos[self.address])
+        return InsideRow(theta_2, omega_2, alpha_2, joint, soft, rigid, gap)
+
+    def _measure_gap(self, qpos: Array) -> float:
+        """Measure the distance of the ends of the closure, m."""
+        residual, _ = self._evaluate_closure(qpos)
+        return float(np.linalg.norm(residual[:3]))
+
+    @property
+    def name(self) -> str:
+        """Name of the driven joint."""
+        return self.model.joint(self.loop.joint).name or f"joint {self.loop.joint}"
+
+    def _solve_rigid(
+        self, state: RobotState, alpha_2: float
+    ) -> tuple[PinsAndTorque, Array]:
+        """Solve for torque and pin forces with rigid pins at a closed state; return all accelerations too, (nv,)."""
+        model, data = self.closure, self.closing
+        data.qpos[:], data.qvel[:] = state.qpos, state.qvel
+        mujoco.mj_forward(model, data)
+        rows = data.efc_J.reshape(-1, model.nv)[: data.nefc]
+        # MuJoCo's reference is -(dJ/dt) v - B (J v) - K I r
+        damper, spring = data.efc_KBIP[: data.nefc, 1], data.efc_KBIP[: data.nefc, 0]
+        spring = spring * data.efc_KBIP[: data.nefc, 2]
+        drift = data.efc_aref[: data.nefc] + damper * (rows @ state.qvel)
+        drift = drift + spring * data.efc_pos[: data.nefc]
+        accelerations = np.zeros(model.nv)
+        accelerations[self.drive] = self.sense * alpha_2
+        due = drift - rows[:, self.drive] * accelerations[self.drive]
+        free = rows[:, self.passive]
+        accelerations[self.passive] = np.linalg.lstsq(free, due, rcond=1e-9)[0]
+        needed = np.zeros(model.nv)
+        mujoco.mj_mulM(model, data, needed, accelerations)
+        needed += data.qfrc_bias - data.qfrc_passive
+        needed += self._friction * np.sign(state.qvel)
+        multipliers = np.linalg.lstsq(free.T, needed[self.passive], rcond=1e-9)[0]
+        couple = needed[self.drive] - rows[:, self.drive] @ multipliers
+        data.qacc[:], data.efc_force[: data.nefc] = accelerations, multipliers
+        mujoco.mj_rnePostConstraint(model, data)
+        forces = self._read_forces(data)
+        return PinsAndTorque(float(self.sense * couple), forces), accelerations
+
+    def _balance(self, start: Array) -> Array:
+        """Return the joint forces under which the hinges that are not driven are left to themselves, (nv,)."""
+        model, data = self.model, self.data
+        accelerations = start.copy()
+
+        def forces(at: Array) -> Array:
+            data.qacc[:] = at
+            mujoco.mj_inverse(model, data)
+            return np.array(data.qfrc_inverse)
+
+        passive = self.passive
+        left = forces(accelerations)
+        for _ in range(SOLVE_STEPS):
+            inertial = np.abs(data.qfrc_bias[passive]) + np.abs(
+                data.qfrc_constraint[passive]
+            )
+            if np.all(np.abs(left[passive]) <= BALANCED * (inertial.max() or 1.0)):
+                break
+            slopes = np.empty((len(passive), len(passive)))
+            size = max(float(np.abs(accelerations[passive]).max()), 1.0)
+            for column, dof in enumerate(passive):
+                moved = accelerations.copy()
+                moved[dof] += size
+                slopes[:, column] = (forces(moved) - left)[passive] / size
+            step = np.linalg.lstsq(slopes, -left[passive], rcond=None)[0]
+            part, before = 1.0, np.abs(left[passive]).max()
+            while True:
+                moved = accelerations.copy()
+                moved[passive] += part * step
+                trial = forces(moved)
+                if np.abs(trial[passive]).max() < before or part < 1e-6:
+                    break
+                part *= 0.5
+            if np.abs(trial[passive]).max() >= before:
+                break
+            accelerations, left = moved, trial
+        forces(accelerations)
+        return np.asarray(left)
+
+    def _read_forces(self, data: mujoco.MjData) -> dict[str, Array]:
+        """Read the pin forces of a state that was evaluated, in the axes of the plane, (2,) each, N."""
+        ground = data.xmat[self.loop.bodies[1][0]].reshape(3, 3)
+        axes = np.array(
+            [
+                ground @ self.loop.along,
+                ground @ np.cross(self.loop.axis, self.loop.along),
+            ]
+        )
+        forces = {}
+        for pin, name in FORCE_OF_PIN.items():
+            joint = self.loop.hinges.get(pin)
+            if joint is None:
+                force, bar = self._read_closure(data, pin)
+            else:
+                body = int(self.model.jnt_bodyid[joint])
+                force, bar = data.cfrc_int[body, 3:], self._find_bar(body, pin)
+            sign = 1.0 if bar == FORCE_ON[name] else -1.0
+            forces[name] = sign * (axes @ force)
+        return forces
+
+    def _read_closure(self, data: mujoco.MjData, pin: str) -> tuple[Array, int]:
+        """Sum the forces of the equalities at the cut pin; return the sum and the bar that it acts on."""
+        total = np.zeros(3)
+        bars = []
+        for equality in self.loop.closures:
+            rows = np.flatnonzero(
+                (data.efc_type[: data.nefc] == mujoco.mjtConstraint.mjCNSTR_EQUALITY)
+                & (data.efc_id[: data.nefc] == equality)
+            )[:3]
+            bars.append(self._find_bar(find_tied_bodies(self.model, equality)[0], pin))
+            sign = 1.0 if bars[-1] == bars[0] else -1.0
+            total += sign * data.efc_force[rows]
+        return total, bars[0]
+
+    def _find_bar(self, body: int, pin: str) -> int:
+        """Return which of the two bars of a pin a body belongs to."""
+        for above in climb(self.model, body):
+            for bar in PAIRS[pin]:
+                if above in self.loop.bodies[bar] and bar != 1:
+                    return bar
+        return 1
+
+    def answer_states(
+        self, theta_2: Sequence[float], omega_2: float, alpha_2: float
+    ) -> InsideAnswer:
+        """Answer at closed states, each by itself."""
+        answer = InsideAnswer()
+        for angle in theta_2:
+            state = self.state(angle, omega_2)
+            if state is not None:
+                answer.rows.append(self.ask(state.qpos, state.qvel, alpha_2))
+        return answer
+
+    def answer_through_time(
+        self,
+        theta_2: Sequence[float],
+        omega_2: float,
+        alpha_2: float,
+        heavy: float = HEAVY,
+    ) -> InsideAnswer:
+        """Step the whole robot through the angles, at the file's own timestep, integrator and solver.
+
+        Each joint that is held, and the driven one, gets an armature of `heavy` times the robot's largest inertia.
+        """
+        answer = InsideAnswer()
+        angles = sorted(theta_2, reverse=omega_2 < 0.0)
+        model, data = copy(self.model), mujoco.MjData(self.model)
+        timestep = float(model.opt.timestep)
+        armature = heavy * float(model.dof_M0.max())
+        moved = [self.drive, *self.held]
+        model.dof_armature[moved] += armature
+        state = self.state(angles[0], omega_2)
+        if state is None:
+            raise LimitError("the loop does not close where the motion starts")
+        data.qpos[:], data.qvel[:] = state.qpos, state.qvel
+        data.qfrc_applied[self.drive] = armature * self.sense * alpha_2
+        stepper = Stepper(model, data, timestep)
+        instants = [
+            _find_instant(angles[0], angle, omega_2, alpha_2) for angle in angles
+        ]
+        if not 1.0 <= instants[-1] / timestep <= MOST_STEPS:
+            raise LimitError(
+                f"its timestep of {timestep:g} s makes {instants[-1] / timestep:.3g} steps of the motion; "
+                f"must be 1 to {MOST_STEPS}"
+            )
+        spent = 0.0
+        # the loop starts exactly closed: only after the first step has it begun to yield
+        for instant in instants[1:]:
+            began = time.process_time()
+            stepper.to(instant)
+            spent += time.process_time() - began
+            mujoco.mj_forward(model, data)
+            if stepper.lost() or any(data.warning[kind].number for kind in WARNINGS):
+                answer.lost = "MuJoCo lost the motion: a value not finite, or too large"
+                break
+            made = float(self.sense * data.qacc[self.drive])
+            answer.rows.append(self.ask(data.qpos, data.qvel, made))
+        answer.seconds_per_step = spent / max(stepper.done, 1)
+        return answer
+
+    def answer_under_torque(
+        self, theta_2: Iterable[float], torque: float, seconds: float
+    ) -> list[TornState]:
+        """From rest at each angle let a motor's torque act for some time, the other joints held.
+
+        A state is the one of the largest gap on the way from each angle; of a motion that MuJoCo loses there is none.
+        """
+        states = []
+        model, data = copy(self.model), mujoco.MjData(self.model)
+        model.dof_armature[self.held] += HEAVY * float(model.dof_M0.max())
+        model.opt.disableflags &= ~(
+            LIMIT & ~self.flags
+        )  # the motor may meet the stops of the file
+        steps = max(round(seconds / model.opt.timestep), 1)
+        for angle in theta_2:
+            state = self.state(angle, 0.0)
+            if state is None:
+                continue
+            mujoco.mj_resetData(model, data)
+            data.qpos[:] = state.qpos
+            worst: TornState | None = None
+            for _ in range(steps):
+                data.qfrc_applied[self.drive] = self.sense * torque
+                mujoco.mj_step(model, data)
+                mujoco.mj_forward(model, data)
+                mujoco.mj_rnePostConstraint(model, data)
+                if any(data.warning[kind].number for kind in WARNINGS):
+                    worst = TornState(float(state.qpos[self.address]), math.inf, {})
+                    break
+                gap = self._measure_gap(data.qpos)
+                if worst is None or gap > worst.gap:
+                    joint = float(data.qpos[self.address])
+                    worst = TornState(joint, gap, self._read_forces(data))
+            assert worst is not None
+            states.append(worst)
+        return states
+
+
+def _find_instant(start: float, angle: float, omega: float, alpha: float) -> float:
+    """Return the time at which a motion passes an angle, s; LimitError where it comes to rest before."""
+    turned = angle - start
+    squared = omega**2 + 2.0 * alpha * turned
+    if squared <= 0.0:
+        raise LimitError(f"alpha_2 brings the input to rest before {angle:.6g} rad")
+    return 2.0 * turned / (omega + math.copysign(math.sqrt(squared), omega))
+
+
+def _copy_for_closures(
+    model: mujoco.MjModel, closures: Sequence[int]
+) -> mujoco.MjModel:
+    """Copy a model so that a loop's closures are its only constraints, with a dense derivative."""
+    alone = copy(model)
+    alone.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
+    for name in ("CONTACT", "LIMIT", "FRICTIONLOSS", "ISLAND"):
+        alone.opt.disableflags |= int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{name}"))
+    for number in range(alone.neq):
+        alone.eq_active0[number] = number in closures
+    return alone

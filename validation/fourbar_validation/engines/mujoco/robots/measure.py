@@ -1,0 +1,163 @@
+"""Torque, pin forces and gap of the loops of a robot's file: what `check-mjcf` and `advise` ask of MuJoCo."""
+
+import math
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+
+from fourbar.errors import InputError, LimitError
+from fourbar.scene import Scene, command
+from fourbar_validation.engines.mujoco.robots.answers import (
+    InsideAnswer,
+    LoopMeasurement,
+    MeasureOptions,
+    RobotMeasurement,
+    TornState,
+)
+from fourbar_validation.engines.mujoco.robots.closures import (
+    choose_loop,
+    find_closures,
+)
+from fourbar_validation.engines.mujoco.robots.compiled import compile_robot
+from fourbar_validation.engines.mujoco.robots.inside import HEAVY, LoopInside
+from fourbar_validation.engines.mujoco.robots.loop import RobotFile, RobotLoop
+from fourbar_validation.engines.mujoco.robots.pose import pose_robot
+from fourbar_validation.engines.mujoco.robots.scene import make_scene
+from fourbar_validation.engines.mujoco.robots.settings import (
+    SettingsSearch,
+    read_settings,
+)
+from fourbar_validation.engines.mujoco.robots.sweep import LoopMotion
+from fourbar_validation.engines.mujoco.theirs import collect_warnings
+
+POSITIONS = 37
+"""Positions at which a loop is looked at."""
+TORN_POSITIONS = 5
+"""Positions from which a motor's torque acts."""
+CONSTANTS = 10.0
+"""Time constants of the closure during which it acts: the loop has then yielded as far as it does."""
+LIGHTER = 0.1
+"""Factor on what holds the other joints, to see what it matters."""
+FIRST_CONSTANT = 0.02
+"""s, time constant where the file states a stiffness in its place."""
+
+
+def measure_loops(
+    file: RobotFile, options: MeasureOptions, scene: Scene | None
+) -> RobotMeasurement:
+    """Measure the loops of a robot.
+
+    Parameters
+    ----------
+    scene : of the loop; None: it is made from the file.
+
+    Raises
+    ------
+    InputError : there is no four-bar of that name, or none at all.
+    """
+    with collect_warnings() as warnings:
+        compiled = compile_robot(file)
+        posed = pose_robot(compiled.model, options.pose)
+        closures = find_closures(posed, options.pose)
+        if options.loop is not None:
+            loops = [choose_loop(closures, options.loop)]
+        else:
+            loops = [one.loop for one in closures if one.loop is not None]
+        if not loops:
+            reasons = "; ".join(f"{one.name}: {one.reason}" for one in closures)
+            raise InputError("MJCF", reasons or None, "has no planar four-bar")
+        measured = []
+        for loop in loops:
+            made = make_scene(compiled, posed, loop, options.speed, loop.name)
+            stated = made.scene if scene is None else scene
+            remarks = made.remarks if scene is None else loop.remarks
+            measurement = _measure_loop(posed.model, loop, stated, options, file)
+            measured.append(replace(measurement, remarks=(*remarks,)))
+    notes = [*compiled.notes, *posed.notes]
+    notes += [f"MuJoCo warns: {warning}" for warning in warnings]
+    return RobotMeasurement(tuple(measured), tuple(notes))
+
+
+def _measure_loop(
+    model: mujoco.MjModel,
+    loop: RobotLoop,
+    scene: Scene,
+    options: MeasureOptions,
+    file: RobotFile,
+) -> LoopMeasurement:
+    if options.speed is not None:
+        scene = replace(scene, motion=scene.motion.replace(speed=options.speed))
+    inside = LoopInside(model, loop)
+    turned = _find_turn(scene, loop)
+    motion = _choose_motion(scene, turned).thin_out(POSITIONS)
+    states = inside.answer_states(*motion)
+    if not states.rows:
+        raise LimitError(f"{loop.name} closes at none of the positions of the scene")
+    closing = motion._replace(theta_2=tuple(row.theta_2 for row in states.rows))
+    through: InsideAnswer | None = None
+    refusal, influence = "", math.nan
+    try:
+        if motion.omega_2 == 0.0 or len(closing.theta_2) < 2:
+            raise LimitError("nothing moves: a sweep at a speed is needed")
+        through = inside.answer_through_time(*closing)
+        lighter = inside.answer_through_time(*closing, HEAVY * LIGHTER)
+        influence = _compare(through, lighter)
+    except LimitError as error:
+        refusal = str(error)
+    torn: tuple[TornState, ...] = ()
+    if options.torque is not None:
+        constant = float(model.eq_solref[loop.equality, 0])
+        seconds = CONSTANTS * (constant if constant > 0.0 else FIRST_CONSTANT)
+        starts = closing.thin_out(TORN_POSITIONS).theta_2
+        torn = tuple(inside.answer_under_torque(starts, options.torque, seconds))
+    advice = None
+    if options.error is not None:
+        search = SettingsSearch(model, loop, closing)
+        advice = search.advise(options.error, file)
+    return LoopMeasurement(
+        loop.name,
+        inside.name,
+        scene,
+        turned,
+        (),
+        read_settings(model, loop),
+        len(inside.held),
+        states,
+        through,
+        refusal,
+        influence,
+        torn,
+        advice,
+    )
+
+
+def _find_turn(scene: Scene, loop: RobotLoop) -> float:
+    """Return the angle from a scene's axes to those of the loop's plane, by whole turns near the pose, rad."""
+    turned = loop.angles[0] - scene.linkage.ground_angle
+    middle = float(np.mean(command(scene).theta_2)) + turned
+    return turned - math.tau * round((middle - loop.angles[1]) / math.tau)
+
+
+def _choose_motion(scene: Scene, turned: float) -> LoopMotion:
+    """Return the motion of a scene in the plane of the loop."""
+    commanded = command(scene)
+    speed = float(np.max(commanded.omega_2 or 0.0))
+    acceleration = float(np.max(commanded.alpha_2))
+    angles = np.unique(commanded.theta_2) + turned
+    return LoopMotion(tuple(angles.tolist()), speed, acceleration)
+
+
+def _compare(one: InsideAnswer, other: InsideAnswer) -> float:
+    """Return the largest difference of two answers at the same angles, of the largest of each quantity."""
+    scales, worst = one.scales(), 0.0
+    if one.lost or other.lost:
+        return math.inf
+    for name, scale in scales.items():
+        first, second = (
+            np.array([row.soft.values()[name] for row in answer.rows])
+            for answer in (one, other)
+        )
+        if scale:
+            worst = max(worst, float(np.abs(first - second).max()) / scale)
+    return worst

@@ -1,0 +1,239 @@
+"""What to type into a robot's file: each setting of a loop's softness and of the stepping, measured in the file itself.
+
+A setting is changed alone first. Then combinations are tried, those that cost least time first, until one keeps the
+torque and the pin forces within the wanted error.
+"""
+
+import math
+import time
+from collections.abc import Iterator, Sequence
+from copy import copy
+from dataclasses import replace
+from itertools import product
+from typing import Any
+from xml.etree import ElementTree as ET
+
+import mujoco
+import numpy as np
+
+from fourbar.errors import LimitError
+from fourbar_validation.engines.mujoco.robots.answers import (
+    InsideAnswer,
+    RobotSettings,
+    SettingsAdvice,
+    TriedSettings,
+)
+from fourbar_validation.engines.mujoco.robots.inside import LoopInside
+from fourbar_validation.engines.mujoco.robots.loop import RobotFile, RobotLoop
+from fourbar_validation.engines.mujoco.robots.sweep import LoopMotion
+
+SECONDS = 75.0
+"""Seconds of processor time in which combinations are tried; with the rest the command stays within two minutes."""
+POSITIONS = 9
+"""Positions of a trial."""
+STIFF = (0.9999, 0.9999, 0.001, 0.5, 2.0)
+"""The stiffest impedance: MuJoCo clamps it there."""
+FASTER = (0.5, 0.2, 0.1, 0.05)
+"""Factors on the closure's time constant."""
+FEWEST = 2.0
+"""Timesteps of the time constant, below which MuJoCo keeps it."""
+FINER = (0.5, 0.2, 0.1)
+"""Factors on the timestep."""
+INTEGRATORS = ("Euler", "implicit", "implicitfast", "RK4")
+EVALUATIONS = {"RK4": 4.0}
+"""Evaluations of a step, for the order in which combinations are tried; the others have one."""
+SOLVER = ("Newton", 100, 1e-10)
+"""Solver, iterations and tolerance at which the solver leaves nothing."""
+FIRST_CONSTANT = 0.02
+"""s; MuJoCo's own time constant, tried where the file states a stiffness in its place."""
+
+
+def read_settings(model: mujoco.MjModel, loop: RobotLoop) -> RobotSettings:
+    """Read the settings of a compiled model."""
+    option = model.opt
+    return RobotSettings(
+        tuple(model.eq_solref[loop.equality].tolist()),
+        tuple(model.eq_solimp[loop.equality].tolist()),
+        float(option.timestep),
+        _name(mujoco.mjtIntegrator, option.integrator, INTEGRATORS),
+        _name(mujoco.mjtSolver, option.solver, ("Newton", "CG", "PGS")),
+        int(option.iterations),
+        float(option.tolerance),
+    )
+
+
+def _name(kinds: type, value: int, words: Sequence[str]) -> str:
+    """Return the word of MJCF for a value of an enumeration."""
+    name = kinds(value).name.partition("_")[2]
+    return next(word for word in words if word.upper() == name)
+
+
+def set_settings(
+    model: mujoco.MjModel, loop: RobotLoop, settings: RobotSettings
+) -> mujoco.MjModel:
+    """Return a copy of a compiled model with other settings; all closures of the loop get the same."""
+    changed = copy(model)
+    for equality in loop.closures:
+        changed.eq_solref[equality] = settings.solref
+        changed.eq_solimp[equality] = settings.solimp
+    option = changed.opt
+    option.timestep = settings.timestep
+    integrators, solvers = mujoco.mjtIntegrator, mujoco.mjtSolver
+    option.integrator = int(
+        getattr(integrators, f"mjINT_{settings.integrator.upper()}")
+    )
+    option.solver = int(getattr(solvers, f"mjSOL_{settings.solver.upper()}"))
+    option.iterations, option.tolerance = settings.iterations, settings.tolerance
+    return changed
+
+
+class SettingsSearch:
+    """Settings tried on one loop of a robot, for one motion."""
+
+    def __init__(
+        self, model: mujoco.MjModel, loop: RobotLoop, motion: LoopMotion
+    ) -> None:
+        self.model, self.loop = model, loop
+        self.motion = motion.thin_out(POSITIONS)
+        self.own = read_settings(model, loop)
+        self.tried: dict[RobotSettings, TriedSettings] = {}
+        self.end = time.process_time() + SECONDS
+
+    def advise(self, wanted: float, file: RobotFile) -> SettingsAdvice:
+        """Find the cheapest combination within an error."""
+        before = self.measure(self.own)
+        alone = sorted(map(self.measure, self._list_alone()), key=lambda one: one.error)
+        best, reached = self._find_cheapest(wanted)
+        typed = write_elements(file, self.loop, best)
+        return SettingsAdvice(
+            wanted, before, tuple(alone), best, reached, len(self.tried), typed
+        )
+
+    def measure(self, settings: RobotSettings) -> TriedSettings:
+        """Measure what settings reach."""
+        if settings in self.tried:
+            return self.tried[settings]
+        inside = LoopInside(set_settings(self.model, self.loop, settings), self.loop)
+        motion = self.motion
+        states = through = gap = seconds = math.inf
+        try:
+            states = _find_worst(inside.answer_states(*motion))
+            answer = inside.answer_through_time(*motion)
+            through, seconds = _find_worst(answer), answer.seconds_per_step
+            gap = max((row.gap for row in answer.rows), default=math.inf)
+        except LimitError:
+            pass  # too many steps, or a loop that the settings tear
+        changes = settings.list_changes(self.own)
+        measured = TriedSettings(settings, changes, states, through, gap, seconds)
+        self.tried[settings] = measured
+        return measured
+
+    def _list_alone(self) -> Iterator[RobotSettings]:
+        """List each setting changed by itself."""
+        own = self.own
+        for name, values in self._list_values().items():
+            for value in values[1:]:
+                yield replace(own, **{name: value})
+        solver, iterations, tolerance = SOLVER
+        if own.solver != solver:
+            yield replace(own, solver=solver)
+        if own.iterations < iterations:
+            yield replace(own, iterations=iterations)
+        if own.tolerance > tolerance:
+            yield replace(own, tolerance=tolerance)
+
+    def _list_values(self) -> dict[str, list[Any]]:
+        """List the values of each setting that combinations are made of, the file's own first."""
+        own = self.own
+        constant = own.solref[0] if own.solref[0] > 0.0 else FIRST_CONSTANT
+        ratio = own.solref[1] if own.solref[0] > 0.0 else 1.0
+        shortest = FEWEST * own.timestep
+        constants = {max(factor * constant, shortest) for factor in FASTER}
+        faster = sorted((one for one in constants if one < constant), reverse=True)
+        return {
+            "solimp": [own.solimp, *([STIFF] if own.solimp != STIFF else [])],
+            "solref": [own.solref, *((one, ratio) for one in faster)],
+            "integrator": [
+                own.integrator,
+                *(name for name in INTEGRATORS if name != own.integrator),
+            ],
+            "timestep": [own.timestep, *(factor * own.timestep for factor in FINER)],
+        }
+
+    def _find_cheapest(self, wanted: float) -> tuple[TriedSettings, bool]:
+        """Try combinations in the order of their cost and the number of changes, until one serves."""
+        values = self._list_values()
+        solvers: list[dict[str, Any]] = [{}]
+        name, iterations, tolerance = SOLVER
+        solved: dict[str, Any] = {
+            "solver": name,
+            "iterations": iterations,
+            "tolerance": tolerance,
+        }
+        tight = self.measure(replace(self.own, **solved))
+        if tight.error < 0.9 * self.measure(self.own).error:
+            solvers.append(solved)
+        combinations = [
+            replace(self.own, **dict(zip(values, chosen, strict=True)), **solver)
+            for *chosen, solver in product(*values.values(), solvers)
+        ]
+        combinations.sort(key=self._rank)
+        for settings in combinations:
+            if time.process_time() > self.end:
+                break
+            measured = self.measure(settings)
+            if measured.error <= wanted:
+                return measured, True
+        return min(self.tried.values(), key=lambda one: one.error), False
+
+    def _rank(self, settings: RobotSettings) -> tuple[float, int, float]:
+        """Return the order of combinations: evaluations of a simulated second, changes, stiffness."""
+        evaluations = EVALUATIONS.get(settings.integrator, 1.0) / settings.timestep
+        changes = settings.list_changes(self.own)
+        return evaluations, len(changes), -settings.solref[0]
+
+
+def _find_worst(answer: InsideAnswer) -> float:
+    """Return the worst error of torque and pin forces over the largest of each; infinite without an answer."""
+    if answer.lost or not answer.rows:
+        return math.inf
+    scales = answer.scales()
+    worst = 0.0
+    for name, errors in answer.errors().items():
+        largest = float(np.max(errors))
+        if not math.isfinite(largest):
+            return math.inf
+        if scales[name]:
+            worst = max(worst, largest / scales[name])
+    return worst
+
+
+def write_elements(
+    file: RobotFile, loop: RobotLoop, tried: TriedSettings
+) -> tuple[str, ...]:
+    """Write the elements of the file that are to be changed, as they are to stand there."""
+    written = []
+    option = {
+        name: value
+        for name, value in tried.changes.items()
+        if name not in ("solref", "solimp")
+    }
+    if option:
+        written.append(ET.tostring(ET.Element("option", option), encoding="unicode"))
+    closure = {
+        name: value
+        for name, value in tried.changes.items()
+        if name in ("solref", "solimp")
+    }
+    if closure:
+        root = ET.fromstring(file.text)
+        equalities = [
+            element for section in root.iter("equality") for element in section
+        ]
+        equalities = [one for one in equalities if one.tag != "equality"]
+        for number in loop.closures:
+            element = ET.Element(
+                equalities[number].tag, {**equalities[number].attrib, **closure}
+            )
+            written.append(ET.tostring(element, encoding="unicode"))
+    return tuple(written)
