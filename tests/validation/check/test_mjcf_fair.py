@@ -21,7 +21,6 @@ from fourbar.solve import solve
 from fourbar_validation.check.differences import find_differences
 from fourbar_validation.check.mjcf import ModelReport, examine_model
 from fourbar_validation.compare.answer import Answer
-from fourbar_validation.engines.mujoco.couple import bracket_couple
 from fourbar_validation.engines.mujoco.theirs import (
     ONE_STATE,
     THROUGH_TIME,
@@ -267,15 +266,6 @@ def test_the_cause_that_explains_the_error_stands_first(
         c.row.error for c in report.costs if c.row.quantity in ("torque", "F12", "F43")
     )
     assert cost is not None and cost > 0.1 * worst
-
-
-def test_a_couple_that_nothing_gives_is_none() -> None:
-    """A clamped drive reaches 2 rad/s^2, a ratchet jumps over 5."""
-    assert bracket_couple(lambda couple: min(couple, 2.0), 3.0, 1.0, 1e-3) is None
-    assert bracket_couple(lambda couple: 10.0 * (couple > 4.0), 5.0, 1.0, 1e-3) is None
-    for wanted in (-7.0, 0.0, 1.5):
-        couple = bracket_couple(lambda couple: min(couple, 2.0), wanted, 1e-3, 1e-9)
-        assert couple == pytest.approx(wanted, abs=1e-12)
 
 
 def test_where_no_force_gives_the_acceleration_is_said() -> None:

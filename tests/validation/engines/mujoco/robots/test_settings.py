@@ -5,13 +5,12 @@ from pathlib import Path
 
 import pytest
 
-from fourbar_validation.engines.mujoco.robots.answers import SettingsAdvice
+from fourbar_validation.engines.mujoco.robots.answers import LoopMotion, SettingsAdvice
 from fourbar_validation.engines.mujoco.robots.closures import find_closures
 from fourbar_validation.engines.mujoco.robots.compiled import compile_robot
 from fourbar_validation.engines.mujoco.robots.loop import PoseOptions, RobotFile
 from fourbar_validation.engines.mujoco.robots.pose import pose_robot
 from fourbar_validation.engines.mujoco.robots.settings import SettingsSearch
-from fourbar_validation.engines.mujoco.robots.sweep import LoopMotion
 from fourbar_validation.robots.files import read_robot
 
 FOOT = Path(__file__).parents[5] / "models" / "robots" / "biped_foot.xml"

@@ -11,6 +11,7 @@ from fourbar.scene import Scene, command
 from fourbar_validation.engines.mujoco.robots.answers import (
     InsideAnswer,
     LoopMeasurement,
+    LoopMotion,
     MeasureOptions,
     RobotMeasurement,
     TornState,
@@ -28,7 +29,6 @@ from fourbar_validation.engines.mujoco.robots.settings import (
     SettingsSearch,
     read_settings,
 )
-from fourbar_validation.engines.mujoco.robots.sweep import LoopMotion
 from fourbar_validation.engines.mujoco.theirs import collect_warnings
 
 POSITIONS = 37

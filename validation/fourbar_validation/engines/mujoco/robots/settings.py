@@ -19,13 +19,13 @@ import numpy as np
 from fourbar.errors import LimitError
 from fourbar_validation.engines.mujoco.robots.answers import (
     InsideAnswer,
+    LoopMotion,
     RobotSettings,
     SettingsAdvice,
     TriedSettings,
 )
 from fourbar_validation.engines.mujoco.robots.inside import LoopInside
 from fourbar_validation.engines.mujoco.robots.loop import RobotFile, RobotLoop
-from fourbar_validation.engines.mujoco.robots.sweep import LoopMotion
 
 SECONDS = 75.0
 """Seconds of processor time in which combinations are tried; with the rest the command stays within two minutes."""
