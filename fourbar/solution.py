@@ -68,9 +68,11 @@ class Solution(Quantities):
     forces are NaN (T3 and T4 have these poles where omega_3, omega_4 are 0). 8 overflow: numbers beyond the range of
     doubles; from the first stage (position, velocity, ...) that meets them on everything is NaN. 9 invalid: a member of
     a study with numbers that a scene refuses (a length that is not positive, a mass below 0); all of it is NaN.
-    10 no_lever: the line of the drive has none there, its stroke stands still, forces are NaN."""
+    10 no_lever: the line of the drive has none there, its stroke stands still, forces are NaN. 11 change_point: all
+    bars are in line; positions, speeds and the drive are their limits along the assembly, pin forces, which have no
+    bound there, are NaN."""
     branch: NDArray[np.int8]
-    """+1 open, -1 crossed."""
+    """Sign of sin(theta_4 - theta_3): +1 or -1."""
     points: dict[str, Array] = field(default_factory=dict, init=False)
     """Positions of the scene's own points by name, (n, 2), m."""
     velocity: dict[str, Array] = field(default_factory=dict, init=False)
@@ -81,10 +83,12 @@ class Solution(Quantities):
     """Length and angle of the ground bar, m and rad; of a study (m, 1) each where they vary."""
     scene: "Scene | None" = field(default=None, init=False)
     """Scene that was solved; None for a study."""
+    lengths: tuple[Any, Any, Any, Any] | None = field(default=None, init=False)
+    """Lengths of ground, input, coupler and output, m; of a study (m, 1) each where they vary."""
     drive: "LinearDrive | None" = field(default=None, init=False)
     """Linear drive of the scene; None: a bar is driven."""
-    stopped_at: float | None = field(default=None, init=False)
-    """Time at which a free motion reached a limit position or change point, s; None: it did not."""
+    change_points: tuple[float, ...] | None = field(default=None, init=False)
+    """Times at which a free motion passed a change point, s: another motion was possible there."""
 
     at: Command = field(default=None, init=False)  # type: ignore[assignment]  # `solve` states it
     """Name of the commanded quantity; theta_2 for a free motion."""
@@ -219,7 +223,11 @@ def write_json(solution: Solution, units: Conversion = SI, **more: Any) -> str:
         status=solution.status,
         branch=solution.branch,
         **{name: find_values(solution, name, units) for name in names},
-        **({} if solution.time is None else {"stopped_at": solution.stopped_at}),
+        **(
+            {}
+            if solution.change_points is None
+            else {"change_points": solution.change_points}
+        ),
         drive_bar=solution.drive_bar,
         assembled=solution.assembled,
         **more,

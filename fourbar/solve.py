@@ -32,7 +32,7 @@ from fourbar.quantities import (
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import COMMANDS
 from fourbar.scene.numbers import POINT_STAGES
-from fourbar.scene.scene import Independent
+from fourbar.scene.scene import Independent, with_signs
 from fourbar.solution import Array, Solution, unwrap
 
 LONG_BLOCK = BLOCK // 4
@@ -82,7 +82,7 @@ def solve(
     require_whole("side", side, (-1, 0, 1), "must be -1, 0 or 1")
     if not isinstance(scene, Scene):
         return _require_study(scene, at).solve(stage, out=out, side=side)
-    stopped_at = None
+    change_points: tuple[float, ...] | None = None
     if at is not None:
         _refuse(at)
         commanded = at
@@ -90,7 +90,7 @@ def solve(
         from fourbar.evaluation.free_motion import release
 
         released = release(scene)
-        commanded, stopped_at = released.command, released.stopped_at
+        commanded, change_points = released.command, released.change_points
     else:
         commanded = command(scene)
     request = find_requested(scene, commanded, stage, out)
@@ -102,7 +102,7 @@ def solve(
             alone = _solve_alone(case, commanded, request)
             results = alone or _solve_blocks(case, commanded, request)
     solution = make_solution(scene, commanded, results)
-    solution.scene, solution.stopped_at = scene, stopped_at
+    solution.scene, solution.change_points = scene, change_points
     return solution
 
 
@@ -393,11 +393,14 @@ def make_solution(scene: Scene, commanded: Command, results: Results) -> Solutio
         }
     branch, theta_2 = np.asarray(commanded.branch), commanded.angle
     if commanded.bar != 2:
-        theta_2, sine = quantities["theta_2"], quantities["sin_mu"]
+        theta_2 = quantities["theta_2"]
         quantities = {
             name: array for name, array in quantities.items() if name != "theta_2"
         }
+    if (sine := quantities.get("sin_mu")) is not None:
         branch = np.where(np.abs(sine) > 0.0, np.sign(sine), branch).astype(np.int8)
+    else:
+        branch = with_signs(scene.linkage, commanded).branch
     solution = Solution(
         scene.title, scene.drive_bar, codes, branch, theta_2=theta_2, **quantities
     )
@@ -409,6 +412,7 @@ def make_solution(scene: Scene, commanded: Command, results: Results) -> Solutio
         of_points["a_"],
     )
     solution.ground = (scene.linkage.ground, scene.linkage.ground_angle)
+    solution.lengths = scene.linkage.lengths
     return solution
 
 

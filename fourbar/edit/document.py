@@ -13,7 +13,6 @@ from tomlkit.items import AoT, InlineTable, Item, Table, Whitespace
 from fourbar.effects import Load, list_kinds
 from fourbar.effects.load import FRAMES
 from fourbar.errors import InputError
-from fourbar.files.scene_file import THROUGH
 from fourbar.files.scene_text import BRANCHES
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, PINS, REQUIRED, Bar
 from fourbar.scene.motion import COMMANDS, SIDES, SPLINES, STROKE_COMMAND, Motion
@@ -23,7 +22,6 @@ Path = Sequence[str | int]
 WORDS = {
     **{
         "branch": [*BRANCHES],
-        "through": [*THROUGH],
         "side": [*SIDES],
         "ends": [*SPLINES],
     },
@@ -97,7 +95,7 @@ def _offer_commands() -> dict[str, Any]:
     angles = {
         names: (
             f"angle \u03b8{chr(0x2080 + bar)} of the {BAR_NAMES[bar]}",
-            {"branch": "open", "through": "sign"},
+            {"branch": "open"},
         )
         for bar, names in COMMANDS.items()
     }

@@ -9,12 +9,7 @@ from fourbar.effects.effect import Actions, SolvedFriction, list_bodies
 from fourbar.formulas.arithmetic import U, angle, is_any, polar, select
 from fourbar.formulas.longer import change_numbers, lengthen
 from fourbar.formulas.motion import Coefficients, State, rates
-from fourbar.formulas.path import (
-    NO_DIGIT_LEFT,
-    Path,
-    meet_change_points,
-    prepare_path,
-)
+from fourbar.formulas.path import NO_DIGIT_LEFT, Path, prepare_path
 from fourbar.formulas.pin_forces import (
     Bodies,
     PinForces,
@@ -24,7 +19,7 @@ from fourbar.formulas.pin_forces import (
     inertia_wrenches,
     pin_forces,
 )
-from fourbar.formulas.position import HalfAngle, Loop, Position
+from fourbar.formulas.position import HalfAngle, Loop, Passing, Position
 from fourbar.formulas.torque import driving_torque, half_slope, inertia
 from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.quantities import COUPLE, JAMMED, LINE, Array, DriveNames
@@ -41,6 +36,9 @@ on OpenBLAS starts threads for the squares by which `is_finite` looks for what i
 UNDECIDED = 32.0 * U
 """A factor of Heron's formula smaller than this times its terms is evaluated in many digits: in doubles it is wrong
 by at most about 12 U times them."""
+A_PERTURBATION = 1e-3
+"""Part of the sum of the lengths: a member of a study that misses a change point of the nominal linkage by more is a
+linkage of its own."""
 NO_POSITIONS = np.empty(0, dtype=np.intp)
 NO_MOTION = Coefficients(*[np.nan] * 8)
 """Coefficients of NaN, used where only positions are evaluated."""
@@ -114,6 +112,24 @@ class Case(NamedTuple):
             drive=scene.drive,
         )
 
+    def beside(self, nominal: Scene) -> "Case":
+        """Return the case of members near a nominal linkage, in the assembly nearest to its own at each position.
+
+        Of a nominal linkage with a change point a root changes its sign there. A member that misses this change point
+        by less than a perturbation keeps that sign, so that it lies beside the nominal one on either side.
+        """
+        root = prepare_path(
+            Loop(*nominal.linkage.lengths, 0.0, 0.0), 0.0, self.path.bar
+        ).passing
+        d, a, b, c, E1, E2 = self.path.lengths
+        small = A_PERTURBATION * (d + a + b + c) ** 2
+        own = self.path.passing
+        passing = Passing(
+            own.outer | (root.outer & (abs(E1) <= small)),
+            own.inner | (root.inner & (abs(E2) <= small)),
+        )
+        return self._replace(path=self.path._replace(passing=passing))
+
     def lengthened(self) -> "Case":
         """Return the same case in longer numbers, all that is computed of the scene's own numbers too."""
         linkage, terms, drive = change_numbers(
@@ -123,18 +139,7 @@ class Case(NamedTuple):
         path = prepare_path(
             Loop(d, a, b, c, 0.0, 0.0), linkage.ground_angle, self.path.bar
         )
-        kept: Any = {  # a free motion meets a change point that the lengths miss by rounding
-            name: select(
-                getattr(self.path.lengths, name) == 0.0,
-                0.0,
-                getattr(path.lengths, name),
-            )
-            for name in ("E1", "E2")
-        }
-        path = path._replace(
-            lengths=path.lengths._replace(**kept),
-            may_stay_parallel=self.path.may_stay_parallel,
-        )
+        path = path._replace(passing=self.path.passing)
         bodies, lengths = list_bodies(linkage, terms), _restore_unit(linkage, path)
         return self._replace(
             linkage=linkage,
@@ -234,9 +239,7 @@ class Case(NamedTuple):
     @classmethod
     def of_released(cls, scene: Scene, bar: int, side: Any) -> "Case":
         """Collect the numbers of a released linkage, read in the angle of bar 2 or 4, which no couple drives."""
-        case = cls.of(scene, bar)
-        path = case.path._replace(lengths=meet_change_points(case.path.lengths))
-        return case._replace(drive_bar=bar, drive=None, path=path, side=side)
+        return cls.of(scene, bar)._replace(drive_bar=bar, drive=None, side=side)
 
     def started(self, start: Command) -> "Case":
         """Return a copy whose path-dependent effects begin at this position; it may hold many linkages."""

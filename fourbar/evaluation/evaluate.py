@@ -17,10 +17,11 @@ from fourbar.evaluation.case import Case, Dynamics, find_margin, find_sign
 from fourbar.formulas.arithmetic import U, angle, is_any, select
 from fourbar.formulas.longer import lengthen, shorten
 from fourbar.formulas.motion import State
-from fourbar.formulas.path import NO_DIGIT_LEFT
+from fourbar.formulas.path import NO_DIGIT_LEFT, Path
 from fourbar.formulas.position import HalfAngle
 from fourbar.quantities import (
     ANGLES,
+    CHANGE_POINT,
     COUPLE,
     JAMMED,
     LINE,
@@ -31,6 +32,7 @@ from fourbar.quantities import (
     NOT_ASSEMBLED,
     OK,
     OVERFLOW,
+    PIN_FORCES,
     SEVERAL,
     SINGULAR,
     STAGE_OF,
@@ -69,7 +71,7 @@ def evaluate(
     if _asks_angles_alone(case, command, names):
         return _evaluate_angles(case, command, names)
     state, refined_rows = case.at(command, moving=last_stage > 0)
-    codes = _compute_codes(state.sine, state.position.half, command)
+    codes = _compute_codes(case.path, state.sine, state.position.half, command)
     values = list_kinematics(case, state, names)
     if command.condition is not None and "condition" in names:
         values["condition"] = values["condition"] * command.condition
@@ -111,7 +113,7 @@ def evaluate_released(
 
 
 def _compute_codes(
-    sine: Any, half: HalfAngle, command: Command, unit: float = 1.0
+    path: Path, sine: Any, half: HalfAngle, command: Command, unit: float = 1.0
 ) -> Any:
     """Compute the status of each position from the sine of the transmission angle, times `unit`."""
     size, margin = abs(sine), find_margin(command) * unit
@@ -122,6 +124,10 @@ def _compute_codes(
     codes = np.zeros(np.shape(sine), dtype=np.uint8)
     if not np.min(size, initial=np.inf) > margin:  # NaN where the loop does not close
         codes[size <= margin] = SINGULAR
+        on_change_point = (abs(sine) <= margin) & path.passes_zero(half)
+        if command.condition is not None:
+            on_change_point = on_change_point & (command.condition > margin)
+        codes[on_change_point] = CHANGE_POINT
         codes[np.isnan(sine)] = NOT_ASSEMBLED
         # theta_2 - theta_1 overflows, so the loop cannot be evaluated
         codes[np.isnan(half.kk)] = OVERFLOW
@@ -140,7 +146,7 @@ def _evaluate_angles(case: Case, command: Command, names: Set[str]) -> Evaluated
     half, _ = case.half_angle(command.angle, None)
     theta_3, theta_4, root = case.path.angles(half, find_sign(command.branch))
     unit = 2.0 * case.path.lengths.b * case.path.lengths.c
-    codes = _compute_codes(root, half, command, unit)
+    codes = _compute_codes(case.path, root, half, command, unit)
     angles = {"theta_3": theta_3, "theta_4": theta_4}
     return Evaluated(codes, {name: angles[name] for name in names}, None)
 
@@ -196,13 +202,21 @@ def _list_forces(
     if without:
         codes = np.where(codes == OK, np.max(without, axis=0), codes).astype(np.uint8)
     if is_any(codes > SINGULAR):
-        gone = np.isin(codes, WITHOUT_FORCES)
-        values |= {
-            name: np.where(gone, make_no_value(value), value)
-            for name, value in values.items()
-            if name != "drive_condition"
-        }
+        _withhold_forces(case, codes, values)
     return codes, values
+
+
+def _withhold_forces(case: Case, codes: Any, values: dict[str, Any]) -> None:
+    """Put NaN where an effect or the drive has no value, and in the pin forces on change points."""
+    gone = np.isin(codes, WITHOUT_FORCES)
+    of_pins = {*PIN_FORCES, "force_error"}
+    if any(term.loaded_pins for term in case.terms):
+        of_pins |= values.keys()  # the drive balances friction of those forces
+    for name, value in values.items():
+        if name == "drive_condition":
+            continue
+        missing = gone | (codes == CHANGE_POINT) if name in of_pins else gone
+        values[name] = np.where(missing, make_no_value(value), value)
 
 
 def compute_error_bars(

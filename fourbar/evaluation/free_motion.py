@@ -2,8 +2,9 @@
 
 The reduced equation J q'' + J'/2 q'^2 = Q is integrated with q = theta_2 or q = theta_4, whichever
 is further from its limit position: bars 3, 4 collinear stop theta_2, bars 2, 3 collinear stop
-theta_4, and both at once happen at a change point alone, where the path itself is regular. The
-loop therefore closes to round-off at every instant, and nothing drifts off it.
+theta_4, and both at once happen at a change point alone, where an assembly is regular. The
+loop therefore closes to round-off at every instant, and nothing drifts off it. The motion runs on
+through limit positions, and through change points on its assembly, where another motion is possible.
 """
 
 import cmath
@@ -26,12 +27,7 @@ from fourbar.errors import (
 )
 from fourbar.evaluation.case import Case
 from fourbar.formulas.motion import Coefficients, State, rates
-from fourbar.formulas.path import (
-    drive_sine,
-    find_smooth_branch,
-    meet_change_points,
-    prepare_path,
-)
+from fourbar.formulas.path import NO_DIGIT_LEFT, drive_sine, prepare_path
 from fourbar.formulas.pin_forces import Body
 from fourbar.formulas.position import HalfAngle, Position, loop
 from fourbar.formulas.torque import half_slope, inertia
@@ -55,18 +51,18 @@ VANISHING = 2.0**-300
 
 @dataclass(slots=True, eq=False)
 class Released:
-    """Motion of a released linkage at the times of the scene, until it stopped."""
+    """Motion of a released linkage at the times of the scene."""
 
     command: Command
     """theta_2 (continuous), branch, omega_2, alpha_2, time and the independent angle, for `solve(scene, at=...)`."""
     energy_drift: float
     """Largest |kinetic energy - work done| over the motion, by the largest of either; 0 where nothing moves."""
-    stopped_at: float | None = None
-    """Time at which a limit position or change point was reached, s; None: the whole duration was run."""
+    change_points: tuple[float, ...] = ()
+    """Times at which the motion passed a change point, s: another motion was possible there."""
 
     @property
     def time(self) -> Array:
-        """Times of the instants, (n,), s; they end before `stopped_at` where the motion did."""
+        """Times of the instants, (n,), s."""
         assert self.command.time is not None
         return self.command.time
 
@@ -121,7 +117,6 @@ def release(scene: Scene) -> Released:
         scene.motion.speed or 0.0,
         int(start.branch[0]),
         np.linspace(0.0, free.duration, free.steps + 1),
-        follow=scene.motion.through == "follow",
         bar=start.bar,
     )
     if scene.counts_turns:
@@ -147,47 +142,37 @@ def _make_plain(numbers: Any) -> Any:
 
 
 class _Reading:
-    """The linkage read in the angle of bar 2 or of bar 4, with the sign of its path."""
+    """The linkage read in the angle of bar 2, 3 or 4, with its assembly."""
 
     def __init__(self, linkage: FourBar, bar: int) -> None:
         path = prepare_path(loop(*linkage.lengths), linkage.ground_angle, bar)
-        lengths = _make_plain(meet_change_points(path.lengths))
         self.path = path._replace(
-            lengths=lengths, u1=complex(path.u1), unit=float(path.unit)
+            lengths=_make_plain(path.lengths),
+            u1=complex(path.u1),
+            unit=float(path.unit),
         )
-        self.bar, self.sign = bar, 1.0
-        self.changes = 0.0 in (self.path.lengths.E1, self.path.lengths.E2)
+        self.bar, self.branch = bar, 1.0
         self.last: tuple[tuple[float, float], tuple[Position, Coefficients]] | None = (
             None
         )
 
-    def branch(self, q: float) -> float:
-        """Return the sign of the root at q."""
-        if not self.changes:
-            return self.sign
-        psi = q - self.path.theta_1 - (math.pi if self.bar == 4 else 0.0)
-        return float(find_smooth_branch(self.path.lengths, psi, self.sign))
-
     def evaluate(self, q: float) -> tuple[Position, Coefficients]:
         """Compute the position and its coefficients by q; what is wanted again is kept."""
-        if self.last is None or self.last[0] != (q, self.sign):
-            self.last = (q, self.sign), self._at(q)
+        if self.last is None or self.last[0] != (q, self.branch):
+            self.last = (q, self.branch), self._at(q)
         return self.last[1]
 
     def _at(self, q: float) -> tuple[Position, Coefficients]:
-        branch = self.branch(q)
         half = self.path.half_angle(q)
         try:
-            return self._by(q, _make_plain(half), branch)
+            return self._by(q, _make_plain(half))
         except ZeroDivisionError:  # NumPy's numbers give inf or NaN instead
-            return self._by(q, half, branch)
+            return self._by(q, half)
 
-    def _by(
-        self, q: float, half: HalfAngle, branch: float
-    ) -> tuple[Position, Coefficients]:
+    def _by(self, q: float, half: HalfAngle) -> tuple[Position, Coefficients]:
         # a motion may start at a limit of the bar that it is read from: coefficients are
         # then infinite, and another bar is taken
-        position, k, _ = self.path.close(q, half, branch, margin=-1.0)
+        position, k, _ = self.path.close(q, half, self.branch, margin=-1.0)
         return (
             (_make_plain(position), _make_plain(k))
             if self.path.may_stay_parallel
@@ -208,7 +193,6 @@ def integrate(
     branch: int,
     times: Array,
     *,
-    follow: bool = False,
     bar: int = 2,
 ) -> Released:
     """Integrate the motion from theta_2 with omega_2 under the effects, with no driving torque.
@@ -218,9 +202,8 @@ def integrate(
     Parameters
     ----------
     terms : loads and effects.
-    theta, omega, branch : +1 or -1, of the bar that is released, at the start.
+    theta, omega, branch : of the bar that is released, at the start; its assembly is +1 or -1.
     times : (n,) rising from 0, s.
-    follow : run through limit positions and change points of that bar; otherwise the motion stops there.
     bar : 2, or 3 or 4.
 
     Raises
@@ -236,7 +219,7 @@ def integrate(
             "a free motion cannot carry friction that depends on the pin forces"
         )
     with np.errstate(invalid="ignore", divide="ignore", over="ignore", under="ignore"):
-        return _Run(linkage, terms, theta, omega, branch, follow, bar).through(times)
+        return _Run(linkage, terms, theta, omega, branch, bar).integrate(times)
 
 
 class _Run:
@@ -249,28 +232,15 @@ class _Run:
         theta: float,
         omega: float,
         branch: int,
-        follow: bool,
         bar: int,
     ) -> None:
-        self.linkage, self.terms, self.follow, self.branch, self.bar = (
-            linkage,
-            terms,
-            follow,
-            branch,
-            bar,
-        )
+        self.linkage, self.terms, self.bar = linkage, terms, bar
         self.lengths = _make_plain(loop(*linkage.lengths))
         two, three, four = (_make_plain(body) for body in list_bodies(linkage, terms))
         self.bodies: tuple[Body, Body, Body] = two, three, four
         self.readings = {each: _Reading(linkage, each) for each in (2, 4)}
         self.reading = self.readings[bar] if bar != 3 else _Reading(linkage, 3)
-        # at a change point the branch just after the start decides the sign of the path
-        ahead = theta + math.copysign(1e-8, omega)
-        for near in (theta, ahead, 2.0 * theta - ahead):
-            sine = _compute_sines(self.reading.evaluate(near)[0])[bar]
-            if sine != 0.0 and math.isfinite(sine):
-                self.reading.sign = branch * math.copysign(1.0, sine)
-                break
+        self.reading.branch = self.branch = float(branch)
         position, k = self.reading.evaluate(theta)
         if not np.isfinite(position.u3):
             raise InputError(
@@ -296,7 +266,7 @@ class _Run:
         self.start_energy = self._compute_kinetic_energy()
         self.times = np.empty(0)
         self.t, self.steps = 0.0, 0
-        self.stopped_at: float | None = None
+        self.change_points: list[float] = []
         self.drift = self.largest = 0.0
         self.rows: list[tuple[float, ...]] = []
 
@@ -357,9 +327,7 @@ class _Run:
         elif abs(sines[self.reading.bar]) >= CHANGE_OVER * abs(sines[bar]):
             return False
         q, reading = self.theta[bar], self.readings[bar]
-        reading.sign *= math.copysign(
-            1.0, _compute_sines(reading.evaluate(q)[0])[bar] * sines[bar]
-        )
+        reading.branch = float(reading.path.sign(q, math.copysign(1.0, sines[bar])))
         rate = float(self.y[1] * (k.h2 if bar == 2 else k.h4)) if self.y[1] else 0.0
         self.reading, self.y = reading, np.array([q, rate, self.y[2]])
         return True
@@ -387,7 +355,7 @@ class _Run:
         self.side = math.copysign(1.0, rate)
         return True
 
-    def through(self, times: Array) -> Released:
+    def integrate(self, times: Array) -> Released:
         """Integrate over the times and report."""
         try:
             from scipy.integrate import DOP853
@@ -399,7 +367,7 @@ class _Run:
         self.times, self.largest = times, self.start_energy
         moves = self._starts()
         self._report(0.0, lambda _: self.y)
-        while self.t < end and self.stopped_at is None:
+        while self.t < end:
             if not moves:
                 self._report(end, lambda _: self.y)
                 break
@@ -422,7 +390,9 @@ class _Run:
             independent=Independent(bar.astype(np.int8), *independent)
         )
         return Released(
-            motion, self.drift / self.largest if self.largest else 0.0, self.stopped_at
+            motion,
+            self.drift / self.largest if self.largest else 0.0,
+            tuple(self.change_points),
         )
 
     def _follow_solver(self, solver: Any) -> bool:
@@ -442,13 +412,7 @@ class _Run:
             if rested:
                 t = _find_root(dense, lambda y: float(y[1]), solver.t_old, t)
                 new = np.array([dense(t)[0], 0.0, dense(t)[2]])
-            if (
-                not self.follow and self.branch * self._compute_sine(new) < 0.0
-            ):  # bars 3, 4 were in line
-                self.stopped_at = t = _find_root(
-                    dense, self._compute_sine, solver.t_old, t
-                )
-                new = dense(t)
+            self._note_change_points(solver.t_old, t, dense)
             self._report(t, dense)
             self.t, self.y = t, np.array(new)
             self._turn(self._at()[0])
@@ -459,18 +423,35 @@ class _Run:
             )
             if rested or self._change_over():
                 return self._starts()
-            if self.stopped_at is not None:
-                break
         return True
+
+    def _note_change_points(
+        self, start: float, stop: float, dense: Callable[[float], Array]
+    ) -> None:
+        """Note the times within a step at which all bars are in line: another motion is possible there."""
+        path = self.reading.path
+        beginning = path.theta_1 + (math.pi if path.bar == 4 else 0.0)
+        for passes, psi in ((path.passing.inner, 0.0), (path.passing.outer, math.pi)):
+            if not passes:
+                continue
+            point = beginning + psi
+            before, after = (
+                (float(dense(t)[0]) - point) / (2.0 * math.pi) for t in (start, stop)
+            )
+            passed = range(math.floor(before) + 1, math.floor(after) + 1)
+            if after < before:
+                passed = range(math.ceil(after), math.ceil(before))
+            for turn in passed:
+
+                def find_gap(y: Array, turn: int = turn, point: float = point) -> float:
+                    return float(y[0]) - (point + 2.0 * math.pi * turn)
+
+                self.change_points.append(_find_root(dense, find_gap, start, stop))
 
     def _report(self, until: float, dense: Callable[[float], Array]) -> None:
         """Report the instants up to a time, from the motion as a function of time."""
         while len(self.rows) < len(self.times) and self.times[len(self.rows)] <= until:
             self.rows.append(self._make_row(dense(float(self.times[len(self.rows)]))))
-
-    def _compute_sine(self, y: Array) -> float:
-        """Compute sin(theta_4 - theta_3), or that of the bar that was released: zero at its limits."""
-        return _compute_sines(self.reading.evaluate(float(y[0]))[0])[self.bar]
 
     def _make_row(self, y: Array) -> tuple[float, ...]:
         """Return theta_2, omega_2, alpha_2, branch and what belongs to the independent angle, of one instant."""
@@ -484,21 +465,24 @@ class _Run:
         growth = 0.0 if still else self._compute_rates(0.0, y)[1]
         moving = rates(k, rate, growth)
         sine = _compute_sines(position)[2]
-        branch = math.copysign(1.0, sine) if sine else float(self.branch)
+        if abs(sine) > NO_DIGIT_LEFT:  # at a limit of theta_2 both branches meet
+            self.branch = float(
+                self.readings[2].path.sign(theta_2, math.copysign(1.0, sine))
+            )
         side = (self.side or self.holding) if self.dry and rate == 0.0 else 0.0
         independent = (
             float(self.reading.bar),
             q,
             rate,
             growth,
-            self.reading.branch(q),
+            self.reading.branch,
             side,
         )
         return (
             theta_2,
             float(moving.omega_2),
             float(moving.alpha_2),
-            branch,
+            self.branch,
             *independent,
         )
 

@@ -36,7 +36,9 @@ from fourbar.files.drawing import (
 )
 from fourbar.files.fields import BARE_KEY, Reader
 from fourbar.files.scene_text import BARS, BRANCHES, SIGMA
+from fourbar.formulas.mobility import meet_change_points
 from fourbar.linkage import ANY, BAR_NAMES, MOST_STEPS, PINS, POSITIVE, Bar, FourBar
+from fourbar.quantities.units import find_rounding
 from fourbar.scene import Scene
 from fourbar.scene.motion import (
     COMMANDS,
@@ -70,7 +72,6 @@ LONGEST_LINE = 60
 MOST_LOADS = 1000
 """Each load is a term at every position."""
 MOST_SPRINGS = 1000
-THROUGH = ("sign", "follow")
 TABLES = (
     "title",
     "source",
@@ -255,6 +256,7 @@ def _read_linkage(read: Reader, top: dict[str, Any]) -> FourBar:
     length = read.numbers(
         "lengths", lengths, dict.fromkeys(BAR_NAMES.values(), Bar.numbers["length"])
     )
+    length = _meet_change_points(length, lengths)
     tables = read.table("bars", top.get("bars", {}), BARS)
     bars = {
         name: _read_bar(read, f"bars.{name}", tables.get(name, {}), length[name])
@@ -262,12 +264,25 @@ def _read_linkage(read: Reader, top: dict[str, Any]) -> FourBar:
     }
     ground = read.numbers("lengths", lengths, FourBar.numbers)
     return FourBar(
-        ground["ground"],
+        length["ground"],
         bars["input"],
         bars["coupler"],
         bars["output"],
         ground["ground_angle"],
     )
+
+
+def _meet_change_points(
+    length: dict[str, float], stated: dict[str, Any]
+) -> dict[str, float]:
+    """Return the lengths with the equalities that they miss by the rounding of their last decimals."""
+    names = tuple(BAR_NAMES.values())
+    d, a, b, c = (length[name] for name in names)
+    if not math.isfinite(d + a + b + c):  # refused where they are put together
+        return length
+    roundings = [find_rounding(stated[name], "m") for name in names]
+    met = meet_change_points((d, a, b, c), tuple(roundings))  # type: ignore[arg-type]
+    return dict(zip(names, met, strict=True))
 
 
 def _read_bar(read: Reader, key: str, value: object, length: float) -> Bar:
@@ -292,14 +307,13 @@ def _read_motion(read: Reader, value: object) -> Motion:
     entry = read.table(
         "motion",
         value,
-        (*numbers, *STROKE_COMMAND, "side", "branch", "through", "free", "law"),
+        (*numbers, *STROKE_COMMAND, "side", "branch", "free", "law"),
     )
     stated = [name for name in numbers if name in entry]
     arguments: dict[str, Any] = {
         "branch": BRANCHES[
             read.choice("motion.branch", entry.get("branch", "open"), BRANCHES)
         ],
-        "through": read.choice("motion.through", entry.get("through", "sign"), THROUGH),
     }
     if of_stroke := [name for name in (*STROKE_COMMAND, "side") if name in entry]:
         for name in (*stated, *(name for name in ("free", "law") if name in entry)):

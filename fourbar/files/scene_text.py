@@ -185,7 +185,6 @@ def _write_motion(motion: Motion) -> dict[str, Any]:
         "law": None if law is None else _write_law(law),
         "branch": BRANCH_NAMES[motion.branch],
         "side": motion.side,
-        "through": motion.through,
         "free": None
         if free is None
         else {"duration": write_quantity(free.duration, "s"), "steps": free.steps},

@@ -30,6 +30,16 @@ def is_any(mask: Number) -> bool:
     return bool(mask) if isinstance(mask, PLAIN) else bool(mask.any())
 
 
+def is_zero(x: Number) -> Number:
+    """Mark where the value of a number is zero, whatever its slopes are."""
+    return (x <= 0.0) & (x >= 0.0)
+
+
+def without_slopes(x: Number) -> Number:
+    """Return the value of a number that may carry slopes."""
+    return x.values if hasattr(x, "slopes") else x
+
+
 def select(mask: Number, x: Number, y: Number) -> Number:
     """Select x where a mask holds and y elsewhere; a single truth value returns one of them as it is."""
     if isinstance(mask, PLAIN):

@@ -8,8 +8,8 @@ from fourbar.formulas.arithmetic import make_like
 from fourbar.formulas.position import (
     TOUCHING,
     HalfAngle,
-    Loop,
     compute_factors,
+    loop,
     reorder_lengths,
 )
 from fourbar.linkage import FourBar
@@ -29,7 +29,7 @@ def half_angle(
     bar: int = 2,
     lost: float = 0.0,
 ) -> HalfAngle:
-    """Compute the five numbers of `formulas.position.half_angle` (mpmath).
+    """Compute the five numbers of `formulas.position.half_angle` that depend on digits (mpmath).
 
     Parameters
     ----------
@@ -59,14 +59,7 @@ def half_angle(
         if bar == 4:
             h -= mp.pi / 2
         s, k = mp.sin(h), mp.cos(h)
-        lengths = Loop(
-            d,
-            a,
-            b,
-            c,
-            (b + c - a - d) * (a + b + c + d),
-            (d - a - b + c) * (d - a + b - c),
-        )
+        lengths = loop(d, a, b, c)
         half = compute_factors(lengths, s * s, k * k, s * k)
         size = 2 * (a + b + c + d) * mp.sqrt(half.inner + (b - c) ** 2)
         least, most = (
@@ -101,21 +94,22 @@ def decide_half_angles(
     mask[index] = True
     high, low = np.zeros((2, 5, flat.size))
     for i in index:
-        for row, value in enumerate(
-            half_angle(linkage, float(flat[i]), offset, unit, i, bar, left_out[i])
-        ):
+        *numbers, _ = half_angle(
+            linkage, float(flat[i]), offset, unit, i, bar, left_out[i]
+        )
+        for row, value in enumerate(numbers):
             high[row, i] = float(value)
             low[row, i] = float(value - high[row, i])
+    *numbers, side = half
     mask, rows = (
         mask.reshape(shape),
-        zip(half, high.reshape(5, *shape), low.reshape(5, *shape), strict=True),
+        zip(numbers, high.reshape(5, *shape), low.reshape(5, *shape), strict=True),
     )
-    return HalfAngle(
-        *(
-            np.where(mask, make_like(rounded, number) + rest, number)[()]
-            for number, rounded, rest in rows
-        )
+    decided = (
+        np.where(mask, make_like(rounded, number) + rest, number)[()]
+        for number, rounded, rest in rows
     )
+    return HalfAngle(*decided)._replace(side=side)
 
 
 def limit_remainder(

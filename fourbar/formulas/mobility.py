@@ -8,15 +8,15 @@ allowed range all four bars are collinear: a change point. All sums of lengths a
 """
 
 import math
+from operator import mul
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.errors import expect
-from fourbar.formulas.arithmetic import U
-from fourbar.formulas.path import prepare_path
-from fourbar.formulas.position import TOUCHING, loop
+from fourbar.formulas.path import ROLES, prepare_path
+from fourbar.formulas.position import TOUCHING, find_parallel_pairs, loop
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, FourBar, require_bar
 
 Array = NDArray[np.float64]
@@ -25,9 +25,6 @@ MARGIN = math.radians(1.0)
 """Angle that `choose_range` leaves out at each end of an interval, because no speeds exist at a limit itself."""
 NARROW = 4.0
 """An interval shorter than NARROW * MARGIN gives up this part of its width at each end instead."""
-AT_CHANGE_POINT = 4.0 * U
-"""A position this close to a change point, relative to the angles it was computed from, is on it:
-theta_2, theta_1 and n pi are rounded by U each, their difference once more."""
 
 
 class LimitPosition(NamedTuple):
@@ -265,43 +262,6 @@ def time_ratio(linkage: FourBar) -> float | None:
     return (TURN - delta) / delta
 
 
-def follow_smooth_path(
-    linkage: FourBar, theta_2: Array, branch: int, bar: int = 2
-) -> NDArray[np.int8]:
-    """Choose the branch of each position of a sweep that runs smoothly through the change points, (n,).
-
-    At a change point sin(theta_4 - theta_3) passes through zero with its slope, so the smooth path
-    changes the sign there. A position on a change point belongs to the side that the sweep comes
-    from; if the sweep starts on one, to the side that it does not turn to.
-
-    Parameters
-    ----------
-    theta_2 : (n,), rad, in the order of the sweep; the input turns from each to the next without detour.
-    branch : +1 or -1, of the first position.
-    bar : whose angles and branches they are, where it is not the input that is commanded.
-    """
-    psi = np.asarray(theta_2, dtype=float) - linkage.ground_angle
-    crossed = np.zeros(psi.shape, dtype=np.int64)
-    steps = np.sign(np.diff(psi)).astype(np.int64)
-    heading = np.zeros(psi.shape, dtype=np.int64)
-    if steps.any():
-        heading[1:] = steps
-        moving = np.flatnonzero(heading)
-        latest = np.maximum.accumulate(
-            np.where(heading != 0, np.arange(psi.size), moving[0])
-        )
-        heading = heading[latest]
-    rounding = AT_CHANGE_POINT * (np.abs(theta_2) + abs(linkage.ground_angle))
-    for point in change_points(linkage, bar):
-        psi_of_point = 0.0 if point == linkage.ground_angle else math.pi
-        turns = (psi - psi_of_point) / TURN
-        nearest = np.rint(turns)
-        on = np.abs(psi - psi_of_point - nearest * TURN) <= rounding
-        cell = np.where(on, nearest - (heading > 0), np.floor(turns)).astype(np.int64)
-        crossed += cell - cell[:1]
-    return np.where(crossed % 2 == 0, branch, -branch).astype(np.int8)
-
-
 BOTH = (1, -1)
 
 
@@ -362,7 +322,14 @@ GRASHOF = {
 }
 """Barker's code and the name by the number of the shortest bar, which turns fully against all others."""
 CHANGE_POINT = {1: "SCCC", 2: "SCRR", 3: "SRCR", 4: "SRRC"}
-PARALLELOGRAM = "parallelogram (crossed: antiparallelogram)"
+PARALLELOGRAM = "parallelogram"
+NEARLY = 1e-3
+"""Part of the sum of the lengths by which a linkage that nearly has a change point misses it, so that it is said."""
+DIGITS_STATED = 1e-4
+"""Part of the sum of the lengths up to which the last decimal of a length is a rounding; a coarser one is meant as it
+stands."""
+EQUALITIES = ((-1, -1, 1, 1), (1, -1, -1, 1), (1, -1, 1, -1))
+"""Signs of ground, input, coupler and output in the sums that vanish at change points: of E1, and both of E2."""
 
 
 class LinkageType(NamedTuple):
@@ -383,13 +350,15 @@ class LinkageType(NamedTuple):
     """Bars among 2, 3, 4 that turn fully against the ground (through change points, if need be)."""
 
 
-def classify(linkage: FourBar) -> LinkageType:
+def classify(linkage: FourBar, within: float = TOUCHING) -> LinkageType:
     """Classify a linkage by the Grashof condition s + l < p + q and by which bar is shortest or longest.
 
     s, l are the shortest and longest lengths, p, q the other two. The sums are exact; equality is
     decided within the rounding of the four lengths. Which of the three sums of two bars and the
     other two are equal tells the change-point types apart: one equality 9-12, two 13 (opposite
     bars equal: parallelogram; adjacent bars equal: kite, also deltoid or Galloway), three 14 (rhombus).
+
+    `within`: part of the sum of the lengths within which sums count as equal.
 
     Source: C. R. Barker, A complete classification of planar four-bar linkages, Mechanism and
     Machine Theory 20 (1985).
@@ -409,7 +378,7 @@ def classify(linkage: FourBar) -> LinkageType:
         total = math.fsum(
             length if k in (bar, partner) else -length for k, length in lengths.items()
         )
-        return 0.0 if abs(total) <= TOUCHING * perimeter else total
+        return 0.0 if abs(total) <= within * perimeter else total
 
     # all bars equal: every bar is both, and any other one is its partner
     surplus = -balance(shortest, longest if longest != shortest else 4) * unit
@@ -448,3 +417,66 @@ def classify(linkage: FourBar) -> LinkageType:
     return found(
         8 + shortest, CHANGE_POINT[shortest], f"change-point {GRASHOF[shortest][1]}"
     )
+
+
+def name_assembly(linkage: FourBar, bar: int = 2, branch: int = 1) -> str:
+    """Name a linkage in the assembly that a command of a bar and its branch state.
+
+    A parallelogram's other assembly, and both that a command of its coupler can have, are the antiparallelogram. In
+    one assembly of a kite or a rhombus two bars lie on each other and turn together, and one bar stands still.
+
+    >>> from fourbar import uniform
+    >>> name_assembly(uniform(3, 1, 3, 1)), name_assembly(uniform(3, 1, 3, 1), branch=-1)
+    ('parallelogram', 'antiparallelogram')
+    """
+    name = classify(linkage).name
+    path = prepare_path(loop(*linkage.lengths), linkage.ground_angle, bar)
+    parallel, folded = find_parallel_pairs(path.lengths, branch)
+    if folded:
+        return f"{name}, {BAR_NAMES[ROLES[bar][2]]} at rest"
+    if name == PARALLELOGRAM and not parallel:
+        return "antiparallelogram"
+    return name
+
+
+def find_miss(linkage: FourBar) -> tuple[float, str] | None:
+    """Find by how much a linkage misses one with a change point, m, and the name of that one; None if by too much."""
+    meant, own = classify(linkage, NEARLY), classify(linkage)
+    if meant.name == own.name or meant.barker is None or meant.barker < 9:
+        return None
+    sums = [abs(math.fsum(map(mul, signs, linkage.lengths))) for signs in EQUALITIES]
+    perimeter = math.fsum(linkage.lengths)
+    return max(gap for gap in sums if gap <= NEARLY * perimeter), meant.name
+
+
+def meet_change_points(
+    lengths: tuple[float, float, float, float],
+    roundings: tuple[float, float, float, float],
+) -> tuple[float, float, float, float]:
+    """Return the lengths of ground, input, coupler and output with the equalities that they miss by rounding.
+
+    The equalities b + c = a + d, d + c = a + b, d + b = a + c of change points hold within the sum of the roundings
+    or not; the lengths nearest to the stated ones that fulfil those which hold are returned, the stated ones if none.
+
+    Parameters
+    ----------
+    lengths : as stated, m.
+    roundings : largest error of each length by the rounding of what was stated, m.
+    """
+    largest = DIGITS_STATED * math.fsum(lengths)
+    fine = [rounding if rounding <= largest else 0.0 for rounding in roundings]
+    allowed = math.fsum(fine)
+    missed = [
+        signs
+        for signs in EQUALITIES
+        if abs(math.fsum(map(mul, signs, lengths))) <= allowed
+    ]
+    if not missed or not allowed > 0.0:
+        return lengths
+    equalities = np.array(missed, dtype=float)
+    weights = np.square(fine)
+    gaps = np.array([math.fsum(map(mul, signs, lengths)) for signs in missed])
+    normal = (equalities * weights) @ equalities.T
+    changes = weights * (equalities.T @ (np.linalg.pinv(normal) @ gaps))
+    d, a, b, c = (np.array(lengths) - changes).tolist()
+    return d, a, b, c

@@ -53,7 +53,7 @@ def coefficients(lengths: Loop, position: Position) -> Coefficients:
     '6.998 470.134'
     """
     d, a, b, c, E1, E2 = lengths
-    ss, kk, sk, outer, inner = position.half
+    ss, kk, sk, outer, inner, _ = position.half
     ad, per_e2, per_root = a * d, 1.0 / position.e2, 0.5 / position.root
     x, y = (b - c) * (b + c), (d - a) * (d + a)
     S, grown = (4.0 * ad) * sk, (2.0 * ad) * ss

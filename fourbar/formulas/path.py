@@ -7,6 +7,9 @@ is that bar, and every formula of position and motion holds as it stands:
 The sine between its coupler and its output is sin(theta_4 - theta_2) read from bar 3 and sin(theta_3 - theta_2) read
 from bar 4: the sign of the root, zero at the limits of that bar, and by it what is singular at the limits of theta_2 is
 not.
+
+The branch of a path is an assembly: its root keeps its formula, and with it the motion is smooth through change points.
+The sign of the sine at a position follows from the lengths and the angle alone, `Path.sign`.
 """
 
 from typing import NamedTuple
@@ -31,16 +34,18 @@ from fourbar.formulas.motion import (
 )
 from fourbar.formulas.motion import put_parallel_pairs as parallel_motion
 from fourbar.formulas.position import (
-    TOUCHING,
     HalfAngle,
     Loop,
+    Passing,
     Position,
     close_loop,
     direction,
     find_parallel_pairs,
+    find_passing,
     half_angle,
     loop,
     reorder_lengths,
+    signed_root,
 )
 from fourbar.formulas.position import put_parallel_pairs as parallel_position
 from fourbar.linkage import FourBar
@@ -66,10 +71,28 @@ class Path(NamedTuple):
     """Unit of the lengths, a power of two near the longest, m: no product of them leaves the range of doubles."""
     may_stay_parallel: bool = False
     """True if there are two pairs of equal bars."""
+    passing: Passing = Passing(False, False)
+    """Roots that pass through zero at a change point, with their sign."""
 
     def half_angle(self, q: Number) -> HalfAngle:
-        """Compute the half angle for the independent angle q (rad) against the ground."""
-        return half_angle(self.lengths, q - self.theta_1, opposite=self.bar == 4)
+        """Compute the half angle for the independent angle q (rad, not reduced) against the ground."""
+        psi = q - self.theta_1
+        return half_angle(
+            self.lengths, psi, opposite=self.bar == 4, passing=self.passing
+        )
+
+    def sign(self, q: Number, branch: Number) -> Number:
+        """Compute the sign of the bar's own sine at an angle in an assembly.
+
+        Twice applied it returns its argument: of that sign at the angle it is the assembly.
+        """
+        if not is_any(self.passing.outer | self.passing.inner):
+            return branch
+        return branch * self.half_angle(q).side
+
+    def passes_zero(self, half: HalfAngle) -> Number:
+        """Mark where the smaller root is one that passes through zero: near it lies a change point, and no limit."""
+        return select(half.outer < half.inner, self.passing.outer, self.passing.inner)
 
     def input_direction(self, q: Number, half: HalfAngle) -> Number:
         """Compute e^{i q}: over level ground from the half angle, which is at hand."""
@@ -87,13 +110,14 @@ class Path(NamedTuple):
     def position(self, q: Number, half: HalfAngle, branch: Number) -> Position:
         """Compute positions with the bars in the order of the path.
 
-        `branch`: sign of the root in that order, which is that of `drive_sine` for a drive on the bar itself.
+        `branch`: assembly, the sign of `drive_sine` for a drive on the bar itself while the bar turns through the first
+        half turn from the ground (for bar 4 from its opposite).
         """
         u2 = self.input_direction(q, half)
         position = close_loop(self.lengths, self.u1, u2, half, branch, self.unit)
         if self.may_stay_parallel:
             position = parallel_position(
-                position, *find_parallel_pairs(self.lengths, half, branch)
+                position, *find_parallel_pairs(self.lengths, branch)
             )
         return position
 
@@ -103,8 +127,8 @@ class Path(NamedTuple):
         In real numbers, against the ground; a turned ground's angle is added.
         """
         d, a, b, c, _, _ = self.lengths
-        ss, kk, sk, outer, inner = half
-        root = branch * np.sqrt(outer * inner)
+        ss, kk, sk, _, inner, _ = half
+        root = signed_root(half, branch)
         at_A, at_O4 = inner + 2.0 * b * (b - c), 2.0 * c * (b - c) - inner
         x, y = (d - a) * kk + (d + a) * ss, (-2.0 * a) * sk
         along, across = x * root, y * root
@@ -131,10 +155,12 @@ class Path(NamedTuple):
 
         The sine is that between the two other moving bars. Coefficients are NaN where
         they are 0/0: where it, or the condition of the command, is no larger than `margin`;
-        nowhere if that is negative.
+        nowhere if that is negative, and on a change point they are limits.
         """
         position = self.position(q, half, branch)
         singular = abs(position.sin_mu) <= margin
+        if is_any(singular):
+            singular = singular & ~np.asarray(self.passes_zero(half), dtype=bool)
         if condition is not None:
             singular = singular | (condition <= margin)
         if is_any(singular):
@@ -149,7 +175,7 @@ class Path(NamedTuple):
         k = coefficients(self.lengths, position)
         position = take_sines_of_rates(self.lengths, position, k)
         if self.may_stay_parallel:
-            first, second = find_parallel_pairs(self.lengths, position.half, branch)
+            first, second = find_parallel_pairs(self.lengths, branch)
             regular = ~np.isnan(position.root)
             k = parallel_motion(k, first & regular, second & regular)
         return (
@@ -197,9 +223,8 @@ class Path(NamedTuple):
             )
         sine = drive_sine_of_triangle(self.lengths, position, role)
         if self.may_stay_parallel:  # all bars make one angle, whose sine is exact
-            first, second = find_parallel_pairs(
-                self.lengths, position.half, np.sign(position.root)
-            )
+            assembly = np.sign(position.root) * np.sign(position.half.sk)
+            first, second = find_parallel_pairs(self.lengths, assembly)
             with_first, with_second = (
                 (0.0, 2.0 * position.half.sk)
                 if role == 3
@@ -219,17 +244,17 @@ def prepare_path(lengths: Loop, theta_1: Number, bar: int = 2) -> Path:
         loop(*reorder_lengths(bar, (d / unit, a / unit, b / unit, c / unit))),
         polar(1.0, theta_1),
     )
-    meets = is_any((reordered.E1 == 0.0) & (reordered.E2 == 0.0))
-    return Path(bar, reordered, theta_1, -u1 if bar == 4 else u1, unit, meets)
+    passing = find_passing(reordered)
+    meets = is_any(passing.outer & passing.inner)
+    if bar == 4:
+        u1 = -u1
+    return Path(bar, reordered, theta_1, u1, unit, meets, passing)
 
 
-def meet_change_points(lengths: Loop) -> Loop:
-    """Return the lengths of one linkage with E1 and E2 zero where they miss a change point by rounding."""
-    d, a, b, c, E1, E2 = lengths
-    total = d + a + b + c
-    largest = max(abs((d - a) - (b - c)), abs((d - a) + (b - c)))
-    met = abs(E1) <= TOUCHING * total * total, abs(E2) <= TOUCHING * total * largest
-    return lengths._replace(E1=0.0 if met[0] else E1, E2=0.0 if met[1] else E2)
+def count_turns(lengths: tuple[Number, Number, Number, Number], bar: int) -> Number:
+    """Count the turns of a bar after which an assembly repeats: two with a single change point, otherwise one."""
+    passing = find_passing(loop(*reorder_lengths(bar, lengths)))
+    return np.where(passing.outer ^ passing.inner, 2, 1)
 
 
 def find_singular(position: Position) -> Number:
@@ -282,7 +307,7 @@ def drive_sine_of_triangle(lengths: Loop, position: Position, drive_bar: int) ->
     if drive_bar == 2:
         return position.sin_mu
     d, a, b, c, _, _ = lengths
-    ss, _, sk, _, inner = position.half
+    ss, _, sk, _, inner, _ = position.half
     along = ((d - a) - 2.0 * d * ss) * position.root
     if drive_bar == 3:
         return (along + 2.0 * d * sk * (inner - 2.0 * c * (b - c))) / (
@@ -291,17 +316,6 @@ def drive_sine_of_triangle(lengths: Loop, position: Position, drive_bar: int) ->
     return (along - 2.0 * d * sk * (inner + 2.0 * b * (b - c))) / (
         2.0 * b * position.e2
     )
-
-
-def find_smooth_branch(lengths: Loop, psi: Number, sign: Number) -> Number:
-    """Return the root's sign on a path that runs smoothly through change points: there cos h or sin h changes its sign.
-
-    `psi`: independent angle less that of the ground, rad, not wrapped. `sign`: +1 or -1, a constant of the path.
-    """
-    k, s = np.cos(0.5 * psi), np.sin(0.5 * psi)
-    at_stretched = np.where(np.equal(lengths.E1, 0.0) & (k < 0.0), -1.0, 1.0)
-    at_folded = np.where(np.equal(lengths.E2, 0.0) & (s < 0.0), -1.0, 1.0)
-    return sign * at_stretched * at_folded
 
 
 def read_from(bar: int, k: Coefficients) -> Coefficients:

@@ -17,11 +17,11 @@ from fourbar.formulas.mobility import (
     Array,
     change_points,
     circuits,
-    follow_smooth_path,
     turns_fully,
 )
 from fourbar.formulas.motion import State
-from fourbar.formulas.path import compute_state
+from fourbar.formulas.path import compute_state, prepare_path
+from fourbar.formulas.position import Loop
 from fourbar.linkage import (
     A_BRANCH,
     MOST_STEPS,
@@ -118,6 +118,7 @@ class CouplerCurve(NamedTuple):
     theta_2: Array
     """rad; not wrapped."""
     branch: NDArray[np.int8]
+    """Sign of sin(theta_4 - theta_3)."""
     x: Array
     """m."""
     y: Array
@@ -134,15 +135,15 @@ def coupler_curve(
 ) -> CouplerCurve:
     """Trace the closed coupler curve of one circuit, run smoothly through limits and change points.
 
-    Where the input turns fully theta_2 is spaced evenly, over two turns if one turn ends on the
-    other branch; else it goes from limit to limit on one branch and back on the other, spaced by
+    Where the input turns fully theta_2 is spaced evenly, over two turns if the linkage has a single
+    change point; else it goes from limit to limit on one branch and back on the other, spaced by
     the cosine, so that the curve's points do not thin out at the limits.
 
     Parameters
     ----------
     r_along, r_across : the point in the coupler's frame at A, m.
     circuit : index into `circuits`; InputError where there is none of that number.
-    branch : where to start, for a linkage with change points.
+    branch : assembly, for a linkage with change points.
     steps : number of intervals, a multiple of 4 (InputError otherwise): limits and change points,
         at which directions are undetermined or lose digits, then fall between positions.
     """
@@ -166,18 +167,17 @@ def coupler_curve(
         turns = 2 if len(change_points(linkage)) == 1 else 1
         # odd halves of a multiple of 4 never meet theta_1 or theta_1 + pi
         theta_2: Array = start + half * (turns * TURN / steps)
-        signs = follow_smooth_path(linkage, theta_2, branch)
+        assembly: NDArray[np.int64] = np.full(theta_2.shape, branch)
     else:
         out = 0.5 * (start + stop) - 0.5 * (stop - start) * np.cos(
             half[: steps // 2] * (TURN / steps)
         )
-        ahead = follow_smooth_path(linkage, out, branch)
-        theta_2, signs = (
-            np.concatenate((out, out[::-1])),
-            np.concatenate((ahead, -ahead[::-1])),
-        )
-    curve = compute_state(linkage, theta_2, signs).point(3, point)
+        theta_2 = np.concatenate((out, out[::-1]))
+        assembly = np.repeat((branch, -branch), len(out))
+    curve = compute_state(linkage, theta_2, assembly).point(3, point)
     x, y = curve.real, curve.imag
+    path = prepare_path(Loop(*linkage.lengths, 0.0, 0.0), linkage.ground_angle)
+    signs = path.sign(theta_2, assembly).astype(np.int8)
     theta_2 = np.append(theta_2, theta_2[0] + turns * TURN)
     return CouplerCurve(
         theta_2, np.append(signs, signs[0]), np.append(x, x[0]), np.append(y, y[0])

@@ -6,8 +6,12 @@ With h = (theta_2 - theta_1)/2 and e the diagonal from A to O4, the loop closes 
 Heron's formula are >= 0; their product is the square of four times the area of the triangle:
     outer = (b + c)^2 - e^2 = E1 + 4 a d cos^2 h,   E1 = (b + c - a - d)(a + b + c + d),
     inner = e^2 - (b - c)^2 = E2 + 4 a d sin^2 h,   E2 = (d - a - b + c)(d - a + b - c).
-outer = 0 is bars 3, 4 stretched, inner = 0 is bars 3, 4 folded. At a change point E1 or E2 is zero
-exactly and nothing cancels near it; nothing passes through zero at theta = 180 deg.
+outer = 0 is bars 3, 4 stretched, inner = 0 is bars 3, 4 folded.
+
+A linkage with E1 = 0 or E2 = 0 has a change point at h = 90 deg or h = 0, where a factor is a square
+and its root passes through zero:
+    sqrt(outer) = 2 sqrt(a d) cos h if E1 = 0,   sqrt(inner) = 2 sqrt(a d) sin h if E2 = 0,
+with their signs. With these roots a branch is an assembly, which moves smoothly through change points.
 
 Source: R. L. Norton, Design of Machinery, ch. 4 (the loop and its two branches).
 """
@@ -21,17 +25,23 @@ from fourbar.formulas.arithmetic import (
     U,
     exact_difference,
     is_any,
+    is_zero,
     select,
     square_root,
     tangent,
     vector,
+    without_slopes,
 )
 
-TOUCHING = U
-"""Bars that miss each other, or a change point, by up to this times the sum of the lengths count as touching: each
-length was itself rounded by up to that, so the linkage meant touches as well as not."""
+TOUCHING = 4.0 * U
+"""Bars that miss each other, or a change point, by up to this times the sum of the lengths count as touching: lengths
+that are computed, as distances of points are, are rounded by a few U each."""
+VISIBLE = 1e-9
+"""Part of a length that is no rounding of it."""
+VISIBLE_AT_A = 1e-11
+"""The same of d - a: bars 3 and 4 are as much too long or short where A passes O4."""
 TINY_TANGENT = 1e-100
-"""Added to the size of tan h: with A on O4 bars 3, 4 get the directions to which they tend from theta_2 > theta_1."""
+"""Added to the size of tan h: on a change point everything takes the limit to which it tends along the assembly."""
 
 
 class Loop(NamedTuple):
@@ -53,6 +63,17 @@ class HalfAngle(NamedTuple):
     sk: Number
     outer: Number
     inner: Number
+    side: Number = 1.0
+    """Sign of the product of both roots: +1 or -1, always +1 without a change point."""
+
+
+class Passing(NamedTuple):
+    """The roots that pass through zero at a change point of the linkage, with their sign."""
+
+    outer: Number
+    """True if E1 = 0: bars 3, 4 are stretched there, and theta_2 - theta_1 is 180 deg."""
+    inner: Number
+    """True if E2 = 0: bars 3, 4 are folded there, and theta_2 - theta_1 is 0."""
 
 
 class Position(NamedTuple):
@@ -63,13 +84,13 @@ class Position(NamedTuple):
     u3: Number  # from A to B
     u4: Number  # from O4 to B
     sin_mu: Number
-    """sin(theta_4 - theta_3), signed like the branch."""
+    """sin(theta_4 - theta_3), with the sign of the root."""
     diagonal: Number
     """Vector from A to O4, complex, m."""
     e2: Number
     """Square e^2 of the diagonal; like the root, in the unit of the lengths that the loop was closed with."""
     root: Number
-    """sigma sqrt(outer inner); NaN where the loop does not close."""
+    """sigma sqrt(outer) sqrt(inner), as `signed_root`; NaN where the loop does not close."""
     half: HalfAngle
 
 
@@ -84,12 +105,60 @@ def reorder_lengths(
 def loop(d: Number, a: Number, b: Number, c: Number) -> Loop:
     """Return the lengths with E1 = (b + c - a - d)(a + b + c + d) and E2 = (d - a - b + c)(d - a + b - c).
 
+    A difference within the rounding of the lengths is zero. Where two of them vanish the lengths are equal in
+    pairs, and are returned so.
+
     >>> loop(0.3, 0.1, 0.3, 0.1).E1  # a parallelogram, whose bars come to lie in one line
     0.0
     """
-    E1 = exact_difference(b, c, a, d) * (a + b + c + d)
-    E2 = exact_difference(d, c, a, b) * exact_difference(d, b, a, c)
+    parallelogram = _are_equal(c, a) & _are_equal(b, d)
+    kite_at_B = _are_equal(b, a) & _are_equal(c, d)
+    kite_at_A = _are_equal(a, d) & _are_equal(c, b)
+    if is_any(parallelogram | kite_at_B | kite_at_A):
+        b, c = _replace(b, d, parallelogram), _replace(c, a, parallelogram)
+        b, c = _replace(b, a, kite_at_B), _replace(c, d, kite_at_B)
+        a, c = _replace(a, d, kite_at_A), _replace(c, b, kite_at_A)
+    lengths = d, a, b, c
+    E1 = _vanish(exact_difference(b, c, a, d), lengths) * (a + b + c + d)
+    E2 = _vanish(exact_difference(d, c, a, b), lengths, d - a)
+    E2 = E2 * _vanish(exact_difference(d, b, a, c), lengths, d - a)
     return Loop(d, a, b, c, E1, E2)
+
+
+def _are_equal(length: Number, other: Number) -> Number:
+    """Mark lengths that are equal within their rounding."""
+    difference, rounding = length - other, 2.0 * TOUCHING * other
+    return difference * difference <= rounding * rounding
+
+
+def _replace(length: Number, other: Number, mask: Number) -> Number:
+    """Return a length, where a mask holds with the value of another one; its slopes stay."""
+    return length - select(mask, without_slopes(length - other), 0.0)
+
+
+def _vanish(
+    difference: Number, lengths: tuple[Number, ...], diagonal: Number | None = None
+) -> Number:
+    """Return a difference of lengths, zero if it is within the rounding of their sum; its slopes stay.
+
+    It stays where it is a visible part of a bar, or of the least length of the diagonal, d - a.
+    """
+    d, a, b, c = lengths
+    square, rounding = difference * difference, TOUCHING * (d + a + b + c)
+    touching = square <= rounding * rounding
+    if not is_any(touching):
+        return difference
+    for length in lengths:
+        touching = touching & (square <= (VISIBLE * VISIBLE) * (length * length))
+    if diagonal is not None:
+        visible = VISIBLE_AT_A * diagonal
+        touching = touching & (square <= visible * visible)
+    return difference - select(touching, without_slopes(difference), 0.0)
+
+
+def find_passing(lengths: Loop) -> Passing:
+    """Find the roots that pass through zero: E1 = 0 or E2 = 0."""
+    return Passing(is_zero(lengths.E1), is_zero(lengths.E2))
 
 
 def direction(theta: Number) -> Number:
@@ -99,23 +168,44 @@ def direction(theta: Number) -> Number:
     return vector((1.0 - t * t) * kk, 2.0 * t * kk)
 
 
-def half_angle(lengths: Loop, psi: Number, *, opposite: bool = False) -> HalfAngle:
-    """Compute the half angle h of psi = theta_2 - theta_1 (rad), and the factors of Heron's formula.
+def half_angle(
+    lengths: Loop,
+    psi: Number,
+    *,
+    opposite: bool = False,
+    passing: Passing | None = None,
+) -> HalfAngle:
+    """Compute the half angle h of psi = theta_2 - theta_1 (rad, not reduced), and the factors of Heron's formula.
 
-    `opposite`: h of psi - pi, from the same tangent: there the ground is read from O4 to O2.
+    `opposite`: h of psi - pi, from the same tangent: there the ground is read from O4 to O2. `passing`: roots that
+    pass through zero with their sign; left out: those of the lengths.
     """
-    E = lengths.E1 if opposite else lengths.E2
-    t, meets = tangent(0.5 * psi), E == 0.0
-    if is_any(meets):
-        t = select(meets, t + np.copysign(TINY_TANGENT, t), t)
+    passing = find_passing(lengths) if passing is None else passing
+    t = tangent(0.5 * psi)
+    collinear = passing.outer if opposite else passing.inner
+    if is_any(collinear):
+        t = select(collinear, t + np.copysign(TINY_TANGENT, t), t)
     kk = 1.0 / (1.0 + t * t)
     sk = t * kk
     ss = t * sk
-    return (
-        compute_factors(lengths, kk, ss, -sk)
-        if opposite
-        else compute_factors(lengths, ss, kk, sk)
-    )
+    squares = (kk, ss, -sk) if opposite else (ss, kk, sk)
+    half = compute_factors(lengths, *squares)
+    if not is_any(passing.outer | passing.inner):
+        return half
+    sign_k = np.copysign(1.0, np.cos(0.5 * psi))
+    sign_s = np.copysign(1.0, t) * sign_k
+    if opposite:
+        sign_k, sign_s = sign_s, -sign_k
+    side = select(passing.outer, sign_k, 1.0) * select(passing.inner, sign_s, 1.0)
+    return half._replace(side=side)
+
+
+def signed_root(half: HalfAngle, branch: Number) -> Number:
+    """Compute sigma sqrt(outer) sqrt(inner), each root with its sign; NaN where the loop does not close.
+
+    `branch`: sigma, +1 or -1, the assembly.
+    """
+    return branch * half.side * square_root(half.outer * half.inner)
 
 
 def compute_factors(lengths: Loop, ss: Number, kk: Number, sk: Number) -> HalfAngle:
@@ -151,7 +241,7 @@ def close_loop(
     lengths : of the loop, m.
     u1, u2 : e^{i theta_1} and e^{i theta_2}.
     half : of theta_2 - theta_1.
-    branch : +1 (B lies left of the diagonal from A to O4) or -1.
+    branch : assembly, +1 (B lies left of the diagonal from A to O4 for 0 < theta_2 - theta_1 < 180 deg) or -1.
     unit : of the lengths, m; the diagonal is found in m.
 
     >>> lengths, theta_2 = loop(100, 40, 120, 80), np.radians(40)  # mm; Norton, example 4-1
@@ -161,7 +251,7 @@ def close_loop(
     """
     d, a, b, c, _, _ = lengths
     e2 = half.inner + (b - c) * (b - c)
-    root = branch * square_root(half.outer * half.inner)
+    root = signed_root(half, branch)
     twice_a = 2.0 * a * unit
     diagonal = vector((d - a) * unit + twice_a * half.ss, -twice_a * half.sk) * u1
     # e^2 + b^2 - c^2 and b^2 - e^2 - c^2 use the factor in the root, so that u3 and u4 keep their length
@@ -173,26 +263,20 @@ def close_loop(
     return Position(u1, u2, u3, u4, root * (0.5 / (b * c)), diagonal, e2, root, half)
 
 
-def find_parallel_pairs(
-    lengths: Loop, half: HalfAngle, branch: Number
-) -> tuple[Number, Number]:
-    """Mark where two pairs of bars stay parallel: E1 = E2 = 0, and the root is 4 a d sin h cos h or its opposite.
+def find_parallel_pairs(lengths: Loop, branch: Number) -> tuple[Number, Number]:
+    """Mark assemblies in which two pairs of bars stay parallel: E1 = E2 = 0, root = +- 4 a d sin h cos h.
 
     First: the coupler keeps the ground's direction and bars 2, 4 turn together (a = c, b = d).
     Second: B stays on O2, bars 2, 3 turn together and bar 4 rests (a = b, c = d).
     """
     d, a, b, c, _, _ = lengths
-    side = branch * np.sign(half.sk)
-    return (a == c) & (b == d) & (side > 0), (a == b) & (c == d) & (side < 0)
+    return (a == c) & (b == d) & (branch > 0), (a == b) & (c == d) & (branch < 0)
 
 
 def put_parallel_pairs(position: Position, first: Number, second: Number) -> Position:
     """Put in the exact directions u3 = u1, u4 = u2 where `first`, u3 = -u2, u4 = -u1 where `second`."""
     u3 = np.where(first, position.u1, np.where(second, -position.u2, position.u3))
     u4 = np.where(first, position.u2, np.where(second, -position.u1, position.u4))
-    sine = np.where(
-        first | second,
-        np.sign(position.root) * 2.0 * abs(position.half.sk),
-        position.sin_mu,
-    )
+    sine = 2.0 * position.half.sk
+    sine = np.where(first, sine, np.where(second, -sine, position.sin_mu))
     return position._replace(u3=u3, u4=u4, sin_mu=sine)

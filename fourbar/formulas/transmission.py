@@ -1,9 +1,10 @@
 """Transmission quality: transmission angle, speed ratio, mechanical advantage, nearest singular position."""
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fourbar.formulas.arithmetic import dot
 from fourbar.formulas.mobility import (
@@ -15,6 +16,8 @@ from fourbar.formulas.mobility import (
     reach_of,
 )
 from fourbar.formulas.motion import State
+from fourbar.formulas.path import prepare_path
+from fourbar.formulas.position import Loop
 from fourbar.linkage import FourBar
 
 
@@ -107,7 +110,7 @@ def distance_to_singular(
     linkage: FourBar,
     theta_2: Array,
     drive_bar: int = 2,
-    branch: int | Array | None = None,
+    branch: int | NDArray[Any] | None = None,
 ) -> Array:
     """Compute the angle of the input to the nearest singular position, rad, in [0, pi], (n,); inf where there is none.
 
@@ -120,9 +123,10 @@ def distance_to_singular(
     ----------
     theta_2 : (n,), rad.
     drive_bar : 2, 3 or 4.
-    branch : +1 or -1, or one of them for each position; left out: dead centres of both branches count.
+    branch : assembly, +1 or -1, or one for each position; left out: dead centres of both count.
     """
     theta_2 = np.asarray(theta_2, dtype=float)
+    path = prepare_path(Loop(*linkage.lengths, 0.0, 0.0), linkage.ground_angle)
     points = [(limit.theta_2, 0) for limit in limit_positions(linkage)]
     points += [(point, 0) for point in change_points(linkage)]
     if drive_bar != 2:
@@ -132,7 +136,10 @@ def distance_to_singular(
         ]
     nearest = np.full(theta_2.shape, np.inf)
     for point, side in points:
-        distance = np.abs((theta_2 - point) - TURN * np.rint((theta_2 - point) / TURN))
-        counts = True if branch is None or side == 0 else np.asarray(branch) == side
+        there = point + TURN * np.rint((theta_2 - point) / TURN)
+        counts: Any = True
+        if branch is not None and side != 0:
+            counts = path.sign(there, np.asarray(branch)) == side
+        distance = np.abs(theta_2 - there)
         nearest = np.where(counts, np.minimum(nearest, distance), nearest)
     return nearest

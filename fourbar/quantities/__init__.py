@@ -46,7 +46,7 @@ class Quantities:
     theta_3: Array = _scalar("rad", "position", "angle of the coupler", "unknown")
     theta_4: Array = _scalar("rad", "position", "angle of the output", "unknown")
     sin_mu: Array = _scalar(
-        "1", "position", "sin(theta_4 - theta_3), signed like the branch"
+        "1", "position", "sin(theta_4 - theta_3); its sign is the branch"
     )
     condition: Array = _scalar(
         "1", "position", "motion condition |sin_mu|, in (0, 1]; 1 is best"
@@ -139,9 +139,7 @@ class Quantities:
     friction_residual: Array | None = _scalar(
         "N m", "force", "largest remaining |mu r |F| - couple|", "pin loads"
     )
-    time: Array | None = _scalar(
-        "s", None, "of a motion law or a free motion, which ends at a limit position"
-    )
+    time: Array | None = _scalar("s", None, "of a motion law or a free motion")
 
 
 QUANTITIES = tuple(
@@ -203,7 +201,7 @@ DRY_FRICTION_QUANTITIES = tuple(q.name for q in QUANTITIES if q.group == "dry fr
 PIN_LOAD_QUANTITIES = tuple(q.name for q in QUANTITIES if q.group == "pin loads")
 STATUS_NAMES = (
     *("ok", "not_assembled", "singular", "jammed", "several", "no_direction", "wound"),
-    *("no_torque", "overflow", "invalid", "no_lever"),
+    *("no_torque", "overflow", "invalid", "no_lever", "change_point"),
 )
 """Status names by code; `Solution.status_code` explains each."""
 (
@@ -218,4 +216,5 @@ STATUS_NAMES = (
     OVERFLOW,
     INVALID,
     NO_LEVER,
+    CHANGE_POINT,
 ) = range(len(STATUS_NAMES))

@@ -157,6 +157,20 @@ def find_unit(text: object, otherwise: str) -> str:
     return unit or otherwise
 
 
+def find_rounding(text: object, unit: str) -> float:
+    """Return half a unit of the last decimal of the number in a text, in `unit`; 0 for a number without decimals."""
+    last = FEET.sub("", str(text).strip())
+    number_text = None if FRACTION.match(last) else NUMBER.match(last)
+    if number_text is None:
+        return 0.0
+    digits, _, power = number_text[0].lower().partition("e")
+    decimals = len(digits.partition(".")[2])
+    if not decimals:
+        return 0.0
+    half = 0.5 * 10.0 ** (int(power or 0) - decimals)
+    return half * find_factor(unit, find_unit(text, unit))
+
+
 def find_factor(unit: str, given: str) -> float:
     """Return what a number in the unit `given` is multiplied by to be in `unit`.
 

@@ -249,9 +249,10 @@ class Motion:
     theta_2 : one angle, an array of them (n,), a Sweep, a FromLimit, or None (the default range), rad.
     omega_2 : rad/s; None: positions only.
     alpha_2 : rad/s^2.
-    branch : "open" or +1 (B left of the diagonal A to O4), "crossed" or -1: the sign of sin(theta_4 - theta_3); where
-        bar 3 or 4 is commanded that of sin(theta_4 - theta_2) or sin(theta_3 - theta_2), +1 "open".
-    through : at a change point keep the "sign" of the branch, or "follow" the smooth path.
+    branch : "open" or +1, "crossed" or -1: the assembly. Open has sin(theta_4 - theta_3) > 0 for
+        0 < theta_2 - theta_1 < 180 deg, and at every other angle that it reaches smoothly from there, through change
+        points too. Where bar 3 is commanded it is sin(theta_4 - theta_2), by theta_3; where bar 4 is, it is
+        sin(theta_3 - theta_2), for 180 deg < theta_4 - theta_1 < 360 deg.
     free : released motion instead of a prescribed one.
     law : an angle over time instead of theta_2, omega_2 and alpha_2.
     theta_3, omega_3, alpha_3, theta_4, omega_4, alpha_4 : of the coupler or the output instead.
@@ -272,7 +273,7 @@ class Motion:
     acceleration: float
     """Commanded acceleration, rad/s^2, or m/s^2 of a stroke."""
     branch: int
-    through: str
+    """Assembly, +1 open or -1 crossed."""
     free: Free | None
     law: Law | None
     side: str | None
@@ -298,7 +299,6 @@ class Motion:
         omega_2: float | None = None,
         alpha_2: float = 0.0,
         branch: int = OPEN,
-        through: str = "sign",
         free: Free | None = None,
         law: Law | None = None,
         theta_3: float | Array | Sweep | FromLimit | None = None,
@@ -355,15 +355,12 @@ class Motion:
             )
         checked = _require_command(names, *numbers)
         expect("motion.branch", branch, int, np.integer, str)
-        expect("motion.through", through, str)
         expect("motion.free", free, Free, type(None))
         if branch not in (OPEN, CROSSED):
             raise InputError("motion.branch", branch, A_BRANCH)
-        if through not in ("sign", "follow"):
-            raise InputError("motion.through", through, 'must be "sign" or "follow"')
         fields = zip(
             self.__slots__,
-            (names[0], bar, *checked, branch, through, free, law, side),
+            (names[0], bar, *checked, branch, free, law, side),
             strict=True,
         )
         for name, value in fields:
@@ -372,16 +369,14 @@ class Motion:
             )  # the class is frozen; this is its constructor
 
     def replace(self, **changes: Any) -> "Motion":
-        """Return a copy with other values of fields: angle, speed, acceleration, branch, through, free, law, side.
+        """Return a copy with other values of fields: angle, speed, acceleration, branch, free, law, side.
 
         angle, speed and acceleration are those of what this motion commands, a bar or a stroke.
         """
         keywords = dict(
             zip(("angle", "speed", "acceleration"), self.names, strict=True)
         )
-        keywords |= {
-            name: name for name in ("branch", "through", "free", "law", "side")
-        }
+        keywords |= {name: name for name in ("branch", "free", "law", "side")}
         if foreign := changes.keys() - keywords:
             raise TypeError(
                 f"a motion has no field {min(foreign)!r} to replace; it has {', '.join(keywords)}"
@@ -415,7 +410,6 @@ class Motion:
             self.speed,
             self.acceleration,
             self.branch,
-            self.through,
             self.free,
             self.law,
         )

@@ -23,8 +23,9 @@ from fourbar.formulas.mobility import (
     MARGIN,
     choose_range,
     find_limit_angles,
-    follow_smooth_path,
 )
+from fourbar.formulas.path import prepare_path
+from fourbar.formulas.position import Loop
 from fourbar.linkage import BAR_NAMES, FourBar, require_bar
 from fourbar.quantities import Array
 from fourbar.scene.drawing import DrawnPins
@@ -234,7 +235,7 @@ class Command(NamedTuple):
     angle: Array
     """(n,), rad."""
     branch: NDArray[np.int8]
-    """(n,), +1 or -1: the sign of the sine between the two other moving bars, as `Motion` has it."""
+    """(n,), +1 or -1: the assembly, as `Motion` has it; of a result of `with_signs` the sign at each position."""
     speed: float | Array | None
     """rad/s; None: positions only."""
     acceleration: float | Array
@@ -465,13 +466,8 @@ def command_stroke(
     )
 
 
-def command_at(
-    scene: Scene, places: Array, branch: NDArray[np.int8] | None = None
-) -> Command:
-    """Command what the scene's motion commands at other places: angles, strokes, or of a law times.
-
-    `branch`: at each of them; left out: the scene's, which may follow its smooth path.
-    """
+def command_at(scene: Scene, places: Array) -> Command:
+    """Command what the scene's motion commands at other places: angles, strokes, or of a law times."""
     motion, bar = scene.motion, scene.motion.bar
     if motion.stroke is not None:
         triangle = find_triangle(scene.linkage, scene.drive)
@@ -487,23 +483,24 @@ def command_at(
                 stroke,
                 f"this cylinder can have {least:.6g} to {most:.6g} m",
             )
-        commanded = command_stroke(scene, places, motion.speed, motion.acceleration)
-    else:
-        commanded = Command(
-            places,
-            np.full(places.shape, motion.branch, dtype=np.int8),
-            motion.speed,
-            motion.acceleration,
-        )
-        if motion.law is not None:
-            angle, speed, acceleration = motion.law.at(places)
-            commanded = commanded._replace(
-                angle=angle, speed=speed, acceleration=acceleration, time=places
-            )
-        commanded = commanded._replace(bar=bar)
-    if branch is None and motion.through == "follow":
-        branch = follow_smooth_path(scene.linkage, commanded.angle, motion.branch, bar)
-    return commanded if branch is None else commanded._replace(branch=branch)
+        return command_stroke(scene, places, motion.speed, motion.acceleration)
+    branch = np.full(places.shape, motion.branch, dtype=np.int8)
+    if motion.law is None:
+        return Command(places, branch, motion.speed, motion.acceleration, bar=bar)
+    angle, speed, acceleration = motion.law.at(places)
+    return Command(angle, branch, speed, acceleration, time=places, bar=bar)
+
+
+def with_signs(linkage: FourBar, commanded: Command) -> Command:
+    """Return a command whose branch is the sign of the bar's own sine at each position, as engines are told.
+
+    It follows from the lengths and the angle alone. Of a command with signs this returns the one with assemblies.
+    """
+    path = prepare_path(
+        Loop(*linkage.lengths, 0.0, 0.0), linkage.ground_angle, commanded.bar
+    )
+    branch = path.sign(commanded.angle, commanded.branch)
+    return commanded._replace(branch=np.asarray(branch).astype(np.int8))
 
 
 def command(scene: Scene) -> Command:

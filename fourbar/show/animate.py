@@ -31,6 +31,7 @@ from fourbar.show.plot.film import write_film
 from fourbar.show.plot.style import format_of, shorten_text
 from fourbar.show.plot.symbols import Symbol, list_acting
 from fourbar.show.plot.view import (
+    describe_change_points,
     find_drawn_place,
     is_over_time,
     list_sweep,
@@ -146,7 +147,6 @@ def collect_live_data(
         "acting": [
             _write_symbol(symbol, shown["theta_2"]) for symbol in list_acting(scene)
         ],
-        "followed": motion.through == "follow",
         **shown,
     }
 
@@ -184,16 +184,8 @@ def _collect_sweep(
         start = int(np.argmin(np.abs(thinned.places - drawn)))
     theta_2, branches = thinned.angle, {}
     for sign in signs if name == "theta_2" else (motion.branch,):
-        branch = (
-            None
-            if motion.through == "follow"
-            else np.full(thinned.angle.shape, sign, dtype=np.int8)
-        )
-        solution = solve(
-            one := set_branch(scene, sign),
-            stage,
-            at=command_at(one, thinned.places, branch),
-        )
+        one = set_branch(scene, sign)
+        solution = solve(one, stage, at=command_at(one, thinned.places))
         branches[str(sign)], theta_2 = _collect_columns(solution), solution.theta_2
     if name != "theta_2":
         branches[str(motion.branch)]["theta_2"] = theta_2
@@ -287,8 +279,8 @@ def _describe_pace(motion: Solution, rate: float, shown: int) -> str:
         )
     elif rate > 1.0:
         words = f"At speed 1× it moves {rate:.0f} times faster than it really does"
-    if motion.stopped_at is not None:
-        words += f". The linkage stops at a limit position at {motion.stopped_at:.4g} s"
+    if motion.change_points:
+        words += ". " + describe_change_points(motion)
     if len(motion) > shown:
         words += f". Shown are {shown} of the {len(motion)} instants"
     return words + "."

@@ -8,7 +8,14 @@ from typing import Any
 import numpy as np
 
 from fourbar.errors import clean_line
-from fourbar.formulas.mobility import classify
+from fourbar.formulas.mobility import (
+    PARALLELOGRAM,
+    change_points,
+    classify,
+    find_miss,
+    name_assembly,
+    turns_fully,
+)
 from fourbar.linkage import BAR_NAMES, PIN_FORCE
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Scene
@@ -39,6 +46,8 @@ FEW_DIGITS = 1e-8
 """Error bar as a part of the value from which on the block says where digits are lost: half of those of a double."""
 ALIKE = 1e-3
 """Ratio of the smallest to the largest of several quantities from which on they share a prefix."""
+NO_ANGLE = 1e-14
+"""rad; rounding of an angle of a turn."""
 LOST = {2: "3 and 4", 3: "2 and 4", 4: "2 and 3"}
 """Bars that are in line where a command of a bar, or a drive on it, loses digits."""
 
@@ -134,7 +143,7 @@ class _Block:
         return f"{self.symbol}{TIED}={TIED}{text}" if named else text
 
     def _angle(self, angle: float) -> str:
-        return self._value(angle, "rad")
+        return self._value(0.0 if abs(angle) < NO_ANGLE else angle, "rad")
 
     def _write_head(self) -> list[str]:
         """Write what the linkage is."""
@@ -144,14 +153,15 @@ class _Block:
         lengths = ", ".join(
             f"{name} {write_digits(factor * length)}" for name, length in bars
         )
-        name = classify(scene.linkage).name
+        motion = scene.motion
+        name = name_assembly(scene.linkage, motion.bar, motion.branch)
         title = f' "{clean_line(scene.title)}"' if scene.title else ""
-        of_bar = (
-            "" if scene.motion.bar == 2 else f" of the command {scene.motion.commanded}"
-        )
-        head = f"{name[0].upper()}{name[1:]}{title}, {BRANCH_NAMES[scene.motion.branch]} branch{of_bar}:"
+        of_bar = "" if motion.bar == 2 else f" of the command {motion.commanded}"
+        branch = f"{BRANCH_NAMES[motion.branch]} branch{of_bar}"
+        head = f"{name[0].upper()}{name[1:]}{title}, {branch}:"
         line = f"{head} {lengths} {unit}"
-        return [line] if len(line) <= WIDTH else [head, f"    {lengths} {unit}"]
+        lines = [line] if len(line) <= WIDTH else [head, f"    {lengths} {unit}"]
+        return [*lines, *self._write_change_points()]
 
     def _write_motion(self) -> list[str]:
         """Write how far the linkage moves, and how well it transmits."""
@@ -192,6 +202,29 @@ class _Block:
             f"positions only, since {scene.motion.names[1]} is left out:",
             f"    {explain_static(scene)}",
         ]
+
+    def _write_change_points(self) -> list[str]:
+        """Write where change points lie and what the assembly does there, or how nearly there would be one."""
+        linkage, motion = self.facts.scene.linkage, self.facts.scene.motion
+        if (miss := find_miss(linkage)) is not None:
+            gap = self._value(miss[0], "m")
+            return [f"misses a {miss[1]} by {gap}: it has no change point"]
+        points = change_points(linkage, motion.bar)
+        if not points:
+            return []
+        lines = []
+        if motion.bar == 3 and classify(linkage).name == PARALLELOGRAM:
+            lines.append(
+                "no theta_3 moves the parallelogram, whose coupler does not turn"
+            )
+        angles = " and ".join(self._angle(angle) for angle in points)
+        line = f"change point{'s' if len(points) > 1 else ''} at theta_{motion.bar} = {angles}"
+        if len(points) == 1 and turns_fully(linkage, motion.bar):
+            line += (
+                ": the assembly repeats after two turns, open and crossed are one "
+                "motion, a turn apart"
+            )
+        return [*lines, line]
 
     def _write_ranges(self) -> str:
         """Write how far the commanded bar goes, or the stroke, and how far the output, or else the input."""
@@ -237,12 +270,11 @@ class _Block:
     def _write_release(self) -> str:
         free, solution = self.facts.scene.motion.free, self.facts.solution
         assert free is not None
-        if solution.stopped_at is None:
-            return f"released for {write_digits(free.duration)} s, without a drive"
-        stop = f"stops at a limit position at t = {write_digits(solution.stopped_at)} s, where bars 3 and 4 are in line"
-        return (
-            f"released for {write_digits(free.duration)} s, without a drive: it {stop}"
-        )
+        begin = f"released for {write_digits(free.duration)} s, without a drive"
+        if not solution.change_points:
+            return begin
+        times = " and ".join(f"{write_digits(t)} s" for t in solution.change_points)
+        return f"{begin}; at t = {times} all bars are in line, where another motion is possible"
 
     def _write_stretches(self) -> list[str]:
         """Write where the assembly ends, and what grows without bound there."""
@@ -277,7 +309,7 @@ class _Block:
         drive, duty = facts.drive, facts.duty
         lines = [self._write_drive_head()]
         word = "force" if facts.linear else "torque"
-        row = self._value(facts.peak.value, drive.unit)
+        row = self._value(self._without_rounding(facts.peak.value), drive.unit)
         if duty is not None:
             rms = duty.rms_force if facts.linear else duty.rms_torque
             beyond = " (of these positions)" if self._is_rough(drive.keys.value) else ""
@@ -300,6 +332,13 @@ class _Block:
         if pressure is not None and facts.linear:
             lines += self._write_bore(pressure)
         return lines
+
+    def _without_rounding(self, value: float) -> float:
+        """Return zero for a torque or force of the drive that is no larger than its error bars."""
+        drive = self.facts.drive
+        if drive is None or drive.error is None:
+            return value
+        return 0.0 if abs(value) <= np.nanmax(drive.error, initial=0.0) else value
 
     def _write_power(self) -> list[str]:
         """Write power and energy of the drive, and what a motor must have."""
@@ -482,6 +521,11 @@ class _Block:
                 head + ", ".join(names) for head, names in parts if names
             )
             lines.append(f"growing without bound between these positions: {grow}")
+        if facts.solution.change_points and facts.pins:
+            lines.append(
+                "at a change point pin forces grow without bound: the peaks are those "
+                "of these instants"
+            )
         if facts.between.reversals:
             places = ", ".join(
                 f"{self._place(place, named=False)} ({pin})"
@@ -520,6 +564,9 @@ class _Block:
             share = drive.error / np.maximum(
                 np.abs(drive.values), np.nanmedian(np.abs(drive.values))
             )
+        largest = np.nanmax(np.abs(drive.values), initial=0.0)
+        if self._without_rounding(float(largest)) == 0.0:  # nothing has digits to lose
+            return []
         if not np.nanmax(share, initial=0.0) > FEW_DIGITS:
             return []
         worst = int(np.nanargmax(share))

@@ -12,7 +12,7 @@ import numpy as np
 
 from fourbar.errors import InputError
 from fourbar.quantities import DERIVED_NAMES, STAGE_OF
-from fourbar.scene import Command, Scene, command_at
+from fourbar.scene import Command, Scene, command_at, with_signs
 from fourbar.show.derived import derive
 from fourbar.solution import (
     Array,
@@ -156,7 +156,8 @@ def _solve_at_unit_speed(scene: Scene, solution: Solution) -> Solution:
         motion = scene.motion.replace(speed=1.0, acceleration=0.0)
         at = command_at(replace(scene, motion=motion), solution.at.stroke)
     elif solution.at.independent is not None:
-        at = Command(solution.theta_2, solution.branch, 1.0, 0.0)
+        of_input = Command(solution.theta_2, solution.branch, 1.0, 0.0)
+        at = with_signs(scene.linkage, of_input)
     else:
         at = solution.at._replace(speed=1.0, acceleration=0.0)
     return solve(scene, "velocity", at=at)

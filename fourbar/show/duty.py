@@ -9,9 +9,10 @@ from fourbar.effects.effect import Actions, list_bodies
 from fourbar.errors import DependencyError, InputError, expect, say_install
 from fourbar.evaluation.case import compute_state
 from fourbar.formulas.arithmetic import dot
+from fourbar.formulas.path import count_turns
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, PIN_FORCE
 from fourbar.quantities import COUPLE, LINE, UNITS, DriveNames
-from fourbar.scene import Command, Scene
+from fourbar.scene import Command, Scene, with_signs
 from fourbar.solution import Array, Solution
 
 
@@ -173,11 +174,18 @@ def motor_duty(solution: Solution, located: Solution | None = None) -> MotorDuty
 
 
 def is_once_round(solution: Solution) -> Any:
-    """Return True if a sweep covers whole turns, so that its last position repeats the first; for a study (m,)."""
-    angle = solution.at.angle
+    """Return True if a sweep covers whole turns, so that its last position repeats the first; for a study (m,).
+
+    An assembly with a single change point repeats after two turns.
+    """
+    angle, bar = solution.at.angle, solution.at.bar
     if angle.shape[-1] == 1:
         return np.zeros(angle.shape[:-1], dtype=bool)
-    turns = np.abs(angle[..., -1] - angle[..., 0]) / (2.0 * np.pi)
+    assert solution.lengths is not None
+    period = count_turns(solution.lengths, bar)
+    if period.ndim > 1:  # of a study, a column
+        period = period[:, 0]
+    turns = np.abs(angle[..., -1] - angle[..., 0]) / (2.0 * np.pi * period)
     return (turns > 0.5) & np.isclose(turns, np.round(turns), rtol=1e-12, atol=0.0)
 
 
@@ -309,9 +317,8 @@ def compute_energies(scene: Scene, motion: Solution) -> Energies:
             f"SciPy is needed for free motion: {say_install('studies')}"
         ) from None
     assert motion.time is not None and motion.omega_2 is not None
-    state = compute_state(
-        scene, Command(motion.theta_2, motion.branch, motion.omega_2, 0.0)
-    )
+    of_input = Command(motion.theta_2, motion.branch, motion.omega_2, 0.0)
+    state = compute_state(scene, with_signs(scene.linkage, of_input))
     groups = {
         "loads": scene.loads,
         **{effect.key: (effect,) for effect in scene.effects},

@@ -11,7 +11,6 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fourbar.formulas.mobility import TURN, find_intervals
 from fourbar.linkage import MOVING_BARS, PIN_FORCE, PINS
@@ -38,6 +37,8 @@ MOST_PEAKS = 6
 """Number of peaks of one quantity that are listed, the highest."""
 BENDING_PEAKS, BENDING_ROUNDS = 3, 3
 """The same for bending moments: only the largest of a bar is shown, with four digits."""
+NO_BENDING = 1e-13
+"""Part of the pin forces times the longest bar up to which a bending moment is their rounding."""
 GROWING = 1e-3
 """Growth over the last two calls, as a part of the value, above which a quantity has a pole instead of a maximum."""
 AT_REST = 1e-12
@@ -50,7 +51,6 @@ END_ROUNDS = 9
 """Rounds of cutting the interval in which the assembly ends by 40: down to the last digits of a double."""
 IN_LINE = 1e-6
 """rad. Transmission angle that is zero: at a limit, a place in its last digits leaves some 1e-8."""
-Branch = NDArray[np.int8]
 Sizes = Callable[[Solution], dict[str, Array]]
 """List magnitudes at the positions of a solution, by name."""
 
@@ -122,12 +122,10 @@ def locate_between(scene: Scene, solution: Solution) -> Between:
     """
     if not _has_between(scene, solution):
         return Between(solution, solution, [], {COUPLE.value, LINE.value, *PIN_FORCES})
-    pins, low, high, branch = _find_reversing(scene, solution)
+    pins, low, high = _find_reversing(scene, solution)
     for _ in range(ROUNDS if pins else 0):
         places = _cut(low, high)
-        inside = _solve_at(
-            scene, places.ravel(), np.repeat(branch, CUTS + 1), "velocity"
-        )
+        inside = _solve_at(scene, places.ravel(), "velocity")
         slips = np.array(
             [
                 _compute_slip(inside, pin).reshape(places.shape)[row]
@@ -137,13 +135,11 @@ def locate_between(scene: Scene, solution: Solution) -> Between:
         turned = np.argmax(slips * slips[:, :1] <= 0.0, axis=1)
         rows = np.arange(len(pins))
         low, high = places[rows, turned - 1], places[rows, turned]
-    merged = _merge(
-        scene, solution, np.concatenate([low, high]), np.concatenate([branch, branch])
-    )
+    merged = _merge(scene, solution, np.concatenate([low, high]))
     angles = low if scene.motion.law is None else scene.motion.law.at(low)[0]
-    peaks, branch, growing = _find_largest(scene, merged, list_sizes)
+    peaks, growing = _find_largest(scene, merged, list_sizes)
     reversals = sorted(zip(angles.tolist(), pins, strict=True))
-    return Between(solution, _merge(scene, merged, peaks, branch), reversals, growing)
+    return Between(solution, _merge(scene, merged, peaks), reversals, growing)
 
 
 def locate_bending(scene: Scene, between: Between) -> dict[int, BarBending]:
@@ -155,9 +151,15 @@ def locate_bending(scene: Scene, between: Between) -> dict[int, BarBending]:
     if solution.F12 is None or not np.isfinite(solution.F12).any():
         return {}
 
+    longest = max(scene.linkage.lengths)
+
     def find(solution: Solution) -> dict[str, Bending]:
+        forces = [np.hypot(*getattr(solution, name).T) for name in PIN_FORCES]
+        size = longest * np.max(forces, axis=0)
         return {
-            str(bar): internal_forces(scene, solution, bar, np.zeros(1)).largest
+            str(bar): _drop_rounding(
+                internal_forces(scene, solution, bar, np.zeros(1)).largest, size
+            )
             for bar in MOVING_BARS
         }
 
@@ -166,11 +168,11 @@ def locate_bending(scene: Scene, between: Between) -> dict[int, BarBending]:
 
     growing, searched = {str(bar) for bar in MOVING_BARS}, [(solution, find(solution))]
     if _has_between(scene, solution):
-        places, branch, growing = _find_largest(
+        places, growing = _find_largest(
             scene, solution, list_moments, BENDING_PEAKS, BENDING_ROUNDS
         )
         if len(places):
-            peaks = _solve_at(scene, places, branch)
+            peaks = _solve_at(scene, places)
             searched.append((peaks, find(peaks)))
     bending = dict[int, BarBending]()
     for bar in MOVING_BARS:
@@ -188,6 +190,12 @@ def locate_bending(scene: Scene, between: Between) -> dict[int, BarBending]:
     return bending
 
 
+def _drop_rounding(bending: Bending, size: Array) -> Bending:
+    """Return bending moments with zero where they are rounding of the pin forces: a two-force bar has none."""
+    moment = np.where(np.abs(bending.moment) <= NO_BENDING * size, 0.0, bending.moment)
+    return bending._replace(moment=moment)
+
+
 def _has_between(scene: Scene, solution: Solution) -> bool:
     listed = isinstance(scene.motion.angle, np.ndarray)
     return (
@@ -198,18 +206,16 @@ def _has_between(scene: Scene, solution: Solution) -> bool:
     )
 
 
-def _solve_at(
-    scene: Scene, places: Array, branch: Branch, stage: str = "force"
-) -> Solution:
-    """Solve at commanded angles or strokes, or at the times of a motion law, each with its branch."""
-    return solve(scene, stage, at=command_at(scene, places, branch))
+def _solve_at(scene: Scene, places: Array, stage: str = "force") -> Solution:
+    """Solve at commanded angles or strokes, or at the times of a motion law."""
+    return solve(scene, stage, at=command_at(scene, places))
 
 
 def _cut(low: Array, high: Array) -> Array:
     return low[:, None] + (high - low)[:, None] * np.linspace(0.0, 1.0, CUTS + 1)
 
 
-def _merge(scene: Scene, solution: Solution, places: Array, branch: Branch) -> Solution:
+def _merge(scene: Scene, solution: Solution, places: Array) -> Solution:
     """Solve at the positions of a solution and at others among them, in the order of the solution."""
     if not len(places):
         return solution
@@ -217,9 +223,7 @@ def _merge(scene: Scene, solution: Solution, places: Array, branch: Branch) -> S
     order = np.unique(merged, return_index=True)[1][
         :: 1 if merged[0] < merged[1] else -1
     ]
-    return _solve_at(
-        scene, merged[order], np.concatenate([solution.at.branch, branch])[order]
-    )
+    return _solve_at(scene, merged[order])
 
 
 def _compute_slip(solution: Solution, pin: str) -> Array:
@@ -230,27 +234,19 @@ def _compute_slip(solution: Solution, pin: str) -> Array:
     return np.asarray(second - first)
 
 
-def _find_reversing(
-    scene: Scene, solution: Solution
-) -> tuple[list[str], Array, Array, Branch]:
-    """List the steps in which the slip of a pin with dry friction changes sign: pin, ends, branch."""
-    places, branch, steps = (
-        solution.at.places,
-        solution.at.branch,
-        list[tuple[str, int, int]](),
-    )
+def _find_reversing(scene: Scene, solution: Solution) -> tuple[list[str], Array, Array]:
+    """List the steps in which the slip of a pin with dry friction changes sign: pin and ends."""
+    places, steps = solution.at.places, list[tuple[str, int, int]]()
     for pin in sorted({pin for effect in scene.effects for pin in effect.dry_pins}):
         slip = np.nan_to_num(_compute_slip(solution, pin))
         moving = np.flatnonzero(np.abs(slip) > AT_REST * np.abs(slip).max())
         steps += [
             (pin, i, j)
             for i, j in pairwise(moving.tolist())
-            if slip[i] * slip[j] < 0.0
-            and branch[i] == branch[j]
-            and solution.assembled[i:j].all()
+            if slip[i] * slip[j] < 0.0 and solution.assembled[i:j].all()
         ]
     first, last = (np.array([step[end] for step in steps], dtype=int) for end in (1, 2))
-    return [pin for pin, *_ in steps], places[first], places[last], branch[first]
+    return [pin for pin, *_ in steps], places[first], places[last]
 
 
 def _find_largest(
@@ -259,13 +255,9 @@ def _find_largest(
     sizes: Sizes,
     most: int = MOST_PEAKS,
     rounds: int = ROUNDS,
-) -> tuple[Array, Branch, set[str]]:
-    """Find the places and branches of the local maxima of each magnitude, and the names of those that grow."""
-    places, branch, peaks = (
-        solution.at.places,
-        solution.at.branch,
-        list[tuple[str, int, int, int]](),
-    )
+) -> tuple[Array, set[str]]:
+    """Find the places of the local maxima of each magnitude, and the names of those that grow."""
+    places, peaks = solution.at.places, list[tuple[str, int, int, int]]()
     present = sizes(solution)
     for name, size in present.items():
         padded = np.concatenate(
@@ -279,15 +271,13 @@ def _find_largest(
             & (here > 0.0)
         )
         for i in tops[np.argsort(-here[tops], kind="stable")][:most]:
-            start = i - (before[i] >= 0.0 and branch[i - 1] == branch[i])
-            stop = i + (
-                after[i] >= 0.0 and branch[min(i + 1, len(branch) - 1)] == branch[i]
-            )
+            start = i - (before[i] >= 0.0)
+            stop = i + (after[i] >= 0.0)
             peaks.append((name, i, start, stop))
         for i, j in pairwise(
-            range(len(branch))
+            range(len(places))
         ):  # towards a gap a magnitude may grow without a local maximum
-            if padded[i + 1] * padded[j + 1] < 0.0 and branch[i] == branch[j]:
+            if padded[i + 1] * padded[j + 1] < 0.0:
                 peaks.append((name, i if padded[j + 1] < 0.0 else j, i, j))
     rows, names = np.arange(len(peaks)), [name for name, *_ in peaks]
     top, start, stop = (
@@ -298,7 +288,7 @@ def _find_largest(
     reached = [np.array([present[name][i] for name, i, *_ in peaks])]
     for _ in range(rounds if len(peaks) else 0):
         cut = _cut(low, high)
-        inside = sizes(_solve_at(scene, cut.ravel(), np.repeat(branch[top], CUTS + 1)))
+        inside = sizes(_solve_at(scene, cut.ravel()))
         values = np.array(
             [
                 np.nan_to_num(inside[n].reshape(cut.shape)[k], nan=-1.0)
@@ -321,7 +311,6 @@ def _find_largest(
     )  # beside a gap other magnitudes grow
     return (
         peak_places[kept],
-        branch[top][kept],
         {name for name, grows in zip(names, growing, strict=True) if grows},
     )
 
@@ -381,15 +370,15 @@ def summarize(scene: Scene, solution: Solution) -> Facts:
     places, codes = _list_places(solution), solution.status_code
     fine, stretches = solution, list[tuple[float | None, float | None]]()
     if smooth := kind in ("sweep", "turn", "law"):
-        fine = _solve_positions(
-            scene, np.linspace(places[0], places[-1], FINE + 1), solution
+        fine = _solve_at(
+            scene, np.linspace(places[0], places[-1], FINE + 1), "position"
         )
         stretches = _list_stretches(scene, fine)
         ends = np.array(
             [end for stretch in stretches for end in stretch if end is not None]
         )
-        fine = _solve_positions(
-            scene, np.sort(np.concatenate([fine.at.places, ends])), solution
+        fine = _solve_at(
+            scene, np.sort(np.concatenate([fine.at.places, ends])), "position"
         )
 
     def find_range(values: Array) -> tuple[Peak, Peak]:
@@ -457,15 +446,6 @@ def _list_places(solution: Solution) -> Array:
     return solution.at.places if solution.time is None else solution.time
 
 
-def _solve_positions(scene: Scene, places: Array, like: Solution) -> Solution:
-    """Solve positions at other places, each on the branch of the nearest position of a solution."""
-    order = np.argsort(like.at.places, kind="stable")
-    rising = like.at.places[order]
-    nearest = np.clip(np.searchsorted(rising, places), 1, len(rising) - 1)
-    nearest -= np.abs(places - rising[nearest - 1]) < np.abs(places - rising[nearest])
-    return _solve_at(scene, places, like.at.branch[order][nearest], "position")
-
-
 def _find_extreme(values: Array, places: Array, sign: int, smooth: bool) -> Peak:
     """Find the largest of signed values; of a smooth curve take the top of the parabola through it and neighbours."""
     i = int(np.nanargmax(values))
@@ -502,7 +482,7 @@ def _list_stretches(
         for _ in range(END_ROUNDS):
             cut = np.linspace(low, high, CUTS + 1)
             first = int(
-                np.argmax(_solve_positions(scene, cut, fine).assembled != closes[i])
+                np.argmax(_solve_at(scene, cut, "position").assembled != closes[i])
             )
             low, high = cut[max(first - 1, 0)], cut[first]
         ends.append(float(low if closes[i] else high))

@@ -26,7 +26,7 @@ from fourbar.formulas.mobility import (
 )
 from fourbar.formulas.motion import Coefficients, State, rates
 from fourbar.formulas.position import Loop, Position, half_angle, loop
-from fourbar.scene import Command, Scene, command
+from fourbar.scene import Command, Scene, command, with_signs
 from fourbar.scene.motion import Sweep
 from fourbar.solution import Array
 from fourbar.solve import solve
@@ -87,19 +87,21 @@ def of_input(scene: Scene) -> Command:
     if commanded.commanded == "theta_2":
         return commanded
     solution = solve(scene, "position", at=commanded)
-    return Command(
+    of_result = Command(
         solution.theta_2[solution.assembled],
         solution.branch[solution.assembled],
         None,
         0.0,
     )
+    return with_signs(scene.linkage, of_result)
 
 
 class CircuitCurve:
     """The circuit of a scene: its branches as closed rows of psi = theta_2 - theta_1 and mu = theta_4 - theta_3.
 
     A row is sampled by an angle tau: psi itself where the input turns fully, else psi = middle - half width cos tau, on
-    the open branch up to half a turn and back on the crossed one, so that it is smooth through the limits.
+    the open branch up to half a turn and back on the crossed one, so that it is smooth through the limits. A linkage
+    with two change points has one row, its assembly: a parallelogram never becomes an antiparallelogram.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -116,6 +118,11 @@ class CircuitCurve:
             )
         self.circuit = circuits(linkage)[number[number >= 0][0]]
         self.full = turns_fully(linkage)
+        self.assembly = self.full and len(change_points(linkage)) == 2
+        """True if the row is that of one assembly."""
+        self.branches = self.circuit.branches
+        if self.assembly:
+            self.branches = (int(commanded.branch[0]),)
         self.low, self.high = (end - self.theta_1 for end in self.circuit.theta_2)
         stated = isinstance(scene.motion.angle, Sweep) or scene.motion.law is not None
         self.sweep = (
@@ -148,7 +155,8 @@ class CircuitCurve:
         """Return psi and mu, (n, 2), at places of a row; `branch` where the input turns fully."""
         tau = np.asarray(np.remainder(tau, TURN), dtype=float)
         if self.full:
-            psi, sign = self.low + tau, np.full(tau.shape, float(branch))
+            psi = self.low + tau
+            sign = branch * self.side(psi)
         else:
             psi = 0.5 * (self.low + self.high) - 0.5 * (self.high - self.low) * np.cos(
                 tau
@@ -160,6 +168,8 @@ class CircuitCurve:
         """Return the place and the row (index into `rows`) of points."""
         psi = self.low + np.remainder(points[:, 0] - self.low, TURN)
         sign = np.where(np.sin(points[:, 1]) >= 0.0, 1, -1)
+        if self.assembly:
+            return psi - self.low, np.zeros(len(points), dtype=np.intp)
         if self.full:
             return psi - self.low, np.array(
                 [self.rows.index(branch) for branch in sign], dtype=np.intp
@@ -175,7 +185,13 @@ class CircuitCurve:
     @property
     def rows(self) -> tuple[int, ...]:
         """The branch of each row; one row holds both where the input has limits."""
-        return self.circuit.branches if self.full else (1,)
+        return self.branches if self.full else (1,)
+
+    def side(self, psi: Array) -> Array:
+        """Return the sign of sin mu at places of a row in the open branch, (n,)."""
+        if not self.assembly:
+            return np.ones(psi.shape)
+        return np.asarray(half_angle(self.ratios, psi).side)
 
     def samples(self) -> Array:
         """Sample all rows at even places within the sweep and at its ends, off the limits and change points, (n, 2)."""
@@ -194,7 +210,10 @@ class CircuitCurve:
         on_circuit &= np.abs(np.sin(mu)) > AT_END
         psi, mu = psi[on_circuit], mu[on_circuit]
         return np.concatenate(
-            [np.stack([psi, branch * mu], axis=1) for branch in self.circuit.branches]
+            [
+                np.stack([psi, branch * self.side(psi) * mu], axis=1)
+                for branch in self.branches
+            ]
         )
 
     def order(self, points: Array) -> NDArray[np.intp]:

@@ -34,7 +34,6 @@ SAME_FOR_ALL = (
         "drive",
         "bar",
         "branch",
-        "through",
         "free",
         "law",
         "frame",

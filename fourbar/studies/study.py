@@ -11,8 +11,6 @@ from fourbar.effects.effect import Effect
 from fourbar.errors import InputError, expect
 from fourbar.evaluation.case import Case
 from fourbar.evaluation.evaluate import evaluate
-from fourbar.formulas.mobility import follow_smooth_path
-from fourbar.formulas.position import loop, reorder_lengths
 from fourbar.linkage import convert_to_unit
 from fourbar.quantities import INVALID, NOT_ASSEMBLED
 from fourbar.scene import Command, Scene, command
@@ -79,7 +77,8 @@ class Study:
                 begins = self.begin(rows) if request.asks_forces else self.scene
                 for columns in split(n, block):
                     scene = self.members(rows, columns.stop - columns.start, begins)
-                    case = Case.of(scene, commanded.bar)._replace(side=side)
+                    case = Case.of(scene, commanded.bar).beside(self.scene)
+                    case = case._replace(side=side)
                     positions = take_members(commanded, rows, columns)
                     # kept until the next block is evaluated, so that its memory is used again
                     evaluated = evaluate(
@@ -129,6 +128,7 @@ class Study:
         start = Command(angle, commanded.branch[rows, 0], 0.0, 0.0, bar=commanded.bar)
         counted = (
             Case.of(self.members(rows, 1, scene), commanded.bar)
+            .beside(self.scene)
             .started(start)
             .terms[len(scene.loads) :]
         )
@@ -256,42 +256,12 @@ def _list_commands(
             np.broadcast_to(value, angle.shape) for value in (speed, acceleration)
         )
     if scene.motion.stroke is None:
-        branch = _find_branches(scene, numbers, angles, m)
+        branch = np.full(angle.shape, scene.motion.branch, dtype=np.int8)
         return Command(angle, branch, speed, acceleration, bar=scene.motion.bar)
     varied = replace_numbers(
         scene, {key: array[:, None] for key, array in numbers.items()}
     )
-    commanded = command_stroke(varied, angle, speed, acceleration)
-    return commanded._replace(branch=_find_branches(scene, numbers, commanded.angle, m))
-
-
-def _find_branches(
-    scene: Scene, numbers: Mapping[str, Array], angles: Array, m: int
-) -> NDArray[np.int8]:
-    """Return the branch of each position, (m, n); only a member with a change point can follow a path through it."""
-    motion, shape = scene.motion, (m, angles.shape[1])
-    lengths_given = {key: array for key, array in numbers.items() if key in LENGTHS}
-    if motion.through == "follow" and not lengths_given and len(angles) == 1:
-        return np.broadcast_to(
-            follow_smooth_path(scene.linkage, angles[0], motion.branch, motion.bar),
-            shape,
-        )
-    branch = np.full(shape, motion.branch, dtype=np.int8)
-    if motion.through == "follow":
-        lengths = replace_numbers(scene, lengths_given).linkage.lengths
-        _, _, _, _, E1, E2 = loop(*reorder_lengths(motion.bar, lengths))
-        size = NEAR_A_CHANGE_POINT * sum(lengths) ** 2
-        for member in np.flatnonzero(
-            np.broadcast_to((np.abs(E1) <= size) | (np.abs(E2) <= size), (m,))
-        ):
-            linkage = replace_numbers(
-                scene,
-                {key: float(array[member]) for key, array in lengths_given.items()},
-            ).linkage
-            branch[member] = follow_smooth_path(
-                linkage, angles[member % len(angles)], motion.branch, motion.bar
-            )
-    return branch
+    return command_stroke(varied, angle, speed, acceleration)
 
 
 def _read_numbers(key: str, value: Any, keys: list[str]) -> Array:

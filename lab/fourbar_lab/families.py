@@ -76,6 +76,10 @@ def _draw_near_limit(rng: np.random.Generator) -> Place:
             return (d, a, b, c), command_angle(angle)
 
 
+BESIDE_ROUNDING = 1e-13
+"""Part of a length by which a linkage misses a change point at least: by less it has one, within the rounding."""
+
+
 def _draw_near_change_point(rng: np.random.Generator) -> Place:
     """Draw within 1e-8..1 rad of a change point: parallelograms, kites, any s + l = p + q, some off by as little."""
     x, y = rng.uniform(0.1, 1.0, 2)
@@ -102,10 +106,11 @@ def _draw_near_change_point(rng: np.random.Generator) -> Place:
         )
     distance = float(rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-8, 0))
     if rng.random() < 0.3:
-        k = int(rng.integers(0, 4))
+        k, missed = int(rng.integers(0, 4)), 0.1 * distance**2
+        if missed < BESIDE_ROUNDING:
+            missed = 0.0
         lengths = tuple(
-            v * (1.0 + 0.1 * distance**2) if i == k else v
-            for i, v in enumerate(lengths)
+            v * (1.0 + missed) if i == k else v for i, v in enumerate(lengths)
         )
     return lengths, command_angle(straight + distance)
 

@@ -103,7 +103,7 @@ FAULT_SCENES: dict[str, Scene] = {
     "limited": Scene(ROCKER, Motion(Sweep(0.3, 1.4, 22), 3.0), effects=(WEIGHT,)),
     "parallelogram": Scene(
         FourBar(0.3, Bar(0.1, 0.2), Bar(0.3, 0.5), Bar(0.1, 0.4)),
-        Motion(Sweep(-1.0, 1.1, 14), 4.0, through="follow"),
+        Motion(Sweep(-1.0, 1.1, 14), 4.0, branch=-1),
         effects=(WEIGHT,),
     ),
     "near a limit": Scene(
@@ -216,7 +216,7 @@ FAULT_SCENES: dict[str, Scene] = {
     ),
     "double rocker released": Scene(
         ROCKER,
-        Motion(math.radians(50.0), 0.0, through="follow", free=Free(1.0, 100)),
+        Motion(math.radians(50.0), 0.0, free=Free(1.0, 100)),
         effects=(Gravity(),),
     ),
     "several solutions": Scene(
@@ -274,14 +274,9 @@ FAULT_SCENES: dict[str, Scene] = {
         Motion(1.0, 0.0, free=Free(0.5, 20)),
         effects=(WEIGHT, Friction.at(A=0.01, O4=0.02)),
     ),
-    "released to a limit": Scene(
-        ROCKER,
-        Motion(math.radians(50.0), 3.0, free=Free(1.0, 100)),
-        effects=(Gravity(),),
-    ),
     "turning over change points": Scene(
         FourBar(0.3, Bar(0.1, 0.2), Bar(0.3, 0.5), Bar(0.1, 0.4)),
-        Motion(0.5, 25.0, through="follow", free=Free(0.4, 400)),
+        Motion(0.5, 25.0, free=Free(0.4, 400)),
         effects=(Gravity(),),
     ),
     "to full accuracy: short diagonal": Scene(

@@ -23,7 +23,7 @@ from fourbar.formulas import mobility, transmission
 from fourbar.formulas.path import compute_state as state_of
 from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.quantities import UNITS
-from fourbar.scene import Command, Scene
+from fourbar.scene import Command, Scene, with_signs
 from fourbar.scene import command as command_of
 from fourbar.solve import solve
 from fourbar_validation.compare.answer import Answer
@@ -215,7 +215,8 @@ def collect_stated(linkage: FourBar) -> dict[str, Any]:
     sweep = linkage.ground_angle + np.array(
         [-0.5, 0.5, 4.0, 2.0]
     )  # through both change points, and back
-    numbers["through"] = mobility.follow_smooth_path(linkage, sweep, 1)
+    positions = Command(sweep, np.ones(4, dtype=np.int8), None, 0.0)
+    numbers["through"] = with_signs(linkage, positions).branch
     return {name: np.array(value, dtype=float) for name, value in numbers.items()}
 
 

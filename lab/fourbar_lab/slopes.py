@@ -12,7 +12,7 @@ import numpy as np
 from flint import arb
 
 from fourbar.effects import Friction
-from fourbar.scene import Scene
+from fourbar.scene import Scene, command, with_signs
 from fourbar.studies.derivatives import sensitivity
 from fourbar.studies.keys import (
     command_key,
@@ -52,6 +52,8 @@ def compute_exact_slopes(scene: Scene) -> tuple[Values, Slopes]:
         for key, number in numbers.items()
     }
 
+    sign = int(with_signs(scene.linkage, command(scene)).branch[0])
+
     def moved(*keys: str) -> Values:
         changed: dict[str, Any] = dict(numbers)
         for key in keys:
@@ -60,9 +62,7 @@ def compute_exact_slopes(scene: Scene) -> tuple[Values, Slopes]:
         mate = replace_numbers(
             scene, {key: changed[key] for key in set(keys) - {angle}}
         )
-        return (
-            compute_outputs(mate, scene.motion.branch, make_balls(mate, stated)) or {}
-        )
+        return compute_outputs(mate, sign, make_balls(mate, stated)) or {}
 
     base = moved()
     if ("torque" if scene.drive is None else "drive_force") not in base:

@@ -12,7 +12,7 @@ import numpy as np
 from fourbar.errors import FAILED, HOLDS
 from fourbar.formulas.path import NO_DIGIT_LEFT
 from fourbar.quantities import OK, PIN_FORCES, UNITS
-from fourbar.scene import Scene
+from fourbar.scene import Command, Scene, command, with_signs
 from fourbar.scene.motion import Motion
 from fourbar.solution import Solution
 from fourbar.solve import solve
@@ -54,7 +54,7 @@ def solve_position(scene: Scene, angle: float) -> dict[str, Any]:
 def judge(scene: Scene, tally: Tally, sample: str) -> None:
     """Compare one position with the reference."""
     tally.samples += 1
-    motion, angle = scene.motion, float(np.asarray(scene.motion.angle))
+    angle = float(np.asarray(scene.motion.angle))
     drive = "torque" if scene.drive is None else "drive_force"
     internal = scene.drive is not None and 1 not in (
         scene.drive.start.bar,
@@ -64,7 +64,7 @@ def judge(scene: Scene, tally: Tally, sample: str) -> None:
         warnings.simplefilter("always")
         solution = solve_position(scene, angle)
     tally.warned += [f"{sample}: {warning.message}" for warning in caught]
-    exact = compute_reference(scene, motion.branch, angle)
+    exact = compute_reference(scene, find_sign(scene), angle)
     if exact is None:
         tally.not_assembled += 1
         if math.isfinite(solution[drive]):
@@ -76,7 +76,7 @@ def judge(scene: Scene, tally: Tally, sample: str) -> None:
         for component, index in list_components(name):
             if (
                 component not in values
-                or name == motion.commanded
+                or name == scene.motion.commanded
                 or name.endswith("_error")
             ):
                 continue
@@ -131,6 +131,11 @@ def run(
     return tally
 
 
+def find_sign(scene: Scene) -> int:
+    """Find the sign of the sine of the scene's command at its first position."""
+    return int(with_signs(scene.linkage, command(scene)).branch[0])
+
+
 def feed_back(scene: Scene, bar: int) -> Scene | None:
     """Command bar 2, 3 or 4 to move as it does under the scene's own command; None where that has no motion."""
     if bar == 2:
@@ -140,7 +145,10 @@ def feed_back(scene: Scene, bar: int) -> Scene | None:
     if solution.status_code[0] != OK or abs(sine) <= NO_DIGIT_LEFT:
         return None
     numbers = {f"theta_{bar}": theta, f"omega_{bar}": omega, f"alpha_{bar}": alpha}
-    return replace(scene, motion=Motion(branch=1 if sine > 0.0 else -1, **numbers))  # type: ignore[arg-type]
+    signs = np.array([1 if sine > 0.0 else -1], dtype=np.int8)
+    position = Command(np.array([theta]), signs, None, 0.0, bar=bar)
+    branch = int(with_signs(scene.linkage, position).branch[0])
+    return replace(scene, motion=Motion(branch=branch, **numbers))  # type: ignore[arg-type]
 
 
 def read_commanded(solution: Solution, bar: int) -> tuple[float, float, float, float]:

@@ -4,13 +4,13 @@ import numpy as np
 from flint import arb, ctx
 
 import fourbar
-from fourbar.scene import Command, Scene
+from fourbar.scene import Command, Scene, with_signs
 from fourbar_validation.engines.balls import compute_outputs, make_balls
 
 
 def answer_in_balls(scene: Scene, at: Command | None = None) -> dict[str, np.ndarray]:
     """Compute each output at each position, rounded once: (n,), vectors (n, 2), NaN where it has no value."""
-    at = fourbar.command(scene) if at is None else at
+    at = with_signs(scene.linkage, fourbar.command(scene) if at is None else at)
     rows, precision = [], ctx.prec
     try:
         places = at.angle if at.stroke is None else at.stroke

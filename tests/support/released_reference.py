@@ -9,7 +9,7 @@ motion is analytic there, and a Taylor step passes over the point.
 """
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any, NamedTuple
 
@@ -37,12 +37,11 @@ Three = Sequence[Ball]
 
 
 class Reference(NamedTuple):
-    """The motion at the requested times, until it stopped."""
+    """The motion at the requested times."""
 
     theta_2: np.ndarray
     sine: np.ndarray
     """sin(theta_4 - theta_3)."""
-    stopped_at: float | None
     limits: int
     """How often bars 3, 4 came into one line and bar 2 did not: limit positions reached."""
     change_points: int
@@ -287,16 +286,14 @@ def released(
     omega_2: float,
     branch: int,
     times: np.ndarray,
-    *,
-    follow: bool = False,
 ) -> Reference:
     """The motion under loads, gravity and viscous damping, with nothing driving it."""
     with _digits():
         equations = Equations(linkage, terms)
         theta, omega = equations.start(linkage, theta_2, omega_2, branch)
         rows: list[list[float]] = []
-        t, limits, change_points, stopped = arb(0), 0, 0, None
-        while len(rows) < len(times) and stopped is None:
+        t, limits, change_points = arb(0), 0, 0
+        while len(rows) < len(times):
             step = equations.step(theta, omega)
             h = step.length()
             if equations.stretch(step.at(h)[0]) < SINGULAR:
@@ -314,21 +311,9 @@ def released(
                     limits + (not all_bars),
                     change_points + all_bars,
                 )
-                if not follow:
-                    h = _crossing(lambda h: _sine(step.at(h)[0]) * before, h)  # noqa: B023 - called at once
-                    stopped = float(t + h)
             while len(rows) < len(times) and arb(float(times[len(rows)])) <= t + h:
                 q, _ = step.at(arb(float(times[len(rows)])) - t)
                 rows.append([float(q[0]), _sine(q)])
             t, (theta, omega) = (t + h).mid(), new
     angles = np.array(rows)
-    return Reference(angles[:, 0], angles[:, 1], stopped, limits, change_points)
-
-
-def _crossing(side: Callable[[Ball], float], high: Ball) -> Ball:
-    """Where the sign changes between 0 and `high`, by bisection."""
-    low = arb(0)
-    for _ in range(60):
-        middle = ((low + high) / 2).mid()
-        low, high = (middle, high) if side(middle) > 0.0 else (low, middle)
-    return high
+    return Reference(angles[:, 0], angles[:, 1], limits, change_points)

@@ -213,7 +213,7 @@ def calls() -> dict[str, tuple[Callable[..., object], tuple[Any, ...]]]:
         ),
         "Motion": (
             lambda *x: moving(fourbar.Motion(*x)),
-            (1.0, 10.0, 0.0, 1, "sign", None, None),
+            (1.0, 10.0, 0.0, 1, None, None),
         ),
         "Sweep": (lambda *x: moving(fourbar.Motion(fourbar.Sweep(*x))), (0.0, 1.0, 2)),
         "FromLimit": (fourbar.FromLimit, (1, 0.1)),

@@ -30,7 +30,7 @@ function fieldsAt(path, example) {
   if (path[0] === "drive" && plain.drive?.from) return {};
   if (path[0] !== "motion") return example;
   const fields = offers.commands[commanded()].fields;
-  return plain.motion?.law ? Object.fromEntries(Object.entries(fields).filter(([key]) => ["branch", "through"].includes(key))) : fields;
+  return plain.motion?.law ? Object.fromEntries(Object.entries(fields).filter(([key]) => key === "branch")) : fields;
 }
 function commandField() {
   const input = element("select", { id: "command" }, ...Object.entries(offers.commands).filter(([key]) => key !== "stroke" || plain.drive?.from).map(([key, { label }]) => new Option(label, key, false, key === commanded())));

@@ -178,7 +178,7 @@ function furnish() {
   for (const element of document.querySelectorAll("[data-unit]")) element.textContent = nameOf(element.dataset.unit);
   byId("branch").value = branch;
   for (const element of document.querySelectorAll(".unit")) element.textContent = unit.name;
-  [...byId("branch").options].forEach((option, n) => { option.textContent = ["open", "crossed"][n] + (data.followed && n === (branch === 1 ? 0 : 1) ? " (followed)" : ""); });
+  [...byId("branch").options].forEach((option, n) => { option.textContent = ["open", "crossed"][n]; });
   const hide = (id, hidden) => { byId(id).parentElement.hidden = hidden; };
   hide("show-pictures", !Object.keys(data.pictures).length);
   hide("show-centres", !Object.values(data.centres).some(Boolean));

@@ -14,6 +14,7 @@ from fourbar.evaluation.case import Case, compute_state
 from fourbar.formulas.mobility import limit_positions
 from fourbar.linkage import BAR_NAMES, MOVING_BARS
 from fourbar.quantities import PIN_FORCES
+from fourbar.scene import with_signs
 from fourbar.show.duty import compute_energies, read_drive
 from fourbar.show.plot.style import (
     BAR_COLOURS,
@@ -502,6 +503,7 @@ def _list_marked(view: View) -> list[tuple[list[float], list[float], str, str]]:
         1.5 * float(np.median(np.abs(np.diff(degrees)))) if len(degrees) > 1 else 0.0
     )
     one, follower = (bar for bar in MOVING_BARS if bar != positions.bar)
+    signs = with_signs(view.scene.linkage, positions).branch
     for bar in sorted({2, 4, positions.bar}, key=lambda bar: bar != positions.bar):
         turned, heights = list[float](), list[float]()
         for limit in limit_positions(view.scene.linkage, bar):
@@ -513,7 +515,7 @@ def _list_marked(view: View) -> list[tuple[list[float], list[float], str, str]]:
             ):
                 if (
                     bar == positions.bar
-                    or positions.branch[np.argmin(np.abs(degrees - place))] == sign
+                    or signs[np.argmin(np.abs(degrees - place))] == sign
                 ):
                     turned.append(place)
                     heights.append(

@@ -11,6 +11,7 @@ from fourbar.evaluation.case import compute_state
 from fourbar.formulas.motion import State
 from fourbar.linkage import MOVING_BARS
 from fourbar.scene import Command, Scene, command, command_at, default_places
+from fourbar.scene.motion import BRANCH_NAMES
 from fourbar.show.units import choose_unit
 from fourbar.solution import Array, Conversion, Solution
 from fourbar.solve import solve
@@ -76,15 +77,8 @@ class View:
 
     @property
     def branch_name(self) -> str:
-        """Return "open", "crossed", or "both signs" where the motion follows a smooth path through change points."""
-        branch = self.sweep.at.branch
-        return (
-            "open"
-            if np.all(branch == 1)
-            else "crossed"
-            if np.all(branch == -1)
-            else "both signs"
-        )
+        """Return "open" or "crossed", the assembly that the scene states."""
+        return BRANCH_NAMES[self.scene.motion.branch]
 
     def state(self) -> State:
         """Return the kinematics at the position drawn."""
@@ -165,13 +159,8 @@ def list_sweep(scene: Scene) -> Command:
         if stated.stroke is None
         else 0.0
     )
-    places, first = np.unique(
-        np.concatenate([wide.places, stated.places + turns * math.tau]),
-        return_index=True,
-    )
-    return command_at(
-        scene, places, np.concatenate([wide.branch, stated.branch])[first]
-    )
+    places = np.unique(np.concatenate([wide.places, stated.places + turns * math.tau]))
+    return command_at(scene, places)
 
 
 def find_drawn_place(scene: Scene) -> float | None:
@@ -194,6 +183,15 @@ def choose_common_position(scenes: "list[Scene]") -> float | None:
     sweeps = [solve(scene, at=list_sweep(scene)) for scene in scenes]
     sweeps = [sweep for sweep in sweeps if sweep.assembled.any()]
     return choose_position(sweeps) if sweeps else None
+
+
+def describe_change_points(motion: Solution) -> str:
+    """Say when a free motion passed change points, at which it could have gone on otherwise."""
+    times = " and ".join(f"{time:.4g} s" for time in motion.change_points or ())
+    return (
+        f"At t = {times} all bars are in line, a change point: "
+        "it goes on smoothly, and another motion is possible"
+    )
 
 
 def set_branch(scene: Scene, branch: int) -> Scene:
@@ -226,10 +224,8 @@ def make_view(scene: Scene, position: float | None = None) -> View:
         position = find_drawn_place(scene)
     if position is None:
         position = choose_position([sweep])
-    branch = positions.branch[[np.argmin(np.abs(positions.places - position))]]
-    shown = View(
-        scene, sweep, solve(scene, at=command_at(scene, np.array([position]), branch))
-    )
+    here = solve(scene, at=command_at(scene, np.array([position])))
+    shown = View(scene, sweep, here)
     if not shown.here.assembled[0]:
         raise NotAssembledError(
             f"the linkage does not assemble at {where_in_words(shown.here)}"
@@ -260,10 +256,8 @@ def _view_motion(scene: Scene, position: float | None) -> View:
             )
         index = int(np.argmin(np.abs(angle - position)))
     shown = View(scene, sweep, solve(scene, at=sweep.at.part(slice(index, index + 1))))
-    if sweep.stopped_at is not None:
-        shown.notes.append(
-            f"The linkage stops at a limit position at t = {sweep.stopped_at:.4g} s."
-        )
+    if sweep.change_points:
+        shown.notes.append(f"{describe_change_points(sweep)}.")
     return shown
 
 

@@ -63,25 +63,24 @@ def test_needs_no_driving_torque() -> None:
 @pytest.mark.parametrize(
     "coupler", [0.12, 0.15]
 )  # the first has a change point, the second a limit position only
-def test_stops_at_a_limit_unless_set_to_follow(coupler: float) -> None:
+def test_runs_on_through_limits_and_names_its_change_points(coupler: float) -> None:
     linkage = fourbar.FourBar(
         0.3, fourbar.Bar(0.2, 0.2), fourbar.Bar(coupler, 0.5), fourbar.Bar(0.22, 0.4)
     )
     times = np.linspace(0.0, 1.0, 21)  # there, back and there again
-    halted = integrate(linkage, (fourbar.Gravity(),), 1.0, 0.0, 1, times)
-    assert (
-        halted.stopped_at is not None
-        and halted.command.time[-1] <= halted.stopped_at < 0.5
-    )
-    assert set(halted.command.branch) == {1}
-    passed = integrate(linkage, (fourbar.Gravity(),), 1.0, 0.0, 1, times, follow=True)
-    assert (
-        passed.stopped_at is None
-        and set(passed.command.branch) == {1, -1}
-        and passed.energy_drift < 1e-11
-    )
-    n = len(halted.command.time)
-    assert np.array_equal(passed.command.theta_2[:n], halted.command.theta_2)
+    passed = integrate(linkage, (fourbar.Gravity(),), 1.0, 0.0, 1, times)
+    assert len(passed.time) == len(times) and passed.energy_drift < 1e-11
+    motion = fourbar.Motion(1.0, 0.0, free=fourbar.Free(1.0, 20))
+    solution = solve(fourbar.Scene(linkage, motion, effects=(fourbar.Gravity(),)))
+    assert set(solution.branch) == {1, -1}
+    # on an assembly with a change point theta_2 passes the ground's line, where its sine changes sign
+    assert bool(passed.change_points) == (coupler == 0.12)
+    for time in passed.change_points:
+        at_it = integrate(
+            linkage, (fourbar.Gravity(),), 1.0, 0.0, 1, np.array([0.0, time])
+        )
+        angle = float(at_it.theta_2[-1])
+        assert abs(math.sin(angle)) < 1e-9
 
 
 @pytest.mark.parametrize("bar", [2, 4])
@@ -139,9 +138,7 @@ ROCKER = fourbar.FourBar(
 """A double rocker; released at rest at 50 deg, open, it swings through limit positions of its input."""
 SWING = fourbar.Scene(
     ROCKER,
-    fourbar.Motion(
-        math.radians(50.0), 0.0, through="follow", free=fourbar.Free(1.2, 120)
-    ),
+    fourbar.Motion(math.radians(50.0), 0.0, free=fourbar.Free(1.2, 120)),
     effects=(fourbar.Gravity(),),
 )
 PINS = ("F12", "F32", "F43", "F14")
@@ -228,17 +225,42 @@ def test_what_is_not_released_is_refused(motion: fourbar.Motion, says: str) -> N
         fourbar.release(replace(SWING, motion=motion))
 
 
+def integrate_to_line(scene: fourbar.Scene) -> float:
+    """Time at which bars 3 and 4 of a released scene first come to lie in one line, s, by bisection."""
+    free = scene.motion.free
+    assert free is not None
+    coarse = solve(scene, "position")
+    assert coarse.time is not None
+    row = int(np.argmax(coarse.branch != coarse.branch[0]))
+    low, high = coarse.time[row - 1], coarse.time[row]
+    sign = coarse.branch[0]
+    for _ in range(6):
+        inside = np.linspace(low, high, 33)
+        times = np.concatenate([[0.0], inside])
+        start = fourbar.command(scene)
+        released = integrate(
+            scene.linkage,
+            (*scene.loads, *scene.effects),
+            float(start.theta_2[0]),
+            scene.motion.omega_2 or 0.0,
+            int(start.branch[0]),
+            times,
+        )
+        branch = solve(scene, "position", at=released.command).branch[1:]
+        place = int(np.argmax(branch != sign))
+        low, high = inside[place - 1], inside[place]
+    return float(0.5 * (low + high))
+
+
 @pytest.mark.slow
 def test_pin_forces_pass_a_limit_position_smoothly(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """theta_2, omega_2, alpha_2 as doubles do not hold the forces there, the angle of bar 4 does."""
-    motion = SWING.motion
-    halted = solve(replace(SWING, motion=motion.replace(through="sign")), "position")
-    assert halted.stopped_at is not None and halted.stopped_at < 1.0
+    line = integrate_to_line(SWING)
     distances = np.logspace(-14, -2, 49)
     evenly = np.linspace(0.0, 1.2, 121)
-    dense = halted.stopped_at + np.concatenate([-distances[::-1], [0.0], distances])
+    dense = line + np.concatenate([-distances[::-1], [0.0], distances])
     times = np.unique(np.concatenate([evenly, dense]))
     true = free_motion.integrate
     monkeypatch.setattr(

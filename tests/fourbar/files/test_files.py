@@ -31,7 +31,7 @@ def facts(scene: fourbar.Scene) -> tuple[object, ...]:
         if isinstance(motion.theta_2, np.ndarray)
         else motion.theta_2
     )
-    rest = (motion.omega_2, motion.alpha_2, motion.branch, motion.through, motion.free)
+    rest = (motion.omega_2, motion.alpha_2, motion.branch, motion.free)
     parts = (scene.linkage, angles, rest, scene.drive_bar, scene.loads, scene.effects)
     return (*(repr(part) for part in parts), scene.title, scene.source)
 
@@ -174,7 +174,7 @@ def test_defaults_are_those_of_the_contract() -> None:
         0.0,
         1,
     )
-    assert (motion.through, motion.free, scene.drive_bar) == ("sign", None, 2)
+    assert (motion.free, scene.drive_bar) == (None, 2)
     assert (scene.loads, scene.effects, scene.title, scene.source) == ((), (), "", "")
     bar = loads(LENGTHS + '[bars.coupler]\nmass = "6 kg"\n').linkage.coupler
     assert bar.moment_of_inertia == pytest.approx(
@@ -203,7 +203,6 @@ def test_free_motion_and_frames_are_read() -> None:
 [motion]
 theta_2 = "10 deg"
 omega_2 = "0 rad/s"
-through = "follow"
 free = { duration = "5 s", steps = 500 }
 [[loads]]
 bar = 3
@@ -217,9 +216,7 @@ springs = [{ from = { bar = 1 }, to = { bar = 4, at = ["20 cm", "0 deg"] }, gas 
 """  # noqa: E501
     )
     scene = loads(text)
-    assert (
-        scene.motion.free == fourbar.Free(5.0, 500) and scene.motion.through == "follow"
-    )
+    assert scene.motion.free == fourbar.Free(5.0, 500)
     assert scene.loads == (
         fourbar.Load(3, (2.0, math.pi / 2), (0.01, 0.0), frame="bar"),
     )
@@ -273,7 +270,6 @@ MOTION = st.builds(
     st.none() | numbers(-1e150, 1e150),
     numbers(),
     st.sampled_from((1, -1)),
-    st.sampled_from(("sign", "follow")),
     st.none()
     | st.builds(fourbar.Free, numbers(0.0, exclude_min=True), st.integers(1, 10**8)),
 )

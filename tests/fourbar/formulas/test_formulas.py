@@ -171,10 +171,7 @@ def test_the_constants_of_the_loop_vanish_at_change_points_alone() -> None:
     assert min(zeros) > 300
 
 
-def test_pairs_stay_parallel_on_one_side_of_the_change_points_alone() -> None:
-    psi = np.array([-2.0, -1e-9, 1e-9, 2.0, math.pi + 1e-9])
-    ahead, back = [False, False, True, True, False], [True, True, False, False, True]
-    neither = [False] * 5
+def test_pairs_stay_parallel_in_one_assembly_alone() -> None:
     for lengths, together, folded in (
         ((0.3, 0.1, 0.3, 0.1), True, False),
         ((0.1, 0.3, 0.3, 0.1), False, True),
@@ -183,12 +180,8 @@ def test_pairs_stay_parallel_on_one_side_of_the_change_points_alone() -> None:
         ((0.3, 0.1, 0.25, 0.22), False, False),
     ):
         bars = loop(*lengths)
-        for branch, first, second in ((1, ahead, back), (-1, back, ahead)):
-            pairs = find_parallel_pairs(bars, half_angle(bars, psi), branch)
-            assert [pair.tolist() for pair in pairs] == [
-                first if together else neither,
-                second if folded else neither,
-            ]
+        assert find_parallel_pairs(bars, 1) == (together, False)
+        assert find_parallel_pairs(bars, -1) == (False, folded)
 
 
 def read_from_the_output(drawn: Drawn) -> tuple[State, Any, Any]:
@@ -269,7 +262,7 @@ def test_read_in_theta_4_the_input_stands_at_its_limit() -> None:
 def test_read_in_theta_4_a_parallelogram_stays_parallel_exactly() -> None:
     from_output = prepare_path(loop(0.3, 0.1, 0.3, 0.1), 0.0, 4)
     theta_4 = np.array([1e-9, 0.5, 3.0])
-    sign = -1.0  # of sin(theta_3 - theta_2): the coupler lies as the ground
+    sign = 1.0  # sin(theta_3 - theta_2) > 0 for 180 deg < theta_4 < 360 deg
     position, k = from_output.motion(
         from_output.position(theta_4, from_output.half_angle(theta_4), sign), sign
     )
@@ -308,7 +301,7 @@ def test_the_sine_of_the_drive_is_that_of_the_two_bars_not_driven(
             assert sine[closed] == pytest.approx(cross(u, v)[closed], abs=32.0 * U)
             if bar == 2 and lengths in STAY_PARALLEL:
                 parallel = (u == v) | (u == -v)
-                assert parallel.any() == (drive_bar == STAY_PARALLEL[lengths])
+                assert parallel.any() == ((drive_bar, branch) == STAY_PARALLEL[lengths])
                 assert (sine[parallel] == 0.0).all()
     plain = close_loop(
         loop(*lengths), u1, np.exp(1j), half_angle(loop(*lengths), 0.6), 1.0
@@ -316,9 +309,8 @@ def test_the_sine_of_the_drive_is_that_of_the_two_bars_not_driven(
     assert plain.diagonal == pytest.approx(d * u1 - a * np.exp(1j), abs=8.0 * U)
 
 
-STAY_PARALLEL = {(0.3, 0.1, 0.3, 0.1): 3, (0.2, 0.3, 0.3, 0.2): 4}
-"""The drive with which the two bars not driven are parallel on a branch: 2 and 4 of a parallelogram, 2 and 3 of a
-kite."""
+STAY_PARALLEL = {(0.3, 0.1, 0.3, 0.1): (3, 1.0), (0.2, 0.3, 0.3, 0.2): (4, -1.0)}
+"""Drive and assembly in which the two bars not driven are parallel: 2 and 4 of a parallelogram, 2 and 3 of a kite."""
 
 
 LINKAGES = np.array(
@@ -499,13 +491,13 @@ def test_the_half_angle_in_many_digits_is_rounded_once() -> None:
             bars, theta_2 = drawn.bars, float(drawn.theta_2[0])
             expected = five(bars, mp.mpf(theta_2) - mp.mpf(bars.ground_angle))
             for ours, exact in zip(
-                exact_half_angle(bars, theta_2), expected, strict=True
+                exact_half_angle(bars, theta_2)[:5], expected, strict=True
             ):
                 assert abs(ours - exact) <= U * abs(exact)
             offset = mp.mpf("1e-25") * theta_2
             expected = five(bars, mp.mpf(theta_2) + offset - mp.mpf(bars.ground_angle))
             for ours, exact in zip(
-                exact_half_angle(bars, theta_2, offset), expected, strict=True
+                exact_half_angle(bars, theta_2, offset)[:5], expected, strict=True
             ):
                 assert abs(ours - exact) <= U * abs(exact)
 
@@ -594,7 +586,7 @@ def test_an_offset_from_a_limit_in_many_digits(
             assert abs(mp.mpf(theta_2) + remainder - meant) <= DIGITS_LEFT * size
             expected = five(bars, meant - mp.mpf(bars.ground_angle))
             half = exact_half_angle(bars, theta_2, remainder)
-            for ours, exact in zip(half, expected, strict=True):
+            for ours, exact in zip(half[:5], expected, strict=True):
                 assert abs(ours - exact) <= (1.0 + DIGITS_LEFT) * U * abs(exact)
             # beyond the limit nothing closes, however near: stretched bars stop it going on, folded ones going back
             assert (half.outer if stretched else half.inner) * (
@@ -616,16 +608,15 @@ def test_a_limit_position_itself_closes_in_many_digits() -> None:
 def test_bars_that_miss_by_the_rounding_of_their_lengths_touch() -> None:
     """0.1 + 0.7 and 0.2 + 0.6 are the same sum of the lengths meant, though not of the doubles."""
     for lengths in ((0.6, 0.7, 0.1, 0.2), (0.7, 0.6, 0.2, 0.1)):
-        bars, constants = uniform(*lengths), loop(*lengths)
-        assert -16.0 * U < constants.E2 < 0.0
-        assert exact_half_angle(bars, 0.0).inner == 0.0
+        d, a, b, c = lengths
+        assert Fraction(d) + Fraction(c) != Fraction(a) + Fraction(b)
+        bars = uniform(*lengths)
+        assert loop(*lengths).E2 == 0.0
+        for remainder in (None, mp.mpf(0)):
+            assert exact_half_angle(bars, 0.0, remainder).inner == 0.0
         assert fourbar.solve(fourbar.Scene(bars, fourbar.Motion(0.0, 1.0))).status == [
-            "singular"
+            "change_point"
         ]
-        # what was given in more digits is what it is
-        assert exact_half_angle(bars, 0.0, mp.mpf(0)).inner == pytest.approx(
-            constants.E2, rel=PRODUCTS
-        )
 
 
 def test_positions_decided_in_many_digits_replace_their_own_alone() -> None:
@@ -633,7 +624,10 @@ def test_positions_decided_in_many_digits_replace_their_own_alone() -> None:
     half = half_angle(loop(*bars.lengths), theta_2)
     for offset in (None, mp.mpf("1e-3")):
         decided = decide_half_angles(bars, 1.0, half, np.array([1, 4]), theta_2, offset)
-        for name, before, after in zip(half._fields, half, decided, strict=True):
+        assert decided.side == half.side == 1.0
+        for name, before, after in zip(
+            half._fields[:5], half[:5], decided[:5], strict=True
+        ):
             exact = [
                 float(getattr(exact_half_angle(bars, float(angle), offset), name))
                 for angle in theta_2

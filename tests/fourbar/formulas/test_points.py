@@ -18,6 +18,7 @@ from fourbar.formulas.points import (
     point_coefficients,
 )
 from fourbar.linkage import Bar, FourBar
+from fourbar.scene import Command, with_signs
 
 EPS = 2.0**-52
 FIRST, SECOND = 32.0, 128.0
@@ -66,7 +67,10 @@ class Exact:
         self.d, self.a, self.b, self.c = (
             mp.mpf(length) for length in drawn.bars.lengths
         )
-        self.theta_1, self.sign = mp.mpf(drawn.bars.ground_angle), drawn.branch
+        self.theta_1 = mp.mpf(drawn.bars.ground_angle)
+        branch = np.array([drawn.branch], dtype=np.int8)
+        position = Command(drawn.theta_2, branch, None, 0.0)
+        self.sign = int(with_signs(drawn.bars, position).branch[0])
 
     def pin_b(self, theta_2: mp.mpf) -> tuple[mp.mpc, mp.mpc, mp.mpc]:
         pin_a, pin_4 = self.a * mp.expj(theta_2), self.d * mp.expj(self.theta_1)

@@ -12,8 +12,8 @@ from fourbar.evaluation.free_motion import integrate
 from fourbar.formulas.mobility import limit_positions
 from fourbar.formulas.motion import State, rates
 from fourbar.formulas.path import compute_state as state_of
-from fourbar.formulas.path import meet_change_points, prepare_path
-from fourbar.formulas.position import loop
+from fourbar.formulas.path import prepare_path
+from fourbar.formulas.position import TOUCHING, loop
 from fourbar.formulas.torque import half_slope, inertia
 from fourbar.scene import Command
 from fourbar.solve import solve
@@ -152,7 +152,7 @@ def test_where_the_loop_closes_is_known_at_the_last_digits_of_a_limit() -> None:
                         d - a * mp.expj(mp.mpf(angle) - mp.mpf(linkage.ground_angle))
                     )
                     missed = max(e - (b + c), abs(b - c) - e)
-                    assert assembled == (missed <= U * (a + b + c + d))
+                    assert assembled == (missed <= TOUCHING * (a + b + c + d))
                     compared[assembled] += 1
     assert min(compared) > 20
 
@@ -389,16 +389,24 @@ def test_positions_that_do_not_close_and_limits_are_quiet() -> None:
 
 
 def test_what_touches_is_up_to_the_rounding_of_the_lengths() -> None:
-    """The lengths add up to 2: what misses a change point by 2 U = EPS touches, by twice that it does not."""
-    exact, beyond = (0.5, 0.5 + EPS, 0.5, 0.5), (0.5, 0.5 + 2 * EPS, 0.5, 0.5)
+    """The lengths add up to 2: what misses a change point by 8 U = 4 EPS touches, by one EPS more it does not."""
+    exact, beyond = (0.5, 0.5 + 4 * EPS, 0.5, 0.5), (0.5, 0.5 + 5 * EPS, 0.5, 0.5)
     for lengths, touches in ((exact, True), (beyond, False)):
-        assert (meet_change_points(loop(*lengths)).E1 == 0.0) == touches
-        assert (meet_change_points(loop(*lengths)).E2 == 0.0) == touches
-        assert loop(*lengths).E1 < 0.0
+        assert (loop(*lengths).E1 == 0.0) == touches
+    # d - a = b - c, of lengths that add up to 1.875
+    for misses, touches in ((3.0 * EPS, True), (5.0 * EPS, False)):
+        assert (loop(0.6875, 0.3125, 0.625 + misses, 0.25).E2 == 0.0) == touches
     wide = loop(0.3, 0.1, 0.25, 0.22)
-    assert meet_change_points(wide) == wide
     products = 0.47**2 - 0.4**2, 0.2**2 - 0.03**2
     assert wide[4:] == pytest.approx(products)
+
+
+def test_a_bar_as_short_as_the_rounding_of_the_others_keeps_its_length() -> None:
+    """d - a = 1e-15 is no rounding of a ground of 3e-15, though it is one of a coupler of 1."""
+    assert loop(3e-15, 2e-15, 1.0, 1.0).E2 > 0.0
+    # within the rounding of their own, and no further, lengths become equal
+    assert loop(0.3, 0.3 * (1.0 + EPS), 0.2, 0.2).a == 0.3
+    assert loop(3e-6, 3.0000001e-6, 1.0, 1.0).a == 3.0000001e-6
 
 
 def test_directions_are_unit_vectors_and_the_last_rate_is_that_of_bar_4_against_bar_3() -> (

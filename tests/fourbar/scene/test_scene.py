@@ -28,7 +28,7 @@ from fourbar.errors import InputError, LimitError
 from fourbar.formulas.mobility import find_limit_angles, limit_positions
 from fourbar.linkage import MOVING_BARS
 from fourbar.mjcf import write_mjcf
-from fourbar.scene import Command
+from fourbar.scene import Command, with_signs
 from fourbar.solution import Solution
 from fourbar_validation.compare.rows import AGREES, REFUSES
 from fourbar_validation.engines.free_body import FreeBody
@@ -64,13 +64,14 @@ def of_bar(solution: Solution, bar: int) -> Command:
         for name in ("theta", "omega", "alpha")
     )
     theta, omega, alpha = numbers
-    return Command(
-        theta,
-        np.where(sine(solution, bar) < 0.0, -1, 1).astype(np.int8),
-        omega,
-        alpha,
-        bar=bar,
+    signs = np.where(sine(solution, bar) < 0.0, -1, 1).astype(np.int8)
+    assert solution.lengths is not None and solution.ground is not None
+    linkage = fourbar.FourBar(
+        solution.lengths[0],
+        *(fourbar.Bar(length) for length in solution.lengths[1:]),
+        ground_angle=solution.ground[1],
     )
+    return with_signs(linkage, Command(theta, signs, omega, alpha, bar=bar))
 
 
 @pytest.mark.parametrize("bar", [3, 4])
@@ -306,12 +307,10 @@ def test_released_at_an_angle_of_another_bar_it_moves_as_at_its_own_theta_2(
     moved = solve(
         replace(
             scene,
-            motion=Motion(
-                branch=int(command.branch[0]), through="follow", free=free, **commanded
-            ),
+            motion=Motion(branch=int(command.branch[0]), free=free, **commanded),
         )
     )
-    same = solve(replace(scene, motion=Motion(1.2, 3.0, through="follow", free=free)))
+    same = solve(replace(scene, motion=Motion(1.2, 3.0, free=free)))
     assert len(moved) == len(same) == 9
     assert (
         moved.theta_2 == pytest.approx(same.theta_2, abs=1e-9)
@@ -325,9 +324,7 @@ def replace_alpha(solution: Solution) -> Solution:
     return solution
 
 
-def test_released_at_theta_4_it_passes_a_limit_of_theta_2_and_stops_at_its_own() -> (
-    None
-):
+def test_released_at_theta_4_it_passes_limits_of_theta_2_and_its_own() -> None:
     rocker = FourBar(0.5, Bar(0.4, 1.0), Bar(0.3, 1.0), Bar(0.25, 1.0))
     limit = limit_positions(rocker)[0]
     sign = 1 if math.sin(limit.theta_3 - limit.theta_2) > 0.0 else -1
@@ -341,18 +338,10 @@ def test_released_at_theta_4_it_passes_a_limit_of_theta_2_and_stops_at_its_own()
         free=Free(20.0, 200),
     )
     solution = solve(Scene(rocker, motion))
-    assert (
-        solution.stopped_at is not None
-        and len(solution) < 201
-        and set(solution.branch.tolist()) == {1, -1}
-    )
-    assert (
-        min(
-            abs(math.sin(0.5 * (solution.theta_4[-1] - x)))
-            for x in find_limit_angles(rocker, 4)
-        )
-        < 0.1
-    )
+    assert len(solution) == 201 and solution.change_points == ()
+    assert set(solution.branch.tolist()) == {1, -1}
+    # at a limit of theta_4 sin(theta_3 - theta_2) changes its sign
+    assert set(np.sign(np.sin(solution.theta_3 - solution.theta_2))) == {1.0, -1.0}
 
 
 TWO = """
@@ -374,9 +363,9 @@ STROKE = Motion(
     ("motion", "changes", "same"),
     [
         (
-            Motion(1.0, 2.0, 3.0, -1, "follow"),
+            Motion(1.0, 2.0, 3.0, -1),
             {"angle": 1.5, "branch": 1},
-            Motion(1.5, 2.0, 3.0, 1, "follow"),
+            Motion(1.5, 2.0, 3.0, 1),
         ),
         (
             Motion(theta_4=1.0, omega_4=2.0),

@@ -229,9 +229,7 @@ def test_a_law_and_a_path_through_change_points() -> None:
     np.testing.assert_array_equal(
         solution.torque[1], solve(alone(study, values, 1)).torque
     )  # type: ignore[index]
-    kite = Scene(
-        uniform(0.3, 0.1, 0.3, 0.1), Motion(Sweep(2.0, 8.0, 8), 1.0, through="follow")
-    )
+    kite = Scene(uniform(0.3, 0.1, 0.3, 0.1), Motion(Sweep(2.0, 8.0, 8), 1.0))
     for values in (
         {"lengths.input": np.array([0.1, 0.09])},
         {"bars.coupler.mass": np.array([1.0, 2.0])},

@@ -843,7 +843,7 @@ def test_a_law_and_a_changing_branch_are_judged_at_the_positions_of_the_scene(
     )
     scene = Scene(
         parallelogram,
-        fourbar.Motion(fourbar.Sweep(0.5, 4.0, 21), 2.0, through="follow"),
+        fourbar.Motion(fourbar.Sweep(0.5, 4.0, 21), 2.0),
     )
     (tmp_path / "theirs.csv").write_text(str(fourbar.solve(scene).to_csv()))
     judgement = judged(scene, tmp_path / "theirs.csv")

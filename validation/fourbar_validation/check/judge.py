@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.errors import InputError
-from fourbar.formulas.mobility import follow_smooth_path
 from fourbar.quantities import OK
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.scene import require_input
@@ -260,8 +259,6 @@ def make_command(scene: Scene, table: TheirTable) -> Command:
         allowed = "a table is judged along a law at the scene's own positions, all of them in its order"
         raise InputError("motion.law", scene.title, allowed)
     branch = np.full(len(theta_2), scene.motion.branch, dtype=np.int8)
-    if scene.motion.through == "follow":
-        branch = follow_smooth_path(scene.linkage, theta_2, scene.motion.branch)
     return Command(theta_2, branch, base.omega_2, base.alpha_2)
 
 

@@ -77,8 +77,6 @@ class ReleasedAnswer:
     """Kinetic and potential energy less the work that was done, (n,), J."""
     terms: Array
     """Their magnitudes, summed, (n,), J."""
-    stopped_at: float | None = None
-    """Time at which its bars 3 and 4 first came to lie in one line, s; None if they did not. It moves on."""
     refusal: str | None = None
     """A declared limit that the scene meets; then the arrays are empty."""
 

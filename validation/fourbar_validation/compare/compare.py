@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.quantities import (
+    CHANGE_POINT,
     COUPLE,
     DRY_FRICTION_QUANTITIES,
     FORCES,
@@ -510,7 +511,9 @@ def _mark_stated(quantity: str, formulas: Solution, ours: Array) -> Mask:
     jammed = (formulas.status_code == JAMMED) & (
         quantity == "drive_condition"
     )  # drive_condition says how near that is
-    return np.asarray((formulas.status_code != SINGULAR) & ~beyond & ~jammed)
+    # on a change point no engine can tell the limits of an assembly
+    in_line = np.isin(formulas.status_code, (SINGULAR, CHANGE_POINT))
+    return np.asarray(~in_line & ~beyond & ~jammed)
 
 
 def _count(codes: NDArray[np.uint8]) -> str:

@@ -14,7 +14,7 @@ from fourbar.formulas.longer import change_numbers
 from fourbar.formulas.pin_forces import Wrenches
 from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import PIN_FORCES
-from fourbar.scene import Command, Scene
+from fourbar.scene import Command, Scene, with_signs
 from fourbar.solve import solve
 from fourbar_validation.advise.worst_errors import WorstErrors, find_greatest
 from fourbar_validation.compare.answer import Array
@@ -126,6 +126,7 @@ def evaluate_balls(
 
     from fourbar_validation.engines.balls import collect_inputs, compute_outputs
 
+    command = with_signs(scene.linkage, command)
     before, ctx.prec = ctx.prec, bits
     try:
         outputs = []

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.quantities import COUPLE, LINE
-from fourbar.scene import Command, Scene
+from fourbar.scene import Command, Scene, with_signs
 from fourbar_validation.compare.answer import Answer, Array
 from fourbar_validation.compare.line import DriveLine, place_line
 from fourbar_validation.engines.description import (
@@ -316,7 +316,8 @@ def _solve_unit_couples(
 
 def count_solutions(scene: Scene, command: Command) -> Array:
     """Count the pin forces and friction couples that balance the linkage at each position, where it moves, (n,)."""
-    closed = close(scene.linkage, command.angle, command.branch, command.bar)
+    signs = with_signs(scene.linkage, command).branch
+    closed = close(scene.linkage, command.angle, signs, command.bar)
     theta = np.insert(closed.theta, command.bar - 2, command.angle, axis=0)
     motion = move(
         scene.linkage, theta[0], *list_speeds(command), theta[1], theta[2], command.bar

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from fourbar.effects import Effect
 from fourbar.linkage import MOVING_BARS, FourBar
-from fourbar.scene import Scene, command
+from fourbar.scene import Scene, command, with_signs
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.engines.description import PINS, declares, find_centre
 from fourbar_validation.engines.free_body_closure import Complex, close, cross
@@ -246,7 +246,7 @@ def find_wound(scene: Scene, motion: BodyMotion) -> NDArray[np.bool_] | None:
     ]
     if not springs or scene.motion.free is not None:
         return None
-    begins = command(scene)
+    begins = with_signs(scene.linkage, command(scene))
     if np.ptp(begins.branch) != 0:
         return None
     link, gone = scene.linkage, np.zeros(len(motion.theta_2), dtype=bool)

@@ -299,23 +299,3 @@ def split_answer(
     theta_2, omega_2, alpha_2 = (out[name] for name in MADE)
     rest = {name: values for name, values in out.items() if name not in MADE}
     return Command(theta_2, branch, omega_2, alpha_2), rest
-
-
-class LimitDetector:
-    """Sees bars 3 and 4 of one branch come to lie in one line, from step to step of an engine."""
-
-    def __init__(self, branch: int) -> None:
-        self.branch, self.before = branch, (0.0, 0.0)
-        self.stopped_at: float | None = None
-
-    def look(self, time: float, theta_3: float, theta_4: float) -> None:
-        """Take in a state; the instant between two of them is that of the line through their sines."""
-        if self.stopped_at is not None:
-            return
-        sine = self.branch * math.sin(theta_4 - theta_3)
-        began, last = self.before
-        if sine < 0.0:
-            self.stopped_at = began + (time - began) * max(last, 0.0) / (
-                max(last, 0.0) - sine
-            )
-        self.before = (time, sine)

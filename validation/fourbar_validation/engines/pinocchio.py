@@ -10,7 +10,7 @@ import pinocchio as pin
 
 from fourbar.effects import Gravity
 from fourbar.errors import LimitError
-from fourbar.scene import Scene, command
+from fourbar.scene import Scene, command, with_signs
 from fourbar_validation.compare.answer import Array, ReleasedAnswer
 from fourbar_validation.engines.description import (
     FIRST_PIN,
@@ -19,7 +19,7 @@ from fourbar_validation.engines.description import (
     rotate_by,
 )
 from fourbar_validation.engines.effects import has_term, list_acting
-from fourbar_validation.engines.loop import Assembler, Exact, LimitDetector
+from fourbar_validation.engines.loop import Assembler, Exact
 from fourbar_validation.engines.tree import Tree, solve_closed
 
 WORLD = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
@@ -237,11 +237,9 @@ class PinocchioReleased:
             return ReleasedAnswer.refused(
                 NAME, setting, "in forward dynamics only gravity has a model here"
             )
-        tree, start, none = PinocchioTree(scene), command(scene), np.zeros(3)
-        loop, detector = (
-            ClosedTree(tree, TIME_CONSTANT_STEPS * self.step),
-            LimitDetector(int(start.branch[0])),
-        )
+        tree, none = PinocchioTree(scene), np.zeros(3)
+        start = with_signs(scene.linkage, command(scene))
+        loop = ClosedTree(tree, TIME_CONSTANT_STEPS * self.step)
         state = loop.start(
             float(start.theta_2[0]), int(start.branch[0]), scene.motion.omega_2 or 0.0
         )
@@ -252,11 +250,10 @@ class PinocchioReleased:
         (q, v), rows, now = state, [], 0.0
         for t in times:
             steps = math.ceil((t - now) / self.step - 1e-6)
-            for taken in range(1, steps + 1):
+            for _ in range(steps):
                 q, v = make_step(
                     lambda q, v: loop.acceleration(q, v, none), q, v, (t - now) / steps
                 )
-                detector.look(now + taken * (t - now) / steps, q[0] + q[1], q[2])
             now = float(t)
             energy, data = (
                 pin.computeMechanicalEnergy(tree.model, tree.data, q, v),
@@ -266,6 +263,4 @@ class PinocchioReleased:
                 (q[0], v[0], energy, data.kinetic_energy + abs(data.potential_energy))
             )
         theta_2, omega, energy, terms = np.array(rows).T
-        return ReleasedAnswer(
-            NAME, setting, theta_2, omega, energy, terms, detector.stopped_at
-        )
+        return ReleasedAnswer(NAME, setting, theta_2, omega, energy, terms)

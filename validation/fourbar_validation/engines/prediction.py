@@ -22,7 +22,7 @@ import numpy as np
 
 from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import PIN_FORCES, VECTORS
-from fourbar.scene import Command, Scene
+from fourbar.scene import Command, Scene, with_signs
 from fourbar_validation.compare.tolerance import (
     EPS,
     ROUNDINGS,
@@ -89,6 +89,7 @@ def predict_error(
     NaN where the loop does not close; infinite at a singular position, where the equations have no answer.
     """
     n, (omega, alpha) = len(command.theta_2), list_speeds(command)
+    command = with_signs(scene.linkage, command)
     errors = np.full(n, np.nan)
     for i in range(n) if mask is None else np.flatnonzero(mask).tolist():
         theta_2, branch = float(command.theta_2[i]), int(command.branch[i])

@@ -18,7 +18,8 @@ from fourbar.files.scene_file import read_scene
 from fourbar.files.scene_text import describe
 from fourbar.formulas.many_digits import DIGITS
 from fourbar.quantities import VECTORS
-from fourbar.scene import Command, Scene
+from fourbar.scene import Command, Scene, with_signs
+from fourbar.scene import command as command_of
 from fourbar.scene.motion import COMMANDS, STROKE_COMMAND, Free, Motion
 from fourbar_validation.compare.answer import Answer, Array, EngineError, ReleasedAnswer
 from fourbar_validation.compare.rows import write_one_line
@@ -144,7 +145,6 @@ def command_from_json(scene: Scene, data: Any) -> tuple[Scene, Command]:
     stated |= {
         place: places,
         "branch": int(branch[0]),
-        "through": "sign" if (branch == branch[0]).all() else "follow",
     }
     scene = replace(scene, motion=Motion(**stated))
     omega, alpha = rates.get(speed), rates.get(acceleration, 0.0)
@@ -522,7 +522,8 @@ def release_to_json(scene: Scene) -> dict[str, Any]:
     motion, free = scene.motion, scene.motion.free
     assert free is not None
     start = {"theta_2": float(motion.theta_2), "omega_2": motion.omega_2 or 0.0}
-    command = {**start, "branch": motion.branch, "through": motion.through}
+    sign = with_signs(scene.linkage, command_of(scene)).branch
+    command = {**start, "branch": int(sign[0])}
     return {
         "command": command,
         "times": np.linspace(0.0, free.duration, free.steps + 1).tolist(),
@@ -535,19 +536,20 @@ def release_from_json(scene: Scene, command: Any, times: Any) -> Scene:
         raise InputError(
             "command",
             command,
-            "must be an object with theta_2, omega_2, branch and through",
+            "must be an object with theta_2, omega_2 and branch",
         )
-    _refuse_unknown(command, ("theta_2", "omega_2", "branch", "through"))
+    _refuse_unknown(command, ("theta_2", "omega_2", "branch"))
     instants = _read_list("times", times)
     theta, omega = (
         float(_read_list(name, [command.get(name, 0.0)])[0])
         for name in ("theta_2", "omega_2")
     )
-    branch = int(_read_branch(command.get("branch", 1), 1)[0])
+    sign = _read_branch(command.get("branch", 1), 1)
+    assembly = with_signs(scene.linkage, Command(np.array([theta]), sign, None, 0.0))
     free = Free(float(instants[-1]), len(instants) - 1)
     return replace(
         scene,
-        motion=Motion(theta, omega, 0.0, branch, command.get("through", "sign"), free),
+        motion=Motion(theta, omega, 0.0, int(assembly.branch[0]), free),
     )
 
 
@@ -556,11 +558,7 @@ def released_to_json(released: ReleasedAnswer) -> dict[str, Any]:
     if released.refusal is not None:
         return {"refusal": released.refusal, "setting": released.setting}
     answers = {name: _write_array(getattr(released, name)) for name in OF_RELEASED}
-    return {
-        "answers": answers,
-        "setting": released.setting,
-        "stopped_at": released.stopped_at,
-    }
+    return {"answers": answers, "setting": released.setting}
 
 
 def released_from_json(engine: str, n: int, data: Any) -> ReleasedAnswer:
@@ -573,7 +571,4 @@ def released_from_json(engine: str, n: int, data: Any) -> ReleasedAnswer:
     theta, omega, energy, terms = (
         _read_values("answers", name, answers.get(name), n) for name in OF_RELEASED
     )
-    stopped_at = data.get("stopped_at")
-    if stopped_at is not None:
-        stopped_at = _read_seconds("stopped_at", stopped_at)
-    return ReleasedAnswer(engine, setting, theta, omega, energy, terms, stopped_at)
+    return ReleasedAnswer(engine, setting, theta, omega, energy, terms)

@@ -17,6 +17,7 @@ from fourbar.evaluation.case import compute_state
 from fourbar.formulas.pin_forces import Wrenches
 from fourbar.linkage import MOVING_BARS, PIN_FORCE
 from fourbar.quantities import (
+    CHANGE_POINT,
     COUPLE,
     LINE,
     NO_LEVER,
@@ -325,7 +326,8 @@ def compare_status(
         near := np.flatnonzero(close)
     ):  # exact arithmetic has to decide there
         sine = np.abs(sines(near))
-        closes, in_line = np.isfinite(sine), formulas.status_code[near] == SINGULAR
+        closes = np.isfinite(sine)
+        in_line = np.isin(formulas.status_code[near], (SINGULAR, CHANGE_POINT))
         differ[near] |= (formulas.status_code[near] == NOT_ASSEMBLED) == closes
         differ[near] |= closes & np.where(
             in_line, sine > IN_ONE_LINE, sine < 1.0 / 16.0 * IN_ONE_LINE

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.scene import Command, Scene
+from fourbar.scene import Command, Scene, with_signs
 from fourbar.solution import Solution
 from fourbar.solve import solve
 from fourbar_validation.compare.answer import Adapter, Answer, explain_refusal
@@ -185,14 +185,16 @@ class Question:
 
 
 def ask_at(adapter: Adapter, scene: Scene, command: Command) -> Answer:
-    """Give an engine what is commanded, and nothing that the formulas computed from it."""
-    bare = remove_angles(command)
+    """Give an engine what is commanded, with the sign of its sine at each position; nothing of the formulas besides."""
+    bare = remove_angles(with_signs(scene.linkage, command))
     answer = adapter.answer(scene, bare)
     if answer.at is bare:
         return replace(answer, at=command)
-    if command.stroke is not None and answer.at is not None:
+    if answer.at is None:
+        return answer
+    if command.stroke is not None:
         require_near(answer.at, command)
-    return answer
+    return replace(answer, at=with_signs(scene.linkage, answer.at))
 
 
 def remove_angles(command: Command) -> Command:

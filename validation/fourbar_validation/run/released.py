@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from fourbar.effects import Friction, Gravity, Load
 from fourbar.linkage import MOVING_BARS, PINS
 from fourbar.quantities import UNKNOWNS
-from fourbar.scene import Command, Scene
+from fourbar.scene import Command, Scene, with_signs
 from fourbar.solution import Solution
 from fourbar_validation.compare.answer import Array, ReleasedAnswer
 from fourbar_validation.compare.compare import Comparison
@@ -65,8 +65,8 @@ FORWARD = {
 """Engines that integrate by themselves: function that starts one with a step, longest step (s), and library."""
 LONGEST_STEP = 2e-3
 """s, of a guest."""
-FULL = {"theta_2": 1e-9, "omega_2": 1e-8, "energy": 1e-10, "stopped_at": 1e-9}
-"""Errors (rad, of the greatest speed, of the greatest energies, of the duration) at which a free motion agrees: the
+FULL = {"theta_2": 1e-9, "omega_2": 1e-8, "energy": 1e-10}
+"""Errors (rad, of the greatest speed, of the greatest energies) at which a free motion agrees: the
 formulas hold theta_2 to 1e-9 rad over 5 s; a motion of 100 s may amplify that by its duration, so 5 s is the unit."""
 UNIT = 5.0
 
@@ -107,7 +107,7 @@ def make_pendulum(scene: Scene) -> Pendulum | None:
     if not (
         a == c
         and b == d
-        and scene.motion.through == "follow"
+        and scene.motion.branch == 1
         and not scene.loads
         and len(effects) == 1
     ):
@@ -140,8 +140,7 @@ def make_pendulum(scene: Scene) -> Pendulum | None:
 def check_released(question: Question) -> Iterator[Row]:
     """Compare every forward engine's free motion with that of the formulas, and the forces of each instant.
 
-    The motion of the formulas ends where bars 3 and 4 come to lie in one line, unless it follows the path through;
-    an engine moves on. Both are compared as long as both are there, and the instant itself is compared too.
+    The motion goes on through limit positions and change points.
     """
     name, scene, solution = question.name, question.scene, question.solution
     free = scene.motion.free
@@ -149,7 +148,7 @@ def check_released(question: Question) -> Iterator[Row]:
     times = np.linspace(0.0, free.duration, free.steps + 1)
     yield from _compare_forces(question)
     pendulum = make_pendulum(scene)
-    truth = _Truth(solution.theta_2, solution.omega_2, solution.stopped_at)
+    truth = _Truth(solution.theta_2, solution.omega_2)
     if pendulum is not None:
         phi, rate = pendulum.motion(times)
         truth = _Truth(phi + math.pi / 2, rate)
@@ -209,8 +208,9 @@ def _compare_forces(question: Question) -> Iterator[Row]:
         drive_bar=2,
         drive=None,
     )
-    command = Command(
-        solution.theta_2, solution.branch, solution.omega_2, solution.alpha_2
+    command = with_signs(
+        scene.linkage,
+        Command(solution.theta_2, solution.branch, solution.omega_2, solution.alpha_2),
     )
     driven_ones = [
         (
@@ -328,11 +328,10 @@ def _prescribe(
 
 
 class _Truth(NamedTuple):
-    """The motion that engines are held against, to its end."""
+    """The motion that engines are held against."""
 
     theta_2: Array
     omega_2: Array
-    stopped_at: float | None = None
 
 
 def _make_rows(
@@ -341,11 +340,7 @@ def _make_rows(
     coarse: ReleasedAnswer | None,
     truth: _Truth,
 ) -> list[Row]:
-    free, through, n = (
-        question.scene.motion.free,
-        question.scene.motion.through,
-        len(truth.theta_2),
-    )
+    free, n = question.scene.motion.free, len(truth.theta_2)
     assert free is not None
     who = (question.name, fine.engine, fine.setting)
     if fine.refusal is not None:
@@ -366,15 +361,12 @@ def _make_rows(
             coarse is not None
         ):  # the formulas integrate the energy equation itself; their drift is part of their test
             series["energy"] = answer.energy[:n] - answer.energy[0]
-            if through == "sign":
-                series["stopped_at"] = _find_end(answer.stopped_at, free.duration)
         return series
 
     right_and_size = {
         "theta_2": (truth.theta_2, 1.0),
         "omega_2": (truth.omega_2, float(np.abs(truth.omega_2).max())),
         "energy": (np.zeros(n), float(fine.terms[:n].max())),
-        "stopped_at": (_find_end(truth.stopped_at, free.duration), 1.0),
     }
     rows = []
     for name, values in numbers(fine).items():
@@ -411,13 +403,8 @@ def _make_rows(
                 DEGRADED,
                 f"{error[index]:.1e} of {expected:.1e} predicted from twice the step",
             )
-        place = float(fine.theta_2[n - 1 if name == "stopped_at" else index])
+        place = float(fine.theta_2[index])
         rows.append(
             Row(*who, name, float(error[index]), allowed, verdict, reason, place, 1.0)
         )
     return rows
-
-
-def _find_end(stopped_at: float | None, duration: float) -> Array:
-    """Give when a motion reached its limit, or the stated end, as a part of that duration, (1,)."""
-    return np.array([1.0 if stopped_at is None else stopped_at / duration])

@@ -188,7 +188,7 @@ CHANGE_POINTS: dict[str, tuple[Lengths, int, tuple[float, ...]]] = {
 
 
 def approach_change_point(*, distances: tuple[float, ...] = CHANGE) -> Scenes:
-    """Close to a change point, on both sides and both branches."""
+    """Close to a change point, on both sides and in both assemblies."""
     offsets = np.array(
         [*(-x for x in (*REGULAR, *distances)), *distances[::-1], *REGULAR[::-1]]
     )
@@ -201,16 +201,14 @@ def approach_change_point(*, distances: tuple[float, ...] = CHANGE) -> Scenes:
                 )
 
 
-def sweep_change_point(*, steps: int = 73) -> Scenes:
-    """Sweep through the change points, once by the sign of the branch and once along the smooth path."""
-    for kind, (lengths, branch, _) in CHANGE_POINTS.items():
-        for through in ("sign", "follow"):
+def sweep_change_point(*, steps: int = 145) -> Scenes:
+    """Sweep two turns through the change points in both assemblies."""
+    for kind, (lengths, _, _) in CHANGE_POINTS.items():
+        for branch, name in BRANCH_NAMES.items():
             scene = dress(lengths)
             start = scene.linkage.ground_angle + 0.3
-            motion = Motion(
-                Sweep(start, start + 2 * math.pi, steps), 3.0, 0.0, branch, through
-            )
-            yield f"{kind} {through}", replace(scene, motion=motion)
+            motion = Motion(Sweep(start, start + 4 * math.pi, steps), 3.0, 0.0, branch)
+            yield f"{kind} {name}", replace(scene, motion=motion)
 
 
 def miss_grashof(
@@ -356,7 +354,7 @@ def released(
     bar = Bar(1.0, 1.0)
     linkage = FourBar(1.0, bar, bar, bar)
     for duration in durations:
-        motion = Motion(math.pi / 2, -1.0, through="follow", free=Free(duration, steps))
+        motion = Motion(math.pi / 2, -1.0, free=Free(duration, steps))
         yield f"{duration:g} s", Scene(linkage, motion, effects=(Gravity(),))
 
 

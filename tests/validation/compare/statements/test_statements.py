@@ -14,6 +14,7 @@ from fourbar.linkage import uniform
 from fourbar.scene import Command, Scene, command
 from fourbar_validation import Answer
 from fourbar_validation.compare.rows import REFUSES, Row
+from fourbar_validation.compare.statements import limit_positions
 from fourbar_validation.compare.tolerance import EQUIVALENCE
 from fourbar_validation.engines.loop import Exact
 from fourbar_validation.engines.mujoco.inverse import MujocoInverse
@@ -21,6 +22,7 @@ from fourbar_validation.engines.pinocchio import PinocchioInverse
 from fourbar_validation.engines.registry import Engine
 from fourbar_validation.run.answers import check_statements
 from fourbar_validation.run.judge import judge
+from fourbar_validation.run.question import ask_at
 from fourbar_validation.scenes.random import DrawnType, draw_random_scene
 from tests.support.scenes import crank_rocker
 
@@ -60,9 +62,8 @@ def judged(
         drive_bar=4,
     )
     adapter = engine()
-    rows = check_statements(
-        "scene", scene, adapter, adapter.answer(scene, command(scene))
-    )
+    answer = ask_at(adapter, scene, command(scene))
+    rows = check_statements("scene", scene, adapter, answer)
     return {row.quantity: row for row in rows}
 
 
@@ -241,7 +242,9 @@ FAULTS = {
     "branch through a change point": (
         CHANGE,
         "through",
-        changed("follow_smooth_path", np.negative),
+        lambda patch: patch.setattr(
+            limit_positions, "with_signs", lambda linkage, command: command
+        ),
     ),
 }
 

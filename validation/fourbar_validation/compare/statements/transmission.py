@@ -10,7 +10,7 @@ from fourbar.formulas import mobility, transmission
 from fourbar.formulas.path import compute_state as state_of
 from fourbar.formulas.path import drive_sine, find_singular
 from fourbar.linkage import MOVING_BARS, FourBar
-from fourbar.scene import Command, Scene
+from fourbar.scene import Command, Scene, with_signs
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.compare import Predicted
 from fourbar_validation.compare.statements.limit_positions import Finding, Place, Seen
@@ -175,11 +175,11 @@ def _list_claims(scene: Scene, answer: Answer) -> Iterator[_Claim]:
 
 def _compare_distance(scene: Scene, command: Command) -> Finding:
     """Compare how far it is to a singular position with the limits and dead centres that are stated."""
-    branch, drive = command.branch.astype(float), scene.drive_bar or 2
+    drive = scene.drive_bar or 2
     ours = transmission.distance_to_singular(
-        scene.linkage, command.theta_2, drive, branch
+        scene.linkage, command.theta_2, drive, command.branch
     )
-    theirs = _compute_to_singular(scene, command.theta_2, branch)
+    theirs = _compute_to_singular(scene, command)
     error = np.where(np.isinf(ours) == np.isinf(theirs), 0.0, math.inf)
     finite = np.isfinite(ours) & np.isfinite(theirs)
     error[finite] = np.abs(ours[finite] - theirs[finite])
@@ -203,18 +203,22 @@ def _find_collinear(linkage: FourBar) -> list[float]:
     return [*(limit.theta_2 for limit in limits), *mobility.change_points(linkage)]
 
 
-def _compute_to_singular(scene: Scene, theta_2: Array, branch: Array) -> Array:
+def _compute_to_singular(scene: Scene, command: Command) -> Array:
     """Compute the angle to the nearest position where bars must not be collinear and are; inf where there is none."""
     drive, always = scene.drive_bar or 2, _find_collinear(scene.linkage)
     dead = mobility.limit_positions(scene.linkage, drive) if drive != 2 else ()
+    theta_2 = command.theta_2
     nearest = np.full(theta_2.shape, math.inf)
     for point, side in [
         *((point, 0) for point in always),
         *((limit.theta_2, limit.branch) for limit in dead),
     ]:
-        apart = np.abs(np.angle(np.exp(1j * (theta_2 - point))))
+        apart = np.angle(np.exp(1j * (theta_2 - point)))
+        there = with_signs(scene.linkage, command._replace(angle=theta_2 - apart))
         nearest = np.where(
-            (branch == side) | (side == 0), np.minimum(nearest, apart), nearest
+            (there.branch == side) | (side == 0),
+            np.minimum(nearest, np.abs(apart)),
+            nearest,
         )
     return nearest
 

@@ -17,13 +17,13 @@ from fourbar.errors import InputError
 from fourbar.mjcf import RECIPE, Settings, write_mjcf
 from fourbar.mjcf.model import unwind
 from fourbar.quantities import PIN_FORCES
-from fourbar.scene import Command, Scene
+from fourbar.scene import Command, Scene, with_signs
 from fourbar.scene import command as command_of
 from fourbar_validation.compare.answer import Answer, Array, ReleasedAnswer
 from fourbar_validation.engines.description import name_driving
 from fourbar_validation.engines.loaded import Values
-from fourbar_validation.engines.loop import Angles, Assembler, LimitDetector, read_each
-from fourbar_validation.engines.mujoco.closed_loop import O2, O4, A, ClosedLoop
+from fourbar_validation.engines.loop import Angles, Assembler, read_each
+from fourbar_validation.engines.mujoco.closed_loop import O2, ClosedLoop
 from fourbar_validation.engines.mujoco.runner import Stepper
 
 RELEASED, ONE_STATE = "mujoco-forward", "mujoco-one-state"
@@ -47,7 +47,8 @@ class MujocoForward:
 
     def release(self, scene: Scene, times: Array) -> ReleasedAnswer:
         """Integrate the motion at the given times, rising from 0 (s)."""
-        setting, start = f"RK4 {self.step:g} s", command_of(scene)
+        setting = f"RK4 {self.step:g} s"
+        start = with_signs(scene.linkage, command_of(scene))
         interval = float(
             times[1] - times[0]
         )  # the times are evenly spaced; the step divides the interval
@@ -71,18 +72,14 @@ class MujocoForward:
             )
         loop.model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY
         loop.set_state(q_0, scene.motion.omega_2 or 0.0)
-        rows, q, detector = [], loop.data.qpos, LimitDetector(int(start.branch[0]))
+        rows = []
         stepper, work = (
             Stepper(loop.model, loop.data, timestep),
             _Work(loop.model, loop.data, timestep),
         )
 
-        def look(now: float) -> None:
-            detector.look(now, q[O2] + q[A], q[O4])
-            work.add()
-
         for t in times:
-            stepper.to(float(t), look)
+            stepper.to(float(t), lambda _: work.add())
             mujoco.mj_forward(loop.model, loop.data)
             terms = np.array([*loop.data.energy, -work.done])
             rows.append(
@@ -94,9 +91,7 @@ class MujocoForward:
                 )
             )
         theta_2, omega, energy, terms = np.array(rows).T
-        return ReleasedAnswer(
-            RELEASED, setting, theta_2, omega, energy, terms, detector.stopped_at
-        )
+        return ReleasedAnswer(RELEASED, setting, theta_2, omega, energy, terms)
 
 
 class _Work:

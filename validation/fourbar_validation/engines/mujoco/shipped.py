@@ -50,14 +50,9 @@ def compare_shipped(name: str, scene: Scene, command: Command) -> Row | None:
         errors.append(
             (math.hypot(*loop.gap()) / (OPEN * size), f"{what}: the loop is open")
         )
-        wrong_branch = (
-            float(loop.branch() != command.branch[0])
-            if scene.motion.through == "sign"
-            else 0.0
-        )
         errors.append(
             (
-                math.inf if wrong_branch else 0.0,
+                0.0 if loop.branch() in command.branch else math.inf,
                 f"{what}: not {BRANCH_NAMES[int(command.branch[0])]}",
             )
         )

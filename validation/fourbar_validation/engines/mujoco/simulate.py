@@ -155,9 +155,7 @@ def make_run_scene(scene: Scene, command: Command) -> Scene:
     """Make the scene whose MJCF is run through, a law by its greatest speed and acceleration."""
     if scene.motion.law is not None:
         omega, alpha = find_extremes(scene.motion.law)
-        motion = Motion(
-            command.theta_2, omega, alpha, scene.motion.branch, scene.motion.through
-        )
+        motion = Motion(command.theta_2, omega, alpha, scene.motion.branch)
         return replace(scene, motion=motion)
     omega, alpha = float(np.max(command.omega_2)), float(np.max(command.alpha_2))  # type: ignore[arg-type]
     return replace(

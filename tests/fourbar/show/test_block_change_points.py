@@ -1,0 +1,287 @@
+"""Parallelograms, kites and other linkages with change points as people state them: torque, headings, releases."""
+
+import math
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import fourbar
+from fourbar.cli import group
+from fourbar.formulas.mobility import classify, find_miss, meet_change_points
+from fourbar.show.block import write_block
+
+HANGING = """
+[lengths]
+ground = "300 mm"
+input = "200 mm"
+coupler = "300 mm"
+output = "200 mm"
+[bars.coupler]
+mass = "10 kg"
+[motion]
+theta_2 = { from = "-60 deg", to = "-120 deg", steps = 60 }
+omega_2 = "0 rad/s"
+[effects]
+gravity = ["9.81 m/s^2", "-90 deg"]
+"""
+GIVEN_COUPLE = """
+[lengths]
+ground = "1.8 m"
+input = "1.5 m"
+coupler = "1.8 m"
+output = "1.5 m"
+ground_angle = "90 deg"
+[bars.coupler]
+mass = "150 kg"
+centre = ["1.2 m", "0 deg"]
+[motion]
+theta_2 = "0 deg"
+omega_2 = "0 rad/s"
+free = { duration = "1 s", steps = 200 }
+[[loads]]
+bar = 2
+moment = "5 kN m"
+[effects]
+gravity = ["9.81 m/s^2", "-90 deg"]
+"""
+
+
+def read(tmp_path: Path, text: str) -> fourbar.Scene:
+    path = tmp_path / "scene.toml"
+    path.write_text(text, encoding="utf-8")
+    return fourbar.load(path)
+
+
+def state(lengths: tuple[str, str, str, str], more: str = "") -> str:
+    names = ("ground", "input", "coupler", "output")
+    lines = [f'{n} = "{x}"' for n, x in zip(names, lengths, strict=True)]
+    return "\n".join(["[lengths]", *lines, more])
+
+
+def first_line(scene: fourbar.Scene) -> str:
+    return write_block(scene, fourbar.solve(scene))[0]
+
+
+def test_a_new_parallelogram_is_one_at_every_angle(tmp_path: Path) -> None:
+    """Bars of 0.1, 0.3, 0.1 kg: T2 = (0.05 + 0.3 + 0.05) kg * 9.81 m/s^2 * 0.1 m * cos(theta_2)."""
+    path = tmp_path / "tp.toml"
+    runner = CliRunner()
+    lengths = ["300mm", "100mm", "300mm", "100mm"]
+    made = runner.invoke(group, ["new", str(path), "--lengths", *lengths])
+    assert made.exit_code == 0, made.output
+    shown = runner.invoke(group, ["analyze", str(path)])
+    assert shown.exit_code == 0, shown.output
+    assert shown.output.startswith("Parallelogram")
+    assert "ntiparallelogram" not in shown.output
+    assert max(map(len, shown.output.splitlines())) <= 80
+    scene = fourbar.load(path)
+    solution = fourbar.solve(scene)
+    weight = sum(
+        share * bar.mass
+        for share, bar in zip((0.5, 1.0, 0.5), scene.linkage.moving, strict=True)
+    )
+    right = weight * 9.81 * 0.1 * np.cos(solution.theta_2)
+    assert solution.torque is not None
+    assert np.abs(solution.torque - right).max() < 1e-14
+    on_change_points = np.isclose(np.sin(solution.theta_2), 0.0)
+    assert solution.F12 is not None and on_change_points.sum() == 3
+    assert np.array_equal(np.isnan(solution.F12[:, 0]), on_change_points)
+
+
+def test_five_newton_metres_at_60_degrees() -> None:
+    linkage = fourbar.FourBar(
+        3.0, fourbar.Bar(1.0), fourbar.Bar(3.0, 1.0), fourbar.Bar(1.0)
+    )
+    motion = fourbar.Motion(fourbar.Sweep(0.0, math.tau, 360), 0.0)
+    scene = fourbar.Scene(linkage, motion, effects=(fourbar.Gravity(10.0),))
+    torque = fourbar.solve(scene).torque
+    assert torque is not None and torque[60] == pytest.approx(5.0, rel=1e-14)
+
+
+def test_a_hanging_platform(tmp_path: Path) -> None:
+    solution = fourbar.solve(read(tmp_path, HANGING))
+    assert solution.torque is not None and solution.F12 is not None
+    assert np.abs(solution.torque).max() == pytest.approx(9.81, rel=1e-12)
+    forces = [np.hypot(*getattr(solution, f).T) for f in ("F12", "F32", "F43", "F14")]
+    assert np.max(forces) == pytest.approx(56.6, abs=0.05)
+
+
+def test_a_given_couple_lifts_a_bar_on_two_links(tmp_path: Path) -> None:
+    """alpha = 14.8148 - 6.54 cos(theta); omega^2/2 = 14.8148 theta - 6.54 sin(theta)."""
+    scene = read(tmp_path, GIVEN_COUPLE)
+    released = fourbar.release(scene)
+    angle, omega = released.theta_2, released.omega_2
+    exact = np.sqrt(2.0 * (5000.0 / 337.5 * angle - 9.81 / 1.5 * np.sin(angle)))
+    assert np.abs(omega - exact).max() < 1e-8
+    motion = fourbar.Motion(math.radians(30.0), 2.9957, 9.151)
+    at_30 = fourbar.solve(fourbar.Scene(scene.linkage, motion, effects=scene.effects))
+    assert at_30.F43 is not None and at_30.torque is not None
+    assert np.hypot(*at_30.F43[0]) == pytest.approx(2139.0, abs=1.0)
+    assert at_30.torque[0] == pytest.approx(5000.0, abs=0.5)
+
+
+@pytest.mark.parametrize(
+    ("lengths", "motion", "head"),
+    [
+        ((0.3, 0.1, 0.3, 0.1), {}, "Parallelogram, open"),
+        ((0.3, 0.1, 0.3, 0.1), {"branch": -1}, "Antiparallelogram, crossed"),
+        ((0.3, 0.1, 0.3, 0.1), {"theta_4": 3.5}, "Parallelogram, open"),
+        ((0.3, 0.1, 0.3, 0.1), {"theta_3": 0.2}, "Antiparallelogram, open"),
+        (
+            (0.3, 0.3, 0.2, 0.2),
+            {},
+            "Kite (equal: ground and input; coupler and output)",
+        ),
+        ((0.2, 0.3, 0.3, 0.2), {"branch": -1}, "Kite"),
+        ((0.2, 0.2, 0.2, 0.2), {}, "Rhombus"),
+    ],
+)
+def test_headings_name_the_assembly(
+    lengths: tuple[float, ...], motion: dict[str, float], head: str
+) -> None:
+    scene = fourbar.Scene(fourbar.uniform(*lengths), fourbar.Motion(**motion))
+    lines = write_block(scene, fourbar.solve(scene))
+    assert lines[0].startswith(head)
+    assert any("change point" in line for line in lines)
+    said = any("no theta_3 moves the parallelogram" in line for line in lines)
+    assert said == ("theta_3" in motion)
+
+
+def test_a_single_change_point_takes_two_turns() -> None:
+    linkage = fourbar.uniform(4.0, 1.0, 2.0, 3.0)
+    one, two = (
+        fourbar.Scene(
+            linkage, fourbar.Motion(fourbar.Sweep(0.0, turns * math.tau, 720), 1.0)
+        )
+        for turns in (1, 2)
+    )
+    text = " ".join(" ".join(write_block(one, fourbar.solve(one))).split())
+    assert "the assembly repeats after two turns" in text
+    duties = [fourbar.motor_duty(fourbar.solve(scene)) for scene in (one, two)]
+    assert [duty.closed for duty in duties if duty is not None] == [False, True]
+    crossed = fourbar.Scene(linkage, one.motion.replace(branch=-1))
+    later = fourbar.solve(two).theta_4[360:]
+    apart = fourbar.solve(crossed).theta_4[::2] - later
+    assert np.abs(np.sin(0.5 * apart)).max() < 1e-12
+
+
+def test_lengths_are_equal_within_the_rounding_of_what_is_stated(
+    tmp_path: Path,
+) -> None:
+    motion = '[motion]\nomega_2 = "1 rad/s"\n'
+    rounded = ("44.7214 mm", "22.3607 mm", "44.7213 mm", "22.3607 mm")
+    scene = read(tmp_path, state(rounded, motion))
+    assert classify(scene.linkage).name == "parallelogram"
+    assert first_line(scene).startswith("Parallelogram")
+    # no length moves by more than its rounding
+    off = np.array(scene.linkage.lengths) - [
+        44.7214e-3,
+        22.3607e-3,
+        44.7213e-3,
+        22.3607e-3,
+    ]
+    assert 0.0 < np.abs(off).max() <= 5e-8 * (1.0 + 1e-6)
+    beyond = ("22.3607 mm", "44.9998 mm", "22.3605 mm", "45.0002 mm")
+    scene = read(tmp_path, state(beyond, motion))
+    assert find_miss(scene.linkage) == (pytest.approx(6e-7, rel=1e-6), "parallelogram")
+    lines = write_block(scene, fourbar.solve(scene))
+    assert any("misses a parallelogram by 600 nm" in line for line in lines)
+    # whole numbers and coarse decimals are meant as they stand
+    for stated in (
+        ("300 mm", "100 mm", "301 mm", "100 mm"),
+        ("30.0 cm", "10.0 cm", "30.1 cm", "10.0 cm"),
+    ):
+        assert classify(read(tmp_path, state(stated)).linkage).name != "parallelogram"
+
+
+def test_one_equality_is_met_by_the_least_change() -> None:
+    met = meet_change_points((4.00001, 1.0, 2.0, 3.0), (1e-5, 0.0, 0.0, 0.0))
+    assert met == (4.0, 1.0, 2.0, 3.0)
+    lengths = (4.0, 1.0, 2.0, 3.0 + 4e-6)
+    met = meet_change_points(lengths, (1e-5,) * 4)
+    assert met == pytest.approx((4 + 1e-6, 1 + 1e-6, 2 - 1e-6, 3 + 3e-6), abs=1e-12)
+
+
+def test_members_beside_a_change_point_keep_the_nominal_assembly() -> None:
+    linkage = fourbar.uniform(0.3, 0.1, 0.3, 0.1)
+    angles = np.radians(np.arange(5.0, 360.0, 10.0))
+    for branch in (1, -1):
+        motion = fourbar.Motion(angles, 1.0, branch=branch)
+        scene = fourbar.Scene(linkage, motion, effects=(fourbar.Gravity(),))
+        values = 0.1 + np.array([-1e-5, -1e-9, 0.0, 1e-9, 1e-5])
+        torque = fourbar.solve(fourbar.vary(scene, {"lengths.output": values})).torque
+        nominal = fourbar.solve(scene).torque
+        assert torque is not None and nominal is not None
+        # the change grows towards the change points; a jump to the other assembly would be of the size of the torque
+        assert np.abs(torque - nominal).max() < 0.02 * np.abs(nominal).max()
+    # a linkage of its own keeps its own assembly
+    study = fourbar.vary(scene, {"lengths.output": np.array([0.2])})
+    alone = fourbar.Scene(
+        fourbar.FourBar(0.3, linkage.input, linkage.coupler, fourbar.Bar(0.2, 0.1)),
+        motion,
+        effects=scene.effects,
+    )
+    assert np.array_equal(fourbar.solve(study).branch[0], fourbar.solve(alone).branch)
+
+
+def test_the_tolerance_band_of_a_parallelogram_holds_its_nominal_value() -> None:
+    pytest.importorskip("scipy")
+    scene = fourbar.Scene(
+        fourbar.uniform(0.3, 0.1, 0.3, 0.1),
+        fourbar.Motion(np.radians(np.arange(10.0, 360.0, 40.0)), 1.0),
+        effects=(fourbar.Gravity(),),
+        tolerances=(fourbar.Tolerance("lengths.output", 1e-5),),
+    )
+    spread = fourbar.tolerances(scene, samples=64).spreads["torque"]
+    # samples in the other assembly would make the band as wide as the torque, or leave the nominal value outside
+    width = spread.high - spread.low
+    assert (width < 0.02 * np.abs(spread.nominal).max()).all()
+    middle = 0.5 * (spread.low + spread.high)
+    assert (np.abs(spread.nominal - middle) <= width).all()
+
+
+def test_equilibria_are_those_of_the_assembly() -> None:
+    """A hanging parallelogram rests below and above alone; the antiparallelogram elsewhere too."""
+    scene = fourbar.Scene(
+        fourbar.uniform(0.3, 0.1, 0.3, 0.1), effects=(fourbar.Gravity(),)
+    )
+    found = fourbar.equilibrium(scene).found
+    angles = sorted(math.degrees(rest.place.theta_2) % 360.0 for rest in found)
+    assert angles == pytest.approx([90.0, 270.0], abs=1e-6)
+
+
+def test_rounding_is_written_as_zero() -> None:
+    """A massless rocker is a two-force bar, and bars without mass need no torque."""
+    linkage = fourbar.FourBar(
+        2.0, fourbar.Bar(1.0), fourbar.Bar(3.0, 1.0), fourbar.Bar(3.0)
+    )
+    motion = fourbar.Motion(omega_2=1.0)
+    scene = fourbar.Scene(linkage, motion, effects=(fourbar.Gravity(),))
+    lines = write_block(scene, fourbar.solve(scene, "error"))
+    (moments,) = (line for line in lines if line.startswith("  moment"))
+    assert moments.split()[-3:] == ["0", "N", "m"]
+    assert not any("growing without bound" in line for line in lines)
+    bare = fourbar.Scene(fourbar.uniform(2.0, 1.0, 3.0, 3.0, per_metre=0.0), motion)
+    text = "\n".join(write_block(bare, fourbar.solve(bare, "error")))
+    assert "-0 " not in text and "digits left" not in text
+    kite = fourbar.Scene(fourbar.uniform(0.1, 0.1, 0.3, 0.3), motion)
+    text = "\n".join(write_block(kite, fourbar.solve(kite, "error")))
+    exponents = re.findall(r"e-([0-9]+) (?:deg|mm|m|N)", text)
+    assert all(int(exponent) < 9 for exponent in exponents)
+
+
+def test_the_peak_of_a_release_over_change_points_is_said_to_grow() -> None:
+    pytest.importorskip("scipy")
+    linkage = fourbar.uniform(0.3, 0.1, 0.3, 0.1)
+    motion = fourbar.Motion(0.5, 25.0, free=fourbar.Free(0.4, 50))
+    scene = fourbar.Scene(linkage, motion, effects=(fourbar.Gravity(),))
+    solution = fourbar.solve(scene)
+    assert solution.change_points is not None and len(solution.change_points) > 2
+    text = " ".join(" ".join(write_block(scene, solution)).split())
+    assert "at a change point pin forces grow without bound" in text
+    for time in solution.change_points:
+        angle = np.interp(time, solution.time, solution.theta_2)
+        assert abs(math.sin(angle)) < 1e-3
