@@ -32,7 +32,7 @@ def make_errors(*error: float, condition: float = 1.0, **changes: object) -> Err
         "condition": np.full(n, condition),
         "mask": np.ones(n, dtype=bool),
         "decidable": np.ones(n, dtype=bool),
-        "reason": "round-off",
+        "tolerance": EQUIVALENCE,
     }
     return Errors(**{**parts, **changes})  # type: ignore[arg-type]
 

@@ -407,7 +407,7 @@ def test_junit_skips_what_was_not_compared_and_fails_what_fails_as_before() -> N
         (
             rows(refuse=1),
             rows(refuse=1),
-            "Nothing was compared with the old run in 1 rows: 1 same",
+            "Nothing was compared in 1 rows: 1 same",
             FAILED,
         ),
         (

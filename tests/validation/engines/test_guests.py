@@ -214,6 +214,41 @@ FINE: dict[str, tuple[str, str]] = {
 }
 
 
+@pytest.mark.parametrize(
+    ("errors", "line"),
+    [
+        (
+            "node:internal/modules/cjs/loader:1145\n  throw err;\n  ^\n\n"
+            "Error: Cannot find module '/x.js'\n    at Module._load (node:1)\n"
+            "  code: 'MODULE_NOT_FOUND'\n}\n\nNode.js v20.11.0\n",
+            "Error: Cannot find module '/x.js'",
+        ),
+        (
+            "Traceback (most recent call last):\n  File 'x', line 1\n"
+            "ModuleNotFoundError: No module named 'sim'\n",
+            "ModuleNotFoundError: No module named 'sim'",
+        ),
+        (
+            'Exception in thread "main" java.lang.IllegalStateException: no licence\n'
+            "\tat Main.main(Main.java:5)\n",
+            'Exception in thread "main" java.lang.IllegalStateException: no licence',
+        ),
+        (
+            "terminate called after throwing an instance of 'std::runtime_error'\n"
+            "  what():  model not found\nAborted\n",
+            "what():  model not found",
+        ),
+        ("loading\nsh: 1: simulate: not found\n", "sh: 1: simulate: not found"),
+        ("one\ntwo\n", "two"),
+        ("", ""),
+    ],
+)
+def test_the_reason_of_a_dead_program_is_the_line_that_says_why(
+    errors: str, line: str
+) -> None:
+    assert processes.find_reason(errors) == line
+
+
 def test_a_torque_that_is_a_thousandth_off_fails_alone(tmp_path: Path) -> None:
     by_engine = judged(
         SCENE,

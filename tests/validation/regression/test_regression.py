@@ -25,14 +25,22 @@ from fourbar.errors import InputError
 from fourbar_validation.cli import status
 from fourbar_validation.compare.columns import Columns
 from fourbar_validation.compare.rows import AGREES, FAILS, REFUSES, Row, write_results
-from fourbar_validation.compare.tolerance import EPS, EQUIVALENCE
+from fourbar_validation.compare.tolerance import (
+    EPS,
+    EQUIVALENCE,
+    FULL_ACCURACY,
+    ErrorBound,
+)
 from fourbar_validation.engines.free_body import FreeBody
+from fourbar_validation.engines.guests import STATED
+from fourbar_validation.engines.limits import LIMITS
 from fourbar_validation.engines.registry import Engine
-from fourbar_validation.regression import record, render
+from fourbar_validation.regression import record, render, rules
 from fourbar_validation.regression.accept import HISTORY, accept_command, compare
 from fourbar_validation.regression.change import Kind
 from fourbar_validation.regression.changes import compare_runs
 from fourbar_validation.regression.record import (
+    NOTHING_KNOWN,
     About,
     Recorded,
     describe_run,
@@ -464,13 +472,20 @@ def test_a_part_of_a_long_run_compares_with_its_part_and_a_table_out_of_order_wi
         save(tmp_path / "whole", rows),
         save(tmp_path / "some", [rows[7], rows[70]]),
     )
-    assert status(["compare", str(all_rows), str(some)]) == 0
-    lines = capsys.readouterr().out.splitlines()
+    assert status(["compare", str(all_rows), str(some)]) == 2
+    printed = capsys.readouterr()
+    assert "shares 2 of 80 rows with the new run, fewer than half" in printed.err
+    lines = printed.out.splitlines()
     assert (
         lines[0] == "Not run: scene scene 000 (1 row)"
         and lines[50] == "Not run: 28 more (28 rows)"
     )
-    assert lines[-1].startswith("No regression in 2 of 80 rows: 78 not run, 2 same")
+    assert " in 2 of 80 rows: 78 not run, 2 same" in lines[-1]
+    part = ["--only", "scene 007, scene 070"]
+    assert status(["compare", str(all_rows), str(some), *part]) == 0
+    verdict = capsys.readouterr().out.splitlines()[-1]
+    assert verdict.startswith(f"No regression against {all_rows} of {HERE.date[:10]}")
+    assert " in 2 rows: 2 same" in verdict
     table = some / "results.csv"
     first, *others = table.read_text().splitlines(keepends=True)
     table.write_text(first + "".join(reversed(others)))
@@ -640,13 +655,12 @@ def test_a_renamed_scene_is_found_by_what_it_states(
     assert status(["compare", *both]) == 1
     out = capsys.readouterr().out.splitlines()
     assert out[:2] == ["renamed: g -> gate", "renamed: h -> a"]
-    assert out[-1].startswith("3 regressions in 3 rows: 3 worse.")
-    for name, rows in (
-        ("gate", "1 regression in 1 rows"),
-        ("h", "1 regression in 1 rows"),
-    ):
+    assert out[-1].startswith(f"3 regressions against {both[0]}")
+    assert " in 3 rows: 3 worse." in out[-1]
+    for name in ("gate", "h"):
         assert status(["compare", *both, "--only", name]) == 1
-        assert rows in capsys.readouterr().out
+        verdict = capsys.readouterr().out.splitlines()[-1]
+        assert verdict.startswith("1 regression against") and " in 1 rows" in verdict
 
 
 def test_what_grew_within_its_allowance_is_shown_and_no_regression() -> None:
@@ -731,6 +745,115 @@ def test_of_an_older_record_only_the_hash_can_say_that_scenes_changed() -> None:
     assert render.write_text(changes).startswith(
         "1 of 4 rows are compared"
     ) and "No regression in 1 of 4 rows" in render.write_text(changes)
+
+
+def widen(error: float, reason: str = "fewer digits") -> Engine:
+    """The engine with a tolerance that it states itself."""
+    stated = ErrorBound(STATED, f"{error:g} of the scale: {reason}", error, False)
+    return Engine("engine", FreeBody, stated)
+
+
+LOOSE = replace(
+    ROW, allowed=1e-2, reason="as the engine states: 0.01 of the scale: fewer digits"
+)
+
+
+def test_a_wider_tolerance_is_a_regression_over_two_nights(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The first night widens it and is not accepted; the second hides an error in it."""
+    strict = save(tmp_path / "strict", [ROW])
+    accepted = tmp_path / "accepted"
+    assert status(["accept", str(strict), "--to", str(accepted)]) == 0
+    wider = describe_run([widen(1e-2)], "suite")
+    for night, error in (("first", 1e-15), ("second", 5e-3)):
+        rows = [replace(LOOSE, error=error)]
+        results = save(tmp_path / night, rows, about=wider)
+        capsys.readouterr()
+        assert status(["compare", str(accepted), str(results)]) == 1
+        printed = capsys.readouterr().out
+        first = printed.splitlines()[0]
+        assert first.startswith("Weaker rule: engine: factor 1.11")
+        assert first.endswith("-> 0.01")
+        assert ("Worse: " in printed) == (night == "second")
+        assert status(["accept", str(results), "--to", str(accepted)]) == 2
+        refused = capsys.readouterr().err
+        assert "--allow-weaker" in refused and "engine: factor" in refused
+    both = ["accept", str(tmp_path / "first"), "--to", str(accepted)]
+    assert status([*both, "--allow-weaker"]) == 0
+    assert status(["compare", str(accepted), str(tmp_path / "first")]) == 0
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "what"),
+    [
+        (widen(1e-6), widen(1e-6, "because"), ["reason"]),
+        (widen(1e-6), widen(1e-8, "because"), []),
+        (widen(1e-6), replace(widen(1e-6), residuals=True), ["prediction"]),
+        (widen(1e-6), replace(widen(1e-6), answers=("torque",)), ["answers"]),
+        (
+            Engine("engine", FreeBody, FULL_ACCURACY),
+            Engine("engine", FreeBody, EQUIVALENCE),
+            ["class", "over the condition", "reason"],
+        ),
+    ],
+    ids=["reason", "stricter", "prediction", "fewer answers", "class"],
+)
+def test_each_entry_of_a_rule_can_weaken_it(
+    old: Engine, new: Engine, what: list[str]
+) -> None:
+    before, after = (describe_run([engine], "suite") for engine in (old, new))
+    found = compare_rows((before, [ROW]), (after, [ROW]))
+    assert [weakening.what for weakening in found.weakened] == what
+    assert found.status == bool(what)
+    assert render.write_text(found).startswith("Weaker rule: ") == bool(what)
+
+
+def test_k_and_a_stated_limit_are_rules_whoever_changes_them(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(rules, "K", 500.0)
+    harsher = LIMITS[0]._replace(boundary=0.5)
+    monkeypatch.setattr(rules, "LIMITS", (harsher, *LIMITS[1:]))
+    changed = describe_run([Engine("engine", FreeBody, EQUIVALENCE)], "suite")
+    found = compare_rows((HERE, [ROW]), (changed, [ROW]))
+    assert [str(weakening) for weakening in found.weakened] == [
+        "K: factor 50.0 -> 500.0",
+        f"limit of {harsher.engine}: {harsher.name}: boundary 0.05 -> 0.5",
+    ]
+
+
+def test_rows_alone_say_that_their_class_is_another() -> None:
+    """Of tables without a record."""
+    strict = replace(ROW, reason=EQUIVALENCE.explain(1.0))
+    found = compare_rows((NOTHING_KNOWN, [strict]), (NOTHING_KNOWN, [LOOSE]))
+    (weakening,) = found.weakened
+    assert (weakening.name, weakening.new) == ("engine", STATED)
+    assert not compare_rows(
+        (NOTHING_KNOWN, [LOOSE]), (NOTHING_KNOWN, [strict])
+    ).weakened
+
+
+def test_an_allowance_that_grew_tenfold_is_printed_and_no_regression() -> None:
+    """K eps/condition, at a worst position that is another one."""
+    hard = replace(ROW, condition=1e-2, allowed=1e-12)
+    found = compare_rows((HERE, [ROW]), (HERE, [hard]))
+    assert found.status == 0
+    (line,) = found.grown
+    assert line.startswith("scene / engine / torque: 1.0e-14 -> 1.0e-12")
+    assert "Allowed more: scene / engine / torque" in render.write_text(found)
+    assert not compare_rows((HERE, [ROW]), (HERE, [replace(hard, allowed=9e-14)])).grown
+
+
+def test_every_form_keeps_the_reason_of_a_crash() -> None:
+    """Its rows are gone, and the one in their place is new."""
+    crash = Row.unmeasured(
+        "scene", "engine", "", "all", FAILS, "Cannot find module 'x'"
+    )
+    found = compare_rows((HERE, [ROW]), (HERE, [crash]))
+    forms = (render.write_text, render.write_markdown, render.write_html)
+    for form in (*forms, render.write_junit):
+        assert "Cannot find module" in html.unescape(form(found)), form
 
 
 def test_what_was_not_wanted_is_not_run_and_what_was_wanted_is_gone() -> None:

@@ -109,6 +109,8 @@ class Held(NamedTuple):
     """Errors predicted for it. With them an error beyond the tolerance must be within DEGRADED times its prediction."""
     nearby: Nearby | None = None
     """Evaluation near a position. With it an error beyond the tolerance is taken again within theta_2's rounding."""
+    method: str = ""
+    """Method for which the errors are predicted, as the end of a reason."""
 
 
 class _Judged(NamedTuple):
@@ -325,7 +327,7 @@ class Comparison:
         """
         errors = self._measure(quantity, ours, theirs, mask)
         errors = self._take_again(quantity, ours, errors)
-        worst = judge_errors(errors, self._predict(quantity, errors))
+        worst = judge_errors(errors, self._predict(quantity, errors), self.held.method)
         i = worst.position
         row = self._row(
             quantity,
@@ -361,7 +363,7 @@ class Comparison:
             condition=condition,
             mask=mask,
             decidable=decidable,
-            reason=tolerance.name,
+            tolerance=tolerance,
         )
 
     def _take_again(self, quantity: str, ours: Array, errors: "Errors") -> "Errors":
@@ -422,8 +424,8 @@ class Errors(NamedTuple):
     """Positions that are compared."""
     decidable: Mask
     """Positions of the mask at which digits are left to decide by."""
-    reason: str
-    """Why this much is allowed."""
+    tolerance: ErrorBound
+    """What they are held to."""
     again: Array | None = None
     """Errors of a second answer within the rounding of theta_2; NaN where not asked."""
     settled: int = 0
@@ -458,10 +460,13 @@ class WorstPosition(NamedTuple):
     """Number of positions that have a verdict."""
 
 
-def judge_errors(errors: Errors, predicted: Array | None) -> WorstPosition:
+def judge_errors(
+    errors: Errors, predicted: Array | None, method: str = ""
+) -> WorstPosition:
     """Judge errors by the allowed error, and larger ones by DEGRADED times the predicted one.
 
-    An error that is no number fails. `predicted` is None where nothing predicts it.
+    An error that is no number fails. `predicted` is None where nothing predicts it;
+    `method` says for which method it is predicted.
     """
     beyond = errors.beyond
     if not (errors.decidable | beyond).any():
@@ -472,7 +477,7 @@ def judge_errors(errors: Errors, predicted: Array | None) -> WorstPosition:
         used = find_used(errors.error, errors.allowed)
         index = int(np.argmax(np.where(errors.decidable, used, -1.0)))
         decided = int(np.count_nonzero(errors.decidable))
-        why = errors.reason + errors.notes
+        why = errors.tolerance.explain(errors.condition[index]) + errors.notes
         return WorstPosition(index, AGREES, why, errors.allowed[index], decided)
     expected = np.zeros_like(errors.error) if predicted is None else predicted
     bound = np.maximum(errors.allowed, TIMES_PREDICTED * expected)
@@ -489,13 +494,13 @@ def judge_errors(errors: Errors, predicted: Array | None) -> WorstPosition:
         verdict = UNDECIDED
         why = f"an error of {foreseen:.1e} of the value is predicted"
     elif predicted is None:
-        verdict, why = FAILS, errors.reason
+        verdict, why = FAILS, errors.tolerance.explain(errors.condition[index])
     elif used[index] <= 1.0:
         verdict = DEGRADED
-        why = f"{error:.1e} of {foreseen:.1e} predicted for this position"
+        why = f"{error:.1e} of {foreseen:.1e} predicted for this position{method}"
     else:
         verdict = FAILS
-        why = f"{error:.1e} where {foreseen:.1e} was predicted"
+        why = f"{error:.1e} where {foreseen:.1e} was predicted{method}"
     decided = int(np.count_nonzero(errors.decidable & ~lost))
     return WorstPosition(index, verdict, why + errors.notes, bound[index], decided)
 

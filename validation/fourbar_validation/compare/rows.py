@@ -337,6 +337,16 @@ class Counts:
             else "holds"
         )
 
+    @property
+    def headline(self) -> str:
+        """Give the verdict alone, for what does not fail."""
+        if self.nothing:
+            return f"Nothing was compared{self._write_where()}"
+        hold = f"All {self.compared} comparisons{self._write_where()} hold"
+        if self[DEGRADED]:
+            hold += f"; {self[DEGRADED]} of them at hard positions, as predicted"
+        return hold
+
     def sentence(self) -> str:
         """Give the verdict in one sentence: "all hold" is stated only of what was compared."""
         total, failed = self.compared, self[FAILS]

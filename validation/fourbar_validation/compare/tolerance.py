@@ -33,6 +33,8 @@ NOTHING_TO_TELL = 1e-3
 """Greatest eps/condition with a verdict; beyond it two correct programs may differ in the third digit."""
 WELL_CONDITIONED = 0.1
 """Positions whose condition is at least this set the scale of a quantity."""
+SMALL = 1e-12
+"""Allowed errors below this are stated in parts of eps."""
 DEGRADED = 10.0
 """An engine whose error is predicted may exceed the prediction by this factor, not more."""
 
@@ -49,6 +51,18 @@ class ErrorBound:
     """True if the allowed error is divided by the condition."""
     in_time: bool = False
     """True for an engine that runs through the motion in time and has no convention at rest."""
+    cause: str = ""
+    """What makes the error, in a few words."""
+
+    def explain(self, condition: float) -> str:
+        """Say in a sentence what is allowed at a condition, and what makes the error."""
+        if self.conditioned:
+            size = f"{self.factor / EPS:.3g} eps over the condition {condition:.2g}"
+        elif self.factor < SMALL:
+            size = f"{self.factor / EPS:.3g} eps, whatever the condition"
+        else:
+            size = f"{self.factor:g} of the scale"
+        return f"{self.cause or self.name}: {size}"
 
     def allowed(self, condition: Array) -> Array:
         """Compute the relative error allowed at each position, (n,)."""
@@ -63,6 +77,7 @@ IDENTITY = ErrorBound(
     "K eps of the sum of the absolute terms: an equation that holds in every position, whatever the condition",
     K * EPS,
     conditioned=False,
+    cause="round-off of the terms",
 )
 EQUIVALENCE = ErrorBound(
     "equivalence",
@@ -70,6 +85,7 @@ EQUIVALENCE = ErrorBound(
     "computed for the position, from moving every stored number and the closure by one rounding in 320-bit arithmetic",
     K * EPS,
     conditioned=True,
+    cause="round-off of both sides",
 )
 SIMULATED = ErrorBound(
     "modelling + integration",
@@ -78,6 +94,7 @@ SIMULATED = ErrorBound(
     1e-5,
     conditioned=False,
     in_time=True,
+    cause="softness and time step",
 )
 FULL_ACCURACY = ErrorBound(
     "full accuracy",
@@ -85,6 +102,7 @@ FULL_ACCURACY = ErrorBound(
     "from moving every stored number and the closure by one rounding in 320-bit arithmetic",
     K * EPS,
     conditioned=False,
+    cause="round-off of both sides",
 )
 
 POWER = {

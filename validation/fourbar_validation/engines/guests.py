@@ -35,6 +35,8 @@ QUESTIONS = 4
 """Most questions to a guest about one scene, hello included; each may take as long as the guest's time limit."""
 QUANTITIES = (*COMPARED, *DRY_FRICTION_QUANTITIES)
 """Names of what an engine can answer."""
+STATED = "as the engine states"
+"""Class of the tolerance that a guest states itself."""
 COMMANDS = tuple(names[0] for names in protocol.KINDS_OF_COMMAND)
 HELLO = {"ask": "hello", "protocol": protocol.PROTOCOL}
 
@@ -292,7 +294,7 @@ def _read_tolerance(stated: Any) -> ErrorBound:
         allowed = f'must be "{EQUIVALENCE.name}", or [relative error above 0 and below 1, its reason]'
         raise InputError("tolerance", stated, allowed)
     reason = f"{error:g} of the scale: {write_one_line(reason)}"
-    return ErrorBound("as the engine states", reason, error, conditioned=False)
+    return ErrorBound(STATED, reason, error, conditioned=False)
 
 
 def find_needs(scene: Scene) -> list[str]:

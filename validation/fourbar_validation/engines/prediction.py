@@ -74,6 +74,19 @@ def predict_about_mass_centre(
     )
 
 
+def predict_for_any_method(
+    scene: Scene, command: Command, quantity: str, mask: Mask | None = None
+) -> Array:
+    """Predict for an engine whose method nobody states: the worst of those above.
+
+    Newton and Euler with moments about the mass centres are right, and lose the digits
+    that a centre far from its pins takes.
+    """
+    methods = (predict_from_data, predict_in_world_axes, predict_about_mass_centre)
+    errors = [predict(scene, command, quantity, mask) for predict in methods]
+    return np.asarray(np.maximum.reduce(errors))
+
+
 def predict_error(
     scene: Scene,
     command: Command,

@@ -3,6 +3,7 @@
 import ctypes
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -81,10 +82,35 @@ def run_to_end(
         )
     except subprocess.TimeoutExpired:
         return Ended("", "", True, f"no answer within {seconds:g} s")
-    last = (done.stderr.strip().splitlines() or [f"exit status {done.returncode}"])[-1]
+    why = find_reason(done.stderr) or f"exit status {done.returncode}"
     return Ended(
-        done.stdout, done.stderr, done.returncode not in fine, write_one_line(last)
+        done.stdout, done.stderr, done.returncode not in fine, write_one_line(why)
     )
+
+
+SAYS_WHY = (
+    re.compile(
+        r"^\s*(Caused by: |Exception in thread |Uncaught )?(\w+[.:/])*\w*(Error|Exception)\b.*: *\S"
+    ),
+    re.compile(r"\b(what\(\): |panicked at|terminate called)", re.IGNORECASE),
+    re.compile(
+        r"\b(error|cannot|can't|could not|failed|fatal|no such|not found|undefined|"
+        r"segmentation fault|out of memory|aborted)\b",
+        re.IGNORECASE,
+    ),
+)
+"""Patterns of a line that says why a program ended, the surest first. The last line of
+what Node, Java or a shell print is a version or a place in a file."""
+
+
+def find_reason(errors: str) -> str:
+    """Return the line of a program's standard error that says why it ended, if any."""
+    lines = [line for line in errors.splitlines() if line.strip()]
+    for pattern in SAYS_WHY:
+        for line in reversed(lines):
+            if pattern.search(line):
+                return line.strip()
+    return lines[-1].strip() if lines else ""
 
 
 KEPT = 20_000
@@ -352,10 +378,8 @@ class Running:
             status = process.wait(1.0)
         except subprocess.TimeoutExpired:
             return EngineError("closed its standard output")
-        lines = (
-            self._take_errors().decode(errors="backslashreplace").strip().splitlines()
-        )
-        said = f": {write_one_line(lines[-1])}" if lines else ""
+        reason = find_reason(self._take_errors().decode(errors="backslashreplace"))
+        said = f": {write_one_line(reason)}" if reason else ""
         if status in KILLED:
             return _KilledError(f"was killed{said}")
         how = f"exit status {status}" if status >= 0 else f"ended by signal {-status}"

@@ -33,6 +33,7 @@ from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.loop import make_blank
 from fourbar_validation.engines.prediction import (
     predict_about_mass_centre,
+    predict_for_any_method,
     predict_from_data,
     predict_in_world_axes,
 )
@@ -204,12 +205,17 @@ BALLS = Engine(
 )
 
 
+ANY_METHOD = ", by a method in world axes or about the mass centres"
+"""What a reason says of an error that is predicted for an engine of an unknown method."""
+
+
 def hold_fully(engine: Engine) -> Engine:
     """Hold the engine to full accuracy, or else to the error predicted for each position."""
     if engine.tolerance not in (EQUIVALENCE, FULL_ACCURACY):
         return engine
+    unstated = predict_from_data if engine.nearby else predict_for_any_method
     return replace(
-        engine, tolerance=FULL_ACCURACY, predictor=engine.predictor or predict_from_data
+        engine, tolerance=FULL_ACCURACY, predictor=engine.predictor or unstated
     )
 
 
@@ -257,11 +263,15 @@ def hold(
     `formulas`: their solution at the command, with which an engine that can answers again within theta_2's rounding.
     """
     nearby = None if formulas is None else make_nearby(engine, scene, command, formulas)
+    method = ""
+    if engine.predictor is predict_for_any_method:
+        method = ANY_METHOD
     return Held(
         engine.tolerance,
         engine.answers,
         make_prediction(engine, scene, command, answer),
         nearby,
+        method,
     )
 
 

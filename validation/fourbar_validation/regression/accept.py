@@ -26,10 +26,12 @@ from fourbar_validation.regression.record import (
     ACCEPTED,
     TABLES,
     About,
+    Recorded,
     accept,
     find_baseline,
     open_run,
 )
+from fourbar_validation.regression.rules import list_weakened
 from fourbar_validation.regression.scenes import find_renamed
 
 HISTORY = "history.parquet"
@@ -173,6 +175,7 @@ def report_differences(
     differences = compare_runs(
         (before.about, before.scenes(keep)), (after.about, scenes), engines
     )
+    differences.baseline = before.describe()
     unproven = [str(run.table) for run in (before, after) if not run.verified]
     differences.notes += [
         f"{table}: not verified, its {ABOUT} states no SHA-256 or is missing"
@@ -182,6 +185,14 @@ def report_differences(
         if path is not None:
             write_text(path, FORMS[form](differences))
     click.echo(render.write_text(differences), nl=False)
+    if differences.strange:
+        raise InputError(
+            "OLD",
+            str(old),
+            f"shares {differences.shared} of {differences.rows} rows with the new run, "
+            "fewer than half: name a run of the same suite, or compare a part of it "
+            "with --only and --engines",
+        )
     return differences.status
 
 
@@ -236,8 +247,10 @@ def compare(
 
     Scenes that changed come first, entry by entry; their rows, and those with other settings or at other
     positions, are named and not compared. What the new run was not asked for is "not run", and no regression.
-    Exit status 1 on a regression: a verdict that got worse, an error that grew beyond round-off and its allowance,
-    a row that was run for and is gone, a new row that fails; and where nothing was compared.
+    Exit status 1 on a regression: a rule that is weaker than it was (a wider tolerance, another class or reason, a
+    limit that is met earlier), a verdict that got worse, an error that grew beyond round-off and its allowance, a row
+    that was run for and is gone, a new row that fails; and where nothing was compared. Exit status 2 where the runs
+    share fewer than half of their rows.
     """
     return report_differences(
         find_baseline(old),
@@ -245,6 +258,22 @@ def compare(
         forms,
         {"only": only, "engines": engines, "quantity": quantity},
     )
+
+
+def _require_as_strict(run: Recorded, target: Path) -> None:
+    """Refuse a run whose rules are weaker than those of the run that is accepted now."""
+    if not (target / ABOUT).is_file():
+        return
+    accepted = open_run(target, "--to")
+    weakened = list_weakened(accepted.about.rules, run.about.rules)
+    if weakened:
+        more = f", and {len(weakened) - 1} more" if len(weakened) > 1 else ""
+        raise InputError(
+            "RESULTS",
+            str(run.table.parent),
+            f"is held to weaker rules than {accepted.describe()} ({weakened[0]}{more}): "
+            "say --allow-weaker if that is meant",
+        )
 
 
 @click.command(name="accept")
@@ -256,7 +285,14 @@ def compare(
     is_flag=True,
     help="Accept a run in which a comparison fails, or none was made.",
 )
-def accept_command(results: Path, to: Path | None, even_failing: bool) -> None:
+@click.option(
+    "--allow-weaker",
+    is_flag=True,
+    help="Accept a run that is held to weaker rules than the accepted one.",
+)
+def accept_command(
+    results: Path, to: Path | None, even_failing: bool, allow_weaker: bool
+) -> None:
     """Record RESULTS (a run's folder) as the accepted state that later runs are compared with.
 
     It is kept in DIR, and its rows are appended to DIR/history.parquet, a table for pandas or DuckDB.
@@ -289,6 +325,8 @@ def accept_command(results: Path, to: Path | None, even_failing: bool) -> None:
             str(run.table),
             f"needs a {ABOUT} with its rows and SHA-256; `run` writes one",
         )
+    if not allow_weaker:
+        _require_as_strict(run, target)
     too_long = counts.total > CSV_ROWS
     if not too_long:  # first: if the table is damaged nothing is written
         times = {

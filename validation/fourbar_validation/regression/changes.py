@@ -19,6 +19,12 @@ from fourbar_validation.regression.change import (
 )
 from fourbar_validation.regression.fault import Fault
 from fourbar_validation.regression.record import About
+from fourbar_validation.regression.rules import (
+    Weakening,
+    find_weakened_row,
+    has_grown,
+    list_weakened,
+)
 from fourbar_validation.regression.scenes import (
     SceneChange,
     find_renamed,
@@ -29,6 +35,11 @@ KEPT = 10_000
 """Rows of one kind that are listed, the worst of them; all are counted."""
 NAMED = 50
 """Scenes and engines listed by name that were not run or not compared; the others are counted."""
+ONE_SIDED = (
+    *(Kind.NOT_RUN, Kind.GONE, Kind.GONE_FAILURE),
+    *(Kind.NEW, Kind.NEW_FAILURE),
+)
+"""Kinds of rows that only one run has."""
 T = TypeVar("T")
 ByScene = Iterable[tuple[str, Sequence[T]]]
 """Items of one scene after the other, in ascending order of the scenes' names."""
@@ -69,7 +80,11 @@ class Differences:
     surroundings: list[tuple[str, str, str]]
     """(what, old, new) of versions, machine and settings."""
     scenes: list[SceneChange] = field(default_factory=list)
-    """Scenes that ask something else; reported first."""
+    """Scenes that ask something else."""
+    weakened: list[Weakening] = field(default_factory=list)
+    """Rules that are weaker than they were; reported first, and a regression."""
+    baseline: str = ""
+    """The old run in words: where it lies, of which date and commit."""
     notes: list[str] = field(default_factory=list)
     """Scenes of another name, and what an older record cannot say."""
     kept: int = KEPT
@@ -84,6 +99,7 @@ class Differences:
     _scenes_not_run: Named = field(default_factory=Named)
     _engines_not_run: Named = field(default_factory=Named)
     _not_compared: Named = field(default_factory=Named)
+    _grown: Named = field(default_factory=Named)
 
     def add(self, changes: Sequence[Change]) -> None:
         """Add the rows of one more scene."""
@@ -110,12 +126,25 @@ class Differences:
                 self._not_compared.add(
                     _say_why_not_compared(change, change.old, change.new)
                 )
+            elif change.old is not None and change.new is not None:
+                self._hold_rules(change.old, change.new)
             same_kind = self._changes.setdefault(change.kind, [])
             same_kind.append(change)
             if len(same_kind) > 2 * self.kept:
                 self._changes[change.kind] = nlargest(
                     self.kept, same_kind, key=lambda one: one.severity
                 )
+
+    def _hold_rules(self, old: Row, new: Row) -> None:
+        """Note a row whose rule is another one, or that is allowed far more."""
+        weakening = find_weakened_row(old, new)
+        if weakening is not None:
+            known = {(one.name, one.what) for one in self.weakened}
+            if (weakening.name, weakening.what) not in known:
+                self.weakened.append(weakening)
+        elif has_grown(old, new):
+            growth = f"{old.allowed:.1e} -> {new.allowed:.1e}"
+            self._grown.add(f"{new.scene} / {new.engine} / {new.quantity}: {growth}")
 
     def of(self, kind: Kind) -> list[Change]:
         """List the changes of one kind, the worst first; at most `kept` of them."""
@@ -138,8 +167,14 @@ class Differences:
 
     @property
     def regressed(self) -> int:
-        """Return how many rows a run fails for."""
-        return sum(self.kinds[kind] for kind in REGRESSIONS)
+        """Return how many rows and rules a run fails for."""
+        rows = sum(self.kinds[kind] for kind in REGRESSIONS)
+        return rows + len(self.weakened)
+
+    @property
+    def grown(self) -> list[str]:
+        """Rows that are allowed more than NOTABLE times what they were; no regression."""
+        return [*self._grown]
 
     @property
     def not_run(self) -> list[str]:
@@ -160,6 +195,19 @@ class Differences:
     def nothing(self) -> bool:
         """Return whether no comparison of the new run has a counterpart in the old one."""
         return self._compared.nothing
+
+    @property
+    def shared(self) -> int:
+        """Return how many rows stand in both runs, whatever question they answer."""
+        return self.rows - sum(self.kinds[kind] for kind in ONE_SIDED)
+
+    @property
+    def strange(self) -> bool:
+        """Return whether the runs share fewer than half of their rows.
+
+        The old one is then of another suite, or holds far more than the new one.
+        """
+        return 2 * self.shared < self.rows
 
     @property
     def status(self) -> int:
@@ -190,7 +238,14 @@ def compare_runs(
     names = find_renamed(old[0].scenes, new[0].scenes)
     surroundings, older = _list_surroundings(old[0], new[0])
     notes = [f"renamed: {before} -> {after}" for before, after in names.items()]
-    differences = Differences(surroundings, list(scenes.values()), notes, kept)
+    weakened = list_weakened(old[0].rules, new[0].rules)
+    differences = Differences(
+        surroundings,
+        list(scenes.values()),
+        weakened,
+        notes=notes,
+        kept=kept,
+    )
     answering = {FORMULAS} | engines | (new[0].engines or set())
     for scene, before, after in _merge_scenes(_rename_scenes(old[1], names), new[1]):
         run_for = (

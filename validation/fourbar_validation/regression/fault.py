@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from fourbar_validation.compare.rows import FORMULAS, Row
 from fourbar_validation.regression.change import Change, Kind
-from fourbar_validation.report.summary import NUMBER
+from fourbar_validation.report.words import NUMBER
 
 EXACT = "exact"
 """Setting of an engine that is held to round-off, and sees what is wrong by more."""

@@ -21,6 +21,7 @@ from fourbar_validation.compare.tolerance import SIMULATED, K
 from fourbar_validation.engines.guests import Guest
 from fourbar_validation.engines.registry import Engine
 from fourbar_validation.places import CHECKOUT
+from fourbar_validation.regression.rules import Rules, list_rules
 from fourbar_validation.report.machine import find_kernels, list_versions, name_machine
 
 SHIPPED = Path(__file__).parent
@@ -53,6 +54,8 @@ class About:
     """UTC, ISO 8601; empty in older records."""
     commit: str = ""
     """Commit of the checkout that the run was made in; empty if there is none."""
+    rules: Rules = field(default_factory=dict)
+    """Tolerances, predictions and limits of the engines; empty in older records."""
 
     @property
     def engines(self) -> set[str] | None:
@@ -91,6 +94,7 @@ def describe_run(
         described,
         now,
         _find_commit(),
+        list_rules(engines),
     )
 
 
@@ -173,6 +177,17 @@ class Recorded:
     """True if the tables are those that the record was written with; older records do not say."""
     key: str = "RESULTS"
     """Name in an error message: the argument or option that named the record."""
+
+    def describe(self) -> str:
+        """Say in words which run it is: where it lies, of which date and commit."""
+        folder = self.table.parent
+        shipped = folder.resolve().is_relative_to(SHIPPED.resolve())
+        words = ["the run that comes with fourbar" if shipped else str(folder)]
+        if self.about.date:
+            words.append(f"of {self.about.date.partition('T')[0]}")
+        if self.about.commit:
+            words.append(f"at commit {self.about.commit}")
+        return " ".join(words)
 
     def rows(self) -> Iterator[Row]:
         """Yield the rows in their order; InputError if the table is damaged."""
@@ -288,7 +303,12 @@ def make_record(kept: dict[str, Any]) -> About:
         for name, entries in kept.get("scenes", {}).items()
     }
     date, commit = (make_plain(kept.get(name, "")) for name in ("date", "commit"))
-    return About(versions, make_plain(kept["machine"]), settings, scenes, date, commit)
+    rules = {
+        make_plain(name): _make_plain(entries)
+        for name, entries in kept.get("rules", {}).items()
+    }
+    machine = make_plain(kept["machine"])
+    return About(versions, machine, settings, scenes, date, commit, rules)
 
 
 def _make_plain(entries: dict[str, str]) -> dict[str, str]:

@@ -29,14 +29,19 @@ def write_verdict(diff: Differences) -> str:
     """Write one line: how many regressions among how many rows, what else moved, and the counts of the new run."""
     counts = [f"{diff.kinds[kind]} {kind.value}" for kind in Kind if diff.kinds[kind]]
     many = diff.regressed
+    if diff.weakened:
+        rules = len(diff.weakened)
+        counts.insert(0, f"{rules} rule{'s' if rules > 1 else ''} weaker")
     head = f"{many} regression{'s' if many > 1 else ''}" if many else "No regression"
     if diff.nothing and not many:
-        head = "Nothing was compared with the old run"
+        head = "Nothing was compared"
     rows = (
         f"{diff.compared} of {diff.rows}"
         if diff.compared < diff.rows
         else f"{diff.rows}"
     )
+    if diff.baseline:
+        head += f" against {diff.baseline}"
     moved = f" in {rows} rows: {', '.join(counts)}" if counts else ""
     return f"{head}{moved}. New run: {diff.counts.sentence()}"
 
@@ -46,7 +51,9 @@ def write_line(change: Change) -> str:
     name = " / ".join(part for part in change.key if part)
     if change.old is None:
         assert change.new is not None
-        return f"{name}: {change.new.verdict}, error {write_number(change.new.error)}"
+        error = write_number(change.new.error)
+        why = f": {change.new.reason}" if not change.new.passed else ""
+        return f"{name}: {change.new.verdict}, error {error}{why}"
     if change.new is None:
         return (
             f"{name}: was {change.old.verdict}, error {write_number(change.old.error)}"
@@ -55,15 +62,19 @@ def write_line(change: Change) -> str:
     words = f"{name}: error {write_number(old.error)} -> {write_number(new.error)}"
     if old.verdict != new.verdict:
         words += f", {old.verdict} -> {new.verdict} ({new.reason})"
+    elif new.failed:
+        words += f", {new.verdict} ({new.reason})"
     return words + f"; round-off moves it by {write_number(change.round_off)}"
 
 
 def write_text(diff: Differences) -> str:
     """Write for a terminal: what is another question first, then what it was made with, then the rows."""
-    lines = [*map(str, diff.scenes), *diff.notes]
+    lines = [f"Weaker rule: {weakening}" for weakening in diff.weakened]
+    lines += [*map(str, diff.scenes), *diff.notes]
     lines += [f"{what}: {old} -> {new}" for what, old, new in diff.surroundings]
     lines += [f"Not compared: {name}" for name in diff.not_compared]
     lines += [f"Not run: {name}" for name in diff.not_run]
+    lines += [f"Allowed more: {name}" for name in diff.grown]
     lines += [f"Disagreement: {sentence}" for sentence in diff.fault.sentences]
     groups, more = _group_rows(diff)
     lines += [f"{_begin(group.kind.value)}: {group}" for group in groups] + more
@@ -95,9 +106,11 @@ def _list_worst(diff: Differences, kind: Kind) -> list[str]:
 def list_other_questions(diff: Differences) -> list[tuple[str, list[str]]]:
     """List what is another question or was not run, under its headings."""
     parts = {
+        "Weaker rules": [str(weakening) for weakening in diff.weakened],
         "The scenes changed": [*map(str, diff.scenes), *diff.notes],
         "Not compared": diff.not_compared,
         "Not run": diff.not_run,
+        "Allowed more than ten times as much": diff.grown,
         "Who disagrees": diff.fault.sentences,
     }
     return [(heading, texts) for heading, texts in parts.items() if texts]
@@ -195,6 +208,9 @@ def _list_cases(diff: Differences) -> Iterator[JunitCase]:
             )
         else:
             yield JunitCase(*name, "passed")
+    for weakening in diff.weakened:
+        name = (weakening.name, weakening.name, f"rule: {weakening.what}")
+        yield JunitCase(*name, "failure", "weaker rule", str(weakening))
     yield from count_beyond(diff.rows - len(diff.changes))
     if diff.nothing:
         yield JunitCase(

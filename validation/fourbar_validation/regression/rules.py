@@ -1,0 +1,143 @@
+"""Rules that a run holds its engines to, and where a later run holds them to weaker ones.
+
+A row says by how much it is wrong and how much was allowed. Whoever widens what is
+allowed makes every later error pass, so the rules themselves are kept with a run.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from fourbar_validation.compare.rows import AGREES, Row
+from fourbar_validation.compare.tolerance import (
+    EQUIVALENCE,
+    FULL_ACCURACY,
+    IDENTITY,
+    SIMULATED,
+    ErrorBound,
+    K,
+)
+from fourbar_validation.engines.guests import STATED
+from fourbar_validation.engines.limits import LIMITS
+from fourbar_validation.engines.registry import Engine
+
+Rules = dict[str, dict[str, str]]
+"""What stands under each name, as entries of text."""
+FACTOR, CLASS, REASON, CONDITIONED = "factor", "class", "reason", "over the condition"
+PREDICTED, ANSWERS, BOUNDARY, IN_TIME = (
+    "prediction",
+    "answers",
+    "boundary",
+    "through time",
+)
+YES, NO = "yes", "no"
+LOOSER = 1.0 + 1e-9
+"""Factor by which a number of a rule has grown if it is another one."""
+NOTABLE = 10.0
+"""Growth of a row's allowance that is printed. The worst position moves with the kernels
+of a processor, and K eps/condition with it: 139 of 2093 allowances grew so."""
+CLASSES = {
+    STATED,
+    *(bound.cause for bound in (IDENTITY, EQUIVALENCE, SIMULATED, FULL_ACCURACY)),
+}
+"""Names of the classes of tolerance, with which the reason of a row begins."""
+
+
+def list_rules(engines: Iterable[Engine]) -> Rules:
+    """List the rules of a run: of identities, of each engine, and each declared limit."""
+    rules: Rules = {"identities": _describe(IDENTITY), "K": {FACTOR: repr(K)}}
+    for engine in engines:
+        predicted = engine.predictor is not None or engine.residuals
+        rules[engine.name] = _describe(engine.tolerance) | {
+            PREDICTED: YES if predicted else NO,
+            ANSWERS: ", ".join(sorted(engine.answers)),
+        }
+    for limit in LIMITS:
+        rules[f"limit of {limit.engine}: {limit.name}"] = {
+            BOUNDARY: repr(limit.boundary),
+            REASON: limit.reason,
+        }
+    return rules
+
+
+def _describe(bound: ErrorBound) -> dict[str, str]:
+    return {
+        CLASS: bound.name,
+        FACTOR: repr(bound.factor),
+        CONDITIONED: YES if bound.conditioned else NO,
+        IN_TIME: YES if bound.in_time else NO,
+        REASON: bound.reason,
+    }
+
+
+@dataclass(frozen=True, slots=True)
+class Weakening:
+    """A rule that is weaker than it was."""
+
+    name: str
+    """Engine, limit or identity that it holds for."""
+    what: str
+    old: str
+    new: str
+
+    def __str__(self) -> str:
+        return f"{self.name}: {self.what} {self.old} -> {self.new}"
+
+
+def list_weakened(old: Mapping[str, Mapping[str, str]], new: Rules) -> list[Weakening]:
+    """List the rules of both runs that the new one has weakened.
+
+    A smaller factor is stricter, whatever its class and its reason; otherwise a class,
+    a reason or a boundary that is another one is weaker until somebody has accepted it.
+    """
+    weakened = []
+    for name in sorted(old.keys() & new.keys()):
+        before, after = old[name], new[name]
+        for what in before.keys() & after.keys():
+            if before[what] != after[what] and _is_weaker(what, before, after):
+                weakened.append(Weakening(name, what, before[what], after[what]))
+    return sorted(weakened, key=lambda one: (one.name, one.what != FACTOR, one.what))
+
+
+def _is_weaker(what: str, old: Mapping[str, str], new: Mapping[str, str]) -> bool:
+    """Return whether an entry that differs makes its rule weaker."""
+    if what == FACTOR:
+        return _number(new[what]) > LOOSER * _number(old[what])
+    if what in (CLASS, REASON) and FACTOR in old and FACTOR in new:
+        return not _number(new[FACTOR]) * LOOSER < _number(old[FACTOR])
+    if what in (CONDITIONED, PREDICTED, IN_TIME):
+        return new[what] == YES
+    if what == ANSWERS:
+        return bool(set(old[what].split(", ")) - set(new[what].split(", ")))
+    return True
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return float("inf")
+
+
+def find_class(row: Row) -> str:
+    """Return the class of tolerance that a row's reason begins with; nothing if none."""
+    words = row.reason.partition(":")[0]
+    return words if words in CLASSES else ""
+
+
+def find_weakened_row(old: Row, new: Row) -> Weakening | None:
+    """Tell where two rows that agree are held to tolerances of another class, a wider one.
+
+    It needs no record of the rules: a table says it by itself.
+    """
+    if not old.verdict == new.verdict == AGREES or new.allowed <= old.allowed:
+        return None
+    before, after = find_class(old), find_class(new)
+    if not before or not after or before == after:
+        return None
+    return Weakening(new.engine, CLASS, before, after)
+
+
+def has_grown(old: Row, new: Row) -> bool:
+    """Return whether what a row is allowed has grown so far that it is printed."""
+    both = old.compared and new.compared and old.allowed > 0.0
+    return both and new.allowed > NOTABLE * old.allowed
