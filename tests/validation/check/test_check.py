@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import fourbar
-from fourbar.errors import BAD_INPUT, FAILED, HOLDS
+from fourbar.errors import BAD_INPUT, FAILED, HOLDS, InputError
 from fourbar.quantities import LINE_QUANTITIES, OK, UNITS, VECTORS
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import Law
@@ -306,7 +306,7 @@ MISTAKES: list[tuple[str, str, tuple[str, ...], Callable[[Scene], Numbers], str]
      lambda s: right(s) | {"theta_2": np.radians(right(s)["theta_2"])}, "in radians where degrees"),
     ("omega_2 in rad/s", "crank_rocker", ALL, solved(same, omega_2=10.0 * math.pi / 30), "rad/s taken for rev/min"),
     ("columns exchanged", "thesis", ALL,
-     lambda s: right(s) | {"F32": right(s)["F43"], "F43": right(s)["F32"]}, "columns F32 and F43 are exchanged"),
+     lambda s: right(s) | {"F32": right(s)["F43"], "F43": right(s)["F32"]}, "F32 and F43 are exchanged"),
     ("mass for weight", "crank_rocker", FORCES,
      solved(lambda s: replace(s, effects=(fourbar.Gravity(1.0),))), "gravity 0.101937 times ours"),
     ("a tenth of a load", "thesis", FORCES,
@@ -916,3 +916,108 @@ def test_a_motion_that_rows_are_not_found_by_is_refused_in_one_line(
     (tmp_path / "scene.toml").write_text(fourbar.dump(scene))
     assert status(["check", str(tmp_path / "scene.toml"), str(table)]) == BAD_INPUT
     assert words in capsys.readouterr().err
+
+
+def write_torques(path: Path, form: Callable[[list[tuple[float, float]]], str]) -> Path:
+    """Write theta_2 in whole degrees and the right torque of a crank-rocker in a form."""
+    scene = SCENES["crank_rocker"]
+    degrees = np.arange(0.0, 360.0, 30.0)
+    base = command(scene)
+    branch = np.full(len(degrees), scene.motion.branch, dtype=np.int8)
+    at = Command(np.radians(degrees), branch, base.omega_2, base.alpha_2)
+    torque = solve(scene, "force", at=at).torque
+    path.write_text(
+        form(list(zip(degrees.tolist(), torque.tolist(), strict=True))),
+        encoding="utf-8",
+    )
+    return path
+
+
+def lines(head: str, row: str) -> Callable[[list[tuple[float, float]]], str]:
+    """Make a form of a heading and a line for each position."""
+
+    def form(rows: list[tuple[float, float]]) -> str:
+        return head + "".join(row.format(theta=t, torque=x) for t, x in rows)
+
+    return form
+
+
+ORDINARY: dict[str, Callable[[list[tuple[float, float]]], str]] = {
+    "a comment": lines(
+        "# made by hand\ntheta_2 [deg],torque\n", "{theta:.0f},{torque:.9e}\n"
+    ),
+    "a heading as a comment": lines(
+        "# run 7\n# theta_2 [deg], torque [N m]\n", "{theta:.0f},{torque:.9e}\n"
+    ),
+    "thousands": lines(
+        "theta_2 [deg];torque [N mm]\n",
+        "{theta:.0f};{torque}\n",
+    ),
+    "German": lines(
+        "Kurbelwinkel [deg];Drehmoment [N m]\n", "{theta:.0f};{torque:.9f}\n"
+    ),
+    "upper case": lines("THETA_2 [deg],TORQUE\n", "{theta:.0f},{torque:.9e}\n"),
+    "T2": lines("theta2 (deg),T2 (N m)\n", "{theta:.0f},{torque:.9e}\n"),
+    "repeated": lines(
+        "theta_2 [deg],torque,torque\n", "{theta:.0f},{torque:.9e},{torque:.9e}\n"
+    ),
+}
+
+
+def in_thousands(rows: list[tuple[float, float]]) -> str:
+    """Write micronewton metres with points between thousands, and a decimal comma."""
+    text = "theta_2 [deg];torque [uN m]\n"
+    for theta, torque in rows:
+        number = f"{1e6 * torque:,.3f}".translate(str.maketrans(",.", ".,"))
+        text += f"{theta:.0f};{number}\n"
+    return text
+
+
+ORDINARY["thousands"] = in_thousands
+ORDINARY["decimal comma"] = lambda rows: ORDINARY["German"](rows).replace(".", ",")
+
+
+@pytest.mark.parametrize("form", ORDINARY)
+def test_an_ordinary_table_is_read(form: str, tmp_path: Path) -> None:
+    path = write_torques(tmp_path / "theirs.csv", ORDINARY[form])
+    judgement = judged(SCENES["crank_rocker"], path)
+    assert (judgement.agreeing, judgement.compared) == (12, 12)
+    assert re.search(r"agree, compared to \d digits", judgement.sentence())
+
+
+def test_degrees_under_a_bare_theta_2_are_recognised_and_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bare = lines("theta_2,torque\n", "{theta:.0f},{torque:.9e}\n")
+    path = write_torques(tmp_path / "theirs.csv", bare)
+    scene = str(MODELS / "crank_rocker.toml")
+    assert status(["check", scene, str(path)]) == HOLDS
+    printed = capsys.readouterr().out
+    assert "theta_2 has no unit and goes to 330: it is read as degrees" in printed
+
+
+def test_a_bare_omega_suggests_the_commanded_one(tmp_path: Path) -> None:
+    form = lines("theta_2 [deg],torque,omega\n", "{theta:.0f},{torque:.9e},1\n")
+    table = read_table(write_torques(tmp_path / "theirs.csv", form))
+    assert table.left_out == {"omega": "not a known column: rename it if it is omega_2"}
+
+
+def test_a_repeated_column_of_other_numbers_says_which_to_rename(
+    tmp_path: Path,
+) -> None:
+    form = lines("theta_2 [deg],torque,T2\n", "{theta:.0f},{torque:.9e},0.5\n")
+    path = write_torques(tmp_path / "theirs.csv", form)
+    with pytest.raises(InputError, match="columns 2 and 3 are both torque, with other"):
+        read_table(path)
+
+
+def test_a_column_without_information_is_an_error_and_zeros_that_are_right_are_not(
+    tmp_path: Path,
+) -> None:
+    form = lines("theta_2 [deg],torque [kN m]\n", "{theta:.0f},0\n")
+    path = write_torques(tmp_path / "theirs.csv", form)
+    with pytest.raises(InputError, match="every number would agree; print more digits"):
+        judged(SCENES["crank_rocker"], path)
+    form = lines("theta_2 [deg],torque,alpha_2\n", "{theta:.0f},{torque:.9e},0\n")
+    path = write_torques(tmp_path / "theirs.csv", form)
+    assert judged(SCENES["crank_rocker"], path).status == HOLDS

@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import click
+import numpy as np
 
 from fourbar.errors import FAILED, HOLDS, InputError
 from fourbar.files import load
@@ -16,8 +17,9 @@ from fourbar.writing import require_file, write_text
 from fourbar_validation.check.judge import Allowance, Discrepancy, Judge
 from fourbar_validation.check.mistakes import NEARER, Explanation, explain
 from fourbar_validation.check.problem import check_problem
-from fourbar_validation.check.theirs import TheirTable, read_table
+from fourbar_validation.check.theirs import TheirTable, name_quantity, read_table
 from fourbar_validation.compare.rows import make_plain
+from fourbar_validation.compare.tolerance import EPS, magnitude
 from fourbar_validation.report.junit import JunitCase, write_document
 from fourbar_validation.report.terminal import make_table
 
@@ -79,10 +81,31 @@ class Judgement:
         else:
             within = f"rtol {self.tolerance.rtol:g}, atol {self.tolerance.atol:g}"
             agreed = f"{self.agreeing} of {self.compared} numbers agree within {within}; {self.exact} to round-off"
-        return agreed + (
-            f"; no digit left to judge {self.not_judged} more by"
-            if self.not_judged
-            else ""
+        if self.compared and self.tolerance is None:
+            agreed += f", compared to {self.digits}"
+        if self.not_judged:
+            agreed += f"; no digit left to judge {self.not_judged} more by"
+        return agreed
+
+    @property
+    def digits(self) -> str:
+        """Write to how many digits each quantity was compared, the fewest of its numbers."""
+        fewest: dict[int, list[str]] = {}
+        for quantity in dict.fromkeys(finding.quantity for finding in self.findings):
+            allowed = [
+                finding.allowed
+                for finding in self.findings
+                if finding.quantity == quantity and finding.judged
+            ]
+            if allowed:
+                digits = count_digits(max(allowed))
+                fewest.setdefault(digits, []).append(quantity)
+        if len(fewest) == 1:
+            (digits,) = fewest
+            return f"{digits} digit{'s' if digits != 1 else ''}"
+        return "; ".join(
+            f"{digits} digit{'s' if digits != 1 else ''} of {', '.join(names)}"
+            for digits, names in sorted(fewest.items())
         )
 
     def together(self) -> bool:
@@ -95,6 +118,31 @@ class Judgement:
         return explained >= {finding.quantity for finding in self.differing}
 
 
+def count_digits(allowed: float) -> int:
+    """Count the digits that an allowed relative error leaves to compare by."""
+    return max(0, math.floor(-math.log10(max(allowed, EPS))))
+
+
+def require_information(judge: Judge) -> None:
+    """Refuse a column that is printed so coarsely that every number would agree."""
+    for key in judge.table.values:
+        mask = judge.where(key)
+        if not mask.any():
+            continue
+        unit = judge.table.units[key]
+        of_angle = name_quantity(key).startswith("theta")
+        largest = np.pi if of_angle else float(magnitude(judge.ours(key))[mask].max())
+        rounding = float(judge.table.rounding[key][mask].min())
+        if 0.0 < largest <= rounding:
+            raise InputError(
+                f"column {judge.table.label(key)} [{unit.text}]",
+                None,
+                f"is printed to {2.0 * rounding / unit.factor:.2g} {unit.text}, and the "
+                f"largest right value is {largest / unit.factor:.2g} {unit.text}: every "
+                "number would agree; print more digits",
+            )
+
+
 def judge_table(
     scene: Scene, table: TheirTable, tolerance: Allowance | None = None
 ) -> Judgement:
@@ -103,6 +151,7 @@ def judge_table(
     With a tolerance that decides, and what explains the rest is held to it too.
     """
     judge = Judge(scene, table, tolerance)
+    require_information(judge)
     findings = judge.findings()
     differing_quantities = {
         finding.quantity
@@ -239,9 +288,10 @@ def check(
 
     Columns are named as by `fourbar analyze --csv`, whose file is read as it is; a unit may follow in
     brackets: theta_2 [deg], torque [lbf ft], F12_x, F12_y, F43 [kN] (a magnitude). A spreadsheet's
-    semicolons and blank cells are understood. Half a unit of the last printed digit is allowed; with
-    --rtol or --atol these decide, and how many agree exactly is printed too. Where the scene states no
-    omega_2 each row is judged at its own omega_2 and alpha_2.
+    semicolons, blank cells, thousands separators and lines of comments are understood. Half a unit of the
+    last printed digit is allowed, and to how many digits is printed; with --rtol or --atol these decide,
+    and how many agree exactly is printed too. Where the scene states no omega_2 each row is judged at its
+    own omega_2 and alpha_2.
     """
     if scene.suffix == ".json":
         for option, value in (
@@ -280,6 +330,8 @@ def show(judgement: Judgement, table: TheirTable, name: str) -> None:
     from rich.markup import escape
 
     console = Console(soft_wrap=True)
+    for note in table.notes:
+        console.print(escape(make_plain(note)))
     for why in dict.fromkeys(table.left_out.values()):
         headings = ", ".join(
             heading for heading, reason in table.left_out.items() if reason == why

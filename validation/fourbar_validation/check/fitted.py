@@ -146,7 +146,7 @@ def _try_exchanged(differing: list[str]) -> Iterator[Mistake]:
         if UNITS[one] == UNITS[second] and (one in VECTORS) == (second in VECTORS):
             taken = {one: second, second: one}
             yield Mistake(
-                f"the columns {one} and {second} are exchanged",
+                f"{one} and {second} are exchanged",
                 lambda quantity, right, taken=taken: getattr(
                     right, taken.get(quantity, ""), None
                 ),  # type: ignore[misc]

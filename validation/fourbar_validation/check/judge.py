@@ -79,14 +79,22 @@ class Discrepancy:
 
 
 class Judge:
-    """Numbers of a table against the formulas at its positions."""
+    """Numbers of a table against the formulas at its positions.
+
+    `at`: what was commanded at its rows; left out: what the scene and the table state.
+    """
 
     def __init__(
-        self, scene: Scene, table: TheirTable, tolerance: Allowance | None
+        self,
+        scene: Scene,
+        table: TheirTable,
+        tolerance: Allowance | None = None,
+        at: Command | None = None,
     ) -> None:
         self.scene, self.tolerance = scene, tolerance
-        self.at = make_command(scene, table)
-        command_names = OWN_MOTION if _moves_itself(scene, table) else ()
+        self.at = make_command(scene, table) if at is None else at
+        moves_itself = at is None and _moves_itself(scene, table)
+        command_names = OWN_MOTION if moves_itself else ()
         self.table = replace(
             table,
             values={

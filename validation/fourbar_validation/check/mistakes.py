@@ -15,6 +15,7 @@ from fourbar.quantities import FORCES, VECTORS
 from fourbar.scene import Command, Scene
 from fourbar.solution import Solution
 from fourbar.solve import solve
+from fourbar_validation.check.calculated import find_miscalculated
 from fourbar_validation.check.fitted import ENOUGH, find_fitted
 from fourbar_validation.check.judge import Judge, Mistake
 from fourbar_validation.check.theirs import Array
@@ -293,6 +294,8 @@ class Explanation:
     """The quantities that agree once it is assumed."""
     complete: bool
     """True if every quantity that differed now agrees."""
+    whole: bool = True
+    """True if the mistake is one of the calculation, False if it is one of columns."""
     nearer: tuple[str, ...] = ()
     """Quantities that it explains for the most part: what remains is NEARER times smaller."""
 
@@ -305,7 +308,9 @@ def explain(judge: Judge, differing: list[str]) -> list[Explanation]:
     explanations: list[Explanation] = []
     table = judge.table
     for mistake in chain(
-        list_hypotheses(judge.scene, judge.at), find_fitted(judge, differing)
+        find_miscalculated(judge),
+        list_hypotheses(judge.scene, judge.at),
+        find_fitted(judge, differing),
     ):
         explained, nearer, broken = [], [], False
         for key in table.values:
@@ -333,7 +338,13 @@ def explain(judge: Judge, differing: list[str]) -> list[Explanation]:
         if (explained or nearer) and not broken:
             complete = len(explained) == len(differing)
             explanations.append(
-                Explanation(mistake.text, tuple(explained), complete, tuple(nearer))
+                Explanation(
+                    mistake.text,
+                    tuple(explained),
+                    complete,
+                    mistake.whole,
+                    tuple(nearer),
+                )
             )
     return sorted(explanations, key=lambda e: (-len(e.quantities), -len(e.nearer)))[
         :SHOWN

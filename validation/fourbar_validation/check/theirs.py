@@ -40,6 +40,24 @@ NOT_JUDGED = {
 }
 """Columns of `fourbar analyze --csv` that are no answer, and why."""
 BLANK = "blank"
+COMMENT = ("#", "%", "//")
+"""Beginnings of a line that is a comment."""
+OTHER_NAMES = {
+    **dict.fromkeys(
+        ("t2", "t3", "t4", "moment", "drehmoment", "antriebsmoment"), "torque"
+    ),
+    **dict.fromkeys(
+        ("winkel", "kurbelwinkel", "antriebswinkel", "crankangle", "angle"), "theta_2"
+    ),
+    "zeit": "time",
+}
+"""Names in small letters, without underscores, that other programs and languages use."""
+COMMANDED = {"theta": "theta_2", "omega": "omega_2", "alpha": "alpha_2"}
+"""Names without a bar, and what they may mean."""
+THOUSANDS = re.compile(r"[-+]?\d{1,3}(?:[ ,'\u2019\u00a0\u202f]\d{3})+(?:\.\d+)?")
+GERMAN_THOUSANDS = re.compile(r"[-+]?\d{1,3}(?:\.\d{3})+,\d+")
+TWO_TURNS = 4.0 * math.pi
+"""Angles beyond this many rad, all of them multiples of half a one, are degrees."""
 LARGEST_FILE = 64 * 2**20
 """Bytes; a table larger than this is not a hand-made comparison."""
 HEADING = re.compile(
@@ -74,6 +92,8 @@ class TheirTable:
     """Half a unit of the last digit of theta_2 in a column that is printed with DECIMALS, rad, (n,); else 0."""
     left_out: dict[str, str]
     """Headings of columns that are not judged, and why."""
+    notes: tuple[str, ...] = ()
+    """How the table was read where it does not say so itself."""
 
     def label(self, key: str) -> str:
         """Name the quantity, or the one component of it that the table has."""
@@ -107,9 +127,8 @@ def read_table(path: Path) -> TheirTable:
             "table", path.name, "needs a header and at least one row", str(path)
         )
     columns, left_out = _read_columns(path, headings, unit_line)
+    _drop_repeated(path, columns, left_out, headings, rows)
     names = [name for name, _ in columns.values()]
-    if len(set(names)) != len(names):
-        raise InputError("header", headings, "names a column twice", str(path))
     if "theta_2" not in names:
         raise InputError(
             "header",
@@ -142,6 +161,7 @@ def read_table(path: Path) -> TheirTable:
         if math.isnan(numbers["theta_2"][row]):
             raise InputError(f"line {line}", cells, "needs a theta_2", str(path))
     units = {name: unit for name, unit in columns.values()}
+    notes = _read_degrees(numbers, halves, units, headings, columns)
     left_out |= {
         headings[index]: BLANK
         for index, (name, _) in columns.items()
@@ -151,7 +171,7 @@ def read_table(path: Path) -> TheirTable:
         [line for line, _ in rows],
         _find_rounding(halves["theta_2"], units["theta_2"]),
     )
-    table = TheirTable(numbers["theta_2"], {}, {}, {}, lines, rounded, left_out)
+    table = TheirTable(numbers["theta_2"], {}, {}, {}, lines, rounded, left_out, notes)
     for name in names:
         if name != "theta_2" and not np.isnan(numbers[name]).all():
             _put(table, name, units[name], numbers[name], halves[name])
@@ -164,6 +184,59 @@ def read_table(path: Path) -> TheirTable:
             str(path),
         )
     return table
+
+
+def _drop_repeated(
+    path: Path,
+    columns: dict[int, tuple[str, Unit]],
+    left_out: dict[str, str],
+    headings: list[str],
+    rows: list[tuple[int, list[str]]],
+) -> None:
+    """Leave out a column that repeats another one; InputError where it says otherwise."""
+    first: dict[str, int] = {}
+    for index, (name, unit) in list(columns.items()):
+        earlier = first.setdefault(name, index)
+        if earlier == index:
+            continue
+        same = all(
+            cells[index : index + 1] == cells[earlier : earlier + 1]
+            for _, cells in rows
+        )
+        if not same or unit != columns[earlier][1]:
+            allowed = (
+                f"columns {earlier + 1} and {index + 1} are both {name}, with other "
+                "numbers: rename or remove one"
+            )
+            raise InputError("header", headings, allowed, str(path))
+        left_out[f"{headings[index].strip()} (column {index + 1})"] = (
+            f"repeats column {earlier + 1}"
+        )
+        del columns[index]
+
+
+def _read_degrees(
+    numbers: dict[str, Array],
+    halves: dict[str, Array],
+    units: dict[str, Unit],
+    headings: list[str],
+    columns: dict[int, tuple[str, Unit]],
+) -> tuple[str, ...]:
+    """Read a theta_2 without a unit as degrees where its numbers can be nothing else."""
+    values = numbers["theta_2"]
+    heading = next(headings[i] for i, (name, _) in columns.items() if name == "theta_2")
+    bare = not re.search(r"[\[(]", heading) and units["theta_2"].text == "rad"
+    in_halves = np.all(np.abs(2.0 * values - np.round(2.0 * values)) < 1e-9)
+    largest = float(np.abs(values).max())
+    if not bare or not in_halves or largest <= TWO_TURNS:
+        return ()
+    factor = math.pi / 180.0
+    numbers["theta_2"], halves["theta_2"] = values * factor, halves["theta_2"] * factor
+    units["theta_2"] = Unit("deg", factor)
+    return (
+        f"theta_2 has no unit and goes to {largest:g}: it is read as degrees; "
+        "write theta_2 [deg], or theta_2 [rad] if it is not",
+    )
 
 
 def _put(
@@ -200,6 +273,7 @@ def _find_rounding(halves: Array, unit: Unit) -> Array:
 def _read_lines(path: Path) -> list[tuple[int, list[str]]]:
     """Read the lines that hold anything, with their numbers; at least a header."""
     text = read_text(path, "table", LARGEST_FILE)
+    text = _remove_comments(text)
     header = next((line for line in text.splitlines() if line.strip()), "")
     delimiter = next((mark for mark in ";\t" if mark in header), ",")
     try:
@@ -217,10 +291,47 @@ def _read_lines(path: Path) -> list[tuple[int, list[str]]]:
         )
     if delimiter != ",":  # there a comma is a decimal comma
         numbered[1:] = [
-            (line, [cell.replace(",", ".") for cell in cells])
+            (line, [_read_comma(cell) for cell in cells])
             for line, cells in numbered[1:]
         ]
     return numbered
+
+
+def _remove_comments(text: str) -> str:
+    """Blank the lines that are comments; the last one before the numbers may be the header."""
+    lines = text.splitlines()
+    of_comment = [line.lstrip().startswith(COMMENT) for line in lines]
+    first = next(
+        (i for i, line in enumerate(lines) if line.strip() and not of_comment[i]), 0
+    )
+    has_header = first < len(lines) and re.search(r"[^\W\d]", lines[first])
+    for i, line in enumerate(lines):
+        if not of_comment[i]:
+            continue
+        header = i == first - 1 and not has_header
+        lines[i] = line.lstrip().lstrip("#%/ ") if header else ""
+    return "\n".join(lines) + "\n"
+
+
+def _read_comma(cell: str) -> str:
+    """Read a decimal comma, with points between thousands, as a decimal point."""
+    text = cell.strip()
+    if GERMAN_THOUSANDS.fullmatch(text):
+        text = text.replace(".", "")
+    return text.replace(",", ".")
+
+
+def _find_name(name: str) -> str:
+    """Find the quantity that a column's name means, in whatever letters it is written."""
+    if name in UNITS or name in NOT_JUDGED:
+        return name
+    plain = name.replace("θ", "theta").replace("ω", "omega").replace("α", "alpha")
+    plain = plain.lower().replace("_", "")
+    known = {**dict.fromkeys(NOT_JUDGED), **UNITS}
+    spelled = {one.lower().replace("_", ""): one for one in known}
+    for letter in "xy":
+        spelled |= {f"{one.lower()}{letter}": f"{one}_{letter}" for one in VECTORS}
+    return spelled.get(plain, OTHER_NAMES.get(plain, name))
 
 
 def _is_unit_line(cells: list[str]) -> bool:
@@ -239,14 +350,18 @@ def _read_columns(
     for index, heading in enumerate(headings):
         match = HEADING.fullmatch(heading.strip())
         name = match["name"] + (match["letter"] or "") if match else heading.strip()
+        name = _find_name(name)
         quantity = (
             name[:-2] if name[-2:] in ("_x", "_y") and name[:-2] in VECTORS else name
         )
         if not name and index >= len(headings) - 1:
             continue  # an empty cell that a spreadsheet leaves at the end of a line
         if match is None or quantity in NOT_JUDGED or quantity not in UNITS:
+            unknown = "not a known column"
+            if name.lower() in COMMANDED:
+                unknown += f": rename it if it is {COMMANDED[name.lower()]}"
             left_out[heading.strip() or f"column {index + 1}"] = NOT_JUDGED.get(
-                quantity, "not a known column"
+                quantity, unknown
             )
             continue
         below = unit_line[index].strip(" []()") if index < len(unit_line) else ""
@@ -280,6 +395,8 @@ def _find_known() -> str:
 def _read_number(path: Path, place: str, cell: str) -> tuple[float, float]:
     """Read the number in a cell and half a unit of its last printed digit; NaN for a blank."""
     text = cell.strip().replace("\N{MINUS SIGN}", "-")
+    if THOUSANDS.fullmatch(text):
+        text = re.sub(r"[ ,'\u2019\u00a0\u202f]", "", text)
     if not text:
         return math.nan, math.nan
     try:

@@ -1,0 +1,267 @@
+"""Guests with one mistake each: the run names it, and names nothing of a right one.
+
+Each is the engine of docs/protocol.md with a few words of its text exchanged, so that
+the mistake is made in a calculation which knows nothing of the hypotheses.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fourbar
+from fourbar.scene import Command, Scene
+from fourbar_validation.check.calculated import find_wrenches
+from fourbar_validation.compare.answer import Answer
+from fourbar_validation.compare.tolerance import EQUIVALENCE
+from fourbar_validation.engines import protocol
+from fourbar_validation.engines.free_body import FreeBody
+from fourbar_validation.engines.registry import Engine
+from fourbar_validation.run.judge import judge
+from tests.support.guests import PLAIN
+from tests.support.scenes import crank_rocker
+
+SCENE = crank_rocker(
+    motion=fourbar.Motion(fourbar.Sweep(0.1, 6.0, 30), 10.0, 5.0), loads=()
+)
+SOLVER = PLAIN.partition("\nNAMES =")[0]
+TORQUE = '"torque": moments[0] - cross(r2, F32)'
+FORCES = "(force.real, force.imag)"
+Change = Callable[[dict[str, np.ndarray], Command], None]
+
+
+def nothing(numbers: dict[str, np.ndarray], at: Command) -> None:
+    """Leave the numbers as they are."""
+
+
+def make_guest(*replacements: tuple[str, str], change: Change = nothing) -> type:
+    """Make the page's engine with other words in its text, and other numbers at last."""
+    text = SOLVER
+    for old, new in replacements:
+        assert old in text, old
+        text = text.replace(old, new)
+    solver: dict[str, Any] = {}
+    exec(text, solver)
+
+    class Plain:
+        name = "plain"
+
+        def answer(self, scene: Scene, at: Command) -> Answer:
+            described = protocol.scene_to_json(scene)
+            told = protocol.command_to_json(scene, at)
+            rows = [
+                solver["solve"](described, *row)
+                for row in zip(
+                    *(
+                        np.broadcast_to(told[key], len(at.angle)).tolist()
+                        for key in ("theta_2", "omega_2", "alpha_2", "branch")
+                    ),
+                    strict=True,
+                )
+            ]
+            numbers = {name: np.array([row[name] for row in rows]) for name in rows[0]}
+            change(numbers, at)
+            assembled = np.ones(len(rows), dtype=bool)
+            return Answer(self.name, "exact", at, assembled, numbers)
+
+    return Plain
+
+
+def shift(numbers: dict[str, np.ndarray], at: Command) -> None:
+    for name, values in numbers.items():
+        numbers[name] = np.concatenate((values[:1], values[:-1]))
+
+
+def in_degrees(numbers: dict[str, np.ndarray], at: Command) -> None:
+    for name in ("theta_3", "theta_4"):
+        numbers[name] = np.degrees(numbers[name])
+
+
+def turn_into_bars(numbers: dict[str, np.ndarray], at: Command) -> None:
+    """Give each force in the frame of the bar on which it acts."""
+    bars = {"F12": at.angle, "F32": at.angle, "F43": None, "F14": None}
+    bars |= {"F43": numbers["theta_3"], "F14": numbers["theta_4"]}
+    for name, theta in bars.items():
+        (x, y), c, s = numbers[name].T, np.cos(theta), np.sin(theta)
+        numbers[name] = np.stack((c * x + s * y, c * y - s * x), axis=1)
+
+
+def times_the_step(numbers: dict[str, np.ndarray], at: Command) -> None:
+    for name in ("F12", "F32", "F43", "F14", "torque"):
+        numbers[name] = 2e-3 * numbers[name]
+
+
+BUGS: dict[str, tuple[type, str]] = {
+    "sign": (
+        make_guest((TORQUE, '"torque": cross(r2, F32) - moments[0]')),
+        "sign reversed, or F_ij given for F_ji: torque",
+    ),
+    "exchanged": (
+        make_guest(('"F32": F32, "F43": F43', '"F32": F43, "F43": F32')),
+        "F32 and F43 are exchanged: F32, F43",
+    ),
+    "late": (
+        make_guest(change=shift),
+        "one step late: numbers of the position before",
+    ),
+    "body frame": (
+        make_guest(change=turn_into_bars),
+        "each force is in the frame of the bar on which it acts, not in world axes",
+    ),
+    "F14": (
+        make_guest(('"F14": forces[2] + F43', '"F14": -F43')),
+        "F14 = -F43: F14",
+    ),
+    "other branch": (
+        make_guest(
+            ("    r2 = ", "    branch = branch if theta < 2.0 else -branch\n    r2 = ")
+        ),
+        "the other branch from theta_2 = 118.4 deg on",
+    ),
+    "dJ/dt v": (
+        make_guest(
+            (
+                "k = (alpha + 1j * omega**2) * r2 + 1j * omega_3**2 * r3 "
+                "- 1j * omega_4**2 * r4",
+                "k = alpha * r2",
+            )
+        ),
+        "(dJ/dt) v is missing in the accelerations of the loop",
+    ),
+    "inertia about the pins": (
+        make_guest(
+            (") * turning", " + bar['mass'] * abs(arm) ** 2) * turning"),
+            ('bar.get("inertia"', '(bar.get("inertia"'),
+            (
+                " + bar['mass'] * abs(arm) ** 2) * turning",
+                ") + bar['mass'] * abs(arm) ** 2) * turning",
+            ),
+        ),
+        "every bar: inertia about the pin used as the inertia about G",
+    ),
+    "impulses": (
+        make_guest(change=times_the_step),
+        "impulses in place of forces: every force and the torque times 0.002 s",
+    ),
+    "degrees": (
+        make_guest(change=in_degrees),
+        "degrees where radians were announced: theta_3, theta_4",
+    ),
+    "open tree": (
+        make_guest(
+            ("F43 = (moments[2] * r3 + moments[1] * r4) / det", "F43 = 0j"),
+            (
+                TORQUE,
+                '"torque": moments[0] + moments[1] - cross(r2, F32)',
+            ),
+        ),
+        "forces and torque of the open tree, cut at B: the loop force is 0, as from "
+        "mj_inverse or rnea of a loop",
+    ),
+    "gravity": (make_guest((" - field)", ")")), "gravity is missing"),
+    "gravity reversed": (
+        make_guest((" - field)", " + field)")),
+        "gravity is reversed",
+    ),
+    "mass centre": (
+        make_guest(
+            (
+                'cmath.rect(*bar["centre"])',
+                "(abs(r) / 2 if name == 'coupler' else cmath.rect(*bar['centre']))",
+            ),
+        ),
+        "coupler: mass centre taken at mid-bar",
+    ),
+    "alpha_2": (
+        make_guest(("    d, a, b, c = (", "    alpha = 0.0\n    d, a, b, c = (")),
+        "alpha_2 is left out",
+    ),
+    "x and y": (
+        make_guest((FORCES, "(force.imag, force.real)")),
+        "x and y exchanged: F12, F32, F43, F14",
+    ),
+    "statics": (
+        make_guest(
+            ("    d, a, b, c = (", "    omega = alpha = 0.0\n    d, a, b, c = (")
+        ),
+        "no inertial forces (statics)",
+    ),
+}
+
+
+def find_causes(guest: type, scene: Scene = SCENE) -> list[str]:
+    engine = Engine("plain", guest, EQUIVALENCE)
+    record = judge("scene", scene, [engine], order=False)
+    assert any(row.engine == "plain" for row in record.rows)
+    failed = any(row.engine == "plain" and row.failed for row in record.rows)
+    assert failed == ("plain" in record.causes)
+    return record.causes.get("plain", [])
+
+
+@pytest.mark.parametrize("bug", BUGS)
+def test_a_mistake_is_named_first(bug: str) -> None:
+    guest, text = BUGS[bug]
+    causes = find_causes(guest)
+    assert causes and causes[0] == text, causes
+
+
+def test_free_bodies_give_back_the_forces_that_they_are_made_of() -> None:
+    """Whatever acts: loads, gravity, and an acceleration of the crank."""
+    scene = crank_rocker()
+    right = fourbar.solve(scene, "force")
+    values = find_wrenches(scene, right).solve()
+    for name in ("F12", "F32", "F43", "F14", "torque"):
+        np.testing.assert_allclose(values[name], getattr(right, name), atol=1e-12)
+
+
+def test_a_right_guest_has_no_cause() -> None:
+    assert find_causes(make_guest()) == []
+
+
+def test_what_nobody_knows_is_no_known_mistake() -> None:
+    strange = make_guest((TORQUE, '"torque": 1.0 + 0.3 * math.sin(7.0 * theta)'))
+    assert find_causes(strange) == []
+
+
+class FromThePin:
+    """Free bodies whose loads have their arms measured from the bar's first pin."""
+
+    name = "plain"
+
+    def answer(self, scene: Scene, at: Command) -> Answer:
+        right = fourbar.solve(scene, "position", at=at)
+        parts = []
+        for i in range(len(at.angle)):
+            loads = []
+            for load in scene.loads:
+                first = {2: 0j, 3: complex(*right.A[i])}.get(load.bar)
+                if first is None:
+                    d, theta_1 = scene.linkage.ground, scene.linkage.ground_angle
+                    first = d * np.exp(1j * theta_1)
+                G = complex(*getattr(right, f"G{load.bar}")[i])
+                r, phi = load.at
+                place = first + r * np.exp(1j * phi) - G
+                loads.append(
+                    replace(load, at=(float(abs(place)), float(np.angle(place))))
+                )
+            here = at.part(np.array([i]))
+            parts.append(FreeBody().answer(replace(scene, loads=tuple(loads)), here))
+        numbers = {
+            name: np.concatenate([part.quantities[name] for part in parts])
+            for name in ("theta_3", "theta_4", "F12", "F32", "F43", "F14", "torque")
+        }
+        assembled = np.ones(len(parts), dtype=bool)
+        return Answer(self.name, "exact", at, assembled, numbers)
+
+
+def test_an_arm_from_the_pin_is_named_with_its_load() -> None:
+    motion = fourbar.Motion(fourbar.Sweep(0.1, 6.0, 8), 10.0)
+    scene = crank_rocker(
+        motion=motion, loads=(fourbar.Load(4, (3.0, 0.7), (0.05, 1.0)),)
+    )
+    causes = find_causes(FromThePin, scene)
+    assert causes[0] == (
+        "load 1 (bar 4): its arm is measured from the bar's first pin, not from G"
+    )

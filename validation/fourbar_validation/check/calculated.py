@@ -1,0 +1,375 @@
+"""Mistakes in a calculation of forces, as hypotheses: what its free bodies would give.
+
+Of each bar, p is the mass times the acceleration of G less what acts from outside, and q
+the same for moments about G. The pins and the drive must give both:
+
+    bar 2:  p2 = F12 + F32      bar 3:  p3 = F43 - F32      bar 4:  p4 = F14 - F43
+
+The right p and q follow from the right forces, whatever acts; a mistake changes some of
+them, or a force in place of a balance.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fourbar.errors import FourBarError
+from fourbar.linkage import MOVING_BARS
+from fourbar.quantities import FORCES, PIN_FORCES, VECTORS
+from fourbar.scene import Scene
+from fourbar.solution import Solution
+from fourbar.solve import solve
+from fourbar_validation.check.judge import Judge, Mistake
+from fourbar_validation.check.theirs import Array, name_quantity
+
+Values = dict[str, Array]
+"""Numbers that a mistake leads to, by quantity; others stay right."""
+PAIRS = {"F12": (1, 2), "F32": (3, 2), "F43": (4, 3), "F14": (1, 4)}
+"""Bar that exerts each pin force, and bar on which it acts."""
+CUTS = ("B", "A", "O4")
+"""Pins at which a loop is cut into a tree, the commonest first."""
+ENOUGH = 3
+"""Positions that a hypothesis with a position or a number in it needs."""
+
+
+LATE = {
+    "one step late: numbers of the position before": 1,
+    "one step early: numbers of the position after": -1,
+}
+"""Mistakes in time, and by how many positions the numbers are late."""
+
+
+class BarWrenches(NamedTuple):
+    """Bars at n positions, with what their pins must give each of them."""
+
+    arms: dict[int, Array]
+    """From the bar's first pin (O2, A, O4) to G, (n, 2)."""
+    bars: dict[int, Array]
+    """From the bar's first pin to its second one, (n, 2)."""
+    p: dict[int, Array]
+    q: dict[int, Array]
+
+    def changed(
+        self, bar: int, p: Array | float = 0.0, q: Array | float = 0.0
+    ) -> "BarWrenches":
+        """Return the wrenches with more force and moment needed by one bar."""
+        return self._replace(
+            p={**self.p, bar: self.p[bar] + p}, q={**self.q, bar: self.q[bar] + q}
+        )
+
+    def about_pin(self, bar: int) -> Array:
+        """Compute the moment that a bar needs about its first pin, N m."""
+        return self.q[bar] + cross(self.arms[bar], self.p[bar])
+
+    def solve(self) -> Values:
+        """Solve the three free bodies with the drive on bar 2."""
+        of_3, of_4 = self.about_pin(3), self.about_pin(4)
+        b, c = self.bars[3], self.bars[4]
+        # b x F43 = of_3, c x F43 = -of_4
+        det = cross(b, c)
+        F43 = (of_3[:, None] * c + of_4[:, None] * b) / det[:, None]
+        F32 = F43 - self.p[3]
+        return {
+            "F43": F43,
+            "F32": F32,
+            "F12": self.p[2] - F32,
+            "F14": self.p[4] + F43,
+            "torque": self.about_pin(2) - cross(self.bars[2], F32),
+        }
+
+    def cut(self, pin: str) -> Values:
+        """Solve the tree that a cut at a pin leaves: no force is passed there.
+
+        Its torque is that of the joint at O2, which carries all bars of its branch.
+        """
+        none = np.zeros_like(self.p[2])
+        if pin == "A":
+            F32, F43 = none, self.p[3]
+        elif pin == "B":
+            F32, F43 = -self.p[3], none
+        else:
+            F32, F43 = -self.p[3] - self.p[4], -self.p[4]
+        carried = {"A": (2,), "B": (2, 3), "O4": (2, 3, 4)}[pin]
+        torque = np.zeros(len(none))
+        place = np.zeros_like(none)
+        for bar in carried:
+            first_pin = place if bar != 4 else place - self.bars[4]
+            torque = torque + self.about_pin(bar) + cross(first_pin, self.p[bar])
+            place = place + self.bars[bar]
+        return {
+            "F12": self.p[2] - F32,
+            "F32": F32,
+            "F43": F43,
+            "F14": self.p[4] + F43,
+            "torque": torque,
+        }
+
+
+def cross(u: Array, v: Array) -> Array:
+    """Compute the z component of the cross product of vectors, (n, 2)."""
+    return np.asarray(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
+
+
+def turn(v: Array, angle: Array) -> Array:
+    """Turn vectors, (n, 2), by an angle, rad."""
+    x, y = v[:, 0], v[:, 1]
+    cosine, sine = np.cos(angle), np.sin(angle)
+    return np.stack((cosine * x - sine * y, sine * x + cosine * y), axis=1)
+
+
+def find_wrenches(scene: Scene, right: Solution) -> BarWrenches:
+    """Compute what each bar needs of its pins, from the right forces."""
+    theta_1 = scene.linkage.ground_angle
+    O4 = scene.linkage.ground * np.array([[np.cos(theta_1), np.sin(theta_1)]])
+    A, B = right.A, right.B
+    first = {2: np.zeros_like(A), 3: A, 4: O4 + np.zeros_like(A)}
+    second = {2: A, 3: B, 4: B}
+    F12, F32, F43, F14 = (getattr(right, name) for name in PIN_FORCES)
+    acting = {2: (F12, F32), 3: (-F32, F43), 4: (F14, -F43)}
+    arms, bars, p, q = {}, {}, {}, {}
+    for bar in MOVING_BARS:
+        G = getattr(right, f"G{bar}")
+        arms[bar], bars[bar] = G - first[bar], second[bar] - first[bar]
+        at_first, at_second = acting[bar]
+        p[bar] = at_first + at_second
+        q[bar] = cross(first[bar] - G, at_first) + cross(second[bar] - G, at_second)
+    q[2] = q[2] + np.asarray(right.torque)
+    return BarWrenches(arms, bars, p, q)
+
+
+@dataclass(frozen=True)
+class Calculation:
+    """A judge's right numbers, as wrenches of free bodies."""
+
+    judge: Judge
+    wrenches: BarWrenches
+
+    @property
+    def right(self) -> Solution:
+        """Return the right numbers."""
+        return self.judge.right
+
+    def mistakes(self) -> Iterator[Mistake]:
+        """List the mistakes that this calculation can have, the simplest first."""
+        yield from self._open_tree()
+        yield from self._frames()
+        yield from self._equal_forces()
+        yield from self._velocity_terms()
+        yield from self._arms_of_loads()
+        yield from self._inertia_about_pins()
+
+    def _open_tree(self) -> Iterator[Mistake]:
+        trees = {pin: self.wrenches.cut(pin) for pin in CUTS}
+        how = "the loop force is 0, as from mj_inverse or rnea of a loop"
+        for pin, values in trees.items():
+            yield _state(
+                f"forces and torque of the open tree, cut at {pin}: {how}", values
+            )
+        for pin, values in trees.items():
+            text = f"torque of the open tree, cut at {pin}: {how}"
+            yield _state(text, {"torque": values["torque"]}, whole=False)
+
+    def _frames(self) -> Iterator[Mistake]:
+        ways = {
+            "each force is in the frame of the bar on which it acts": 1,
+            "each force is in the frame of the bar that exerts it": 0,
+        }
+        for text, side in ways.items():
+            frames = {name: bars[side] for name, bars in PAIRS.items()}
+            yield _state(f"{text}, not in world axes", self._turned(frames))
+        for bar in (1, *MOVING_BARS):
+            text = f"forces are in the frame of bar {bar}, not in world axes"
+            yield _state(text, self._turned(dict.fromkeys(PAIRS, bar)))
+
+    def _turned(self, frames: dict[str, int]) -> Values:
+        theta: dict[int, Array] = {
+            bar: getattr(self.right, f"theta_{bar}") for bar in MOVING_BARS
+        }
+        theta_1 = self.judge.scene.linkage.ground_angle
+        theta[1] = np.full_like(theta[2], theta_1)
+        return {
+            name: turn(getattr(self.right, name), -theta[bar])
+            for name, bar in frames.items()
+        }
+
+    def _equal_forces(self) -> Iterator[Mistake]:
+        for name in PIN_FORCES:
+            for other in PIN_FORCES:
+                if other == name:
+                    continue
+                values = getattr(self.right, other)
+                yield _state(f"{name} = {other}", {name: values}, whole=False)
+                yield _state(f"{name} = -{other}", {name: -values}, whole=False)
+
+    def _velocity_terms(self) -> Iterator[Mistake]:
+        """Leave out (dJ/dt) v, without which alpha_3 and alpha_4 follow alpha_2 alone."""
+        right, scene = self.right, self.judge.scene
+        with np.errstate(divide="ignore", invalid="ignore"):
+            gain = np.asarray(right.alpha_2) / np.asarray(right.omega_2)
+        wrong = {bar: gain * getattr(right, f"omega_{bar}") for bar in (3, 4)}
+        wrenches, moved = self.wrenches, Values()
+        for bar, alpha in wrong.items():
+            apart = alpha - getattr(right, f"alpha_{bar}")
+            arm = self.wrenches.arms[bar]
+            a = apart[:, None] * np.stack((-arm[:, 1], arm[:, 0]), axis=1)
+            body = scene.linkage.bar(bar)
+            wrenches = wrenches.changed(
+                bar, body.mass * a, body.moment_of_inertia * apart
+            )
+            moved[f"alpha_{bar}"] = alpha
+            moved[f"a_G{bar}"] = getattr(right, f"a_G{bar}") + a
+        forces = wrenches.solve()
+        text = "(dJ/dt) v is missing in the accelerations of the loop"
+        yield _state(text, {**moved, **forces})
+        yield _state(f"{text}, from which the forces follow", forces)
+
+    def _arms_of_loads(self) -> Iterator[Mistake]:
+        """Measure the arm of a load from the bar's first pin instead of from G."""
+        scene = self.judge.scene
+        for number, load in enumerate(scene.loads):
+            if not load.force:
+                continue
+            others = scene.loads[:number] + scene.loads[number + 1 :]
+            without = solve(replace(scene, loads=others), "force", at=self.judge.at)
+            bar = load.bar
+            force = find_wrenches(scene, without).p[bar] - self.wrenches.p[bar]
+            moment = cross(self.wrenches.arms[bar], force)
+            yield _state(
+                f"load {number + 1} (bar {bar}): its arm is measured from the bar's "
+                "first pin, not from G",
+                self.wrenches.changed(bar, q=moment).solve(),
+            )
+
+    def _inertia_about_pins(self) -> Iterator[Mistake]:
+        wrenches = self.wrenches
+        for bar in MOVING_BARS:
+            body = self.judge.scene.linkage.bar(bar)
+            more = body.mass * body.mass_centre[0] ** 2 if body.mass else 0.0
+            wrenches = wrenches.changed(
+                bar, q=more * getattr(self.right, f"alpha_{bar}")
+            )
+        text = "every bar: inertia about the pin used as the inertia about G"
+        yield _state(text, wrenches.solve())
+
+
+def find_miscalculated(judge: Judge) -> Iterator[Mistake]:
+    """List the mistakes of a calculation, or of a simulation, that a table can show."""
+    scene = judge.scene
+    loaded = any(effect.loaded_pins for effect in scene.effects)
+    by_input = scene.drive is None and scene.drive_bar == 2 and not loaded
+    if judge.stage == "force" and by_input:
+        with np.errstate(all="ignore"):
+            try:
+                wrenches = find_wrenches(scene, judge.right)
+                yield from Calculation(judge, wrenches).mistakes()
+            except FourBarError:  # a scene without one of its loads is none
+                pass
+    if judge.stage == "force":
+        yield from _find_impulses(judge)
+    yield from _find_late(judge)
+    yield from _find_other_branch(judge)
+
+
+def _state(text: str, values: Values, *, whole: bool = True) -> Mistake:
+    def predict(quantity: str, right: Solution) -> Array | None:
+        return values.get(quantity)
+
+    return Mistake(text, predict, whole=whole)
+
+
+def _find_impulses(judge: Judge) -> Iterator[Mistake]:
+    """Fit one time by which all forces and the torque are multiplied."""
+    ours, theirs = [], []
+    for key in judge.table.values:
+        if name_quantity(key) in FORCES:
+            mask = judge.where(key)
+            ours.append(judge.ours(key)[mask].ravel())
+            theirs.append(judge.table.values[key][mask].ravel())
+    if len(ours) < 2:
+        return
+    x, y = np.concatenate(ours), np.concatenate(theirs)
+    stated = np.isfinite(y)
+    x, y = x[stated], y[stated]
+    if len(x) < ENOUGH or not (squares := float(x @ x)):
+        return
+    time = float(x @ y) / squares
+    if not 0.0 < time < 1.0:
+        return
+
+    def predict(quantity: str, right: Solution) -> Array | None:
+        values = getattr(right, quantity, None) if quantity in FORCES else None
+        return None if values is None else np.asarray(time * values)
+
+    text = f"impulses in place of forces: every force and the torque times {time:.4g} s"
+    yield Mistake(text, predict, times=2.0)
+
+
+def _find_late(judge: Judge) -> Iterator[Mistake]:
+    """Give each position the numbers of the one before, or of the one after."""
+    n = len(judge.at.theta_2)
+    if n < ENOUGH + 1:
+        return
+    of_forces: Callable[[str], bool] = (*FORCES, *PIN_FORCES).__contains__
+    for text, step in LATE.items():
+        rows = np.clip(np.arange(n) - step, 0, n - 1)
+        edge = 0 if step == 1 else n - 1
+        for what, applies in (("", bool), (" (forces alone)", of_forces)):
+
+            def predict(
+                quantity: str,
+                right: Solution,
+                rows: NDArray[np.intp] = rows,
+                edge: int = edge,
+                applies: Callable[[str], bool] = applies,
+            ) -> Array | None:
+                values = getattr(right, quantity, None)
+                if values is None or quantity == "theta_2" or not applies(quantity):
+                    return None
+                moved = np.array(values[rows])
+                theirs = judge.table.values.get(quantity)
+                if theirs is not None and theirs.shape == moved.shape:
+                    moved[edge] = theirs[edge]  # it may be anything
+                return moved
+
+            yield Mistake(text + what, predict)
+
+
+def _find_other_branch(judge: Judge) -> Iterator[Mistake]:
+    """Follow the other branch from the position on at which the numbers leave this one."""
+    key = next(
+        (
+            key
+            for key in ("theta_3", "theta_4", *judge.table.values)
+            if key in judge.table.values
+        ),
+        None,
+    )
+    if key is None:
+        return
+    try:
+        other = solve(
+            judge.scene, judge.stage, at=judge.at._replace(branch=-judge.at.branch)
+        )
+    except FourBarError:
+        return
+    error = judge.judged(key, judge.ours(key))[0]
+    of_other = judge.judged(key, judge.ours(key, other))[0]
+    left = of_other < error
+    places = np.flatnonzero(left)
+    if not len(places) or places[0] == 0:
+        return
+    start = int(places[0])
+    later = np.arange(len(left)) >= start
+    here = np.degrees(judge.at.theta_2[start])
+
+    def predict(quantity: str, right: Solution) -> Array | None:
+        ours, theirs = (getattr(one, quantity, None) for one in (right, other))
+        if ours is None or theirs is None:
+            return None
+        mask = later[:, None] if quantity in VECTORS else later
+        return np.asarray(np.where(mask, theirs, ours))
+
+    yield Mistake(f"the other branch from theta_2 = {here:.4g} deg on", predict)

@@ -1,0 +1,78 @@
+"""Known mistakes that explain the numbers of an engine that fails a scene."""
+
+import numpy as np
+
+from fourbar.errors import FourBarError
+from fourbar.quantities import OK, UNITS
+from fourbar_validation.check.judge import Judge
+from fourbar_validation.check.mistakes import explain
+from fourbar_validation.check.theirs import NOT_JUDGED, Array, TheirTable, Unit
+from fourbar_validation.compare.answer import Answer
+from fourbar_validation.compare.tolerance import ErrorBound, magnitude
+from fourbar_validation.run.question import Question
+
+MOST_POSITIONS = 400
+"""Positions, in a row, by which a mistake is looked for."""
+ROUND_OFF = 1e-9
+"""Part of a quantity's largest value within which a mistake must give an exact engine's
+numbers: it was made in another order of summation than the hypothesis."""
+
+
+def find_causes(question: Question, answer: Answer, tolerance: ErrorBound) -> list[str]:
+    """List the mistakes that explain all that differs in an answer, the simplest first."""
+    at = answer.at
+    if at is None or at.commanded != "theta_2" or answer.assembled is None:
+        return []
+    try:
+        table = make_table(answer, tolerance)
+        commanded = at.part(slice(0, len(table.theta_2)))
+        judge = Judge(question.scene, table, at=commanded)
+    except FourBarError:
+        return []
+    differing = [key for key in judge.table.values if differs(judge, key)]
+    if not differing:
+        return []
+    with np.errstate(all="ignore"):
+        explanations = explain(judge, differing)
+    causes = []
+    for explanation in explanations:
+        if explanation.complete:
+            of_columns = "" if explanation.whole else ", ".join(explanation.quantities)
+            causes.append(f"{explanation.text}: {of_columns}".removesuffix(": "))
+    return causes
+
+
+def make_table(answer: Answer, tolerance: ErrorBound) -> TheirTable:
+    """Make a table of an engine's numbers, as if they had been read from a file.
+
+    Each is taken to be rounded to what the engine is held to, so that a mistake need not
+    explain more of it.
+    """
+    assert answer.at is not None and answer.assembled is not None
+    rows = slice(MOST_POSITIONS)
+    theta_2 = np.asarray(answer.at.angle[rows], dtype=float)
+    blank = ~answer.assembled[rows]
+    slack = tolerance.factor if not tolerance.conditioned else ROUND_OFF
+    values: dict[str, Array] = {}
+    rounding: dict[str, Array] = {}
+    for name, numbers in answer.quantities.items():
+        if name not in UNITS or name in NOT_JUDGED or name == "theta_2":
+            continue
+        kept = np.array(numbers[rows], dtype=float)
+        kept[blank] = np.nan
+        size = magnitude(kept)
+        largest = float(np.nanmax(size, initial=0.0)) if len(size) else 0.0
+        scale = 1.0 if UNITS[name] in ("rad", "1") else largest
+        values[name] = kept
+        rounding[name] = np.full(len(theta_2), max(slack, ROUND_OFF) * scale)
+    units = {name: Unit(UNITS[name], 1.0) for name in values}
+    lines = list(range(1, len(theta_2) + 1))
+    exact = np.zeros(len(theta_2))
+    return TheirTable(theta_2, values, rounding, units, lines, exact, {})
+
+
+def differs(judge: Judge, key: str) -> bool:
+    """Return whether any number of a quantity is beyond what is allowed."""
+    mask = judge.where(key) & (judge.right.status_code == OK)
+    error, allowed, _ = judge.judged(key, judge.ours(key))
+    return bool(np.any(~(error[mask] <= allowed[mask])))
