@@ -63,6 +63,7 @@ LAYERS = {
 ON_ONE_FLOOR = {
     ("files", "studies"),
     ("scenes", "compare"),
+    ("run", "check"),
 }
 """Of two layers on one floor the first may use the second."""
 MOST = {"fourbar": 16, "fourbar_validation": 15}

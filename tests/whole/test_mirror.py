@@ -54,7 +54,8 @@ JUDGED_BY = {
     "validation/run/shipped/test_shipped.py": "validation/run/shipped: cuts sensitivities equilibria "
     "files variants",
     "validation/run/test_released.py": "validation/engines/mujoco: forward",
-    "validation/check/test_check.py": "validation/check: fitted judge mistakes theirs; validation/run: printed",
+    "validation/check/test_check.py": "validation/check: calculated fitted judge "
+    "mistakes theirs; validation/run: printed",
     "validation/check/test_mjcf.py": "validation/check: differences screen; validation/robots: guard; "
     "validation/engines/mujoco: describe theirs topology",
     "validation/engines/mujoco/robots/test_closures.py": "validation/engines/mujoco/robots: ancestry loop",
@@ -63,8 +64,9 @@ JUDGED_BY = {
     "validation/published/test_published.py": "validation/published: comparison figures program textbook "
     "thesis thirteen",
     "validation/regression/test_regression.py": "validation/regression: accept change changes fault "
-    "record render scenes; validation/report: junit",
-    "validation/report/test_report.py": "validation/report: figures machine record summary svg templating",
+    "record render rules scenes; validation/report: junit",
+    "validation/report/test_report.py": "validation/report: figures machine overview record "
+    "summary svg templating thumbnail words",
     # studies: each through its command
     "lab/test_bench.py": "lab: contenders",
     "lab/test_stability.py": "lab: families slopes tally",

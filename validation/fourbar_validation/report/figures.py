@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fourbar.quantities import ANGLES, COUPLE, FORCES, LINE, OK
+from fourbar.quantities import ANGLES, COUPLE, FORCES, LINE, OK, PIN_FORCES
 from fourbar.scene import Command, Scene
 from fourbar.show.plot.labels import Labels
 from fourbar.show.plot.linkage import draw_linkage
@@ -82,7 +82,7 @@ def _draw_linkage(name: str, scene: Scene, solution: Solution) -> str:
         np.argmax(np.where(solution.status_code == OK, solution.condition, -1.0))
     )
     with apply_style():
-        figure, labels = Figure(figsize=(4.3, 4.0), layout="constrained"), Labels()
+        figure, labels = Figure(figsize=(3.1, 2.9), layout="constrained"), Labels()
         here = solve(scene, "position", at=solution.at.part(slice(best, best + 1)))
         draw_linkage(figure.subplots(), View(scene, solution, here), labels)
         labels.settle(figure)
@@ -100,11 +100,22 @@ def _draw_answers(record: Record, solution: Solution) -> str:
         if answer.refusal is None and answer.quantities
     ]
     drive = COUPLE.value if solution.drive is None else LINE.value
-    shown = (drive, "F32") if solution.F32 is not None else ANGLES
+    shown = ANGLES
+    if solution.F32 is not None:
+        shown = (drive, find_largest_force(solution))
     if record.scene is not None and record.scene.motion.free is not None:
         shown = MOTION_AND_FORCE
     return "".join(
         _draw_picture(quantity, record, solution, answers) for quantity in shown
+    )
+
+
+def find_largest_force(solution: Solution) -> str:
+    """Name the pin whose force is the largest over the positions that have a value."""
+    good = solution.status_code == OK
+    return max(
+        PIN_FORCES,
+        key=lambda name: float(np.nanmax(magnitude(getattr(solution, name))[good])),
     )
 
 
@@ -130,7 +141,7 @@ def _draw_picture(
     for below, group in zip(axes[1:], groups, strict=True):
         _draw_errors(below, quantity, record, solution, group)
         below.set_ylabel(
-            "error / scale" if quantity in FORCES else "error (rad)", fontsize=7.5
+            "error / scale" if quantity in FORCES else "error (rad)", fontsize=8.5
         )
     axes[-1].set_xlabel("time (s)" if solution.time is not None else "θ₂ (°)")
     figure.align_ylabels(axes)
@@ -182,7 +193,7 @@ def _draw_errors(
     answers: list[Answer],
 ) -> None:
     """Draw the largest error of each segment on a logarithmic axis, the worst one ringed, and what is allowed."""
-    from matplotlib.ticker import LogLocator, NullLocator
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
     good, scene = solution.status_code == OK, record.scene
     assert scene is not None
@@ -231,6 +242,7 @@ def _draw_errors(
     axes.set_ylim(low / 4.0, 5.0 * high)
     axes.yaxis.set_major_locator(LogLocator(numticks=5))
     axes.yaxis.set_minor_locator(NullLocator())
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.0e}"))
     middle = int(np.flatnonzero(good)[np.count_nonzero(good) // 2])
     place = (float(_choose_base(solution, None)[middle]), float(allowed[middle]))
     axes.annotate(
@@ -238,7 +250,7 @@ def _draw_errors(
         place,
         (0, -9),
         textcoords="offset points",
-        fontsize=7.5,
+        fontsize=8.5,
         ha="center",
         color=ALLOWED,
     )
@@ -312,7 +324,7 @@ def _limit_to_bulk(axes: "Axes", values: Array) -> None:
             note,
             (0.99, 0.97),
             xycoords="axes fraction",
-            fontsize=7,
+            fontsize=8.5,
             ha="right",
             va="top",
             color=INK,

@@ -15,10 +15,10 @@ from fourbar_validation.compare.rows import (
     sort_rows,
     write_rows,
 )
+from fourbar_validation.report.overview import GROUPS, OWN_ENGINES
 from fourbar_validation.report.record import Record
 from fourbar_validation.report.summary import (
     OWN,
-    OWN_ENGINES,
     STATEMENT,
     Summary,
     compute_shares,
@@ -146,6 +146,12 @@ def write_html(
         own_engines=[name for name in OWN_ENGINES if name in engines],
         own=OWN,
         failing=failing,
+        groups=GROUPS,
+        causes=summary.overview.causes,
+        places={
+            view.scene.name: (number, view) for number, view in enumerate(views, 1)
+        },
+        answers=Markup(_take_answers(summary.first)),
         lazy=len(views) > ALL_OPEN,
         figures={
             scene.name: Markup(scene.figure) for scene in summary.shown if scene.figure
@@ -172,10 +178,24 @@ def write_html(
     )
 
 
+def _take_answers(scene: Record | None) -> str:
+    """Take the pictures of torque and pin force out of a scene's figure."""
+    if scene is None or not scene.figure:
+        return ""
+    linkage, end, answers = scene.figure.partition("</svg>")
+    return answers or linkage + end
+
+
 def write_markdown(summary: Summary) -> str:
     """Write the report as Markdown, short enough for a comment on a pull request."""
     return render(
-        "fourbar_validation.report", "report.md.j2", s=summary, statement=STATEMENT
+        "fourbar_validation.report",
+        "report.md.j2",
+        s=summary,
+        groups=GROUPS,
+        causes=summary.overview.causes,
+        own=OWN,
+        statement=STATEMENT,
     )
 
 

@@ -39,13 +39,17 @@ class Record:
     evidence: dict[str, dict[str, float]] = field(default_factory=dict)
     output: dict[str, str] = field(default_factory=dict)
     """engine: what it printed."""
+    causes: dict[str, list[str]] = field(default_factory=dict)
+    """engine: known mistakes that explain all that differs, the simplest first."""
     figure: str | None = None
     """SVG of the answers, or None where there is nothing to draw."""
+    thumbnail: str | None = None
+    """Small SVG of linkage and torque, or None."""
     solution: Solution | None = None
     answers: list[Answer] = field(default_factory=list)
     jumps: list[Reversal] = field(default_factory=list)
 
-    def kept(self, figure: str | None = None) -> "Record":
+    def kept(self, figure: str | None = None, thumbnail: str | None = None) -> "Record":
         """Return a copy without the scene, the solution and the answers."""
         return replace(
             self,
@@ -61,6 +65,7 @@ class Record:
             },
             reversals=[str(jump) for jump in self.jumps],
             figure=figure,
+            thumbnail=thumbnail,
             scene=None,
             solution=None,
             answers=[],
@@ -105,4 +110,5 @@ class Record:
             independence={**self.independence, **further.independence},
             evidence={**self.evidence, **further.evidence},
             output={**self.output, **further.output},
+            causes={**self.causes, **further.causes},
         )

@@ -1,7 +1,6 @@
 """Compute once, from the scenes, what every form of the report says."""
 
 import math
-import re
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -17,7 +16,6 @@ from fourbar_validation.compare.rows import (
     DEGRADED,
     FORMULAS,
     REFUSES,
-    SHIPPED,
     Counts,
     Row,
 )
@@ -33,7 +31,9 @@ from fourbar_validation.compare.tolerance import (
 )
 from fourbar_validation.engines.registry import WORK
 from fourbar_validation.report.machine import list_versions, name_machine
+from fourbar_validation.report.overview import OWN_ENGINES, Overview, OverviewLine
 from fourbar_validation.report.record import Record
+from fourbar_validation.report.words import NUMBER
 
 T = TypeVar("T")
 ALLOWANCE = attrgetter("allowed")
@@ -84,9 +84,9 @@ class EngineLine:
 
 
 OWN = "our own consistency"
-OWN_ENGINES = (FORMULAS, *SHIPPED)
-"""Engines whose rows check fourbar against itself: identities, and functions other than `solve`."""
 SCENES_SHOWN = 200
+SKETCHED = 60
+"""Scenes with small pictures."""
 PICTURED = 24
 """Scenes with pictures, if fewer fail: drawing one takes ten times as long as judging it by an exact engine."""
 WORST_SHOWN = 80
@@ -95,8 +95,6 @@ ORDERS_SHOWN = 20
 FAILURES_KEPT = 1000
 """Lines of a table at the most; everything is in results.csv."""
 TIMED = 1000
-NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
-"""Pattern of a number in a reason; reasons that differ in numbers alone count as one."""
 STATEMENT = (
     f"K = {K:g} for every exact comparison; where eps/condition > {NOTHING_TO_TELL:g} the row is undecided. "
     "Errors are relative to the largest magnitude over the positions whose condition is at least 0.1; below that "
@@ -109,6 +107,11 @@ class Summary:
 
     def __init__(self) -> None:
         self.counts = Counts()
+        self.overview = Overview()
+        self.date = self.commit = ""
+        """When it was made, and at which commit of the harness."""
+        self.asked = ""
+        """Name of the scene that was asked for; empty if there are several."""
         self.versions, self.machine = list_versions(), name_machine()
         self.failures: list[Row] = []
         """Failures, at most FAILURES_KEPT of them."""
@@ -140,6 +143,7 @@ class Summary:
     def add(self, scene: Record) -> None:
         """Add one more scene."""
         self.counts.add_scene(scene.rows)
+        self.overview.add(scene)
         bad = [row for row in scene.rows if row.failed]
         self.failures += bad[: FAILURES_KEPT - len(self.failures)]
         for row, used in zip(scene.rows, compute_shares(scene.rows), strict=True):
@@ -160,7 +164,7 @@ class Summary:
             WORST_SHOWN, [*self._worst, *worst], lambda w: w.used
         )
         for row in scene.rows:
-            if row.reason.startswith(EQUIVALENCE.name) and math.isfinite(row.error):
+            if row.reason.startswith(EQUIVALENCE.cause) and math.isfinite(row.error):
                 k = row.error * row.condition / EPS
                 self.measured_k[row.engine] = max(
                     self.measured_k.get(row.engine, 0.0), k
@@ -180,7 +184,7 @@ class Summary:
         """Add what was drawn and measured of a scene that is shown."""
         for scene in self.shown:
             if scene.name == drawn.name:
-                scene.figure = drawn.figure
+                scene.figure, scene.thumbnail = drawn.figure, drawn.thumbnail
         self._add_orders(drawn)
 
     def _add_times(self, scene: Record) -> None:
@@ -210,6 +214,34 @@ class Summary:
             else ""
         )
         return self.counts.sentence() + not_run
+
+    @property
+    def headline(self) -> str:
+        """Say the verdict in plain words: where it is not green, whose fault it is."""
+        worst = self.overview.first_failure
+        if worst is None:
+            missing = ", ".join(engine for engine, _ in self.missing)
+            return self.counts.headline + (f"; not run: {missing}" if missing else "")
+        causes = self.overview.causes
+        others = f", and {len(causes) - 1} more causes" if len(causes) > 1 else ""
+        first = causes[0]
+        named = first.engine if first.engine not in OWN_ENGINES else "fourbar itself"
+        what = f"{named} is wrong: {first.text}, in {first.scenes} scene"
+        what += f"{'s' if first.scenes > 1 else ''}; worst {first.worst.quantity} of "
+        since = f" {self.overview.since}" if self.overview.since else ""
+        return f"FAILS: {what}{first.place}{others}.{since}"
+
+    @property
+    def lines(self) -> list[OverviewLine]:
+        """Return the engines of the first screen, with their names and versions."""
+        versions = {name.lower(): version for name, version in self.versions.items()}
+        of_engines = {}
+        for name in self._engines:
+            version = versions.get(name.partition("-")[0], "")
+            of_engines[name] = self.stated.get(name, version)
+            if name.endswith(f" {of_engines[name]}"):
+                of_engines[name] = ""
+        return self.overview.name_lines(of_engines)
 
     @property
     def loosest(self) -> str:
@@ -286,6 +318,19 @@ class Summary:
     def pictured(self) -> list[Record]:
         """Return the scenes that have pictures: all that fail, then those that used most of their allowed error."""
         return self._find_most_used(PICTURED)
+
+    @property
+    def sketched(self) -> list[Record]:
+        """Return the scenes with small pictures: those that fail, then the nearest to it."""
+        scenes = self._find_most_used(SCENES_SHOWN)
+        return [scene for scene in scenes if scene.thumbnail][:SKETCHED]
+
+    @property
+    def first(self) -> Record | None:
+        """Return the scene of the large figure: the one asked for, else the first that fails."""
+        drawn = [scene for scene in self.shown if scene.figure]
+        failing = [scene for scene in self._failing if scene.figure]
+        return next(iter([*failing, *drawn]), None)
 
     def _find_most_used(self, most: int) -> list[Record]:
         holding = nlargest(

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from fourbar.errors import clean_line
 from fourbar_validation.compare.rows import FAILS
-from fourbar_validation.report.summary import OWN, Summary
+from fourbar_validation.report.overview import GROUPS
+from fourbar_validation.report.summary import Summary
 from fourbar_validation.report.templating import write_number
 
 if TYPE_CHECKING:
@@ -16,72 +17,81 @@ if TYPE_CHECKING:
 
 NARROWEST = 80
 """Columns of the table at least: a narrower terminal breaks its lines, where rich would cut its numbers."""
+MOST_CAUSES = 18
+"""Causes of failures that are printed, one line each; the report has all."""
+MOST_NOTES = 10
+"""Lines beneath the table."""
 
 
 def print_table(summary: Summary, out: Path, *, verbose: bool = False) -> None:
-    """Print a row of every engine, what fails, what was left out, the verdict last.
+    """Print the verdict, a row of every engine, what is wrong, and the report's path.
 
-    `verbose`: the worst row of every scene and engine too, and each reason for which something was left out.
+    `verbose`: the worst row of every scene and engine too, each row that fails, and each
+    reason for which something was not compared.
     """
     from rich.console import Console
     from rich.markup import escape
 
     console = Console()
     wide = Console(width=max(console.width, NARROWEST))
-    if verbose:
-        wide.print(_make_worst_table(summary))
-    wide.print(_make_engine_table(summary))
-    for row in summary.failures:
+    colour = "green" if summary.good else "red"
+    console.print(f"[bold {colour}]{escape(clean_line(summary.headline))}[/]")
+    wide.print(_make_overview(summary))
+    causes = summary.overview.causes
+    for cause in causes[:MOST_CAUSES]:
+        console.print(f"[bold red]wrong:[/] {escape(clean_line(str(cause)))}")
+    if len(causes) > MOST_CAUSES:
         console.print(
-            f"[bold red]fails[/] {escape(clean_line(row.scene))} {escape(row.engine)} {escape(row.quantity)}: "
-            f"error {write_number(row.error)}, allowed {write_number(row.allowed)}: {escape(clean_line(row.reason))}"
+            f"and {len(causes) - MOST_CAUSES} more causes; the report has them"
         )
-    if summary.counts[FAILS] > len(summary.failures):
-        console.print(
-            f"{summary.counts[FAILS] - len(summary.failures)} more rows fail; results.csv has them."
-        )
-    if verbose:
-        for engine, reason, count in summary.refusals:
-            scenes = f"{count} scene{'s' if count > 1 else ''}"
-            console.print(
-                f"{escape(engine)} left out in {scenes}: {escape(clean_line(reason))}"
-            )
-    elif summary.refusals:
-        count = sum(count for *_, count in summary.refusals)
-        console.print(
-            f"{count} comparisons were left out, for {len(summary.refusals)} reasons; --verbose lists them."
-        )
+    for note in summary.overview.notes[:MOST_NOTES]:
+        console.print(escape(clean_line(note)))
     for engine, reason in summary.missing:
         console.print(f"[bold red]Not run:[/] {escape(engine)}: {escape(reason)}")
-    console.print(f"[bold]{escape(summary.verdict)}.[/]")
+    if verbose:
+        _print_rows(summary, console, wide)
     console.print(
         f"Report: {escape(clean_line(str(out / 'report.html')))}", soft_wrap=True
     )
 
 
-def _make_engine_table(summary: Summary) -> "Table":
+def _print_rows(summary: Summary, console: Any, wide: Any) -> None:
+    """Print the worst rows, those that fail, and why others were not compared."""
     from rich.markup import escape
 
-    shown = _make_bare_table(("engine",), ("error", "allowed"))
-    shown.add_column("worst at", overflow="fold")
-    for line in summary.engines:
-        row, name = line.worst, f"{line.name} {line.version}".rstrip()
-        if row is None:
-            shown.add_row(escape(name), "-", "-", "nothing compared")
-            continue
-        quantity = f"{row.engine} {row.quantity}" if line.name == OWN else row.quantity
-        place = (
-            "" if math.isnan(row.theta_2) else f", {math.degrees(row.theta_2):.1f} deg"
+    wide.print(_make_worst_table(summary))
+    for row in summary.failures:
+        console.print(
+            f"[bold red]fails[/] {escape(clean_line(row.scene))} {escape(row.engine)} "
+            f"{escape(row.quantity)}: error {write_number(row.error)}, allowed "
+            f"{write_number(row.allowed)}: {escape(clean_line(row.reason))}"
         )
-        cells = (
-            name,
-            write_short(row.error),
-            write_short(row.allowed),
-            f"{quantity} of {clean_line(row.scene)}{place}",
-        )
-        shown.add_row(
-            *map(escape, cells), style="bold red" if line.counts[FAILS] else ""
-        )
+    more = summary.counts[FAILS] - len(summary.failures)
+    if more > 0:
+        console.print(f"{more} more rows fail; results.csv has them.")
+    for engine, reason, count in summary.refusals:
+        scenes = f"{count} scene{'s' if count > 1 else ''}"
+        why = escape(clean_line(reason))
+        console.print(f"not compared: {escape(engine)} in {scenes}: {why}")
+
+
+def _make_overview(summary: Summary) -> "Table":
+    """Make the table of engines: largest error and allowance in each group."""
+    from rich.box import SIMPLE_HEAD
+    from rich.markup import escape
+    from rich.table import Table
+
+    shown = Table(
+        box=SIMPLE_HEAD, pad_edge=False, collapse_padding=True, padding=(0, 1)
+    )
+    shown.add_column("", overflow="fold", ratio=1)
+    for heading in (*GROUPS, "compared"):
+        shown.add_column(heading, justify="right", no_wrap=True)
+    for line in summary.lines:
+        cells = [str(line.columns[group]) for group in GROUPS]
+        style = "bold red" if line.failed else ""
+        name = escape(clean_line(line.name))
+        shown.add_row(name, *cells, str(line.compared), style=style)
     return shown
 
 

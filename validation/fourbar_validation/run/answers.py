@@ -18,6 +18,7 @@ from fourbar_validation.compare.statements import limit_positions, transmission
 from fourbar_validation.compare.statements.limit_positions import look, make_worst_row
 from fourbar_validation.engines.description import name_driving
 from fourbar_validation.engines.registry import Engine, hold, make_prediction
+from fourbar_validation.run.causes import find_causes
 from fourbar_validation.run.question import Question, remove_angles
 
 
@@ -31,7 +32,10 @@ def _answer(question: Question, engine: Engine) -> Iterator[Row]:
     answer = question.answer(engine)
     if answer.refusal is not None:
         question.left_out.append(f"{answer.engine}: {answer.refusal}")
-    yield from compare_answer(question, engine, answer)
+    rows = compare_answer(question, engine, answer)
+    if any(row.failed for row in rows):
+        question.causes[engine.name] = find_causes(question, answer, engine.tolerance)
+    yield from rows
     if question.order and engine.order and answer.refusal is None:
         answer.evidence |= _observe_order(question, engine)
 

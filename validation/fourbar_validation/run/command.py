@@ -205,19 +205,19 @@ def command(**stated: Any) -> int:
     suite = select_scenes(request)
     engines = select_engines(request)
     present, missing = find_askable(engines, by_name=request.engines is not None)
+    against = None if request.against is None else find_baseline(request.against)
     options = RunOptions(
-        request.workers, not request.no_pictures, request.sample_shipped
+        request.workers,
+        not request.no_pictures,
+        against=against,
+        sample=request.sample_shipped,
     )
     with ShownProgress(len(suite)) as progress:
         summary = run(suite, request.out, present, options, missing, progress)
     print_table(summary, request.out, verbose=request.verbose)
     worse = False
-    if request.against is not None:
-        worse = bool(
-            report_differences(
-                find_baseline(request.against), request.out, request.forms
-            )
-        )
+    if against is not None:
+        worse = bool(report_differences(against, request.out, request.forms))
     elif request.junit is not None:
         write_text(
             request.junit,

@@ -15,6 +15,7 @@ from fourbar_validation.engines.guests import list_numbers
 from fourbar_validation.engines.registry import ENGINES, Engine
 from fourbar_validation.report.record import Record
 from fourbar_validation.report.svg import NUMBERS
+from fourbar_validation.report.thumbnail import draw_thumbnail
 from fourbar_validation.run.answers import (
     check_mjcf,
     compare_answers,
@@ -106,11 +107,13 @@ def judge_for_report(
     engines: Sequence[Engine] = ENGINES,
     *,
     draw: bool = True,
+    sketch: bool = False,
     shipped: bool = False,
 ) -> Record:
     """Judge a scene and keep what the report needs of it.
 
-    `draw`: with its pictures and observed orders. `shipped`: with checks of functions other than `solve`.
+    `draw`: with its pictures and observed orders. `sketch`: with its small picture.
+    `shipped`: with checks of functions other than `solve`.
     """
     record = judge(name, scene, engines, order=draw, shipped=shipped)
     for i, row in enumerate(record.rows):
@@ -118,13 +121,15 @@ def judge_for_report(
             record.rows[i] = replace(
                 row, reason=f"{row.reason}; what it printed: {OUTPUT}"
             )
-    figure = None
+    figure = thumbnail = None
+    NUMBERS.update(list_numbers(engines))
     if draw:
         from fourbar_validation.report.figures import draw_scene_figure
 
-        NUMBERS.update(list_numbers(engines))
         figure = draw_scene_figure(record)
-    return record.kept(figure)
+    if draw or sketch:
+        thumbnail = draw_thumbnail(record)
+    return record.kept(figure, thumbnail)
 
 
 def judge(

@@ -15,13 +15,15 @@ from fourbar_validation.scenes.suites import Files, Suite
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """One scene for a worker: its place in a suite, its engines, whether it is drawn, and judged as shipped too."""
+    """One scene for a worker: its place in a suite, its engines, and what is made of it."""
 
     suite: Suite
     scene: int
     engines: Sequence[Engine]
     draw: bool
     shipped: bool
+    """True if functions other than `solve` are checked."""
+    sketch: bool = False
 
     @property
     def name(self) -> str:
@@ -35,6 +37,7 @@ def make_jobs(
     engines: Sequence[Engine],
     draw: bool,
     sample: int = 0,
+    sketch: bool = False,
 ) -> list[Job]:
     """Make the jobs of some scenes; one of a file carries its own text alone.
 
@@ -46,10 +49,17 @@ def make_jobs(
         if isinstance(suite, Files):
             drawn = draw and suite.name(i) not in suite.not_drawn
             jobs.append(
-                Job(replace(suite, texts=(suite.texts[i],)), 0, engines, drawn, shipped)
+                Job(
+                    replace(suite, texts=(suite.texts[i],)),
+                    0,
+                    engines,
+                    drawn,
+                    shipped,
+                    sketch,
+                )
             )
         else:
-            jobs.append(Job(suite, i, engines, draw, shipped))
+            jobs.append(Job(suite, i, engines, draw, shipped, sketch))
     return jobs
 
 
@@ -57,7 +67,12 @@ def judge_job(job: Job) -> Record:
     """Judge one scene; runs in a worker."""
     scene = job.suite.scene(job.scene)
     return judge_for_report(
-        job.name, scene, job.engines, draw=job.draw, shipped=job.shipped
+        job.name,
+        scene,
+        job.engines,
+        draw=job.draw,
+        sketch=job.sketch,
+        shipped=job.shipped,
     )
 
 

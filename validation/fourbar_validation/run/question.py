@@ -50,6 +50,8 @@ class Question:
     """Text that each engine printed."""
     left_out: list[str] = field(default_factory=list)
     """Comparisons left out, each with the reason."""
+    causes: dict[str, list[str]] = field(default_factory=dict)
+    """Known mistakes that explain what differs, by engine."""
     timings: list[Timing] = field(default_factory=list)
     jumps: list[Reversal] = field(default_factory=list)
     """Positions where dry friction reverses and the pin forces jump."""
@@ -167,6 +169,7 @@ class Question:
             timings,
             self.left_out,
             output=self.output,
+            causes=self.causes,
             solution=self.solution,
             answers=[answer for answer, _ in answered],
             jumps=self.jumps,

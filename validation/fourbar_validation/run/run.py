@@ -21,7 +21,9 @@ from fourbar_validation.regression.record import (
     ABOUT,
     COLUMNS,
     TABLE,
+    Recorded,
     describe_run,
+    open_run,
     write_about,
 )
 from fourbar_validation.regression.scenes import describe_scenes
@@ -29,7 +31,7 @@ from fourbar_validation.report.html import write_html, write_markdown
 from fourbar_validation.report.machine import name_code
 from fourbar_validation.report.record import Record
 from fourbar_validation.report.sections import collect_sections
-from fourbar_validation.report.summary import PICTURED, Summary
+from fourbar_validation.report.summary import PICTURED, SKETCHED, Summary
 from fourbar_validation.report.svg import NUMBERS
 from fourbar_validation.run import pool
 from fourbar_validation.run.judge import OUTPUT
@@ -61,6 +63,8 @@ class RunOptions:
     """Number of processes."""
     drawn: bool = True
     """True for pictures; a long suite has them at the end, of the scenes that fail or come nearest to failing."""
+    against: Path | None = None
+    """Earlier run in which the first failure is looked up."""
     sample: int = SAMPLE
     """Scenes, evenly chosen, in which functions other than `solve` are checked."""
 
@@ -92,6 +96,7 @@ def run(
     """
     without_pictures = len(suite.not_drawn) if isinstance(suite, Files) else 0
     draw_at_once = options.drawn and len(suite) - without_pictures <= PICTURED
+    sketch = options.drawn and len(suite) <= SKETCHED
     simulated = any(engine.through_time for engine in engines)
     size = max(CHUNK[draw_at_once or simulated], math.ceil(len(suite) / MOST_PARTS))
     chunks = [
@@ -103,6 +108,7 @@ def run(
         "engines": [engine.fingerprint() for engine in engines],
         **name_code(),
         "draw": draw_at_once,
+        "sketch": sketch,
         "sample": options.sample,
     }
     summary = Summary()
@@ -122,7 +128,12 @@ def run(
         progress.advance(JUDGING, sum(len(chunks[number]) for number in done))
         todo = (number for number in range(len(chunks)) if number not in done)
         jobs = (
-            (n, pool.make_jobs(suite, chunks[n], engines, draw_at_once, options.sample))
+            (
+                n,
+                pool.make_jobs(
+                    suite, chunks[n], engines, draw_at_once, options.sample, sketch
+                ),
+            )
             for n in todo
         )
         limit = pool.find_time_limit(suite, engines)
@@ -145,9 +156,14 @@ def run(
             for _, records in pool.judge_chunks(jobs, limit, options.workers):
                 summary.picture(*records)
                 progress.advance(DRAWING, 1)
-        write_about(
-            describe_run(engines, suite.fingerprint(), describe_scenes(suite)), out
-        )
+        about = describe_run(engines, suite.fingerprint(), describe_scenes(suite))
+        write_about(about, out)
+        summary.date, summary.commit = about.date, about.commit
+        summary.asked = make_plain(suite.name(0)) if len(suite) == 1 else ""
+        if options.against is not None:
+            summary.overview.since = find_since(
+                summary.overview.first_failure, open_run(options.against, "--against")
+            )
         write_text(out / "report.md", write_markdown(summary))
         generated = any(engine.generated for engine in engines)
         models, why_not = picture_models(suite, shown) if generated else ({}, "")
@@ -165,6 +181,18 @@ def run(
         write_text(out / "report.html", page)
         store.finish()
     return summary
+
+
+def find_since(failure: Row | None, before: Recorded) -> str:
+    """Say how the first failure stood in an earlier run; nothing if there is none."""
+    if failure is None:
+        return ""
+    key = (failure.scene, failure.engine, failure.quantity)
+    for row in before.rows():
+        if (row.scene, row.engine, row.quantity) == key:
+            held = "It failed too in" if row.failed else "It held in"
+            return f"{held} {before.describe()}."
+    return f"It is not in {before.describe()}."
 
 
 def _collect(

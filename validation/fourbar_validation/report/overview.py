@@ -1,0 +1,338 @@
+"""The first screen of a report: what agrees, how closely, and whose fault it is if not."""
+
+import math
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from fourbar.quantities import LINE, PIN_FORCES, UNITS
+from fourbar_validation.compare.rows import (
+    FORMULAS,
+    HELD,
+    REFUSES,
+    SHIPPED,
+    UNDECIDED,
+    Row,
+    write_one_line,
+)
+from fourbar_validation.compare.tolerance import find_used
+from fourbar_validation.report.record import Record
+from fourbar_validation.report.words import NUMBER
+
+OWN_ENGINES = (FORMULAS, *SHIPPED)
+"""Engines whose rows check fourbar against itself: identities, and functions other than `solve`."""
+TORQUE, PINS, MOTION = "torque", "pin forces", "motion"
+GROUPS = (TORQUE, PINS, MOTION)
+"""Columns of the table."""
+DRIVES = ("torque", LINE.value)
+"""Names of what drives: a couple, or the force of a cylinder."""
+NAMES = {
+    "free-body": "free bodies",
+    "pinocchio-inverse": "Pinocchio {}",
+    "pinocchio-forward": "Pinocchio {}, released",
+    "mujoco-inverse": "MuJoCo {}, inverse",
+    "mujoco-simulated": "MuJoCo {}, simulated",
+    "mujoco-forward": "MuJoCo {}, released",
+    "exudyn-constraints": "Exudyn {}",
+    "opensim-constraints": "OpenSim {}",
+    "drake-inverse": "Drake {}",
+    "ball-arithmetic": "320-bit balls",
+}
+"""Names of engines as people write them, with the place of the version."""
+MOST_KINDS = 500
+"""Causes that are told apart; further ones are one."""
+OTHERS = "other causes"
+LIMIT, NO_VALUE, NO_DIGITS, DOES_NOT_APPLY = (
+    "at declared limits of an engine",
+    "where the formulas state no value",
+    "with no digit left to decide by",
+    "where a check does not apply",
+)
+"""Kinds of what was not compared."""
+
+
+@dataclass(slots=True)
+class OverviewCell:
+    """Worst row of an engine in one group of quantities."""
+
+    row: Row | None = None
+    used: float = -1.0
+    """error/allowed of that row."""
+
+    def add(self, row: Row, used: float) -> None:
+        """Take in a row."""
+        if used > self.used:
+            self.row, self.used = row, used
+
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """Return the error, and of what it is allowed, as the parts of a cell."""
+        if self.row is None:
+            return ("-",)
+        if math.isnan(self.row.error):
+            return ("no number",)
+        return f"{self.row.error:.1e}", f"of {self.row.allowed:.0e}"
+
+    def __str__(self) -> str:
+        return " ".join(self.parts)
+
+
+@dataclass(slots=True)
+class OverviewLine:
+    """What an engine answered, in the columns of the table."""
+
+    engine: str
+    name: str
+    columns: dict[str, OverviewCell] = field(
+        default_factory=lambda: {group: OverviewCell() for group in GROUPS}
+    )
+    compared: int = 0
+    failed: int = 0
+    scenes: int = 0
+    reasons: Counter[str] = field(default_factory=Counter)
+    """Why it was not compared, by scene."""
+
+
+@dataclass(slots=True)
+class Cause:
+    """What is wrong with an engine, by a known mistake or in words."""
+
+    engine: str
+    text: str
+    scenes: int
+    worst: Row
+
+    @property
+    def place(self) -> str:
+        """Return the scene and the position where it is worst."""
+        return name_place(self.worst)
+
+    def __str__(self) -> str:
+        count = f"{self.scenes} scene{'s' if self.scenes > 1 else ''}"
+        return f"{self.engine}: {self.text}: {count}; worst {self.place}"
+
+
+@dataclass(slots=True)
+class _Kind:
+    """Scenes of an engine that the same mistakes would explain."""
+
+    scenes: int
+    worst: Row
+    used: float
+
+
+def name_place(row: Row) -> str:
+    """Write the scene of a row and its position."""
+    where = "" if math.isnan(row.theta_2) else f" {math.degrees(row.theta_2):.4g} deg"
+    return f"{row.scene}{where}"
+
+
+def find_group(row: Row) -> str | None:
+    """Find the column of an engine's row; None for what is no error of a quantity."""
+    name = row.quantity
+    if name in DRIVES or name.removesuffix("_inertia") in DRIVES:
+        return TORQUE
+    if name in PIN_FORCES:
+        return PINS
+    if name in UNITS or name in ("energy", "frequency", "closure"):
+        return MOTION
+    return None
+
+
+class Overview:
+    """The first screen, condensed scene by scene."""
+
+    def __init__(self) -> None:
+        self.statements = self.statements_failed = 0
+        """Comparisons that no engine takes part in."""
+        self.scenes = self.with_forces = self.checked_twice = 0
+        self.released = False
+        self.not_compared: Counter[str] = Counter()
+        self.first_failure: Row | None = None
+        self.since = ""
+        """How the first failure stood in the run that this one is held against."""
+        self._lines: dict[str, OverviewLine] = {}
+        self._kinds: dict[tuple[str, tuple[str, ...]], _Kind] = {}
+
+    def add(self, scene: Record) -> None:
+        """Add one more scene."""
+        self.scenes += 1
+        refused = {row.reason for row in scene.rows if row.verdict == REFUSES}
+        for line in scene.left_out:
+            if line.partition(": ")[2] not in refused:
+                self.not_compared[DOES_NOT_APPLY] += 1
+        for row in scene.rows:
+            self._add_row(row)
+        self._add_agreement(scene.rows)
+        self._add_causes(scene)
+        for engine, reason in _list_reasons(scene):
+            self._line(engine).reasons[NUMBER.sub("#", reason)] += 1
+
+    def _line(self, engine: str) -> OverviewLine:
+        return self._lines.setdefault(engine, OverviewLine(engine, engine))
+
+    def _add_row(self, row: Row) -> None:
+        if row.verdict == REFUSES:
+            self.not_compared[LIMIT if row.quantity == "all" else NO_VALUE] += 1
+        elif row.verdict == UNDECIDED:
+            self.not_compared[NO_DIGITS] += 1
+        if row.engine in OWN_ENGINES:
+            self.statements += row.compared
+            self.statements_failed += row.failed
+            return
+        line = self._line(row.engine)
+        line.compared += row.compared
+        line.failed += row.failed
+        group = find_group(row)
+        if row.compared and group is not None:
+            line.columns[group].add(row, float(find_used(row.error, row.allowed)))
+
+    def _add_agreement(self, rows: Sequence[Row]) -> None:
+        """Count a scene whose torque and pin forces two engines compared, and agree on."""
+        asked: dict[str, dict[str, bool]] = {}
+        for row in rows:
+            name = "torque" if row.quantity in DRIVES else row.quantity
+            if row.engine not in OWN_ENGINES and name in ("torque", *PIN_FORCES):
+                asked.setdefault(row.engine, {})[name] = row.verdict in HELD
+        whole = len(PIN_FORCES) + 1
+        agreeing = [all(of.values()) for of in asked.values() if len(of) == whole]
+        if asked:
+            self.with_forces += 1
+            self.checked_twice += sum(agreeing) >= 2
+        self.released |= any(row.quantity == "energy" for row in rows)
+
+    def _add_causes(self, scene: Record) -> None:
+        failing: dict[str, list[Row]] = {}
+        for row in scene.rows:
+            if row.failed:
+                failing.setdefault(row.engine, []).append(row)
+        for engine, rows in failing.items():
+            used = [float(find_used(row.error, row.allowed)) for row in rows]
+            worst = rows[used.index(max(used))]
+            self.first_failure = self.first_failure or worst
+            key = (engine, tuple(name_causes(scene, engine, rows)))
+            if key not in self._kinds and len(self._kinds) >= MOST_KINDS:
+                key = (engine, (OTHERS,))
+            kind = self._kinds.setdefault(key, _Kind(0, worst, -1.0))
+            kind.scenes += 1
+            if max(used) > kind.used:
+                kind.worst, kind.used = worst, max(used)
+
+    @property
+    def causes(self) -> list[Cause]:
+        """Return what is wrong, engine by engine: the mistake that explains most first."""
+        causes = []
+        for engine in dict.fromkeys(engine for engine, _ in self._kinds):
+            left = {
+                texts: kind for (of, texts), kind in self._kinds.items() if of == engine
+            }
+            of_engine = []
+            while left:
+                counts: Counter[str] = Counter()
+                for texts, kind in left.items():
+                    for text in texts:
+                        counts[text] += kind.scenes
+                text = counts.most_common(1)[0][0]
+                explained = {texts for texts in left if text in texts}
+                worst = max((left[texts] for texts in explained), key=lambda k: k.used)
+                of_engine.append(Cause(engine, text, counts[text], worst.worst))
+                left = {t: kind for t, kind in left.items() if t not in explained}
+            causes += sorted(of_engine, key=lambda cause: -cause.scenes)
+        return causes
+
+    def name_lines(self, versions: Mapping[str, str]) -> list[OverviewLine]:
+        """Return the engines that were compared, with their names and versions."""
+        for line in self._lines.values():
+            version = versions.get(line.engine, "")
+            pattern = NAMES.get(line.engine)
+            if pattern is None:
+                line.name = f"{line.engine} {version}".strip()
+            else:
+                line.name = pattern.format(version).replace(" ,", ",").strip()
+        order = list(NAMES)
+        lines = [line for line in self._lines.values() if line.compared or line.failed]
+        return sorted(
+            lines,
+            key=lambda line: (
+                order.index(line.engine) if line.engine in order else len(order),
+                line.name,
+            ),
+        )
+
+    @property
+    def silent(self) -> list[str]:
+        """Return the engines with nothing to compare, each with its commonest reason."""
+        lines = []
+        for line in sorted(self._lines.values(), key=lambda one: one.engine):
+            if not line.compared and not line.failed and line.reasons:
+                reason, count = line.reasons.most_common(1)[0]
+                scenes = f"{count} scene{'s' if count > 1 else ''}"
+                lines.append(f"{line.engine}: nothing compared ({scenes}): {reason}")
+        return lines
+
+    @property
+    def notes(self) -> list[str]:
+        """Return what is said beneath the table."""
+        notes = []
+        if self.statements or self.statements_failed:
+            held = "all hold"
+            if self.statements_failed:
+                held = f"{self.statements_failed} FAIL"
+            notes.append(
+                f"also checked, without an engine: {self.statements} statements on "
+                f"identities, studies and files; {held}"
+            )
+        if self.with_forces:
+            notes.append(
+                f"Torque and pin forces of {self.checked_twice} of {self.with_forces} "
+                "scenes: at least two independent engines compared all of them and agree."
+            )
+        if self.released:
+            notes.append("released: angles, energy and speeds alone (no torque acts)")
+        notes += self.silent
+        if self.not_compared:
+            total = sum(self.not_compared.values())
+            kinds = ", ".join(
+                f"{count} {kind}" for kind, count in self.not_compared.most_common()
+            )
+            notes.append(f"not compared: {total}: {kinds}")
+        return notes
+
+
+def _list_reasons(scene: Record) -> Iterable[tuple[str, str]]:
+    """List the engines that a scene was not compared with, each with the reason."""
+    for row in scene.rows:
+        whole = row.verdict == REFUSES and row.quantity == "all"
+        if whole and row.engine not in OWN_ENGINES:
+            yield row.engine, row.reason
+    refused = {row.engine for row in scene.rows}
+    for line in scene.left_out:
+        engine, _, reason = line.partition(": ")
+        if engine in NAMES and engine not in refused:
+            yield engine, reason
+
+
+def name_causes(scene: Record, engine: str, rows: Sequence[Row]) -> list[str]:
+    """Name the mistakes that explain the failing rows of an engine in a scene, or say what fails."""
+    whole = [row for row in rows if row.quantity == "all"]
+    if whole:
+        reason = NUMBER.sub("#", whole[0].reason.partition("; what it printed")[0])
+        return [f"no answer: {write_one_line(reason)}"]
+    if known := scene.causes.get(engine):
+        return [f"{text}, all else agrees" for text in known]
+    if engine in OWN_ENGINES:
+        names = sorted({row.quantity for row in rows})
+        return [
+            f"{', '.join(names[:3])} {'does' if len(names) == 1 else 'do'} not hold"
+        ]
+    groups = {find_group(row) or row.quantity for row in rows}
+    missing = sorted({row.quantity for row in rows if math.isnan(row.error)})
+    if missing and len(missing) == len({row.quantity for row in rows}):
+        return [f"no number for {', '.join(missing[:4])}"]
+    differ = [group for group in GROUPS if group in groups]
+    differ += sorted(groups - set(GROUPS))
+    agree = [group for group in GROUPS if group not in groups]
+    words = f"{' and '.join(differ[:3])} {'differs' if len(differ) == 1 else 'differ'}"
+    if agree:
+        words += f", {' and '.join(agree)} {'agrees' if len(agree) == 1 else 'agree'}"
+    return [f"{words}; no known mistake explains it"]

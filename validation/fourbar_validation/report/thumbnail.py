@@ -1,0 +1,108 @@
+"""Small pictures of a scene, without words: the linkage, and the torque over the motion."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from fourbar.quantities import COUPLE, LINE, OK
+from fourbar.solution import Solution
+from fourbar_validation.compare.answer import Answer
+from fourbar_validation.compare.tolerance import Array
+from fourbar_validation.report.record import Record
+from fourbar_validation.report.svg import choose_style
+
+HEIGHT, LINKAGE, CURVE, EDGE = 76.0, 96.0, 150.0, 6.0
+"""Sizes in pixels: height, widths of both pictures, and their margin."""
+MOST_POINTS = 120
+"""Points of a curve."""
+Place = Callable[[Array], tuple[Array, Array]]
+"""Function that places values in the picture."""
+MARKS = 7
+"""Marks of one engine on it."""
+
+
+def draw_thumbnail(record: Record) -> str | None:
+    """Draw linkage and torque as one SVG; None where nothing assembles."""
+    solution, scene = record.solution, record.scene
+    if scene is None or solution is None or not np.any(solution.status_code == OK):
+        return None
+    width = LINKAGE + CURVE
+    return (
+        f'<svg viewBox="0 0 {width:g} {HEIGHT:g}" width="{width:g}" '
+        f'height="{HEIGHT:g}" aria-hidden="true">'
+        f"{_draw_linkage(record, solution)}{_draw_curve(record, solution)}</svg>"
+    )
+
+
+def _draw_linkage(record: Record, solution: Solution) -> str:
+    """Draw the four bars at the best conditioned position."""
+    assert record.scene is not None
+    good = solution.status_code == OK
+    best = int(np.argmax(np.where(good, solution.condition, -1.0)))
+    d, theta_1 = record.scene.linkage.ground, record.scene.linkage.ground_angle
+    O4 = (d * np.cos(theta_1), d * np.sin(theta_1))
+    pins = np.array([(0.0, 0.0), solution.A[best], solution.B[best], O4])
+    low, high = pins.min(axis=0), pins.max(axis=0)
+    room = np.array([LINKAGE, HEIGHT]) - 2.0 * EDGE - 4.0
+    scale = float(np.min(room / np.maximum(high - low, 1e-300)))
+    middle = 0.5 * np.array([LINKAGE, HEIGHT])
+    places = (pins - 0.5 * (low + high)) * [scale, -scale] + middle
+    bars = " ".join(f"{x:.1f},{y:.1f}" for x, y in places)
+    ground = " ".join(f"{x:.1f},{y:.1f}" for x, y in places[[0, 3]])
+    dots = "".join(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="2.6"/>' for x, y in places)
+    return (
+        f'<polyline class="ground" points="{ground}"/>'
+        f'<polyline class="bars" points="{bars}"/>{dots}'
+    )
+
+
+def _draw_curve(record: Record, solution: Solution) -> str:
+    """Draw the formulas' torque as a band, and each engine's as marks on it."""
+    name = COUPLE.value if solution.drive is None else LINE.value
+    assert record.scene is not None
+    released = record.scene.motion.free is not None  # no torque acts
+    ours = None if released else getattr(solution, name, None)
+    good = solution.status_code == OK
+    if ours is None or np.count_nonzero(good) < 2:
+        return ""
+    low, high = np.nanpercentile(ours[good], [2.0, 98.0])
+    span = max(float(high - low), 1e-300)
+
+    def place(values: Array) -> tuple[Array, Array]:
+        x = LINKAGE + EDGE + (CURVE - 2.0 * EDGE) * np.linspace(0.0, 1.0, len(values))
+        height = np.clip((values - low) / span, -0.1, 1.1)
+        return x, HEIGHT - 2.0 * EDGE - (HEIGHT - 4.0 * EDGE) * height
+
+    kept = np.linspace(0, len(ours) - 1, min(len(ours), MOST_POINTS)).astype(int)
+    x, y = place(np.where(good, ours, np.nan))
+    drawn = "".join(_write_path(x[kept], y[kept]))
+    marks = ""
+    answers = [one for one in record.answers if name in one.quantities]
+    for turn, answer in enumerate(answers):
+        marks += _draw_marks(answer, name, turn / max(len(answers), 1), place)
+    return f'<path class="formulas" d="{drawn}"/>{marks}'
+
+
+def _write_path(x: Array, y: Array) -> list[str]:
+    """Write a path that is broken where there is no value."""
+    parts, pen = [], "M"
+    for across, up in zip(x.tolist(), y.tolist(), strict=True):
+        if np.isfinite(up):
+            parts.append(f"{pen}{across:.1f} {up:.1f}")
+            pen = "L"
+        else:
+            pen = "M"
+    return parts
+
+
+def _draw_marks(answer: Answer, name: str, phase: float, place: Place) -> str:
+    values = answer.quantities[name]
+    x, y = place(values)
+    rows = ((np.arange(MARKS) + phase) / MARKS * len(values)).astype(int)
+    colour = choose_style(answer.engine).variable
+    return "".join(
+        f'<circle class="mark" cx="{x[i]:.1f}" cy="{y[i]:.1f}" r="2.2" '
+        f'style="stroke:var({colour})"/>'
+        for i in np.unique(rows)
+        if np.isfinite(y[i])
+    )
