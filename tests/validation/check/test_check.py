@@ -299,7 +299,7 @@ MISTAKES: list[tuple[str, str, tuple[str, ...], Callable[[Scene], Numbers], str]
     ("backwards", "thesis", ALL, lambda s: {name: x[::-1] for name, x in right(s).items()}
      | {"theta_2": right(s)["theta_2"]}, "in reverse order"),
     ("one row down", "crank_rocker", ALL, lambda s: {name: np.roll(x, 1, axis=0) for name, x in right(s).items()}
-     | {"theta_2": right(s)["theta_2"]}, "the rows are shifted by -1"),
+     | {"theta_2": right(s)["theta_2"]}, "one step late: numbers of the position before"),
     ("theta_2 as degrees", "crank_rocker", ALL,
      lambda s: right(s, theta_2=np.radians(right(s)["theta_2"])) | {"theta_2": right(s)["theta_2"]}, "read as degrees"),
     ("theta_2 as radians", "crank_rocker", ALL,
@@ -611,7 +611,7 @@ BAD_TABLES = [
     ("of dry friction", "theta_2,torque_low\n1,2\n", "no dry friction"),
     ("unknown column", "theta_2,wheel\n1,2\n", "known are theta_2"),
     ("unit of another kind", "theta_2,torque [kg]\n1,2\n", "kg"),
-    ("twice", "theta_2,torque,torque\n1,2,2\n", "twice"),
+    ("twice", "theta_2,torque,torque\n1,2,3\n", "are both torque"),
     ("word", "theta_2,torque\n1,much\n", "line 2"),
     ("NaN", "theta_2,torque\n1,nan\n", "finite"),
     ("too large", "theta_2,torque\n1,1e999\n", "larger than a double"),
@@ -982,7 +982,7 @@ def test_an_ordinary_table_is_read(form: str, tmp_path: Path) -> None:
     path = write_torques(tmp_path / "theirs.csv", ORDINARY[form])
     judgement = judged(SCENES["crank_rocker"], path)
     assert (judgement.agreeing, judgement.compared) == (12, 12)
-    assert re.search(r"agree, compared to \d digits", judgement.sentence())
+    assert re.search(r"agree, compared to \d+ digits", judgement.sentence())
 
 
 def test_degrees_under_a_bare_theta_2_are_recognised_and_said(

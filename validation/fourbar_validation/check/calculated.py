@@ -9,7 +9,9 @@ The right p and q follow from the right forces, whatever acts; a mistake changes
 them, or a force in place of a balance.
 """
 
+import math
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -32,7 +34,7 @@ PAIRS = {"F12": (1, 2), "F32": (3, 2), "F43": (4, 3), "F14": (1, 4)}
 CUTS = ("B", "A", "O4")
 """Pins at which a loop is cut into a tree, the commonest first."""
 ENOUGH = 3
-"""Positions that a hypothesis with a position or a number in it needs."""
+"""Columns or positions that a hypothesis with a number in it needs."""
 
 
 LATE = {
@@ -261,12 +263,12 @@ def find_miscalculated(judge: Judge) -> Iterator[Mistake]:
     loaded = any(effect.loaded_pins for effect in scene.effects)
     by_input = scene.drive is None and scene.drive_bar == 2 and not loaded
     if judge.stage == "force" and by_input:
-        with np.errstate(all="ignore"):
-            try:
-                wrenches = find_wrenches(scene, judge.right)
-                yield from Calculation(judge, wrenches).mistakes()
-            except FourBarError:  # a scene without one of its loads is none
-                pass
+        mistakes: list[Mistake] = []
+        with np.errstate(all="ignore"), suppress(FourBarError):
+            # a scene without one of its loads may be none
+            wrenches = find_wrenches(scene, judge.right)
+            mistakes.extend(Calculation(judge, wrenches).mistakes())
+        yield from mistakes
     if judge.stage == "force":
         yield from _find_impulses(judge)
     yield from _find_late(judge)
@@ -288,14 +290,16 @@ def _find_impulses(judge: Judge) -> Iterator[Mistake]:
             mask = judge.where(key)
             ours.append(judge.ours(key)[mask].ravel())
             theirs.append(judge.table.values[key][mask].ravel())
-    if len(ours) < 2:
+    if len(ours) < ENOUGH:
         return
     x, y = np.concatenate(ours), np.concatenate(theirs)
     stated = np.isfinite(y)
     x, y = x[stated], y[stated]
-    if len(x) < ENOUGH or not (squares := float(x @ x)):
+    with np.errstate(all="ignore"):
+        squares = float(x @ x)
+        time = float(x @ y) / squares if squares else math.nan
+    if len(x) < ENOUGH:
         return
-    time = float(x @ y) / squares
     if not 0.0 < time < 1.0:
         return
 

@@ -133,7 +133,8 @@ def require_information(judge: Judge) -> None:
         of_angle = name_quantity(key).startswith("theta")
         largest = np.pi if of_angle else float(magnitude(judge.ours(key))[mask].max())
         rounding = float(judge.table.rounding[key][mask].min())
-        if 0.0 < largest <= rounding:
+        theirs = magnitude(np.nan_to_num(judge.table.values[key]))[mask]
+        if 0.0 < largest <= rounding and float(theirs.max()) <= rounding:
             raise InputError(
                 f"column {judge.table.label(key)} [{unit.text}]",
                 None,

@@ -58,6 +58,8 @@ THOUSANDS = re.compile(r"[-+]?\d{1,3}(?:[ ,'\u2019\u00a0\u202f]\d{3})+(?:\.\d+)?
 GERMAN_THOUSANDS = re.compile(r"[-+]?\d{1,3}(?:\.\d{3})+,\d+")
 TWO_TURNS = 4.0 * math.pi
 """Angles beyond this many rad, all of them multiples of half a one, are degrees."""
+MOST_DEGREES = 1e6
+"""Beyond this no angle is meant."""
 LARGEST_FILE = 64 * 2**20
 """Bytes; a table larger than this is not a hand-made comparison."""
 HEADING = re.compile(
@@ -226,9 +228,10 @@ def _read_degrees(
     values = numbers["theta_2"]
     heading = next(headings[i] for i, (name, _) in columns.items() if name == "theta_2")
     bare = not re.search(r"[\[(]", heading) and units["theta_2"].text == "rad"
-    in_halves = np.all(np.abs(2.0 * values - np.round(2.0 * values)) < 1e-9)
     largest = float(np.abs(values).max())
-    if not bare or not in_halves or largest <= TWO_TURNS:
+    if not bare or not TWO_TURNS < largest < MOST_DEGREES:
+        return ()
+    if np.any(np.abs(2.0 * values - np.round(2.0 * values)) > 1e-9):
         return ()
     factor = math.pi / 180.0
     numbers["theta_2"], halves["theta_2"] = values * factor, halves["theta_2"] * factor
@@ -304,7 +307,8 @@ def _remove_comments(text: str) -> str:
     first = next(
         (i for i, line in enumerate(lines) if line.strip() and not of_comment[i]), 0
     )
-    has_header = first < len(lines) and re.search(r"[^\W\d]", lines[first])
+    words = re.sub(r"\d[eE][-+]?\d", "", lines[first]) if lines else ""
+    has_header = re.search(r"[^\W\d_]", words)
     for i, line in enumerate(lines):
         if not of_comment[i]:
             continue
