@@ -233,7 +233,7 @@ class Overview:
                     for text in texts:
                         counts[text] += kind.scenes
                 text = counts.most_common(1)[0][0]
-                explained = {texts for texts in left if text in texts}
+                explained = [texts for texts in left if text in texts]
                 worst = max((left[texts] for texts in explained), key=lambda k: k.used)
                 of_engine.append(Cause(engine, text, counts[text], worst.worst))
                 left = {t: kind for t, kind in left.items() if t not in explained}
