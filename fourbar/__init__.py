@@ -41,8 +41,9 @@ if _TYPE_CHECKING:
     from fourbar.effects import LinearDrive as LinearDrive
     from fourbar.effects import Load as Load
     from fourbar.effects import PinFriction as PinFriction
+    from fourbar.effects import Place as Place
+    from fourbar.effects import PointDrive as PointDrive
     from fourbar.effects import Spring as Spring
-    from fourbar.effects import SpringEnd as SpringEnd
     from fourbar.effects import Springs as Springs
     from fourbar.effects import Table as Table
     from fourbar.effects import Torsion as Torsion
@@ -81,8 +82,9 @@ _EFFECTS = (
         "LinearDrive",
         "Load",
         "PinFriction",
+        "Place",
+        "PointDrive",
         "Spring",
-        "SpringEnd",
         "Springs",
     ),
     *("Table", "Torsion", "Viscous"),

@@ -20,6 +20,7 @@ from fourbar.quantities import (
     PIN_FORCES,
     SCALARS,
     STATUS_NAMES,
+    STROKE,
     UNITS,
     Quantities,
 )
@@ -39,7 +40,7 @@ Array = NDArray[np.float64]
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-    from fourbar.effects import LinearDrive
+    from fourbar.effects import ForceDrive
 
 SCHEMA = "fourbar-analyze/1"
 Conversion = Mapping[str, tuple[str, float]]
@@ -85,7 +86,7 @@ class Solution(Quantities):
     """Scene that was solved; None for a study."""
     lengths: tuple[Any, Any, Any, Any] | None = field(default=None, init=False)
     """Lengths of ground, input, coupler and output, m; of a study (m, 1) each where they vary."""
-    drive: "LinearDrive | None" = field(default=None, init=False)
+    drive: "ForceDrive | None" = field(default=None, init=False)
     """Linear drive of the scene; None: a bar is driven."""
     change_points: tuple[float, ...] | None = field(default=None, init=False)
     """Times at which a free motion passed a change point, s: another motion was possible there."""
@@ -107,7 +108,9 @@ class Solution(Quantities):
             {name: find_values(self, name) for name in _list_quantities(self)},
             scalars=("theta_2", "torque", "drive_force"),
         )
-        on = f"on bar {self.drive_bar}" if self.drive is None else "along a line"
+        on = f"on bar {self.drive_bar}"
+        if self.drive is not None:
+            on = "along a line" if self.drive.has_stroke else "at a point"
         lines = [
             f"Solution {self.title!r}: {describe_extent(self.theta_2)}, drive {on}",
             "status: "
@@ -381,7 +384,9 @@ def find_unit_in(unit: str, units: Conversion) -> tuple[str, float]:
 
 def _list_quantities(solution: "Solution") -> list[str]:
     """List every quantity of a solution, evaluated or not; time and those of a linear drive only where there is one."""
-    left_out = () if solution.drive is not None else LINE_QUANTITIES
+    left_out: tuple[str, ...] = LINE_QUANTITIES
+    if solution.drive is not None:
+        left_out = () if solution.drive.has_stroke else (STROKE,)
     names = [
         name
         for name in UNITS

@@ -27,6 +27,7 @@ from fourbar.quantities import (
     SCALARS,
     STAGE_OF,
     STAGES,
+    STROKE,
     UNITS,
 )
 from fourbar.scene import Command, Scene, command
@@ -404,7 +405,7 @@ def make_solution(scene: Scene, commanded: Command, results: Results) -> Solutio
     solution = Solution(
         scene.title, scene.drive_bar, codes, branch, theta_2=theta_2, **quantities
     )
-    solution.drive, solution.at = scene.drive, commanded
+    solution.drive, solution.at = scene.settled().drive, commanded
     solution.time = commanded.time
     solution.points, solution.velocity, solution.acceleration = (
         of_points[""],
@@ -426,7 +427,9 @@ def unwrap_angles(arrays: Mapping[str, Array], bar: int) -> None:
 
 def _list_foreign(scene: Scene) -> tuple[str, ...]:
     """List quantities of the kind of drive that the scene lacks."""
-    return LINE_QUANTITIES if scene.drive is None else COUPLE
+    if scene.drive is None:
+        return LINE_QUANTITIES
+    return COUPLE if scene.drive.has_stroke else (*COUPLE, STROKE)
 
 
 def _list_absent(scene: Scene) -> tuple[str, ...]:

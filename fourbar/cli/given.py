@@ -212,7 +212,9 @@ def _read_drawn(scene: Scene, name: str, text: str) -> float:
     from fourbar.files.drawing import find_drawn
 
     drawing = scene.drawing
-    drawn = None if drawing is None else find_drawn(drawing, scene.drive, name)
+    drawn = (
+        None if drawing is None else find_drawn(drawing, scene.settled().drive, name)
+    )
     if drawn is None:
         raise InputError("--at", text, "needs a scene that states [pins]")
     return drawn

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fourbar.edit.document import Path, SceneDocument
+from fourbar.effects import ForceDrive, Place, Springs
 from fourbar.errors import InputError
 from fourbar.files.drawing import DRAWN
 from fourbar.linkage import BAR_NAMES, MOVING_BARS
@@ -42,6 +43,8 @@ class Handle(NamedTuple):
     """True if the pair's angle turns with the bar."""
     force: Path | None = None
     """Path of the force whose arrow stands here."""
+    force_turns: bool = False
+    """True if the force's direction turns with the bar."""
 
     def drawn(self) -> dict[str, Any]:
         """Write it for the page."""
@@ -66,42 +69,59 @@ def list_handles(scene: Scene, document: dict[str, Any]) -> list[Handle]:
         if n in MOVING_BARS and scene.linkage.bar(n).mass > 0.0
     ]
     for point in scene.points:
-        path = ("points", point.name, "from_pin")
-        handles.append(
-            Handle(
-                f"point {point.name}", path, point.bar, 0j, cmath.rect(*point.from_pin)
-            )
-        )
+        name = f"point {point.name}"
+        handles.append(_hold_place(name, ("points", point.name), point.place, scene))
     for n, load in enumerate(scene.loads):
-        if load.force is not None:
-            foot, turns = scene.linkage.bar(load.bar).to_centre, load.frame == "bar"
-            force = ("loads", n, "force")
-            handles.append(
-                Handle(
-                    f"load {n + 1}",
-                    ("loads", n, "at"),
-                    load.bar,
-                    foot,
-                    cmath.rect(*load.at),
-                    turns,
-                    force,
-                )
-            )
-    lines: list[tuple[tuple[str | int, ...], Any]] = [
-        (("drive",), document.get("drive", {}))
-    ]
-    lines += [
-        (("effects", "springs", n), s)
-        for n, s in enumerate(document.get("effects", {}).get("springs", []))
-    ]
-    for path_of, entry in lines:
-        for end in ("from", "to"):
-            if isinstance(place := entry.get(end), dict):
-                stated = place.get("at", ("0 m", "0 rad"))
-                z = parse_place(stated, scene.drawing, place["bar"])
-                name = f"{end} of {path_of[-2:][0]} {path_of[-1] + 1 if isinstance(path_of[-1], int) else ''}".strip()
-                handles.append(Handle(name, (*path_of, end, "at"), place["bar"], 0j, z))
+        if load.force is None:
+            continue
+        name = f"load {n + 1}"
+        path: tuple[str | int, ...] = ("loads", n)
+        if load.arm is not None:
+            G = scene.linkage.bar(load.bar).to_centre
+            arm = cmath.rect(*load.arm)
+            handle = Handle(name, (*path, "arm"), load.bar, G, arm, turns=False)
+        else:
+            handle = _hold_place(name, path, load.place, scene)
+        handles.append(
+            handle._replace(force=(*path, "force"), force_turns=load.frame == "bar")
+        )
+    if scene.drive is not None:
+        handles += _hold_drive(scene.drive, scene)
+    for effect in scene.effects:
+        if isinstance(effect, Springs):
+            for n, spring in enumerate(effect.springs):
+                path = ("effects", "springs", n)
+                handles += _hold_ends(f"springs {n + 1}", path, spring, scene)
     return handles
+
+
+def _hold_drive(drive: ForceDrive, scene: Scene) -> list[Handle]:
+    """List the handles of a drive that exerts a force: its ends, or its point."""
+    if drive.has_stroke:
+        return _hold_ends("drive", ("drive",), drive, scene)
+    ((_, place),) = drive.ends
+    return [_hold_place("point of drive", ("drive",), place, scene)]
+
+
+def _hold_ends(name: str, path: Path, line: Any, scene: Scene) -> list[Handle]:
+    """List the handles of both ends of a line between two bars."""
+    return [
+        _hold_place(f"{end} of {name}", (*path, end), place, scene)
+        for end, place in (("from", line.start), ("to", line.end))
+    ]
+
+
+def _hold_place(name: str, path: Path, place: Place | None, scene: Scene) -> Handle:
+    """Make the handle of a place by the form in which it is stated; of a named point, by the point's."""
+    assert place is not None
+    if place.point is not None:
+        path = ("points", place.point)
+        place = next(point.place for point in scene.points if point.name == place.point)
+    if place.from_centre is not None:
+        G = scene.linkage.bar(place.bar).to_centre
+        pair = cmath.rect(*place.from_centre)
+        return Handle(name, (*path, "from_centre"), place.bar, G, pair)
+    return Handle(name, (*path, "from_pin"), place.bar, 0j, place.vector())
 
 
 class Dragged(NamedTuple):
@@ -158,12 +178,13 @@ def drag(
         frame = cmath.rect(1.0, turned[handle.bar])
         foot = pins[{1: "O2", 2: "O2", 3: "A", 4: "O4"}[handle.bar]] + frame * handle.at
         own_frame = frame if handle.turns else 1.0 + 0.0j
+        force_frame = frame if handle.force_turns else 1.0 + 0.0j
         if list(handle.path) == dragged.what:
             pair = (dragged.to - foot) / own_frame
             put_place(document, handle.path, pair, dragged.grain)
             return
         if handle.force is not None and list(handle.force) == dragged.what:
-            arrow = (dragged.to - foot - own_frame * handle.beyond) / own_frame
+            arrow = (dragged.to - foot - own_frame * handle.beyond) / force_frame
             size = str(plain["loads"][handle.force[1]]["force"][0])
             unit = find_unit(size, "N")
             force = to_si(size, unit) * dragged.stretch

@@ -14,14 +14,18 @@ if TYPE_CHECKING:
     from fourbar.effects.effect import Actions as Actions
     from fourbar.effects.effect import Effect as Effect
     from fourbar.effects.flywheel import Flywheel as Flywheel
+    from fourbar.effects.force_drive import ForceDrive as ForceDrive
     from fourbar.effects.friction import Friction as Friction
     from fourbar.effects.gravity import Gravity as Gravity
     from fourbar.effects.linear_drive import LinearDrive as LinearDrive
     from fourbar.effects.load import Load as Load
     from fourbar.effects.load import Table as Table
     from fourbar.effects.pin_friction import PinFriction as PinFriction
+    from fourbar.effects.place import STATED_PLACES as STATED_PLACES
+    from fourbar.effects.place import Place as Place
+    from fourbar.effects.place import require_place as require_place
+    from fourbar.effects.point_drive import PointDrive as PointDrive
     from fourbar.effects.spring import Spring as Spring
-    from fourbar.effects.spring import SpringEnd as SpringEnd
     from fourbar.effects.spring import Springs as Springs
     from fourbar.effects.torsion import Torsion as Torsion
     from fourbar.effects.viscous import Viscous as Viscous
@@ -39,9 +43,12 @@ FILE_OF = {
 OTHER_FILES = {
     "Effect": "effect",
     **dict.fromkeys(("Load", "Table"), "load"),
-    **dict.fromkeys(("Spring", "SpringEnd"), "spring"),
+    **dict.fromkeys(("Place", "STATED_PLACES", "require_place"), "place"),
+    "Spring": "spring",
     "Actions": "effect",
+    "ForceDrive": "force_drive",
     "LinearDrive": "linear_drive",
+    "PointDrive": "point_drive",
 }
 
 

@@ -111,7 +111,7 @@ class Actions:
         first, second = PINS[pin]
         on_second = force if start.bar == second else -force
         (from_start, square), (from_end, other_square) = (
-            point.from_pin(pin, self.state) for point in (start, end)
+            point.arm_from(pin, self.state) for point in (start, end)
         )
         by_one, by_other = (
             from_start * self.state.direction(start.bar),
@@ -332,8 +332,12 @@ class Effect:
         """Pins at which its couples jump."""
         return ()
 
+    def with_places(self, change: Callable[[Any], Any]) -> Self:
+        """Return the same effect with each `Place` of it changed; most effects have none."""
+        return self
+
     def act(self, actions: Actions, state: State) -> None:
-        """Add its forces and couples on the bars."""
+        """Add its forces and couples on the bars; its places are settled."""
 
     def solve_friction(
         self, actions: Actions, pins: PinForces, eliminate: Callable[..., PinForces]

@@ -1,13 +1,15 @@
 """External loads: a force at a point of a bar, or a pure couple on it, constant or a table over theta_2."""
 
 import math
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import KW_ONLY, dataclass
 from itertools import pairwise
 from typing import Any, ClassVar
 
 import numpy as np
 
 from fourbar.effects.effect import Actions, Effect
+from fourbar.effects.place import STATED_PLACES, Place, copy_with
 from fourbar.errors import InputError, LimitError, expect
 from fourbar.formulas.arithmetic import (
     PI_LOW,
@@ -31,7 +33,9 @@ TURN = 2.0 * math.pi
 BEYOND_TURN = 2.0 * PI_LOW
 """2 pi less TURN, rad: what counts after many turns."""
 FRAMES = ("world", "bar")
-"""Axes that a load keeps its angles to."""
+"""Axes in which the direction of a force is kept."""
+PLACES_OF_LOADS = ("from_pin", "from_centre", "point", "arm")
+"""Keys of which one says where a force acts."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,66 +127,115 @@ class Table:
 class Load(Effect):
     """A force and a couple on a moving bar.
 
+    The force acts at a place that turns with the bar, in a direction that is kept in
+    the world's axes or turns with the bar too.
+
     Parameters
     ----------
     bar : 2, 3 or 4.
-    force : (magnitude, angle), N and rad, or None.
-    at : (distance, angle) from the mass centre G to where the force acts, m and rad.
+    force : (magnitude, direction), N and rad, or None.
+    from_pin : (distance, angle) from the bar's first pin (O2, A, O4) to where the force
+        acts, m, the angle from the bar's line, rad.
+    from_centre : likewise from the mass centre G; (0, 0), which is G itself, where the
+        place of a force is left out.
+    point : name of the point of the scene at which the force acts.
+    arm : (distance, angle) from G in world axes, m and rad: the force keeps its lever
+        about G as the bar turns. In place of a place of the bar, for "world" alone.
     moment : couple, N m, counter-clockwise.
-    frame : "world": both angles are from +x; "bar": both turn with the bar, from its line.
+    frame : "world": the force's direction is from +x; "bar": from the bar's line.
     table : factor of force and couple over theta_2; None: constant.
     """
 
     bar: int
     force: tuple[float, float] | None = None
-    at: tuple[float, float] = (0.0, 0.0)
+    _: KW_ONLY
+    from_pin: tuple[float, float] | None = None
+    from_centre: tuple[float, float] | None = None
+    point: str | None = None
+    arm: tuple[float, float] | None = None
     moment: float = 0.0
     frame: str = "world"
     table: Table | None = None
     key: ClassVar[str] = "load"
     numbers: ClassVar[dict[str, Declared]] = {
         "force": Declared("N", left_out=None, pair=True),
-        "at": Declared("m", left_out=(0.0, 0.0), pair=True),
+        **STATED_PLACES,
+        "arm": Declared("m", left_out=None, pair=True),
         "moment": Declared("N m", left_out=0.0),
     }
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "bar", require_bar("loads.bar", self.bar))
-        expect("loads.frame", self.frame, str)
-        if self.frame not in FRAMES:
-            raise InputError(
-                "loads.frame",
-                self.frame,
-                "must be " + " or ".join(f'"{frame}"' for frame in FRAMES),
-            )
+        require_frame("loads.frame", self.frame)
+        expect("loads.point", self.point, str, type(None))
         expect("loads.table", self.table, Table, type(None))
         check_numbers(self, "loads")
+        forms = {
+            name: value
+            for name in PLACES_OF_LOADS
+            if (value := getattr(self, name)) is not None
+        }
+        if len(forms) > 1:
+            raise InputError(
+                "loads", " and ".join(forms), "a force acts at one place: state one"
+            )
+        if forms and self.force is None:
+            ((name, value),) = forms.items()
+            raise InputError(
+                f"loads.{name}", value, "needs a force: state one, or leave this out"
+            )
+        if self.arm is not None and self.frame == "bar":
+            allowed = (
+                "is in world axes, for a force of fixed direction; where the force "
+                "turns with the bar state from_pin or from_centre"
+            )
+            raise InputError("loads.arm", self.arm, allowed)
+        if not forms and self.force is not None:
+            object.__setattr__(self, "from_centre", (0.0, 0.0))
+
+    @property
+    def place(self) -> Place | None:
+        """Place of the force; None: there is no force, or it is stated by its arm."""
+        if self.force is None or self.arm is not None:
+            return None
+        return Place(self.bar, self.from_pin, self.from_centre, self.point)
+
+    def with_places(self, change: Callable[[Place], Place]) -> "Load":
+        """Return the same load with its place changed."""
+        place = self.place
+        if place is None or (changed := change(place)) is place:
+            return self
+        return copy_with(self, **changed._asdict())  # type: ignore[no-any-return]
 
     def act(self, actions: Actions, state: State) -> None:
-        """Add F at its point, and the couple."""
+        """Add F at its place, and the couple."""
         factor = 1.0
         if self.table is not None:
             factor = self.table.at(state.theta_2)
         if self.force is not None:
-            force, arm, G = (
-                polar(*self.force),
-                polar(*self.at),
-                actions.bodies[self.bar - 2].z,
-            )
+            force = polar(*self.force)
             if self.frame == "bar":
-                force, G, arm = force * state.direction(self.bar), G + arm, None
-            actions.force(self.bar, factor * force, G, arm)
+                force = force * state.direction(self.bar)
+            if self.arm is not None:
+                G = actions.bodies[self.bar - 2].z
+                actions.force(self.bar, factor * force, G, polar(*self.arm))
+            else:
+                assert self.place is not None
+                actions.force(self.bar, factor * force, self.place.vector())
         if is_any(self.moment != 0.0):
             actions.moment(self.bar, factor * self.moment)
 
     def greatest_force(self, linkage: FourBar) -> float:
-        """Return the force with its lever, and the couple divided by the bar's length, N."""
+        """Return the force with its lever, and the couple divided by the bar's length, N; of a settled load."""
         bar = linkage.bar(self.bar)
         total = abs(self.moment) / bar.length
         if self.force is not None:
-            total += abs(self.force[0]) * (
-                1.0 + (abs(bar.mass_centre[0]) + abs(self.at[0])) / bar.length
-            )
+            reach = abs(bar.mass_centre[0])
+            if self.arm is not None:
+                reach += abs(self.arm[0])
+            elif self.place is not None:
+                reach = abs(self.place.distance)
+            total += abs(self.force[0]) * (1.0 + reach / bar.length)
         return (
             total
             if self.table is None
@@ -200,3 +253,11 @@ class Load(Effect):
     def couple_on_drive(self, linkage: FourBar, speed: float) -> float:
         """Return the greatest force at the longest arm."""
         return self.greatest_force(linkage) * max(linkage.lengths)
+
+
+def require_frame(key: str, frame: object) -> None:
+    """Raise InputError for what is no name of the axes in which a direction is kept."""
+    expect(key, frame, str)
+    if frame not in FRAMES:
+        allowed = " or ".join(f'"{name}"' for name in FRAMES)
+        raise InputError(key, frame, f"must be {allowed}")

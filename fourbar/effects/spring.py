@@ -1,42 +1,35 @@
 """Linear springs, each between two points of two bars, the ground included."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.effects.effect import Actions, Effect
-from fourbar.errors import InputError, expect
-from fourbar.formulas.arithmetic import (
-    dot,
-    is_any,
-    polar,
-    select,
-    sine_of,
-    vector,
+from fourbar.effects.place import (
+    STATED_PLACES,
+    Place,
+    change_each,
+    copy_with,
+    require_ends,
 )
+from fourbar.errors import InputError, expect
+from fourbar.formulas.arithmetic import is_any, select
 from fourbar.formulas.motion import State
 from fourbar.linkage import (
     AT_LEAST_ZERO,
-    BAR_NAMES,
     POSITIVE,
-    SECOND_PIN,
     Declared,
     FourBar,
     check_numbers,
     require,
-    require_pair,
-    require_whole,
 )
 from fourbar.quantities import NO_DIRECTION, OK
 
 COINCIDE = 16.0 * 2.0**-52
 """Two points nearer than this part of their paths from O2, bar by bar, have no direction between them."""
-
-
-END_POSITION = Declared("m", left_out=(0.0, 0.0), pair=True)
-"""Declaration of the position of an end on its bar."""
 GAS = {
     **dict.fromkeys(("extended", "stroke"), Declared("m", POSITIVE)),
     **dict.fromkeys(
@@ -44,66 +37,6 @@ GAS = {
     ),
 }
 """Numbers of a gas spring, which becomes one of the springs."""
-
-
-class SpringEnd(NamedTuple):
-    """A point of a bar.
-
-    Parameters
-    ----------
-    bar : 1 (the ground), 2, 3 or 4.
-    distance, angle : from the bar's first pin (O2, O2, A, O4), m, the angle from its line, rad.
-    """
-
-    bar: int
-    distance: float
-    angle: float
-
-    @property
-    def in_bar(self) -> Any:
-        """Return the vector in the bar's frame, along + i across its line, m; an array, so products round alike."""
-        point = polar(self.distance, self.angle)
-        return np.asarray(point) if isinstance(point, complex) else point
-
-    def from_pin(self, pin: str, state: State) -> tuple[Any, Any]:
-        """Return the vector from one of the bar's pins in the bar's frame, complex, m, and the square of its length."""
-        arm = self.in_bar
-        if pin != SECOND_PIN[self.bar]:
-            return arm, self.distance * self.distance
-        half = sine_of(
-            0.5 * self.angle
-        )  # r cos phi - L near the pin, where the cosine rounds to 1
-        arm = vector(
-            (self.distance - state.lengths[self.bar - 1])
-            - 2.0 * self.distance * half * half,
-            arm.imag,
-        )
-        return arm, dot(arm, arm)
-
-    def place(self, state: State) -> Any:
-        """Return the position of the end, complex, m."""
-        return state.foot(self.bar) + self.in_bar * state.direction(self.bar)
-
-
-def require_ends(key: str, start: object, end: object) -> tuple[SpringEnd, SpringEnd]:
-    """Return the ends of a line between two bars, checked; InputError for what is none."""
-    ends = []
-    for name, point in (("from", start), ("to", end)):
-        if not isinstance(point, SpringEnd):
-            raise InputError(f"{key}.{name}", point, "must be a fourbar.SpringEnd")
-        bar = require_whole(
-            f"{key}.{name}.bar", point.bar, BAR_NAMES, "must be 1, 2, 3 or 4"
-        )
-        ends.append(
-            SpringEnd(
-                bar, *require_pair(f"{key}.{name}.at", point[1:], END_POSITION.unit)
-            )
-        )
-    if ends[0].bar == ends[1].bar:
-        raise InputError(
-            f"{key}.to.bar", ends[1].bar, "must be another bar than that of `from`"
-        )
-    return ends[0], ends[1]
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,8 +54,8 @@ class Spring:
     preload : N, > 0 pulls, < 0 pushes.
     """
 
-    start: SpringEnd
-    end: SpringEnd
+    start: Place
+    end: Place
     stiffness: float
     length: float = 0.0
     preload: float = 0.0
@@ -144,8 +77,8 @@ class Spring:
     @classmethod
     def gas(
         cls,
-        start: SpringEnd,
-        end: SpringEnd,
+        start: Place,
+        end: Place,
         extended: float,
         stroke: float,
         extended_force: float,
@@ -185,6 +118,10 @@ class Spring:
             )
         return cls(start, end, (last - first) / stroke, extended, -first)
 
+    def with_places(self, change: Callable[[Place], Place]) -> "Spring":
+        """Return the same spring with its ends changed."""
+        return copy_with(self, start=change(self.start), end=change(self.end))  # type: ignore[no-any-return]
+
     @property
     def slack(self) -> float:
         """Tension less stiffness times distance, N; 0: the force is proportional to the distance vector."""
@@ -193,7 +130,7 @@ class Spring:
     def greatest_tension(self, linkage: FourBar) -> float:
         """Return a bound of the tension, N: the points stay within the linkage and their own arms."""
         reach = sum(linkage.lengths) + abs(self.start.distance) + abs(self.end.distance)
-        return abs(self.preload) + self.stiffness * (reach + self.length)
+        return float(abs(self.preload) + self.stiffness * (reach + self.length))
 
 
 @dataclass(frozen=True, slots=True)
@@ -208,10 +145,11 @@ class Springs(Effect):
     key: ClassVar[str] = "springs"
     in_balls: ClassVar[bool] = True
     example: ClassVar[str] = (
-        'springs = [{ from = { bar = 1, at = ["10 cm", "-90 deg"] }, to = { bar = 4, at = ["8 cm", "0 deg"] }, '
+        'springs = [{ from = { bar = 1, from_pin = ["10 cm", "-90 deg"] }, '
+        'to = { bar = 4, from_pin = ["8 cm", "0 deg"] }, '
         'stiffness = "200 N/m", length = "12 cm", preload = "3 N" }]'
     )
-    numbers: ClassVar[dict[str, Declared]] = {**Spring.numbers, "at": END_POSITION}
+    numbers: ClassVar[dict[str, Declared]] = {**Spring.numbers, **STATED_PLACES}
 
     def __post_init__(self) -> None:
         expect("effects.springs", self.springs, tuple, list)
@@ -219,10 +157,15 @@ class Springs(Effect):
             expect("effects.springs", spring, Spring)
         object.__setattr__(self, "springs", tuple(self.springs))
 
+    def with_places(self, change: Callable[[Place], Place]) -> "Springs":
+        """Return the same springs with their ends changed."""
+        springs = change_each(self.springs, change)
+        return copy_with(self, springs=springs)  # type: ignore[no-any-return]
+
     def act(self, actions: Actions, state: State) -> None:
         """Add the tension at `start` along the unit vector to `end`, and its opposite at `end`."""
         for spring in self.springs:
-            across = spring.end.place(state) - spring.start.place(state)
+            across = spring.end.locate(state) - spring.start.locate(state)
             by_distance = spring.stiffness
             if is_any(spring.slack != 0.0):
                 # NaN at a distance of 0, where the status says so
@@ -237,7 +180,7 @@ class Springs(Effect):
         for spring in self.springs:
             if not is_any(spring.slack != 0.0):
                 continue
-            across = spring.end.place(state) - spring.start.place(state)
+            across = spring.end.locate(state) - spring.start.locate(state)
             away = (
                 sum(state.lengths[:4])
                 + abs(spring.start.distance)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.effects.effect import Actions, SolvedFriction, list_bodies
-from fourbar.formulas.arithmetic import U, angle, is_any, polar, select
+from fourbar.formulas.arithmetic import U, angle, is_any, select
 from fourbar.formulas.longer import change_numbers, lengthen
 from fourbar.formulas.motion import Coefficients, State, rates
 from fourbar.formulas.path import NO_DIGIT_LEFT, Path, prepare_path
@@ -26,7 +26,7 @@ from fourbar.quantities import COUPLE, JAMMED, LINE, Array, DriveNames
 from fourbar.scene import Command, Scene
 
 if TYPE_CHECKING:
-    from fourbar.effects import Effect, LinearDrive
+    from fourbar.effects import Effect, ForceDrive
 
 
 BLOCK = 8000
@@ -89,16 +89,17 @@ class Case(NamedTuple):
     """The scene's own: name, bar, and place in the bar's frame at its first pin, complex, m."""
     side: Any = 0
     """Impending direction of rotation at pins at rest, or the fraction of its torque with which friction holds them."""
-    drive: "LinearDrive | None" = None
+    drive: "ForceDrive | None" = None
     """Linear drive that replaces the couple on the driven bar."""
 
     @classmethod
     def of(cls, scene: Scene, bar: int = 2) -> "Case":
         """Collect the numbers that stay the same over the positions, for a command of bar 2, 3 or 4."""
+        scene = scene.settled()
         terms, linkage = (*scene.loads, *scene.effects), scene.linkage
         path = prepare_path(Loop(*linkage.lengths, 0.0, 0.0), linkage.ground_angle, bar)
         points = tuple(
-            (point.name, point.bar, polar(*point.from_pin)) for point in scene.points
+            (point.name, point.bar, point.place.vector()) for point in scene.points
         )
         lengths, bodies = _restore_unit(linkage, path), list_bodies(linkage, terms)
         return cls(

@@ -43,7 +43,7 @@ from fourbar.scene import Command
 from fourbar.scene.numbers import POINT_STAGES
 
 if TYPE_CHECKING:
-    from fourbar.effects import LinearDrive
+    from fourbar.effects import ForceDrive
 
 FORCE, ERROR = STAGES.index("force"), STAGES.index("error")
 WITHOUT_FORCES = (NO_DIRECTION, WOUND, NO_LEVER)
@@ -93,7 +93,7 @@ def evaluate(
 def evaluate_released(
     case: Case,
     command: Command,
-    drive: "LinearDrive | None",
+    drive: "ForceDrive | None",
     last_stage: int,
     names: Set[str],
 ) -> Evaluated:
@@ -379,11 +379,9 @@ def list_kinematics(case: Case, state: State, names: Set[str]) -> dict[str, Any]
     }
     if case.drive is not None and not names.isdisjoint(LINE_QUANTITIES):
         stroke, unit = case.drive.line(state)
-        of_line = {
-            "stroke": stroke,
-            "drive_line": unit,
-            "stroke_speed": case.drive_speed(state),
-        }
+        of_line = {"drive_line": unit, "stroke_speed": case.drive_speed(state)}
+        if case.drive.has_stroke:
+            of_line["stroke"] = stroke
         values |= {name: value for name, value in of_line.items() if name in names}
     if not case.points and names.isdisjoint(PLACES):
         return values

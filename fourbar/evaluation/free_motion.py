@@ -110,9 +110,10 @@ def release(scene: Scene) -> Released:
             scene.motion.angle,
             "a free motion is released at one angle",
         )
+    placed = scene.settled()
     released = integrate(
         scene.linkage,
-        (*scene.loads, *scene.effects),
+        (*placed.loads, *placed.effects),
         float(start.angle[0]),
         scene.motion.speed or 0.0,
         int(start.branch[0]),

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from fourbar.effects import LinearDrive
+from fourbar.effects import ForceDrive, LinearDrive, Place
 from fourbar.files.fields import Reader
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, PINS, Bar, FourBar
 from fourbar.scene import Scene, command_at
@@ -104,6 +104,8 @@ def _state_places(
             raise read.refuse(
                 key, value, "a place of the drawing needs the bar it is of"
             )
+        if key.endswith((".from_centre", ".arm")):
+            raise read.refuse(key, value, "a place of the drawing is written from_pin")
         z = drawing.into_bar(bar, read_point(read, f"{key}.{DRAWN}", entry[DRAWN]))
         return {"x": f"{z.real!r} m", "y": f"{z.imag!r} m"}
     number = value.get("bar")
@@ -141,19 +143,24 @@ def state_motion(
     return stated
 
 
-def find_drawn(drawing: DrawnPins, line: LinearDrive | None, name: str) -> float | None:
+def find_drawn(drawing: DrawnPins, line: ForceDrive | None, name: str) -> float | None:
     """Return the drawn angle or stroke of this name, rad or m; None where there is none."""
     if name in ANGLES:
         return drawing.angle(ANGLES[name])
-    if name != STROKE_COMMAND[0] or line is None:
+    if name != STROKE_COMMAND[0] or not isinstance(line, LinearDrive):
         return None
-    start, end = (drawing.end(*point) for point in (line.start, line.end))
+    start, end = (_draw_end(drawing, place) for place in (line.start, line.end))
     return abs(end - start)
+
+
+def _draw_end(drawing: DrawnPins, place: Place) -> complex:
+    """Return where a settled end of a line is drawn, m."""
+    return drawing.end(place.bar, *place.polar_from_pin())
 
 
 def _find_side(drawing: DrawnPins, line: LinearDrive) -> str | None:
     """Find the side of a cylinder's end on its bar; None where it does not join the ground to a bar."""
-    ends = {point.bar: drawing.end(*point) for point in (line.start, line.end)}
+    ends = {place.bar: _draw_end(drawing, place) for place in (line.start, line.end)}
     (bar,) = ends.keys() - {1} or (None,)
     if 1 not in ends or bar is None:
         return None

@@ -6,6 +6,7 @@ Numbers are rounded once when they are read; what is written reads back bit for 
 import math
 import re
 import tomllib
+from collections.abc import Mapping
 from dataclasses import MISSING, fields, replace
 from pathlib import Path
 from typing import IO, Any
@@ -15,18 +16,21 @@ import numpy as np
 from fourbar import writing
 from fourbar.effects import (
     Effect,
+    ForceDrive,
     Gravity,
     LinearDrive,
     Load,
+    Place,
+    PointDrive,
     Spring,
-    SpringEnd,
     Springs,
     Table,
     list_kinds,
 )
 from fourbar.effects.effect import PinRows
 from fourbar.effects.load import FRAMES
-from fourbar.effects.spring import END_POSITION, GAS
+from fourbar.effects.place import AT_FIRST_PIN, STATED_PLACES
+from fourbar.effects.spring import GAS
 from fourbar.errors import InputError, expect
 from fourbar.files.drawing import (
     choose_assembly,
@@ -35,6 +39,14 @@ from fourbar.files.drawing import (
     state_motion,
 )
 from fourbar.files.fields import BARE_KEY, Reader
+from fourbar.files.place import (
+    AT_OF_A_LOAD,
+    PLACES_OF_A_LOAD,
+    PLACES_OF_ENDS,
+    PLACES_OF_POINTS,
+    read_stated_place,
+    read_table_with_place,
+)
 from fourbar.files.scene_text import BARS, BRANCHES, SIGMA
 from fourbar.formulas.mobility import meet_change_points
 from fourbar.linkage import ANY, BAR_NAMES, MOST_STEPS, PINS, POSITIVE, Bar, FourBar
@@ -85,6 +97,8 @@ TABLES = (
     "effects",
     "tolerances",
 )
+A_LINE = "a drive along a line has from and to alone"
+A_POINT = "a force acts at a place: state point, from_pin or from_centre"
 MOST_POINTS = 1000
 """Each is three columns of every table."""
 
@@ -180,38 +194,36 @@ def read_scene(read: Reader, document: dict[str, Any], folder: str) -> Scene:
     drawing = read_drawing(read, top)
     if drawing is not None:
         top = state_lengths(read, top, drawing)
-    drive = read.table("drive", top.get("drive", {}), ("bar", "from", "to"))
-    line = None
-    if "from" in drive or "to" in drive:
-        if "bar" in drive:
-            raise read.refuse(
-                "drive.bar",
-                drive["bar"],
-                "a drive acts on a bar or along a line: bar, or from and to",
-            )
-        line = LinearDrive(*_read_ends(read, "drive", drive))
+    points = _read_points(read, top.get("points", {}))
+    bars = {point.name: point.bar for point in points}
+    drive_bar, drive = _read_drive(read, top.get("drive", {}), bars)
     entries = top.get("loads", [])
     if not isinstance(entries, list) or len(entries) > MOST_LOADS:
         raise read.refuse(
             "loads", entries, f"must be written as [[loads]], at most {MOST_LOADS}"
         )
     effects = read.table("effects", top.get("effects", {}), list_kinds())
-    motion = top.get("motion", {})
+    motion, linkage = top.get("motion", {}), _read_linkage(read, top)
     if drawing is not None:
+        places = {point.name: point.place for point in points}
+        line = None
+        if isinstance(drive, LinearDrive):
+            line = drive.with_places(lambda place: place.settle(linkage, places))
         motion = state_motion(read, motion, drawing, line)
     scene = Scene(
-        _read_linkage(read, top),
+        linkage,
         _read_motion(read, motion),
-        None if line else read.whole("drive.bar", drive.get("bar", 2), 2, 4),  # type: ignore[arg-type]
+        drive_bar,  # type: ignore[arg-type]
         tuple(
-            _load(read, f"loads[{index}]", entry) for index, entry in enumerate(entries)
+            _read_load(read, f"loads[{index}]", entry, bars)
+            for index, entry in enumerate(entries)
         ),
-        tuple(_read_effect(read, key, value) for key, value in effects.items()),
+        tuple(_read_effect(read, key, value, bars) for key, value in effects.items()),
         read.text("title", top.get("title", "")),
         read.text("source", top.get("source", "")),
         _read_pictures(read, top.get("bars", {}), folder),
-        _read_points(read, top.get("points", {})),
-        drive=line,
+        points,
+        drive=drive,
         drawing=drawing,
     )
     if drawing is not None:
@@ -222,6 +234,26 @@ def read_scene(read: Reader, document: dict[str, Any], folder: str) -> Scene:
     )
 
 
+def _read_drive(
+    read: Reader, value: object, bars: Mapping[str, int]
+) -> tuple[int | None, ForceDrive | None]:
+    """Read the bar on which a couple acts, or a force along a line or at a place."""
+    allowed = ("bar", "from", "to", *PLACES_OF_ENDS, "direction", "frame")
+    entry = read_table_with_place(read, "drive", value, allowed)
+    if "from" in entry or "to" in entry:
+        for name in entry.keys() - {"from", "to"}:
+            raise read.refuse(f"drive.{name}", entry[name], A_LINE)
+        return None, LinearDrive(*_read_ends(read, "drive", entry, bars))
+    if not entry.keys() & {*PLACES_OF_ENDS, "direction", "frame"}:
+        return read.whole("drive.bar", entry.get("bar", 2), 2, 4), None
+    place = read_stated_place(read, "drive", entry, bars, PLACES_OF_ENDS, 2)
+    if place == Place(place.bar):
+        raise read.refuse("drive.point", None, A_POINT)
+    direction = read.quantity("drive.direction", entry.get("direction"), "rad")
+    frame = read.choice("drive.frame", entry.get("frame", FRAMES[0]), FRAMES)
+    return None, PointDrive(place, direction, frame)
+
+
 def _read_points(read: Reader, value: object) -> tuple[Point, ...]:
     if not isinstance(value, dict) or len(value) > MOST_POINTS:
         raise read.refuse(
@@ -230,9 +262,9 @@ def _read_points(read: Reader, value: object) -> tuple[Point, ...]:
     points = []
     for name, point in value.items():
         key = f"points.{name}" if BARE_KEY.fullmatch(name) else "points"
-        entry = read.table(key, point, ("bar", *Point.numbers))
-        bar = read.whole(f"{key}.bar", entry.get("bar"), 1, 4)
-        points.append(Point(name, bar, **read.numbers(key, entry, Point.numbers)))
+        entry = read_table_with_place(read, key, point, ("bar", *STATED_PLACES))
+        place = read_stated_place(read, key, entry, {}, PLACES_OF_POINTS)
+        points.append(Point(name, place.bar, place.from_pin, place.from_centre))
     return tuple(points)
 
 
@@ -404,8 +436,11 @@ def _read_places(
     )
 
 
-def _load(read: Reader, key: str, value: object) -> Load:
-    entry = read.table(key, value, ("bar", *Load.numbers, "frame", "table"))
+def _read_load(read: Reader, key: str, value: object, bars: Mapping[str, int]) -> Load:
+    allowed = ("bar", *Load.numbers, "point", "frame", "table")
+    turns = isinstance(value, dict) and value.get("frame") == "bar"
+    instead = AT_OF_A_LOAD["bar" if turns else "world"]
+    entry = read_table_with_place(read, key, value, allowed, instead)
     table = None
     if "table" in entry:
         over = read.table(f"{key}.table", entry["table"], ("theta_2", "factor"))
@@ -426,26 +461,28 @@ def _load(read: Reader, key: str, value: object) -> Load:
         )
     if "force" not in entry and "moment" not in entry:
         raise read.refuse(key, value, "must have a force, a moment or both")
-    if "at" in entry and "force" not in entry:
+    place = read_stated_place(read, key, entry, bars, PLACES_OF_A_LOAD, 2)
+    numbers = {name: Load.numbers[name] for name in ("force", "arm", "moment")}
+    stated = read.numbers(key, entry, numbers)
+    frame = read.choice(f"{key}.frame", entry.get("frame", FRAMES[0]), FRAMES)
+    try:
+        return Load(**place._asdict(), **stated, frame=frame, table=table)
+    except InputError as error:  # which knows of one load alone
         raise read.refuse(
-            f"{key}.at", entry["at"], "needs a force: state one, or leave this out"
-        )
-    return Load(
-        read.whole(f"{key}.bar", entry.get("bar"), 2, 4),
-        **read.numbers(key, entry, Load.numbers),
-        frame=read.choice(f"{key}.frame", entry.get("frame", FRAMES[0]), FRAMES),
-        table=table,
-    )
+            error.key.replace("loads", key), error.value, error.allowed
+        ) from None
 
 
-def _read_effect(read: Reader, key: str, value: object) -> Effect:
+def _read_effect(
+    read: Reader, key: str, value: object, bar_of_point: Mapping[str, int]
+) -> Effect:
     """Read an effect from the value under its key."""
     kind: Any = list_kinds()[key]
     path = f"effects.{key}"
     if kind is Gravity:
         return Gravity(*read.polar(path, value, kind.numbers["magnitude"].unit))
     if kind is Springs:
-        return _read_springs(read, path, value)
+        return _read_springs(read, path, value, bar_of_point)
     if issubclass(kind, PinRows):
         rows = []
         for pin, entry in read.table(path, value, PINS).items():
@@ -472,7 +509,9 @@ def _read_effect(read: Reader, key: str, value: object) -> Effect:
     return kind(**bar, **read.numbers(path, stated, kind.numbers))  # type: ignore[no-any-return]
 
 
-def _read_springs(read: Reader, key: str, value: object) -> Springs:
+def _read_springs(
+    read: Reader, key: str, value: object, bars: Mapping[str, int]
+) -> Springs:
     """Read springs and gas springs."""
     if not isinstance(value, list) or not 1 <= len(value) <= MOST_SPRINGS:
         raise read.refuse(key, value, f"must be a list of 1 to {MOST_SPRINGS} springs")
@@ -480,7 +519,7 @@ def _read_springs(read: Reader, key: str, value: object) -> Springs:
     for index, entry in enumerate(value):
         path = f"{key}[{index}]"
         row = read.table(path, entry, ("from", "to", *Spring.numbers, "gas"))
-        start, end = _read_ends(read, path, row)
+        start, end = _read_ends(read, path, row, bars)
         if gas := "gas" in row:
             read.table(path, entry, ("from", "to", "gas"))
             words = read.table(f"{path}.gas", row["gas"], GAS)
@@ -505,17 +544,16 @@ def _read_springs(read: Reader, key: str, value: object) -> Springs:
 
 
 def _read_ends(
-    read: Reader, key: str, row: dict[str, Any]
-) -> tuple[SpringEnd, SpringEnd]:
-    """Read the entries `from` and `to` of a line between two bars; an end without `at` is at the bar's first pin."""
+    read: Reader, key: str, row: dict[str, Any], bars: Mapping[str, int]
+) -> tuple[Place, Place]:
+    """Read the entries `from` and `to` of a line between two bars; an end without a place is at its bar's first pin."""
     ends = []
     for name in ("from", "to"):
         path = f"{key}.{name}"
-        entry = read.table(path, row.get(name), ("bar", "at"))
-        bar = read.whole(f"{path}.bar", entry.get("bar"), 1, 4)
-        ends.append(
-            SpringEnd(bar, *read.declared(f"{path}.at", entry.get("at"), END_POSITION))
-        )
+        allowed = ("bar", *PLACES_OF_ENDS)
+        entry = read_table_with_place(read, path, row.get(name), allowed)
+        end = read_stated_place(read, path, entry, bars, PLACES_OF_ENDS)
+        ends.append(Place(end.bar, AT_FIRST_PIN) if len(set(end)) == 2 else end)
     return ends[0], ends[1]
 
 

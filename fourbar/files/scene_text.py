@@ -11,9 +11,17 @@ from typing import Any
 
 import numpy as np
 
-from fourbar.effects import Effect, Gravity, Load, Springs, list_kinds
+from fourbar.effects import (
+    Effect,
+    Gravity,
+    Load,
+    Place,
+    PointDrive,
+    Springs,
+    list_kinds,
+)
 from fourbar.effects.effect import PinRows
-from fourbar.effects.spring import END_POSITION
+from fourbar.effects.place import STATED_PLACES
 from fourbar.errors import InputError, expect
 from fourbar.files.drawing import choose_assembly, read_point
 from fourbar.files.fields import (
@@ -143,9 +151,7 @@ def describe(scene: Scene) -> dict[str, Any]:
     return {
         "lengths": lengths,
         "bars": {name: entry for name, entry in bars.items() if entry},
-        "drive": {"bar": scene.drive_bar}
-        if scene.drive is None
-        else _write_ends(scene.drive),
+        "drive": _write_drive(scene),
         "loads": [_load_entry(load) for load in scene.loads],
         "effects": effects,
     }
@@ -211,8 +217,8 @@ def _load_entry(load: Load) -> dict[str, Any]:
         **write_numbers(load),
         "frame": load.frame,
     }
-    if load.force is None:
-        del entry["at"]
+    if load.point is not None:
+        entry["point"] = load.point
     if load.table is not None:
         angles = [write_quantity(angle, "rad") for angle in load.table.theta_2]
         entry["table"] = {"theta_2": angles, "factor": list(load.table.factor)}
@@ -254,9 +260,29 @@ def _write_effect(effect: Effect) -> Any:
 def _write_ends(line: Any) -> dict[str, Any]:
     """Write the entries `from` and `to` of a line between two bars."""
     ends = {"from": line.start, "to": line.end}
+    return {name: {"bar": end.bar, **_write_place(end)} for name, end in ends.items()}
+
+
+def _write_drive(scene: Scene) -> dict[str, Any]:
+    """Write the bar on which a couple acts, or a force along a line or at a place."""
+    drive = scene.drive
+    if drive is None:
+        return {"bar": scene.drive_bar}
+    if not isinstance(drive, PointDrive):
+        return _write_ends(drive)
+    direction = write_quantity(drive.direction, "rad")
+    where = {"bar": drive.place.bar, **_write_place(drive.place)}
+    return {**where, "direction": direction, "frame": drive.frame}
+
+
+def _write_place(place: Place) -> dict[str, Any]:
+    """Write the form in which a place is stated."""
+    if place.point is not None:
+        return {"point": place.point}
     return {
-        name: {"bar": end.bar, "at": write_declared(end[1:], END_POSITION)}
-        for name, end in ends.items()
+        name: write_declared(pair, declared)
+        for name, declared in STATED_PLACES.items()
+        if (pair := getattr(place, name)) is not None
     }
 
 

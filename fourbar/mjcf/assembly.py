@@ -65,9 +65,7 @@ def assemble(
             f"loads (here on {on}) have no counterpart in {form}; --without-loads leaves them out"
         )
     if scene.drive is not None:
-        raise LimitError(
-            f"a linear drive (drive.from, drive.to) has no counterpart in {form}"
-        )
+        raise LimitError(f"a drive that exerts a force has no counterpart in {form}")
     linkage = scene.linkage
     require_carriable(linkage)
     inertia = {number: linkage.bar(number).moment_of_inertia for number in MOVING_BARS}

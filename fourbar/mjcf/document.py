@@ -9,6 +9,7 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
+from fourbar.effects import LinearDrive
 from fourbar.effects.effect import PinRows
 from fourbar.errors import InputError, LimitError, NotAssembledError, clean_line
 from fourbar.formulas.mobility import change_points, choose_range, turns_fully
@@ -94,7 +95,8 @@ def write_mjcf(
             "a motion law has no counterpart in MJCF: its drive keeps omega_2 or alpha_2"
         )
     require_carriable(scene.linkage)
-    cylinder = scene.drive
+    scene = scene.in_pairs_from_pins()
+    cylinder = _find_cylinder(scene, drive)
     if scene.motion.free is not None:
         drive, cylinder = "none", None
     if drive != "flywheel":
@@ -172,6 +174,17 @@ def _shift_world(root: ET.Element, origin: tuple[float, float]) -> None:
             element.set(name, join(*shifted))
 
 
+def _find_cylinder(scene: Scene, drive: Drive) -> LinearDrive | None:
+    """Return the cylinder that drives; LimitError for a motor of another force."""
+    if isinstance(scene.drive, LinearDrive):
+        return scene.drive
+    if scene.drive is not None and drive == "motor":
+        raise LimitError(
+            "a force at a point has no motor in MJCF: choose flywheel or none"
+        )
+    return None
+
+
 def _is_passive(drive: Drive, reader: str) -> bool:
     """Return whether loads have no controls: MuJoCo alone reads motors without one."""
     return drive == "motor" and reader == "mujoco"
@@ -194,8 +207,9 @@ def _write_comments(
     scene: Scene, drive: Drive, reader: str, *, exerts: bool
 ) -> list[str]:
     """Say how the file starts and where its numbers stand, a line each."""
+    linear = isinstance(scene.drive, LinearDrive)
     notes, numbers, bar = NOTES["mjcf"], NOTES["numbers"][reader], scene.drive_bar
-    kinds: list[str] = [drive if scene.drive is None else f"cylinder_{drive}"]
+    kinds: list[str] = [f"cylinder_{drive}" if linear else drive]
     if scene.motion.free is not None:
         kinds = ["released"]
     elif drive == "flywheel":
@@ -208,6 +222,8 @@ def _write_comments(
         )
         kinds += (
             ["cylinder_flywheel"]
+            if linear
+            else ["pushed"]
             if scene.drive is not None
             else ["elsewhere"]
             if bar != 2
@@ -324,6 +340,7 @@ def _sum_inertia(linkage: FourBar) -> float:
 
 def _sum_load_inertia(scene: Scene) -> float:
     """Sum the couples of loads and effects on the drive, divided by the acceleration scale, kg m^2."""
+    scene = scene.settled()
     acceleration = _compute_acceleration_scale(scene)
     speed = math.sqrt(acceleration)
     couples = (

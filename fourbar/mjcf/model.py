@@ -14,7 +14,8 @@ from fourbar.linkage import BAR_NAMES, FIRST_PIN, MOVING_BARS, PINS, FourBar
 if TYPE_CHECKING:
     from fourbar.effects import LinearDrive, Load
     from fourbar.effects.effect import Joints
-    from fourbar.effects.spring import Spring, SpringEnd
+    from fourbar.effects.place import Place
+    from fourbar.effects.spring import Spring
     from fourbar.scene import Scene
 
 
@@ -427,8 +428,8 @@ class Model:
         root: ET.Element,
         tendons: ET.Element,
         name: str,
-        start: "SpringEnd",
-        end: "SpringEnd",
+        start: "Place",
+        end: "Place",
     ) -> ET.Element:
         """Add a tendon between two points of bars, with a site at each."""
         tendon = ET.SubElement(tendons, "spatial", name=name)
@@ -445,14 +446,13 @@ class Model:
         return tendon
 
     def add_load_sites(self, root: ET.Element) -> None:
-        """Add the point at which each load acts: G for world axes (the arm becomes a couple), else the point itself."""
+        """Add the point at which each load acts: its place, or G where an arm becomes a couple or no force acts."""
         for index, load in enumerate(self.loads, 1):
-            to_G = self.linkage.bar(load.bar).to_centre
-            x, y = to_G.real, to_G.imag
-            if load.frame == "bar":
-                x += load.at[0] * math.cos(load.at[1])
-                y += load.at[0] * math.sin(load.at[1])
-            self._add_site(_find_body(root, load.bar), f"load_{index}", x, y)
+            z = self.linkage.bar(load.bar).to_centre
+            if load.place is not None:
+                z = load.place.vector()
+            body = _find_body(root, load.bar)
+            self._add_site(body, f"load_{index}", z.real, z.imag)
 
     def add_actuators(
         self, root: ET.Element, drive: dict[str, str], *, cylinder: bool, passive: bool
@@ -496,12 +496,10 @@ class Model:
                     load.force[0] * math.cos(load.force[1]),
                     load.force[0] * math.sin(load.force[1]),
                 )
-                if (
-                    load.frame == "world"
-                ):  # force and arm both keep their direction: so does the couple
-                    couple += load.at[0] * (
-                        math.cos(load.at[1]) * fy - math.sin(load.at[1]) * fx
-                    )
+                if load.arm is not None:
+                    # force and arm both keep their direction, and so their moment
+                    arm, angle = load.arm
+                    couple += arm * (math.cos(angle) * fy - math.sin(angle) * fx)
             placed = {"name": f"load_{index}", "site": f"load_{index}"}
             if load.frame == "world":
                 placed["refsite"] = "O2"

@@ -60,7 +60,10 @@ class Quantities:
         "m", "position", "distance of the linear drive's ends", "linear drive"
     )
     drive_line: Array | None = _vector(
-        "1", "position", "unit vector from its one end to the other", "linear drive"
+        "1",
+        "position",
+        "unit vector from its one end to the other, or of the force at a point",
+        "linear drive",
     )
     omega_2: Array | None = _scalar(
         "rad/s", "velocity", "angular velocity of the input"
@@ -77,7 +80,10 @@ class Quantities:
     v_G3: Array | None = _vector("m/s", "velocity", "velocity of G3")
     v_G4: Array | None = _vector("m/s", "velocity", "velocity of G4")
     stroke_speed: Array | None = _scalar(
-        "m/s", "velocity", "speed at which the stroke grows", "linear drive"
+        "m/s",
+        "velocity",
+        "speed at which the stroke grows, or of the driven point along the force",
+        "linear drive",
     )
     alpha_2: Array | None = _scalar(
         "rad/s^2", "acceleration", "angular acceleration of the input"
@@ -195,7 +201,9 @@ LINE = DriveNames(
 LINE_QUANTITIES = (
     *dict.fromkeys((*(q.name for q in QUANTITIES if q.group == "linear drive"), *LINE)),
 )
-"""Every quantity that exists only where the drive is linear."""
+"""Every quantity that exists only where the drive is a force."""
+STROKE = "stroke"
+"""What a force at a point lacks of them."""
 FORCES = (*PIN_FORCES, COUPLE.value, LINE.value, "power")
 DRY_FRICTION_QUANTITIES = tuple(q.name for q in QUANTITIES if q.group == "dry friction")
 PIN_LOAD_QUANTITIES = tuple(q.name for q in QUANTITIES if q.group == "pin loads")

@@ -1,10 +1,12 @@
 """Points that a scene wants, and its numbers by their keys: units, declared where they belong, and tolerances."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar
 
 from fourbar import effects
+from fourbar.effects.place import copy_with
 from fourbar.errors import InputError, expect
 from fourbar.linkage import (
     BAR_NAMES,
@@ -34,12 +36,14 @@ class Point:
     name : letters, digits and underlines; no name of a quantity, as v_ and a_ with it.
     bar : 1, 2, 3 or 4.
     from_pin : (distance, angle), from the bar's first pin (O2, O2, A, O4), the angle from its line, m and rad.
+    from_centre : likewise from the bar's mass centre, in place of `from_pin`.
     """
 
     name: str
     bar: int
-    from_pin: tuple[float, float]
-    numbers: ClassVar[dict[str, Declared]] = {"from_pin": Declared("m", pair=True)}
+    from_pin: tuple[float, float] | None = None
+    from_centre: tuple[float, float] | None = None
+    numbers: ClassVar[dict[str, Declared]] = effects.STATED_PLACES
 
     def __post_init__(self) -> None:
         plain = (
@@ -63,6 +67,19 @@ class Point:
         )
         object.__setattr__(self, "bar", bar)
         check_numbers(self, self.key)
+        effects.require_place(self.key, self.place)
+
+    @property
+    def place(self) -> effects.Place:
+        """Place of the point on its bar."""
+        return effects.Place(self.bar, self.from_pin, self.from_centre)
+
+    def with_places(self, change: Callable[[effects.Place], effects.Place]) -> "Point":
+        """Return the same point with its place changed."""
+        stated = self.place
+        if (place := change(stated)) is stated:
+            return self
+        return copy_with(self, from_pin=place.from_pin, from_centre=place.from_centre)  # type: ignore[no-any-return]
 
     @property
     def key(self) -> str:
@@ -110,7 +127,7 @@ def find_unit(key: str) -> str | None:
     if table == "loads":
         numbers = effects.Load.numbers
     elif table == "drive":
-        numbers = {"at": effects.Springs.numbers["at"]}
+        numbers = {**effects.STATED_PLACES, "direction": Declared("rad")}
     elif table == "effects" and names and (kind := effects.list_kinds().get(names[0])):
         numbers = {**kind.numbers, "gravity": effects.Gravity.numbers["magnitude"]}
     part = names.pop() if names and names[-1] in ("0", "1") else ""

@@ -1,5 +1,6 @@
 """A scene: linkage, motion, drive, loads and effects; `solve` evaluates only the stages requested."""
 
+from collections.abc import Callable
 from copy import copy
 from dataclasses import dataclass, field
 from importlib import import_module
@@ -9,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.effects.effect import Effect
+from fourbar.effects.place import change_each, copy_with
 from fourbar.errors import InputError, LimitError, expect
 from fourbar.formulas.arithmetic import (
     PI_LOW,
@@ -42,7 +44,10 @@ from fourbar.scene.numbers import Point, Tolerance
 from fourbar.scene.pictures import Picture
 
 if TYPE_CHECKING:
-    from fourbar.effects import LinearDrive, Load, SpringEnd
+    from fourbar.effects import ForceDrive, Load, Place
+
+
+A_DRIVE = "a drive is a couple on a bar or a force: state drive_bar or drive"
 
 
 def load_show(module: str) -> Any:
@@ -65,7 +70,7 @@ class Scene:
     pictures : of bars, as a scene file names them.
     points : points of bars whose paths are wanted, `Point`.
     tolerances : of numbers by their keys in a scene file, `Tolerance`.
-    drive : along a line, `LinearDrive`, in place of a torque on a bar.
+    drive : a force in place of a torque on a bar: `LinearDrive` or `PointDrive`.
     drawing : the pins as they are drawn, `DrawnPins`: places are shown in its coordinates.
     coordinates : keys of the places that a scene file states by x and y, with these, m; a file is written likewise.
     """
@@ -81,7 +86,7 @@ class Scene:
     pictures: tuple[Picture, ...] = ()
     points: tuple[Point, ...] = ()
     tolerances: tuple[Tolerance, ...] = ()
-    drive: "LinearDrive | None" = None
+    drive: "ForceDrive | None" = None
     drawing: DrawnPins | None = None
     coordinates: tuple[tuple[str, tuple[float, float]], ...] = field(
         default=(), repr=False, compare=False
@@ -92,20 +97,6 @@ class Scene:
         expect("drawing", self.drawing, DrawnPins, type(None))
         for name, kind in one.items():
             expect(name, getattr(self, name), kind)
-        if self.drive is None:
-            bar = (
-                2
-                if self.drive_bar is None
-                else require_bar("drive.bar", self.drive_bar)
-            )
-            object.__setattr__(self, "drive_bar", bar)
-        else:
-            self._require_linear(self.drive)
-        if self.motion.stroke is not None:
-            object.__setattr__(self, "motion", copy(self.motion))
-            object.__setattr__(
-                self.motion, "bar", find_triangle(self.linkage, self.drive).bar
-            )
         many = {
             "loads": Effect,
             "effects": Effect,
@@ -121,6 +112,27 @@ class Scene:
         names = [point.name for point in self.points]
         if len(set(names)) < len(names):
             raise InputError("points", names, "each point has a name of its own")
+        if self.drive is None:
+            bar = (
+                2
+                if self.drive_bar is None
+                else require_bar("drive.bar", self.drive_bar)
+            )
+            object.__setattr__(self, "drive_bar", bar)
+        else:
+            self._require_linear(self.drive)
+        self._require_points()
+        if self.drive is not None:
+            settled = self.settled().drive
+            assert settled is not None
+            settled.require_motion(self.linkage)
+        if self.motion.stroke is not None:
+            object.__setattr__(self, "motion", copy(self.motion))
+            object.__setattr__(
+                self.motion,
+                "bar",
+                find_triangle(self.linkage, self.settled().drive).bar,
+            )
         if len({picture.bar for picture in self.pictures}) < len(self.pictures):
             raise InputError(
                 "pictures",
@@ -170,17 +182,48 @@ class Scene:
 
     def _require_linear(self, drive: object) -> None:
         """Raise InputError where the drive is none along a line, acts on a bar too, or never moves its ends."""
-        from fourbar.effects.linear_drive import LinearDrive
+        from fourbar.effects.force_drive import ForceDrive
 
-        expect("drive", drive, LinearDrive)
+        expect("drive", drive, ForceDrive)
         if self.drive_bar is not None:
             raise InputError(
                 "drive.bar",
                 self.drive_bar,
-                "a drive acts on a bar or along a line: bar, or from and to",
+                A_DRIVE,
             )
-        assert isinstance(drive, LinearDrive)
-        drive.require_stroke(self.linkage)
+
+    def with_places(self, change: "Callable[[Place], Place]") -> "Scene":
+        """Return the same scene with each place of its points, loads, effects and drive changed."""
+        changed = {
+            name: change_each(getattr(self, name), change)
+            for name in ("points", "loads", "effects")
+        }
+        drive = None if self.drive is None else self.drive.with_places(change)
+        return copy_with(self, **changed, drive=drive)  # type: ignore[no-any-return]
+
+    def settled(self) -> "Scene":
+        """Return the same scene with every place from the first pin of its bar, as `Place.settle` does."""
+        places = {point.name: point.place for point in self.points}
+        return self.with_places(lambda place: place.settle(self.linkage, places))
+
+    def in_pairs_from_pins(self) -> "Scene":
+        """Return the same scene with every place as one pair (distance, angle) from the first pin of its bar."""
+        return self.settled().with_places(lambda place: place.in_one_pair())
+
+    def _require_points(self) -> None:
+        """Raise InputError for a place at a point that the scene does not have, or that another bar has."""
+        bars = {point.name: point.bar for point in self.points}
+
+        def check(place: "Place") -> "Place":
+            name = place.point
+            if name is not None and bars.get(name) != place.bar:
+                allowed = "is no point of [points]"
+                if name in bars:
+                    allowed = f"is a point of bar {bars[name]}, not of bar {place.bar}"
+                raise InputError("point", name, allowed)
+            return place
+
+        self.with_places(check)
 
     @property
     def origin(self) -> tuple[float, float]:
@@ -358,14 +401,15 @@ class Triangle(NamedTuple):
         return theta, sign * rate, sign * growth, condition
 
 
-def find_triangle(linkage: FourBar, drive: "LinearDrive | None") -> Triangle:
+def find_triangle(linkage: FourBar, drive: "ForceDrive | None") -> Triangle:
     """Return the triangle of a cylinder between the ground and bar 2 or 4; InputError for any other drive."""
-    if drive is None or {drive.start.bar, drive.end.bar} not in ({1, 2}, {1, 4}):
-        drives = (
-            "no cylinder"
-            if drive is None
-            else f"one from bar {drive.start.bar} to bar {drive.end.bar}"
-        )
+    from fourbar.effects.linear_drive import LinearDrive
+
+    bars, drives = set[int](), "no cylinder"
+    if isinstance(drive, LinearDrive):
+        bars = {drive.start.bar, drive.end.bar}
+        drives = f"one from bar {drive.start.bar} to bar {drive.end.bar}"
+    if not isinstance(drive, LinearDrive) or bars not in ({1, 2}, {1, 4}):
         raise InputError(
             "motion.stroke",
             drives,
@@ -391,7 +435,7 @@ def find_triangle(linkage: FourBar, drive: "LinearDrive | None") -> Triangle:
     )
 
 
-def _reverse(point: "SpringEnd") -> Any:
+def _reverse(point: "Place") -> Any:
     """Return half a turn for a point at a distance that is negative."""
     forwards = 0.0 * point.distance  # zero of the same kind of number
     return select(point.distance >= 0.0, forwards, np.pi + forwards + PI_LOW)
@@ -401,7 +445,7 @@ def default_places(scene: Scene, holding: float | None = None) -> Array:
     """List the angles (of the range that holds one), or strokes, that are swept where a scene names none, (n,)."""
     if scene.motion.stroke is not None:
         triangle, half = (
-            find_triangle(scene.linkage, scene.drive),
+            find_triangle(scene.linkage, scene.settled().drive),
             0.5 * np.array([MARGIN, np.pi - MARGIN]),
         )
         twice_mean = 2.0 * np.sqrt(triangle.length * triangle.reach)
@@ -423,7 +467,7 @@ def turn_bar(
     """
     if scene.motion.stroke is None:
         return place, speed, acceleration, None
-    return find_triangle(scene.linkage, scene.drive).turn_bar(
+    return find_triangle(scene.linkage, scene.settled().drive).turn_bar(
         place, speed, acceleration, scene.motion.side
     )
 
@@ -437,7 +481,7 @@ def command_stroke(
     if speed is not None:  # what angle, speed and acceleration leave out as doubles
         with np.errstate(all="ignore"):
             longer = find_triangle(
-                *change_numbers((scene.linkage, scene.drive), lengthen)
+                *change_numbers((scene.linkage, scene.settled().drive), lengthen)
             )
             *turned, _ = longer.turn_bar(
                 lengthen(stroke),
@@ -470,7 +514,7 @@ def command_at(scene: Scene, places: Array) -> Command:
     """Command what the scene's motion commands at other places: angles, strokes, or of a law times."""
     motion, bar = scene.motion, scene.motion.bar
     if motion.stroke is not None:
-        triangle = find_triangle(scene.linkage, scene.drive)
+        triangle = find_triangle(scene.linkage, scene.settled().drive)
         least, most = (
             abs(triangle.length - triangle.reach),
             triangle.length + triangle.reach,

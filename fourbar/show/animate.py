@@ -138,11 +138,11 @@ def collect_live_data(
         "branch": motion.branch,
         "points": [
             {
-                "name": p.name,
-                "bar": p.bar,
-                "at": [p.from_pin[0] * f(p.from_pin[1]) for f in (math.cos, math.sin)],
+                "name": point.name,
+                "bar": point.bar,
+                "at": [(z := point.place.vector()).real, z.imag],
             }
-            for p in scene.points
+            for point in scene.settled().points
         ],
         "acting": [
             _write_symbol(symbol, shown["theta_2"]) for symbol in list_acting(scene)

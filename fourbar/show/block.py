@@ -382,7 +382,10 @@ class _Block:
 
     def _write_drive_head(self) -> str:
         scene, motion = self.facts.scene, self.facts.scene.motion
-        head = f"cylinder {describe_drive(scene).removeprefix('along a line ')}"
+        where = describe_drive(scene)
+        head = f"cylinder {where.removeprefix('along a line ')}"
+        if scene.drive is not None and not scene.drive.has_stroke:
+            head = f"force {where}"
         if scene.drive is None:
             head = f"drive on the {BAR_NAMES[scene.drive_bar]}"
         if motion.speed is None:

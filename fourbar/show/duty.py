@@ -289,7 +289,10 @@ def read_drive(solution: Solution) -> Driving:
 def describe_drive(scene: Scene) -> str:
     """Say what is driven."""
     if scene.drive is not None:
-        start, end = scene.drive.start.bar, scene.drive.end.bar
+        start, *others = (place.bar for _, place in scene.drive.ends)
+        if not others:
+            return f"at a point of bar {start} ({BAR_NAMES[start]})"
+        end = others[0]
         return f"along a line from bar {start} ({BAR_NAMES[start]}) to bar {end} ({BAR_NAMES[end]})"
     return f"bar {scene.drive_bar} ({BAR_NAMES[scene.drive_bar]})"
 
@@ -317,6 +320,7 @@ def compute_energies(scene: Scene, motion: Solution) -> Energies:
             f"SciPy is needed for free motion: {say_install('studies')}"
         ) from None
     assert motion.time is not None and motion.omega_2 is not None
+    scene = scene.settled()
     of_input = Command(motion.theta_2, motion.branch, motion.omega_2, 0.0)
     state = compute_state(scene, with_signs(scene.linkage, of_input))
     groups = {

@@ -230,10 +230,7 @@ def _collect(scene: Scene, solution: Solution, bar: int) -> _Beam:
                 gravity = gravity + term.field
                 continue
             if term.key == "load" and term.bar == bar:
-                arm = polar(*term.at)
-                recorder.place = described.to_centre + (
-                    arm if term.frame == "bar" else arm * back
-                )
+                recorder.place = _find_couple(term, described.to_centre, back)
             term.act(recorder, state)
             recorder.place = 0.0j
             term.act_known(
@@ -311,6 +308,13 @@ def _sum_by_foot(
     return np.stack(feet, axis=1), np.stack(forces, axis=1), np.stack(couples, axis=1)
 
 
+def _find_couple(load: Any, G: Any, back: Any) -> Any:
+    """Return where the couple of a load acts in the bar's axes: where its force does, or else at G."""
+    if load.arm is not None:
+        return G + polar(*load.arm) * back
+    return G if load.place is None else load.place.vector()
+
+
 def _record_pins(recorder: _Recorder, solution: Solution) -> None:
     """Record the forces at both pins."""
     for pin in ENDS[recorder.bar]:
@@ -330,6 +334,7 @@ def _record_drive(recorder: _Recorder, scene: Scene, solution: Solution) -> None
         return
     if scene.drive is not None:
         assert solution.drive_force is not None
-        scene.drive.act(recorder, solution.drive_force)
+        assert solution.drive is not None
+        solution.drive.act(recorder, solution.drive_force)
     elif scene.drive_bar == recorder.bar:
         recorder.moment(recorder.bar, solution.torque)

@@ -11,7 +11,7 @@ from numpy.lib.mixins import NDArrayOperatorsMixin
 
 from fourbar.effects import Gravity, Springs
 from fourbar.effects.effect import PinRows
-from fourbar.effects.spring import END_POSITION
+from fourbar.effects.place import STATED_PLACES
 from fourbar.errors import InputError, expect
 from fourbar.formulas.arithmetic import polar
 from fourbar.linkage import (
@@ -102,21 +102,34 @@ def _list_effect(effect: Any, key: str, place: Place) -> dict[str, SceneNumber]:
     entries = dict[str, SceneNumber]()
     for index, spring in enumerate(effect.springs):
         spring_place = (*place, "springs", index)
-        entries |= _list_numbers(spring, f"{key}.{index}", spring_place) | _list_ends(
-            f"{key}.{index}", spring_place
-        )
+        entries |= _list_numbers(spring, f"{key}.{index}", spring_place)
+        entries |= _list_ends(spring, f"{key}.{index}", spring_place)
     return entries
 
 
-def _list_ends(key: str, place: Place) -> dict[str, SceneNumber]:
+def _list_ends(line: Any, key: str, place: Place) -> dict[str, SceneNumber]:
     """List the entries of both ends of a line between two bars."""
-    of_start, of_end = (
-        _make_pair(
-            f"{key}.{name}.at", (*place, end), END_POSITION.unit, ("distance", "angle")
-        )
-        for name, end in (("from", "start"), ("to", "end"))
-    )
-    return of_start | of_end
+    entries = dict[str, SceneNumber]()
+    for name, end in (("from", "start"), ("to", "end")):
+        entries |= list_place(getattr(line, end), f"{key}.{name}", (*place, end))
+    return entries
+
+
+def _list_drive(drive: Any) -> dict[str, SceneNumber]:
+    """List the entries of a drive that exerts a force."""
+    if drive.has_stroke:
+        return _list_ends(drive, "drive", ("drive",))
+    place = list_place(drive.place, "drive", ("drive", "place"))
+    return place | {"drive.direction": SceneNumber(("drive", "direction"), "rad")}
+
+
+def list_place(stated: Any, key: str, place: Place) -> dict[str, SceneNumber]:
+    """List the entries of the form in which a place is stated; a named point has its own."""
+    entries = dict[str, SceneNumber]()
+    for name, declared in STATED_PLACES.items():
+        if getattr(stated, name) is not None:
+            entries |= _make_pair(f"{key}.{name}", (*place, name), declared.unit)
+    return entries
 
 
 def list_entries(scene: Scene) -> dict[str, SceneNumber]:
@@ -143,16 +156,16 @@ def list_entries(scene: Scene) -> dict[str, SceneNumber]:
                 ("motion", field), scene.motion.numbers[name].unit
             )
     if scene.drive is not None:
-        entries |= _list_ends("drive", ("drive",))
+        entries |= _list_drive(scene.drive)
     for index, load in enumerate(scene.loads):
         numbers = _list_numbers(load, f"loads.{index}", ("loads", index))
         entries |= {
             key: entry
             for key, entry in numbers.items()
-            if load.force is not None or entry.place[2] == "moment"
+            if getattr(load, str(entry.place[2])) is not None
         }
     for index, point in enumerate(scene.points):
-        entries |= _list_numbers(point, point.key, ("points", index))
+        entries |= list_place(point, point.key, ("points", index))
     for index, effect in enumerate(scene.effects):
         entries |= _list_effect(effect, f"effects.{effect.key}", ("effects", index))
     return entries

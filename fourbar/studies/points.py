@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from fourbar.errors import InputError, expect
 from fourbar.formulas import points
-from fourbar.formulas.arithmetic import Number, polar
+from fourbar.formulas.arithmetic import Number
 from fourbar.formulas.mobility import find_circuit
 from fourbar.formulas.points import Centre, CouplerCurve
 from fourbar.linkage import FourBar
@@ -119,11 +119,12 @@ def coupler_curve(
 
 def _find_in_coupler(scene: Scene, name: str) -> tuple[float, float]:
     """Return a point of the coupler, along and across at A, m; InputError for another name."""
-    of_coupler = {point.name: point for point in scene.points if point.bar == 3}
+    points = scene.settled().points
+    of_coupler = {point.name: point for point in points if point.bar == 3}
     if name not in of_coupler:
         allowed = "must be a point of the coupler"
         if of_coupler:
             allowed += f": {', '.join(of_coupler)}"
         raise InputError("point", name, allowed)
-    z = polar(*of_coupler[name].from_pin)
+    z = of_coupler[name].place.vector()
     return float(z.real), float(z.imag)

@@ -40,8 +40,8 @@ EFFECTS: dict[str, kinds.Effect | None] = {
     "springs": kinds.Springs(
         (
             kinds.Spring(
-                kinds.SpringEnd(1, 0.1, -1.5),
-                kinds.SpringEnd(4, 0.08, 0.0),
+                kinds.Place(1, (0.1, -1.5)),
+                kinds.Place(4, (0.08, 0.0)),
                 200.0,
                 0.05,
                 3.0,
@@ -49,14 +49,14 @@ EFFECTS: dict[str, kinds.Effect | None] = {
         )
     ),
     "flywheel": kinds.Flywheel(0.02),
-    "load": kinds.Load(4, (3.0, 0.7), (0.05, 1.0), 0.2),
+    "load": kinds.Load(4, (3.0, 0.7), arm=(0.05, 1.0), moment=0.2),
     "load over theta_2": kinds.Load(
         4,
         (3.0, 0.7),
-        (0.05, 1.0),
-        0.2,
-        "world",
-        kinds.Table((0.0, 3.0, math.tau), (0.0, 1.0, 0.0)),
+        arm=(0.05, 1.0),
+        moment=0.2,
+        frame="world",
+        table=kinds.Table((0.0, 3.0, math.tau), (0.0, 1.0, 0.0)),
     ),
 }
 EFFECTS |= {

@@ -4,14 +4,15 @@ import cmath
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from fourbar.effects import (
     LinearDrive,
     Load,
+    Place,
     Spring,
-    SpringEnd,
     Springs,
     Table,
     Torsion,
@@ -22,7 +23,7 @@ from fourbar.scene.motion import Motion
 from fourbar.scene.numbers import Point
 from fourbar.solve import solve
 from fourbar_validation.scenes.random import (
-    Place,
+    DrawnLinkage,
     RandomFamily,
     Ranges,
     command_angle,
@@ -53,7 +54,7 @@ def spread_masses(spread: float) -> Ranges:
 EVEN, UNEVEN = spread_masses(0.0), spread_masses(3.0)
 
 
-def _draw_anywhere(rng: np.random.Generator) -> Place:
+def _draw_anywhere(rng: np.random.Generator) -> DrawnLinkage:
     """Draw lengths within a factor of ten, theta_2 anywhere it assembles."""
     while True:
         d, a = rng.uniform(0.1, 1.0, 2)
@@ -64,7 +65,7 @@ def _draw_anywhere(rng: np.random.Generator) -> Place:
             return (d, a, b, c), command_angle(angle)
 
 
-def _draw_near_limit(rng: np.random.Generator) -> Place:
+def _draw_near_limit(rng: np.random.Generator) -> DrawnLinkage:
     """Draw a position within 1e-12..1e-2 rad of a limit of the input."""
     while True:
         d, a, b, c = rng.uniform(0.1, 1.0, 4)
@@ -80,7 +81,7 @@ BESIDE_ROUNDING = 1e-13
 """Part of a length by which a linkage misses a change point at least: by less it has one, within the rounding."""
 
 
-def _draw_near_change_point(rng: np.random.Generator) -> Place:
+def _draw_near_change_point(rng: np.random.Generator) -> DrawnLinkage:
     """Draw within 1e-8..1 rad of a change point: parallelograms, kites, any s + l = p + q, some off by as little."""
     x, y = rng.uniform(0.1, 1.0, 2)
     kind = rng.integers(0, 4)
@@ -115,7 +116,7 @@ def _draw_near_change_point(rng: np.random.Generator) -> Place:
     return lengths, command_angle(straight + distance)
 
 
-def _draw_with_ratios(rng: np.random.Generator) -> Place:
+def _draw_with_ratios(rng: np.random.Generator) -> DrawnLinkage:
     """Draw crank to ground, coupler to diagonal, and masses, each in ratios from 1e-6 to 1e6."""
     lengths, angle = draw_uneven_lengths(
         rng, draw_decades(-6.0, 6.0), draw_decades(-1.0, 1.0)
@@ -141,15 +142,22 @@ def scales(rng: np.random.Generator) -> Scene:
                 (bar.mass_centre[0] * k, bar.mass_centre[1]),
             )
         )
-    loads = tuple(
-        replace(load, at=(load.at[0] * k, load.at[1]), moment=load.moment * k)
-        for load in scene.loads
-    )
+    loads = tuple(_scale_load(load, k) for load in scene.loads)
     return replace(
         scene,
         linkage=FourBar(link.ground * k, bars[0], bars[1], bars[2], link.ground_angle),
         loads=loads,
     )
+
+
+def _scale_load(load: Load, k: float) -> Load:
+    """Return the load of a linkage whose lengths are k times as large."""
+    scaled: Any = {
+        form: (place[0] * k, place[1])
+        for form in ("from_pin", "from_centre", "arm")
+        if (place := getattr(load, form)) is not None
+    }
+    return replace(load, moment=load.moment * k, **scaled)
 
 
 def speeds(rng: np.random.Generator) -> Scene:
@@ -188,11 +196,15 @@ def springs(rng: np.random.Generator) -> Scene:
         int(bar) for bar in rng.choice((1, *MOVING_BARS), 2, replace=False)
     )
     start, end = (
-        SpringEnd(bar, *rng.uniform((0.0, -3.0), (1.0, 3.0)).tolist())
+        Place(bar, tuple(rng.uniform((0.0, -3.0), (1.0, 3.0)).tolist()))
         for bar in (first, second)
     )
     marked = replace(
-        scene, points=(Point("P", first, start[1:]), Point("Q", second, end[1:]))
+        scene,
+        points=(
+            Point("P", first, start.from_pin),
+            Point("Q", second, end.from_pin),
+        ),
     )
     places = solve(marked, "position").points
     distance = math.hypot(*(places["Q"] - places["P"])[0])
@@ -263,13 +275,15 @@ def tables(rng: np.random.Generator) -> Scene:
     size, arm = float(rng.uniform(0.1, 10.0)), float(rng.uniform(0.0, 1.0))
     turned = (float(x) for x in rng.uniform(-3.0, 3.0, 2))
     frame, moment = str(rng.choice(["world", "bar"])), float(rng.choice([0.0, size]))
+    form = "arm" if frame == "world" else "from_centre"
+    place: Any = {form: (arm, next(turned))}
     load = Load(
         int(rng.choice(MOVING_BARS)),
         (size, next(turned)),
-        (arm, next(turned)),
-        moment,
-        frame,
-        table,
+        moment=moment,
+        frame=frame,
+        table=table,
+        **place,
     )
     motion = scene.motion.replace(angle=angle + math.tau * turns)
     return replace(
@@ -321,7 +335,7 @@ def _put_cylinder(
     scene: Scene, rng: np.random.Generator, one: int, other: int
 ) -> Scene:
     ends = (
-        SpringEnd(bar, *rng.uniform((0.05, -3.0), (1.0, 3.0)).tolist())
+        Place(bar, tuple(rng.uniform((0.05, -3.0), (1.0, 3.0)).tolist()))
         for bar in (one, other)
     )
     return replace(scene, drive_bar=None, drive=LinearDrive(*ends))  # type: ignore[arg-type]
@@ -344,8 +358,8 @@ def near_pins(rng: np.random.Generator) -> Scene:
             scene.linkage.lengths[near - 1] - cmath.rect(distance, angle)
         )
     start, end = (
-        SpringEnd(near, distance, angle),
-        SpringEnd(far, *rng.uniform((0.1, -3.0), (1.0, 3.0)).tolist()),
+        Place(near, (distance, angle)),
+        Place(far, tuple(rng.uniform((0.1, -3.0), (1.0, 3.0)).tolist())),
     )
     if rng.random() < 0.5:
         start, end = end, start
@@ -365,7 +379,7 @@ def near_pins(rng: np.random.Generator) -> Scene:
         return replace(
             scene,
             linkage=linkage,
-            loads=(Load(near, force, (distance, angle), 0.0, frame),),
+            loads=(Load(near, force, from_pin=(distance, angle), frame=frame),),
         )
     if kind == 1:
         return replace(

@@ -12,8 +12,9 @@ from fourbar.effects import (
     LinearDrive,
     Load,
     PinFriction,
+    Place,
+    PointDrive,
     Spring,
-    SpringEnd,
     Springs,
     Table,
     Torsion,
@@ -37,9 +38,9 @@ SLENDER = FourBar(0.3, Bar(0.1, 0.2), Bar(0.25, 0.5), Bar(0.22, 0.4), ground_ang
 ROCKER = FourBar(0.3, Bar(0.25, 0.7), Bar(0.1, 1.3), Bar(0.22, 0.9))
 TURN = Motion(Sweep(0.1, 0.1 + 2.0 * math.pi, 24), 10.0, 5.0)
 LOADS = (
-    Load(4, (3.0, 0.7), (0.05, 1.0)),
-    Load(3, (2.0, -0.4), (0.06, 0.5), 0.1, frame="bar"),
-    Load(2, (1.0, 0.3), (0.02, -0.7)),
+    Load(4, (3.0, 0.7), arm=(0.05, 1.0)),
+    Load(3, (2.0, -0.4), from_centre=(0.06, 0.5), moment=0.1, frame="bar"),
+    Load(2, (1.0, 0.3), from_pin=(0.07, -0.2)),
 )
 WEIGHT = Gravity(9.81, -1.3)
 POINTS = (
@@ -60,7 +61,7 @@ FAULT_SCENES: dict[str, Scene] = {
         CRANK_ROCKER,
         motion=TURN.replace(branch=CROSSED),
         drive_bar=None,  # type: ignore[arg-type]
-        drive=LinearDrive(SpringEnd(2, 0.17, -1.1), SpringEnd(4, 0.09, 0.7)),
+        drive=LinearDrive(Place(2, (0.17, -1.1)), Place(4, (0.09, 0.7))),
     ),
     "stroke": replace(
         CRANK_ROCKER,
@@ -71,7 +72,7 @@ FAULT_SCENES: dict[str, Scene] = {
             side="left",
         ),
         drive_bar=None,  # type: ignore[arg-type]
-        drive=LinearDrive(SpringEnd(1, 0.3, 2.2), SpringEnd(2, 0.12, 0.4)),
+        drive=LinearDrive(Place(1, (0.3, 2.2)), Place(2, (0.12, 0.4))),
     ),
     "stroke of the output": replace(
         CRANK_ROCKER,
@@ -82,7 +83,7 @@ FAULT_SCENES: dict[str, Scene] = {
             side="right",
         ),
         drive_bar=None,  # type: ignore[arg-type]
-        drive=LinearDrive(SpringEnd(1, 0.5, -0.5), SpringEnd(4, 0.09, 0.7)),
+        drive=LinearDrive(Place(1, (0.5, -0.5)), Place(4, (0.09, 0.7))),
     ),
     "output commanded": replace(
         CRANK_ROCKER,
@@ -93,10 +94,20 @@ FAULT_SCENES: dict[str, Scene] = {
         CRANK_ROCKER,
         motion=Motion(theta_3=Sweep(0.4, 0.8, 12), omega_3=3.0, branch=CROSSED),
     ),
+    "push": replace(
+        CRANK_ROCKER,
+        drive_bar=None,  # type: ignore[arg-type]
+        drive=PointDrive(Place(4, (0.17, -0.6)), 1.1, "bar"),
+    ),
+    "push on the coupler": replace(
+        CRANK_ROCKER,
+        drive_bar=None,  # type: ignore[arg-type]
+        drive=PointDrive(Place(3, from_centre=(0.07, 0.9)), 2.1),
+    ),
     "cylinder on the ground": replace(
         CRANK_ROCKER,
         drive_bar=None,  # type: ignore[arg-type]
-        drive=LinearDrive(SpringEnd(1, 0.17, -1.1), SpringEnd(3, 0.09, 0.7)),
+        drive=LinearDrive(Place(1, (0.17, -1.1)), Place(3, (0.09, 0.7))),
     ),
     "slender bars": Scene(SLENDER, TURN),
     "drag link": Scene(uniform(0.08, 0.24, 0.2, 0.26), TURN, 4, effects=(Gravity(),)),
@@ -133,9 +144,9 @@ FAULT_SCENES: dict[str, Scene] = {
             Springs(
                 (
                     Spring(
-                        SpringEnd(1, 0.2, 0.6), SpringEnd(3, 0.15, -0.4), 80.0, 0.1, 2.0
+                        Place(1, (0.2, 0.6)), Place(3, (0.15, -0.4)), 80.0, 0.1, 2.0
                     ),
-                    Spring(SpringEnd(2, 0.05, 0.3), SpringEnd(4, 0.1, 0.5), 50.0, 0.12),
+                    Spring(Place(2, (0.05, 0.3)), Place(4, (0.1, 0.5)), 50.0, 0.12),
                 )
             ),
             Torsion.at(B=(0.5, 0.7, 0.1), O4=(0.3, 1.2, -0.05)),
@@ -147,7 +158,7 @@ FAULT_SCENES: dict[str, Scene] = {
         effects=(
             Springs(
                 tuple(
-                    Spring(SpringEnd(i, 0.12, 0.5), SpringEnd(j, 0.09, -0.4), 60.0, 0.1)
+                    Spring(Place(i, (0.12, 0.5)), Place(j, (0.09, -0.4)), 60.0, 0.1)
                     for i, j in PINS.values()
                 )
             ),
@@ -180,8 +191,8 @@ FAULT_SCENES: dict[str, Scene] = {
             Load(
                 4,
                 (3.0, 0.7),
-                (0.05, 1.0),
-                0.2,
+                arm=(0.05, 1.0),
+                moment=0.2,
                 table=Table(
                     (0.1, 2.0, 4.0, 0.1 + 2.0 * math.pi), (1.0, -0.5, 2.0, 1.0)
                 ),
@@ -254,9 +265,7 @@ FAULT_SCENES: dict[str, Scene] = {
         CRANK,
         Motion(1.0 + np.array([1e-5, 0.1, 1.0]), 10.0),
         effects=(
-            Springs(
-                (Spring(SpringEnd(1, 0.1, 0.8), SpringEnd(2, 0.1, 0.0), 80.0, 0.05),)
-            ),
+            Springs((Spring(Place(1, (0.1, 0.8)), Place(2, (0.1, 0.0)), 80.0, 0.05),)),
         ),
     ),
     "held by friction": Scene(
@@ -304,11 +313,7 @@ FAULT_SCENES: dict[str, Scene] = {
             WEIGHT,
             Viscous.at(A=0.002, B=0.003),
             Springs(
-                (
-                    Spring(
-                        SpringEnd(1, 0.2, 0.6), SpringEnd(3, 0.15, -0.4), 80.0, 0.1, 2.0
-                    ),
-                )
+                (Spring(Place(1, (0.2, 0.6)), Place(3, (0.15, -0.4)), 80.0, 0.1, 2.0),)
             ),
         ),
     ),
@@ -321,7 +326,7 @@ FAULT_SCENES: dict[str, Scene] = {
         CRANK,
         Motion(Sweep(0.1, 3.0, 8), 10.0),
         loads=LOADS,
-        drive=LinearDrive(SpringEnd(1, 0.17, -1.1), SpringEnd(3, 0.09, 0.7)),
+        drive=LinearDrive(Place(1, (0.17, -1.1)), Place(3, (0.09, 0.7))),
     ),
     "simulated stroke": Scene(
         CRANK,
@@ -332,7 +337,7 @@ FAULT_SCENES: dict[str, Scene] = {
             side="left",
         ),
         loads=LOADS,
-        drive=LinearDrive(SpringEnd(1, 0.3, 2.2), SpringEnd(2, 0.12, 0.4)),
+        drive=LinearDrive(Place(1, (0.3, 2.2)), Place(2, (0.12, 0.4))),
     ),
     "simulated, quickening": Scene(
         CRANK, Motion(Sweep(0.1, 3.0, 8), 10.0, 20.0), 4, effects=(Flywheel(0.003, 4),)

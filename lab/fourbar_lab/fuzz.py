@@ -32,7 +32,7 @@ from fourbar_validation.run.identities import check_identities
 from fourbar_validation.run.question import Question
 from fourbar_validation.run.store import Store
 from fourbar_validation.scenes.random import (
-    Place,
+    DrawnLinkage,
     RandomFamily,
     Ranges,
     draw_chance,
@@ -113,7 +113,7 @@ def draw_fuzz_scene(seed: int, index: int) -> Scene:
         return replace(scene, motion=scene.motion.replace(acceleration=alpha))
 
 
-def _draw_place(hard: bool, rng: np.random.Generator) -> Place:
+def _draw_place(hard: bool, rng: np.random.Generator) -> DrawnLinkage:
     size = SIZES[hard](rng)
     lengths = tuple(float(x * size) for x in _draw_lengths(rng, hard))
     return (

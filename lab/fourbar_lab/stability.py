@@ -56,9 +56,10 @@ def judge(scene: Scene, tally: Tally, sample: str) -> None:
     tally.samples += 1
     angle = float(np.asarray(scene.motion.angle))
     drive = "torque" if scene.drive is None else "drive_force"
-    internal = scene.drive is not None and 1 not in (
-        scene.drive.start.bar,
-        scene.drive.end.bar,
+    internal = (
+        scene.drive is not None
+        and scene.drive.has_stroke
+        and 1 not in [place.bar for _, place in scene.drive.ends]
     )
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")

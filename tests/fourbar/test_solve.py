@@ -18,8 +18,8 @@ from fourbar.effects import (
     Gravity,
     Load,
     PinFriction,
+    Place,
     Spring,
-    SpringEnd,
     Springs,
     Torsion,
     Viscous,
@@ -112,12 +112,18 @@ def scenes(draw: st.DrawFn) -> Scene:
     linkage = draw(linkages())
     loads = draw(
         st.lists(
-            st.builds(Load, st.sampled_from(MOVING_BARS), pairs, pairs, numbers),
+            st.builds(
+                Load,
+                st.sampled_from(MOVING_BARS),
+                pairs,
+                from_pin=pairs,
+                moment=numbers,
+            ),
             max_size=2,
         )
     )
     ends = [
-        st.builds(SpringEnd, st.just(bar), numbers, angles)
+        st.builds(Place, st.just(bar), st.tuples(numbers, angles))
         for bar in draw(st.permutations([1, *MOVING_BARS]))[:2]
     ]
     possible = [
@@ -248,7 +254,7 @@ def test_beyond_the_range_of_doubles_the_status_says_so_from_that_stage_on() -> 
 
 def test_where_it_depends_on_the_position_only_those_positions_are_lost() -> None:
     """The force of a spring of 1e308 N/m, 0.8 m long, at a distance that grows with theta_2."""
-    spring = Spring(SpringEnd(1, 3.0, 0.0), SpringEnd(2, 1.0, 0.0), 1e308, 0.0)
+    spring = Spring(Place(1, (3.0, 0.0)), Place(2, (1.0, 0.0)), 1e308, 0.0)
     solution = solved(
         Scene(
             heavy(1.0),

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -65,16 +66,7 @@ def scenes(draw: st.DrawFn, effects: bool = True) -> Scene:
                 (length * draw(between(-0.5, 1.5)), draw(between(-3, 3))),
             )
         )
-    loads = [
-        Load(
-            draw(st.sampled_from(MOVING_BARS)),
-            (draw(between(-20, 20)), draw(between(-3, 3))),
-            (draw(between(0, 0.5)), draw(between(-3, 3))),
-            draw(between(-5, 5)),
-            draw(st.sampled_from(["world", "bar"])),
-        )
-        for _ in range(draw(st.integers(0, 2)) if effects else 0)
-    ]
+    loads = [draw_load(draw) for _ in range(draw(st.integers(0, 2)) if effects else 0)]
     terms = []
     if effects and draw(st.booleans()):
         terms.append(Gravity(9.81, draw(between(-3, 3))))
@@ -102,6 +94,47 @@ def scenes(draw: st.DrawFn, effects: bool = True) -> Scene:
         and solution.drive_condition[0] >= WORST_CONDITION
     )
     return scene
+
+
+def draw_load(draw: Any) -> Load:
+    """A force at a place of any form, in a direction that is fixed or turns, and a couple."""
+    frame = draw(st.sampled_from(["world", "bar"]))
+    forms = ["from_pin", "from_centre", *(["arm"] if frame == "world" else [])]
+    at = {draw(st.sampled_from(forms)): (draw(between(0, 0.5)), draw(between(-3, 3)))}
+    return Load(
+        draw(st.sampled_from(MOVING_BARS)),
+        (draw(between(-20, 20)), draw(between(-3, 3))),
+        moment=draw(between(-5, 5)),
+        frame=frame,
+        **at,
+    )
+
+
+def change_place(load: Load, change: Any) -> Any:
+    """The place of a load changed, in the form in which it is stated."""
+    forms = ("from_pin", "from_centre", "arm")
+    return {
+        form: change(*getattr(load, form))
+        for form in forms
+        if getattr(load, form) is not None
+    }
+
+
+def arm_from_G(scene: Scene, s: fourbar.Solution, load: Load) -> Any:
+    """The vector from G to where a load acts, world axes."""
+
+    def vector(r: float, phi: float) -> Any:
+        return r * np.array([math.cos(phi), math.sin(phi)])
+
+    turn = float(getattr(s, f"theta_{load.bar}")[0])
+    if load.arm is not None:
+        return vector(*load.arm)
+    if load.from_centre is not None:
+        r, phi = load.from_centre
+        return vector(r, phi + turn)
+    r, phi = load.from_pin
+    G, psi = scene.linkage.bar(load.bar).mass_centre
+    return vector(r, phi + turn) - vector(G, psi + turn)
 
 
 def force_size(scene: Scene, solution: Solution) -> float:
@@ -208,9 +241,7 @@ def test_power_balance(scene: Scene) -> None:
         force = load.force[0] * np.array(
             [math.cos(load.force[1] + turn), math.sin(load.force[1] + turn)]
         )
-        arm = load.at[0] * np.array(
-            [math.cos(load.at[1] + turn), math.sin(load.at[1] + turn)]
-        )
+        arm = arm_from_G(scene, s, load)
         given_power = (
             force @ (velocity[load.bar] + spin(w[load.bar], arm))
             + load.moment * w[load.bar]
@@ -283,8 +314,8 @@ def test_mirror_symmetry(scene: Scene) -> None:
             replace(
                 load,
                 force=(load.force[0], -load.force[1]),
-                at=(load.at[0], -load.at[1]),
                 moment=-load.moment,
+                **change_place(load, lambda r, phi: (r, -phi)),
             )
             for load in scene.loads
         ),
@@ -334,8 +365,8 @@ def test_length_mass_and_time_scale(
             replace(
                 load,
                 force=(load.force[0] * force, load.force[1]),
-                at=(load.at[0] * L, load.at[1]),
                 moment=load.moment * torque,
+                **change_place(load, lambda r, phi: (r * L, phi)),
             )
             for load in scene.loads
         ),
@@ -390,7 +421,7 @@ def test_frame_rotation(scene: Scene, turn: float) -> None:
             else replace(
                 load,
                 force=(load.force[0], load.force[1] + turn),
-                at=(load.at[0], load.at[1] + turn),
+                arm=load.arm and (load.arm[0], load.arm[1] + turn),
             )
             for load in scene.loads
         ),
@@ -419,22 +450,32 @@ def test_relabelled_from_the_other_end(scene: Scene) -> None:
     s, link = fourbar.solve(scene), scene.linkage
     theta_1 = link.ground_angle + math.pi
     b = link.coupler
+
     # the coupler's first pin is now B: G from there, along the line from B to A
-    r, phi = b.mass_centre
-    x, y = b.length - r * math.cos(phi), -r * math.sin(phi)
+    def place_from_B(r: float, phi: float) -> tuple[float, float]:
+        return b.length - r * math.cos(phi), -r * math.sin(phi)
+
+    x, y = place_from_B(*b.mass_centre)
     coupler = replace(b, centre=(math.hypot(x, y), math.atan2(y, x)))
     names = {2: 4, 3: 3, 4: 2}
 
     def relabelled(load: Load) -> Load:
-        if (
-            load.bar == 3 and load.frame == "bar"
-        ):  # the bar's line points in the opposite direction
+        if load.bar != 3:
+            return replace(load, bar=names[load.bar])
+        # the bar's line points in the opposite direction, from its other end
+        size, direction = load.force
+        if load.frame == "bar":
+            direction += math.pi
+        if load.from_centre is not None:
+            r, phi = load.from_centre
             return replace(
-                load,
-                force=(load.force[0], load.force[1] + math.pi),
-                at=(load.at[0], load.at[1] + math.pi),
+                load, force=(size, direction), from_centre=(r, phi + math.pi)
             )
-        return replace(load, bar=names[load.bar])
+        if load.from_pin is not None:
+            x, y = place_from_B(*load.from_pin)
+            at = (math.hypot(x, y), math.atan2(y, x))
+            return replace(load, force=(size, direction), from_pin=at)
+        return load
 
     pins = {"O2": "O4", "A": "B", "B": "A", "O4": "O2"}
     other_end = Scene(

@@ -20,7 +20,7 @@ def crank_rocker(**changes: object) -> fourbar.Scene:
         "linkage": linkage,
         "motion": fourbar.Motion(fourbar.Sweep(0.1, 0.1 + 2 * math.pi, 60), 10.0, 5.0),
         "loads": (
-            fourbar.Load(4, (3.0, 0.7), (0.05, 1.0)),
+            fourbar.Load(4, (3.0, 0.7), arm=(0.05, 1.0)),
             fourbar.Load(3, moment=-0.2),
         ),
         "effects": (fourbar.Gravity(),),
@@ -42,7 +42,7 @@ def thesis(theta_2: object = None) -> fourbar.Scene:
         fourbar.Bar(0.20, 0.2, inertia(0.2, 0.20)),
         ground_angle=math.radians(45.0),
     )
-    loads = [fourbar.Load(2, (10.0, 0.0), (0.05, math.radians(265.0)))]
+    loads = [fourbar.Load(2, (10.0, 0.0), arm=(0.05, math.radians(265.0)))]
     loads += [fourbar.Load(bar, moment=-0.15) for bar in (2, 3, 4)]
     angles = np.radians([135.0]) if theta_2 is None else theta_2
     return fourbar.Scene(

@@ -117,10 +117,18 @@ class Loop:
     ) -> tuple[complex, complex]:
         """Return a load's force in world axes and its arm from the bar's first pin."""
         turned = complex(np.exp(1j * angles[number]))
-        push, arm = _polar(load.force or (0.0, 0.0)), _polar(load.at)
+        push, centre = _polar(load.force or (0.0, 0.0)), self.centres[number]
         if load.frame == "bar":
-            return push * turned, (self.centres[number] + arm) * turned
-        return push, self.centres[number] * turned + arm
+            push = push * turned
+        if load.arm is not None:
+            return push, centre * turned + _polar(load.arm)
+        return push, self.load_place(load, number) * turned
+
+    def load_place(self, load: fourbar.Load, number: int) -> complex:
+        """Return where a load acts on its bar, from the first pin; of a couple, at G."""
+        if load.from_pin is not None:
+            return _polar(load.from_pin)
+        return self.centres[number] + _polar(load.from_centre or (0.0, 0.0))
 
     def drive_direction(self, angles: Array) -> tuple[list[complex], list[float]]:
         """Return the forces and couples about the first pins by which the drive of size one acts on bars 2, 3, 4."""
@@ -243,13 +251,12 @@ class Loop:
         motors = []
         for index, load in enumerate(self.loads):
             number = load.bar - 2
-            push, arm = _polar(load.force or (0.0, 0.0)), _polar(load.at)
-            place, frame = self.centres[number], 'refsite="world"'
+            push = _polar(load.force or (0.0, 0.0))
+            place = self.load_place(load, number)
+            frame = "" if load.frame == "bar" else 'refsite="world"'
             couple = float(load.moment)
-            if load.frame == "bar":
-                place, frame = place + arm, ""
-            else:
-                couple += _cross(arm, push)
+            if load.arm is not None:
+                couple += _cross(_polar(load.arm), push)
             sites[number].append(
                 f'<site name="load{index}" pos="{place.real!r} {place.imag!r} 0"/>'
             )

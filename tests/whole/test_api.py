@@ -99,7 +99,7 @@ def calls() -> dict[str, tuple[Callable[..., object], tuple[Any, ...]]]:
     out, command, ends = (
         {"torque": np.empty(1)},
         fourbar.command(scene),
-        (fourbar.SpringEnd(2, 0.1, 0.2), fourbar.SpringEnd(4, 0.1, 0.2)),
+        (fourbar.Place(2, (0.1, 0.2)), fourbar.Place(4, (0.1, 0.2))),
     )
     times, angles = (0.0, 1.0, 2.0, 3.0), (0.0, 0.1, 0.2, 0.1)
 
@@ -232,14 +232,7 @@ def calls() -> dict[str, tuple[Callable[..., object], tuple[Any, ...]]]:
             lambda *x: fourbar.solve(
                 fourbar.Scene(link, scene.motion, loads=(fourbar.Load(*x),))
             ),
-            (
-                2,
-                (1.0, 0.0),
-                (0.1, 0.1),
-                1.0,
-                "world",
-                fourbar.Table((0.0, 2.0), (1.0, 1.0)),
-            ),
+            (2, (1.0, 0.0)),
         ),
         "Table": (fourbar.Table, ((0.0, 2.0), (1.0, 1.0))),
         "Picture": (fourbar.Picture, (3, "a.png", ".")),
@@ -247,11 +240,11 @@ def calls() -> dict[str, tuple[Callable[..., object], tuple[Any, ...]]]:
             lambda *x: acting(fourbar.Springs((fourbar.Spring(*x),))),
             (*ends, 1.0, 0.1, 0.1),
         ),
-        "SpringEnd": (
+        "Place": (
             lambda *x: acting(
-                fourbar.Springs((fourbar.Spring(fourbar.SpringEnd(*x), ends[1], 1.0),))
+                fourbar.Springs((fourbar.Spring(fourbar.Place(*x), ends[1], 1.0),))
             ),
-            (2, 0.1, 0.2),
+            (2, (0.1, 0.2)),
         ),
         "LinearDrive": (
             lambda *x: fourbar.solve(

@@ -54,7 +54,7 @@ def open_engine(entry: str) -> tuple[Factory, dict[str, Any]]:
         "engine": entry,
         "answers": list(engine.answers),
         "commands": list(getattr(adapter, "commands", ("theta_2",))),
-        "effects": [*ALL_BUT_CYLINDER, "cylinder"],
+        "effects": [*ALL_BUT_CYLINDER, "cylinder", "push"],
     }
     library = engine.library.removeprefix("py")  # pydrake is of the distribution drake
     try:

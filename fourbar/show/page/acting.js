@@ -30,13 +30,9 @@ function framed(p, bar, z) {
 }
 
 // Points that the picture has to hold: the ends of springs, and where loads act.
-const actingPoints = p => data.acting.flatMap(one => one.end ? [framed(p, one.bar, one.at), framed(p, ...one.end)] : one.kind === "force" ? [forceFoot(p, one)] : []);
+const actingPoints = p => data.acting.flatMap(one => one.end ? [framed(p, one.bar, one.at), framed(p, ...one.end)] : ["force", "push"].includes(one.kind) ? [forceFoot(p, one)] : []);
 
-function forceFoot(p, one) {
-  const angle = one.turns ? { 2: p.theta2, 3: p.theta3, 4: p.theta4 }[one.bar] : 0, c = Math.cos(angle), s = Math.sin(angle);
-  const foot = framed(p, one.bar, one.at), [x, y] = one.beyond;
-  return [foot[0] + x * c - y * s, foot[1] + x * s + y * c];
-}
+const forceFoot = (p, one) => framed(p, one.bar, one.at).map((x, j) => x + one.beyond[j]);
 
 const pathOf = points => points.map(([x, y], n) => `${n ? "L" : "M"}${x.toFixed(2)} ${y.toFixed(2)}`).join("");
 const ring = (at, radius, from, turn, count) => Array.from({ length: count }, (_, n) => {
@@ -68,7 +64,7 @@ function drawActing(p, i) {
     const factor = one.factor === null ? 1 : one.factor[i];
     if (factor === 0) continue;
     const S = one.pin ? smallAt(p, one.pin) : one.kind === "moment" ? smallAt(p, FIRST_PIN[one.bar]) : sizeOf();
-    if (["force", "moment", "spring"].includes(one.kind)) drawPlate(p, one.bar, forceFoot(p, one));
+    if (["force", "push", "moment", "spring"].includes(one.kind)) drawPlate(p, one.bar, forceFoot(p, one));
     if (one.end) drawPlate(p, one.end[0], framed(p, ...one.end));
     if (one.kind === "gravity") {
       const size = Math.hypot(...one.vector), [x, y] = [one.vector[0] / size, -one.vector[1] / size], at = [view.width - 34, 34];
@@ -88,11 +84,11 @@ function drawActing(p, i) {
       const [x, y] = on(0.5 * barrel), away = 12 / Math.hypot(b[0] - a[0], b[1] - a[1]);
       named(one.name, x + away * (b[1] - a[1]), y - away * (b[0] - a[0]));
       for (const [x, y] of [a, b]) make(parts.acting, "circle", { class: "act-head act-drive", cx: x, cy: y, r: 3 });
-    } else if (one.kind === "force") {
+    } else if (one.kind === "force" || one.kind === "push") {
       const foot = forceFoot(p, one), angle = one.turns ? { 2: p.theta2, 3: p.theta3, 4: p.theta4 }[one.bar] : 0;
       const direction = Math.atan2(one.vector[1], one.vector[0]) + angle + (factor < 0 ? Math.PI : 0), [x, y] = toScreen(foot);
       const [u, v] = [Math.cos(direction), -Math.sin(direction)];
-      headed([[x, y], [x + 5 * S * u, y + 5 * S * v]], "force");
+      headed([[x, y], [x + 5 * S * u, y + 5 * S * v]], one.kind === "push" ? "drive" : "force");
       named(one.name, x + 7.5 * S * u, y + 7.5 * S * v);
     } else if (one.kind === "moment" || one.kind === "drive") {
       const turn = Math.sign(one.kind === "moment" ? one.moment * factor : torque ?? 1);

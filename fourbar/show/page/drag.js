@@ -14,7 +14,7 @@ function placesOf(p) {
     found.push([handle.name, handle.path, place]);
     const arrow = handle.force && data.acting.find(one => one.kind === "force" && one.name === handle.name);
     if (!arrow) continue;
-    const direction = Math.atan2(arrow.vector[1], arrow.vector[0]) + own;
+    const direction = Math.atan2(arrow.vector[1], arrow.vector[0]) + (arrow.turns ? turned(p, handle.bar) : 0);
     found.push([`arrow of ${handle.name}`, handle.force, [place[0] + arrowLength() * Math.cos(direction), place[1] - arrowLength() * Math.sin(direction)], place]);
   }
   return found;

@@ -99,8 +99,9 @@ def find_poles(view: View) -> Indices:
         return np.array([], dtype=np.intp)
     if view.scene.drive is not None:
         case, state = Case.of(view.scene, s.at.bar), compute_state(view.scene, s.at)
+        assert case.drive is not None
         with np.errstate(all="ignore"):
-            sine = view.scene.drive.leverage(state, case.sines(state.position))[0]
+            sine = case.drive.leverage(state, case.sines(state.position))[0]
         return np.flatnonzero(sine[:-1] * sine[1:] <= 0.0)
     pair = {
         2: (s.theta_4, s.theta_3),

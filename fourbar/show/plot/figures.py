@@ -153,7 +153,8 @@ def _choose_painter(
             None,
             f"is needed for the figure {figure!r}; {explain_static(scene)}",
         )
-    if figure == "stroke" and (scene.drive is None or scene.motion.stroke is not None):
+    stroked = scene.drive is not None and scene.drive.has_stroke
+    if figure == "stroke" and (not stroked or scene.motion.stroke is not None):
         raise InputError(
             "figure",
             figure,

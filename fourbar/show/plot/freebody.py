@@ -159,7 +159,7 @@ def take_one(vector: Any) -> complex:
 
 def _record_actions(view: View) -> Recorder:
     """Record what the drive along a line, loads and effects put on the bars."""
-    scene, state = view.scene, view.state()
+    scene, state = view.scene.settled(), view.state()
     recorder = Recorder(scene, state)
     if scene.drive is not None and scene.motion.free is None:
         recorder.name = "$F$"

@@ -1,6 +1,5 @@
 """The linkage drawn to scale, alike for a plot and for a film, over the paths of its points; coupler curves."""
 
-import cmath
 import math
 from collections.abc import Iterator
 from itertools import cycle
@@ -21,7 +20,7 @@ from fourbar.show.plot.style import (
     write_quantity,
 )
 from fourbar.show.plot.symbols import (
-    Place,
+    Pose,
     draw_vectors,
     list_acting,
     place_of,
@@ -158,15 +157,15 @@ def draw_mechanism(
     return drawn
 
 
-def _list_carried(view: View, place: Place) -> Iterator[tuple[int, complex]]:
+def _list_carried(view: View, place: Pose) -> Iterator[tuple[int, complex]]:
     """List what may lie off its bar: own points, mass centres, and where forces, moments and springs act."""
-    for point in view.scene.points:
-        yield point.bar, place.point(point.bar, cmath.rect(*point.from_pin))
+    for point in view.scene.settled().points:
+        yield point.bar, place.point(point.bar, point.place.vector())
     for number in MOVING_BARS:
         if view.scene.linkage.bar(number).mass > 0.0:
             yield number, place.point(number, view.scene.linkage.bar(number).to_centre)
     for symbol in list_acting(view.scene):
-        if symbol.kind in ("force", "moment", "spring"):
+        if symbol.kind in ("force", "push", "moment", "spring"):
             yield symbol.bar, place.tail(symbol)
         if symbol.end is not None:
             yield symbol.end[0], place.point(*symbol.end)

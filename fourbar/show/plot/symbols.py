@@ -12,7 +12,15 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from fourbar.effects import Flywheel, Gravity, LinearDrive, Spring, Springs
+from fourbar.effects import (
+    Flywheel,
+    ForceDrive,
+    Gravity,
+    LinearDrive,
+    PointDrive,
+    Spring,
+    Springs,
+)
 from fourbar.effects.effect import PinRows
 from fourbar.linkage import FIRST_PIN, FourBar
 from fourbar.scene import Scene
@@ -31,6 +39,7 @@ COLOURS = {
         "force": LOAD,
         "moment": LOAD,
         "drive": INK,
+        "push": INK,
         "gravity": MUTED,
         "spring": SPRING,
         "torsion": SPRING,
@@ -77,7 +86,7 @@ class Symbol(NamedTuple):
     at: complex = 0.0j
     """Point of action, from the bar's first pin in the bar's frame, m."""
     beyond: complex = 0.0j
-    """Vector from there to the point itself, m: in world axes, or in the bar's frame where `turns`."""
+    """Vector from there to the point itself, m, in world axes: an arm that keeps its direction."""
     vector: complex = 0.0j
     """Force (N) or field (m/s^2); in world axes, or in the bar's frame where `turns`."""
     turns: bool = False
@@ -100,9 +109,9 @@ class Symbol(NamedTuple):
 
 def list_acting(scene: Scene) -> list[Symbol]:
     """List everything that acts, the drive first; nothing that has no size."""
-    symbols = []
+    symbols, scene = [], scene.settled()
     if scene.drive is not None and scene.motion.free is None:
-        symbols.append(_join_ends("cylinder", "F", scene.drive))
+        symbols.append(_make_drive(scene.drive))
     elif scene.motion.free is None:
         symbols.append(
             Symbol(
@@ -113,18 +122,18 @@ def list_acting(scene: Scene) -> list[Symbol]:
             )
         )
     for number, load in enumerate(scene.loads, 1):
-        foot, turns = scene.linkage.bar(load.bar).to_centre, load.frame == "bar"
+        G = scene.linkage.bar(load.bar).to_centre
         if load.force is not None and load.force[0] != 0.0:
-            beyond, force = cmath.rect(*load.at), cmath.rect(*load.force)
+            arm = 0.0j if load.arm is None else cmath.rect(*load.arm)
             symbols.append(
                 Symbol(
                     "force",
                     f"load {number}",
                     load.bar,
-                    foot,
-                    beyond,
-                    force,
-                    turns,
+                    G if load.place is None else load.place.vector(),
+                    arm,
+                    cmath.rect(*load.force),
+                    load.frame == "bar",
                     table=load.table,
                 )
             )
@@ -134,7 +143,7 @@ def list_acting(scene: Scene) -> list[Symbol]:
                     "moment",
                     f"load {number}",
                     load.bar,
-                    foot,
+                    G,
                     moment=load.moment,
                     table=load.table,
                 )
@@ -158,13 +167,24 @@ def list_acting(scene: Scene) -> list[Symbol]:
     return symbols
 
 
+def _make_drive(drive: ForceDrive) -> Symbol:
+    """Make the symbol of a drive that exerts a force."""
+    if isinstance(drive, LinearDrive):
+        return _join_ends("cylinder", "F", drive)
+    assert isinstance(drive, PointDrive)
+    bar, at = drive.place.bar, drive.place.vector()
+    direction = cmath.rect(1.0, drive.direction)
+    turns = drive.frame == "bar"
+    return Symbol("push", "F", bar, at, vector=direction, turns=turns)
+
+
 def _join_ends(kind: str, name: str, line: LinearDrive | Spring) -> Symbol:
     """Make the symbol of a line between two points."""
-    (bar, *start), (bar_2, *end) = line.start, line.end
-    return Symbol(kind, name, bar, cmath.rect(*start), end=(bar_2, cmath.rect(*end)))
+    end = line.end.bar, line.end.vector()
+    return Symbol(kind, name, line.start.bar, line.start.vector(), end=end)
 
 
-class Place(NamedTuple):
+class Pose(NamedTuple):
     """One position of the linkage in the units of a drawing."""
 
     foot: dict[int, complex]
@@ -194,9 +214,7 @@ class Place(NamedTuple):
 
     def tail(self, symbol: Symbol) -> complex:
         """Place the foot of a load's arrow."""
-        return self.point(
-            symbol.bar, symbol.at
-        ) + self.factor * symbol.beyond * self.direction(symbol)
+        return self.point(symbol.bar, symbol.at) + self.factor * symbol.beyond
 
     def direction(self, symbol: Symbol) -> complex:
         """Return the axes in which a load's force is stated."""
@@ -217,7 +235,7 @@ class DrawnSymbol:
     """Direction from there outwards, of length 1."""
 
 
-def place_of(linkage: FourBar, solution: Solution, index: int, factor: float) -> Place:
+def place_of(linkage: FourBar, solution: Solution, index: int, factor: float) -> Pose:
     """Collect what symbols need of one position of a solution."""
     A, B = (factor * complex(*point[index]) for point in (solution.A, solution.B))
     O4 = factor * cmath.rect(linkage.ground, linkage.ground_angle)
@@ -228,10 +246,10 @@ def place_of(linkage: FourBar, solution: Solution, index: int, factor: float) ->
     }
     torque = float("nan") if solution.torque is None else float(solution.torque[index])
     pins = {"O2": 0.0j, "A": A, "B": B, "O4": O4}
-    return Place({1: 0.0j, 2: 0.0j, 3: A, 4: O4}, u, pins, factor, angles[2], torque)
+    return Pose({1: 0.0j, 2: 0.0j, 3: A, 4: O4}, u, pins, factor, angles[2], torque)
 
 
-def draw(axes: "Axes", symbol: Symbol, place: Place, size: float) -> DrawnSymbol:
+def draw(axes: "Axes", symbol: Symbol, place: Pose, size: float) -> DrawnSymbol:
     """Draw one symbol at one position; `size` is that of a support."""
     drawn, colour = DrawnSymbol(text=symbol.name), COLOURS.get(symbol.kind, PIN)
     if symbol.kind == "gravity":
@@ -254,7 +272,7 @@ def draw(axes: "Axes", symbol: Symbol, place: Place, size: float) -> DrawnSymbol
             drawn.label = split_components(start + 0.5 * place.barrel * along)
         x, y = zip(*map(split_components, (start, end)), strict=True)
         drawn.artists += axes.plot(x, y, "o", ms=3.5, color=colour, zorder=5.5)
-    elif symbol.kind == "force":
+    elif symbol.kind in ("force", "push"):
         _draw_force(axes, symbol, place, size, drawn)
     elif symbol.kind in ("moment", "drive"):
         centre = place.point(symbol.bar, symbol.at)
@@ -323,7 +341,7 @@ def _draw_arrow(
 
 
 def _draw_force(
-    axes: "Axes", symbol: Symbol, place: Place, size: float, drawn: DrawnSymbol
+    axes: "Axes", symbol: Symbol, place: Pose, size: float, drawn: DrawnSymbol
 ) -> None:
     tail, sign = place.tail(symbol), symbol.sign(place.theta_2)
     if sign == 0.0:
@@ -331,7 +349,7 @@ def _draw_force(
     tip = tail + sign * LENGTHS["force"] * size * place.direction(
         symbol
     ) * symbol.vector / abs(symbol.vector)
-    _draw_arrow(axes, tail, tip, COLOURS["force"], drawn)
+    _draw_arrow(axes, tail, tip, COLOURS[symbol.kind], drawn)
     drawn.label, drawn.away = split_components(tip), (tip - tail) / abs(tip - tail)
 
 

@@ -26,6 +26,7 @@ from exudyn.itemInterface import (
     ObjectJointRevolute2D,
 )
 
+from fourbar.effects import PointDrive
 from fourbar.errors import LimitError
 from fourbar.linkage import MOVING_BARS, PIN_FORCE
 from fourbar.scene import Scene
@@ -63,6 +64,8 @@ class ExudynBars(Loaded):
     def __init__(self, scene: Scene) -> None:
         if reason := find_unknown(scene, has_term, linear=True):
             raise LimitError(reason)
+        if isinstance(scene.drive, PointDrive):
+            raise LimitError("a force at a point has no element here")
         exu.config.printToConsole = False
         self.container = exu.SystemContainer()
         self.mbs = mbs = self.container.AddSystem()
@@ -91,7 +94,7 @@ class ExudynBars(Loaded):
             markers = [bodies.direction(bar) for bar in (1, scene.drive_bar)]
             self.drive = mbs.AddObject(ObjectConnectorCoordinate(markerNumbers=markers))
         else:
-            ends = (scene.drive.start, scene.drive.end)
+            ends = [end for _, end in scene.drive.ends]
             markers = [
                 bodies.point(end.bar, *place(end, scene.linkage.ground_angle))
                 for end in ends

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import opensim as osim
 
+from fourbar.effects import PointDrive
 from fourbar.errors import LimitError
 from fourbar.linkage import MOVING_BARS
 from fourbar.scene import Scene
@@ -47,11 +48,16 @@ TIME_IS_ALPHA = (1.0 / 6.0, 0.0, 0.0, 0.0)
 TURNING = {2: "O2", 4: "O4"}
 """Joint whose coordinate is the direction of a bar."""
 
+ENDS = ("start", "end")
+"""Names of the two ends of a cylinder."""
+
 
 def find_refusal(scene: Scene) -> str:
     """Name the declared limit that a scene meets, if any."""
     if reason := find_unknown(scene, has_term, linear=True):
         return reason
+    if isinstance(scene.drive, PointDrive):
+        return "a force at a point has no element here"
     for number in MOVING_BARS:
         if scene.linkage.bar(number).mass == 0.0:
             return f"bar {number} has no mass; OpenSim takes no such body at the end of a chain, and drops its inertia"
@@ -94,7 +100,7 @@ class OpenSimBars(Loaded):
             for name, place in part.points.items()
         }
         self.ends = (
-            (("start", scene.drive.start), ("end", scene.drive.end))
+            [(name, end) for name, (_, end) in zip(ENDS, scene.drive.ends, strict=True)]
             if scene.drive
             else ()
         )

@@ -318,10 +318,10 @@ def test_a_designer_draws_a_cylinder_drive_and_analyze_gives_the_same(
     driver.find_element(
         "xpath", "//fieldset[legend='from']//button[.='By x and y']"
     ).click()
-    wait_for(driver, "plain.drive.from.at.x")
+    wait_for(driver, "plain.drive.from.from_pin.x")
     for name, value in (("x", "300 mm"), ("y", "-250 mm")):
         type_into(driver, f"field:drive/from/at/{name}", value)
-        wait_for(driver, f"plain.drive.from.at.{name} === '{value}'")
+        wait_for(driver, f"plain.drive.from.from_pin.{name} === '{value}'")
     driver.find_element("css selector", "#command option[value=stroke]").click()
     wait_for(
         driver,
@@ -338,7 +338,7 @@ def test_a_designer_draws_a_cylinder_drive_and_analyze_gives_the_same(
     save(driver)
     scene = fourbar.load(path)
     assert scene.drive is not None and scene.effects and scene.motion.stroke is not None
-    assert 'at = {x = "300 mm", y = "-250 mm"}' in path.read_text()
+    assert 'from_pin = {x = "300 mm", y = "-250 mm"}' in path.read_text()
     solution, stroke = (
         fourbar.solve(scene),
         driver.execute_script("return data.over.values[17]"),

@@ -1,5 +1,6 @@
 """A scene that is changed step by step: its text, its history, its answers and what is kept on the disk."""
 
+import cmath
 import json
 import math
 import os
@@ -113,7 +114,10 @@ def test_each_part_that_is_offered_is_one_that_the_file_takes() -> None:
 
 
 def test_what_a_pair_consists_of_is_read_from_the_declarations() -> None:
-    places = {key: ["distance", "angle"] for key in ("centre", "from_pin", "at")}
+    places = {
+        key: ["distance", "angle"]
+        for key in ("centre", "from_pin", "from_centre", "arm")
+    }
     assert list_offers()["pairs"] == {
         **places,
         "force": ["size", "angle"],
@@ -239,17 +243,15 @@ def test_what_is_dragged_stands_where_it_was_dragged_to(session: Session) -> Non
     assert complex(*at_50(session).G4[0]) == pytest.approx(0.3 + 0.1j, abs=2 * PIXEL)
     dragged(session, ["bars", "input", "centre"], 0.02 + 0.03j)  # the file had none
     assert complex(*at_50(session).G2[0]) == pytest.approx(0.02 + 0.03j, abs=2 * PIXEL)
-    dragged(session, ["effects", "springs", 0, "from", "at"], 0.1 - 0.05j)
+    dragged(session, ["effects", "springs", 0, "from", "from_pin"], 0.1 - 0.05j)
     start = session.now.scene.effects[-1].springs[0].start
     turned = session.now.scene.linkage.ground_angle
-    assert np.exp(1j * turned) * start[1] * np.exp(1j * start[2]) == pytest.approx(
+    assert np.exp(1j * turned) * start.vector() == pytest.approx(
         0.1 - 0.05j, abs=2 * PIXEL
     )
-    dragged(session, ["loads", 1, "at"], 0.12 + 0.12j)
+    dragged(session, ["loads", 1, "from_centre"], 0.12 + 0.12j)
     load, s = session.now.scene.loads[1], at_50(session)
-    foot = complex(*s.G3[0]) + load.at[0] * np.exp(
-        1j * (load.at[1] + s.theta_3[0])
-    )  # frame = "bar"
+    foot = complex(*s.G3[0]) + cmath.rect(*load.from_centre) * np.exp(1j * s.theta_3[0])
     assert foot == pytest.approx(0.12 + 0.12j, abs=2 * PIXEL)
     dragged(session, ["loads", 1, "force"], foot + 0.05j, stretch=2.0)
     load, s = session.now.scene.loads[1], at_50(session)
@@ -272,14 +274,14 @@ def test_what_is_dragged_stands_where_it_was_dragged_to(session: Session) -> Non
 def test_the_arrow_of_a_load_goes_where_it_is_dragged_in_either_frame_and_a_negative_force_stays(
     session: Session, frame: str, size: str
 ) -> None:
-    load = f'[[loads]]\nbar = 3\nforce = ["{size}", "10 deg"]\nat = ["20 mm", "0 deg"]\nframe = "{frame}"\n'
+    load = f'[[loads]]\nbar = 3\nforce = ["{size}", "10 deg"]\nfrom_pin = ["20 mm", "0 deg"]\nframe = "{frame}"\n'
     session.do({"do": "text", "text": session.now.text + load})
     load_path = ["loads", len(session.now.scene.loads) - 1]
     to = 0.13 + 0.11j
-    dragged(session, [*load_path, "at"], to)
+    dragged(session, [*load_path, "from_pin"], to)
     s, load = at_50(session), session.now.scene.loads[-1]
     turned = float(s.theta_3[0]) if frame == "bar" else 0.0
-    foot = complex(*s.G3[0]) + load.at[0] * np.exp(1j * (load.at[1] + turned))
+    foot = complex(*s.A[0]) + load.place.vector() * np.exp(1j * s.theta_3[0])
     assert foot == pytest.approx(to, abs=2 * PIXEL)
     arrow = 0.05 * np.exp(0.7j)
     dragged(session, [*load_path, "force"], foot + arrow, stretch=2.0)
@@ -294,26 +296,28 @@ def test_the_arrow_of_a_load_goes_where_it_is_dragged_in_either_frame_and_a_nega
 def test_a_place_by_coordinates_is_dragged_and_stays_so_until_it_is_restated(
     session: Session,
 ) -> None:
-    load = '[[loads]]\nbar = 3\nforce = ["5 N", "10 deg"]\nat = { x = "1 in", y = "20 mm" }\n'
-    line = '[drive]\nfrom = { bar = 1, at = { x = "-30 mm", y = "40 mm" } }\nto = { bar = 2, at = ["9 cm", "0 deg"] }\n'
+    load = '[[loads]]\nbar = 3\nforce = ["5 N", "10 deg"]\nfrom_pin = { x = "1 in", y = "20 mm" }\n'
+    line = (
+        '[drive]\nfrom = { bar = 1, from_pin = { x = "-30 mm", y = "40 mm" } }\n'
+        'to = { bar = 2, from_pin = ["9 cm", "0 deg"] }\n'
+    )
     text = session.now.text.replace("[drive]\nbar = 2\n", "")
     assert "refused" not in (
         told := session.do({"do": "text", "text": text + load + line})
     ), told
-    path = ["loads", len(session.now.scene.loads) - 1, "at"]
+    path = ["loads", len(session.now.scene.loads) - 1, "from_pin"]
     to = 0.13 + 0.11j
     dragged(session, path, to)
     s, load = at_50(session), session.now.scene.loads[-1]
-    assert complex(*s.G3[0]) + load.at[0] * np.exp(1j * load.at[1]) == pytest.approx(
-        to, abs=2 * PIXEL
-    )
+    foot = complex(*s.A[0]) + load.place.vector() * np.exp(1j * s.theta_3[0])
+    assert foot == pytest.approx(to, abs=2 * PIXEL)
     stated = session.document.at(path)
     assert (
         set(stated) == {"x", "y"}
         and stated["x"].endswith(" in")
         and stated["y"].endswith(" mm")
     )
-    dragged(session, ["drive", "from", "at"], 0.02 + 0.05j)
+    dragged(session, ["drive", "from", "from_pin"], 0.02 + 0.05j)
     turned = np.exp(1j * session.now.scene.linkage.ground_angle)
     start = session.now.scene.drive.start
     assert turned * start.distance * np.exp(1j * start.angle) == pytest.approx(
@@ -321,10 +325,10 @@ def test_a_place_by_coordinates_is_dragged_and_stays_so_until_it_is_restated(
     )
     for by, kind in (("polar", list), ("xy", dict)):
         assert "refused" not in session.do({"do": "restate", "path": path, "by": by})
-        entry = session.now.plain["loads"][path[1]]["at"]
+        entry = session.now.plain["loads"][path[1]]["from_pin"]
         assert isinstance(entry, kind)
-        point = session.now.scene.loads[-1].at
-        assert point == pytest.approx(load.at, rel=1e-5)
+        point = session.now.scene.loads[-1].from_pin
+        assert point == pytest.approx(load.from_pin, rel=1e-5)
     for nonsense in (
         {"path": path, "by": "z"},
         {"path": ["lengths"], "by": "xy"},

@@ -13,8 +13,8 @@ from fourbar.effects import (
     Gravity,
     Load,
     PinFriction,
+    Place,
     Spring,
-    SpringEnd,
     Springs,
     Table,
     Torsion,
@@ -57,7 +57,7 @@ def potential_torque(scene: Scene, energy: object) -> np.ndarray:
 
 
 def test_a_spring_is_the_slope_of_its_energy() -> None:
-    spring = Spring(SpringEnd(1, 0.1, -1.5), SpringEnd(3, 0.08, 0.2), 200.0, 0.05, 3.0)
+    spring = Spring(Place(1, (0.1, -1.5)), Place(3, (0.08, 0.2)), 200.0, 0.05, 3.0)
 
     def energy(s: fourbar.Solution) -> np.ndarray:
         theta_1 = scene.linkage.ground_angle
@@ -83,7 +83,7 @@ def test_the_work_that_compresses_a_gas_spring_is_that_of_its_two_forces() -> No
         pushed = extended - np.abs(s.B @ [1, 1j] - ground)
         return first * pushed + (last - first) / (2.0 * stroke) * pushed**2
 
-    ends = SpringEnd(1, 0.2, 2.0), SpringEnd(4, 0.22, 0.0)
+    ends = Place(1, (0.2, 2.0)), Place(4, (0.22, 0.0))
     scene = alone(Springs((Spring.gas(*ends, extended, stroke, first, last),)))
     torque = solve(scene).torque
     assert torque is not None and np.abs(torque).max() > 1.0
@@ -97,7 +97,7 @@ def test_the_work_that_compresses_a_gas_spring_is_that_of_its_two_forces() -> No
 
 def test_a_spring_without_free_length_has_a_force_where_its_points_meet() -> None:
     """Force k times the distance vector: zero, not NaN, where both ends lie on pin A."""
-    ends = SpringEnd(2, 0.1, 0.0), SpringEnd(3, 0.0, 0.0)
+    ends = Place(2, (0.1, 0.0)), Place(3, (0.0, 0.0))
     torque = solve(alone(Springs((Spring(*ends, 100.0),)))).torque
     assert torque is not None and np.array_equal(torque, np.zeros(9))
 
@@ -259,7 +259,7 @@ def test_a_table_is_linear_between_its_points_and_periodic() -> None:
 
 
 def test_a_load_over_theta_2_is_the_load_times_its_factor() -> None:
-    load = Load(4, (3.0, 0.7), (0.05, 1.0), 0.2)
+    load = Load(4, (3.0, 0.7), arm=(0.05, 1.0), moment=0.2)
     table = Table((0.0, math.pi, 2 * math.pi), (1.0, 3.0, 1.0))
     angle = np.array([math.pi / 2])
     tabled = (
@@ -323,7 +323,7 @@ def test_each_position_of_a_law_is_that_motion_alone() -> None:
         )  # type: ignore[index]
 
 
-HERE = SpringEnd(2, 0.1, 0.0), SpringEnd(4, 0.2, 0.0)
+HERE = Place(2, (0.1, 0.0)), Place(4, (0.2, 0.0))
 
 
 @pytest.mark.parametrize(
@@ -334,7 +334,7 @@ HERE = SpringEnd(2, 0.1, 0.0), SpringEnd(4, 0.2, 0.0)
         (lambda: Motion(1.0, law=Law((0.0, 1.0), (0.0, 1.0), 5, "rest")), "motion.law"),
         (lambda: Flywheel(1.0, 3), "effects.flywheel.bar"),
         (
-            lambda: Spring(SpringEnd(2, 0.1, 0.0), SpringEnd(2, 0.2, 0.0), 1.0),
+            lambda: Spring(Place(2, (0.1, 0.0)), Place(2, (0.2, 0.0)), 1.0),
             "effects.springs.to.bar",
         ),
         (lambda: Spring.gas(*HERE, 0.3, 0.3, 1.0), "effects.springs.gas.stroke"),

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import fourbar
-from fourbar.effects import SpringEnd
+from fourbar.effects import Place
 from fourbar.files.scene_file import loads
 from fourbar.files.scene_text import dump
 from fourbar.mjcf.assembly import write_sdf, write_usd
@@ -37,7 +37,7 @@ WIDE, SHORT, KITE = (
 
 def ends(start_bar: int, end_bar: int) -> fourbar.LinearDrive:
     return fourbar.LinearDrive(
-        SpringEnd(start_bar, 0.17, -1.1), SpringEnd(end_bar, 0.09, 0.7)
+        Place(start_bar, (0.17, -1.1)), Place(end_bar, (0.09, 0.7))
     )
 
 
@@ -200,8 +200,8 @@ def test_the_condition_is_the_slope_of_the_stroke_over_what_its_ends_could_move(
             continue
         polar = rng.uniform(0.05, 0.6, 2), rng.uniform(-3.0, 3.0, 2)
         drive = fourbar.LinearDrive(
-            SpringEnd(start_bar, polar[0][0], polar[1][0]),
-            SpringEnd(end_bar, polar[0][1], polar[1][1]),
+            Place(start_bar, (polar[0][0], polar[1][0])),
+            Place(end_bar, (polar[0][1], polar[1][1])),
         )
         theta_2 = rng.uniform(0.0, 6.0)
         motion = fourbar.Motion(
@@ -236,7 +236,7 @@ def test_where_it_has_no_lever_or_no_direction_there_are_no_forces() -> None:
         fourbar.Scene(
             link,
             motion,
-            drive=fourbar.LinearDrive(SpringEnd(1, 0.2, 0.0), SpringEnd(2, 0.1, 0.0)),
+            drive=fourbar.LinearDrive(Place(1, (0.2, 0.0)), Place(2, (0.1, 0.0))),
         ),
         "error",
     )
@@ -249,14 +249,14 @@ def test_where_it_has_no_lever_or_no_direction_there_are_no_forces() -> None:
     assert s.stroke[0] == pytest.approx(0.1) and abs(s.stroke_speed[0]) < 1e-15
     one = fourbar.solve(fourbar.Scene(link, fourbar.Motion(0.0, 1.0), drive=s.drive))
     assert one.status == ["no_lever"] and np.isnan(one.power).all()
-    meet = fourbar.LinearDrive(SpringEnd(1, 0.1, 0.5), SpringEnd(2, 0.1, 0.0))
+    meet = fourbar.LinearDrive(Place(1, (0.1, 0.5)), Place(2, (0.1, 0.0)))
     assert fourbar.solve(fourbar.Scene(link, motion, drive=meet)).status == [
         "ok",
         "no_direction",
         "ok",
     ]
     # the parallelogram's cranks keep their distance while they are parallel, and only then
-    parallel = fourbar.LinearDrive(SpringEnd(2, 0.05, 0.3), SpringEnd(4, 0.05, 0.3))
+    parallel = fourbar.LinearDrive(Place(2, (0.05, 0.3)), Place(4, (0.05, 0.3)))
     for branch, status in ((1, "no_lever"), (-1, "ok")):
         scene = fourbar.Scene(
             fourbar.uniform(0.3, 0.1, 0.3, 0.1),
@@ -282,7 +282,7 @@ def test_where_it_has_no_lever_or_no_direction_there_are_no_forces() -> None:
 def test_ends_that_keep_their_distance_are_refused_in_one_line(
     start: Any, end: Any
 ) -> None:
-    drive = fourbar.LinearDrive(SpringEnd(*start), SpringEnd(*end))
+    drive = fourbar.LinearDrive(Place(start[0], start[1:]), Place(end[0], end[1:]))
     with pytest.raises(
         fourbar.InputError, match=r"^drive\.to = .*keeps its distance from `from`"
     ):
@@ -300,8 +300,8 @@ omega_2 = "2 rad/s"
 [drive]
 """
 FROM, TO = (
-    'from = { bar = 1, at = ["21 cm", "-60 deg"] }\n',
-    'to = { bar = 4, at = ["9 cm", "0 deg"] }\n',
+    'from = { bar = 1, from_pin = ["21 cm", "-60 deg"] }\n',
+    'to = { bar = 4, from_pin = ["9 cm", "0 deg"] }\n',
 )
 
 
@@ -318,7 +318,7 @@ FROM, TO = (
             FROM.replace("21 cm", "30 cm").replace("-60", "0") + TO,
             r"drive\.to = .*keeps its distance",
         ),
-        (FROM + TO.replace("9 cm", "9 kg"), r"drive\.to\.at"),
+        (FROM + TO.replace("9 cm", "9 kg"), r"drive\.to\.from_pin"),
         (FROM + TO + "force = 1\n", r"drive\.force"),
     ],
 )
@@ -333,11 +333,11 @@ def test_a_file_with_a_wrong_drive_is_refused_in_one_line(
 
 
 def test_it_reads_back_as_it_was_written_and_is_carried_by_studies() -> None:
-    scene = loads(TEXT + FROM + TO + '[tolerances]\n"drive.from.at.0" = "1 mm"\n')
+    scene = loads(TEXT + FROM + TO + '[tolerances]\n"drive.from.from_pin.0" = "1 mm"\n')
     again = loads(dump(scene))
     assert again.drive == scene.drive
-    assert again.drive.start.bar == 1 and again.drive.end == SpringEnd(4, 0.09, 0.0)
-    assert again.drive.start[1:] == pytest.approx((0.21, math.radians(-60)))
+    assert again.drive.start.bar == 1 and again.drive.end == Place(4, (0.09, 0.0))
+    assert again.drive.start.from_pin == pytest.approx((0.21, math.radians(-60)))
     assert again.drive_bar is None and '"drive_bar": null' in write_json(
         fourbar.solve(again)
     )
@@ -362,10 +362,10 @@ def test_derivatives_by_its_ends_are_those_of_differences(
     )
     slopes = fourbar.sensitivity(scene)
     for key in (
-        "drive.from.at.0",
-        "drive.from.at.1",
-        "drive.to.at.0",
-        "drive.to.at.1",
+        "drive.from.from_pin.0",
+        "drive.from.from_pin.1",
+        "drive.to.from_pin.0",
+        "drive.to.from_pin.1",
         "lengths.coupler",
     ):
         value = slopes.numbers[list(slopes.keys).index(key)]
@@ -408,8 +408,8 @@ def test_the_frame_bears_what_changes_the_momentum_of_the_bars(
     assert np.abs(shaking_force(s) - force).max() < ROUND_OFF * pins
     assert np.abs(shaking_moment(s) - moment).max() < ROUND_OFF * pins
     elsewhere = {
-        "drive.from.at.0": [0.17, 0.12],
-        "drive.to.at.1": [0.7, 0.6],
+        "drive.from.from_pin.0": [0.17, 0.12],
+        "drive.to.from_pin.1": [0.7, 0.6],
     }  # the bars move as before
     study = fourbar.solve(fourbar.vary(scene, elsewhere))
     pins = np.abs(study.F12).max() + np.abs(study.F14).max()

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import fourbar
-from fourbar.effects import Gravity, PinFriction, Spring, SpringEnd, Springs, Torsion
+from fourbar.effects import Gravity, PinFriction, Place, Spring, Springs, Torsion
 from fourbar.errors import LimitError
 from fourbar.formulas.mobility import choose_range
 from fourbar.linkage import PINS
@@ -42,10 +42,10 @@ def test_a_spring_with_both_ends_in_one_pin_has_no_direction(
 ) -> None:
     link = linkage(name)
     ends = {
-        "A": (SpringEnd(2, link.input.length, 0.0), SpringEnd(3, 0.0, 0.0)),
+        "A": (Place(2, (link.input.length, 0.0)), Place(3, (0.0, 0.0))),
         "B": (
-            SpringEnd(3, link.coupler.length, 0.0),
-            SpringEnd(4, link.output.length, 0.0),
+            Place(3, (link.coupler.length, 0.0)),
+            Place(4, (link.output.length, 0.0)),
         ),
     }[pin]
     scene = Scene(
@@ -71,7 +71,7 @@ def test_a_spring_with_both_ends_in_one_pin_has_no_direction(
 
 
 def test_a_spring_whose_ends_meet_once_loses_that_position_alone() -> None:
-    spring = Spring(SpringEnd(1, 0.1, 0.5), SpringEnd(2, 0.1, 0.0), 200.0, 0.05)
+    spring = Spring(Place(1, (0.1, 0.5)), Place(2, (0.1, 0.0)), 200.0, 0.05)
     theta_2 = [0.3, 0.5, 0.5 + 1e-9, 0.7]
     scenes = [
         Scene(linkage("crank-rocker"), Motion(theta_2, 8.0), effects=effects)

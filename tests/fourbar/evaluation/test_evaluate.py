@@ -9,8 +9,8 @@ import fourbar
 from fourbar.effects import (
     Gravity,
     Load,
+    Place,
     Spring,
-    SpringEnd,
     Springs,
     Table,
     Torsion,
@@ -43,14 +43,14 @@ def sized(k: float = 1.0, turns: float = 0.0) -> Scene:
         ground_angle=0.2,
     )
     spring = Spring(
-        SpringEnd(1, 0.2 * k, 0.6), SpringEnd(3, 0.15 * k, -0.4), 80.0, 0.1 * k, 2.0 * k
+        Place(1, (0.2 * k, 0.6)), Place(3, (0.15 * k, -0.4)), 80.0, 0.1 * k, 2.0 * k
     )
     effects = (
         Gravity(9.81 * k, -1.3),
         Springs((spring,)),
         Torsion.at(B=(0.5 * k * k, 0.7, 0.1 * k * k)),
     )
-    load = Load(4, (3.0 * k, 0.7), (0.05 * k, 1.0))
+    load = Load(4, (3.0 * k, 0.7), arm=(0.05 * k, 1.0))
     return Scene(
         linkage, Motion(np.linspace(0.1, 6.0, 15), 3.0, 2.0), 2, (load,), effects
     )
@@ -77,7 +77,7 @@ def exactly_one() -> Scene:
 SCENES = {f"{k:g} m": sized(k) for k in (1.0, 1e60, 1e-60, 1e-75, 1e100)}
 SCENES |= {"centres of many turns": sized(turns=TURNS), "one": exactly_one()}
 SPRINGS = Springs(
-    (Spring(SpringEnd(2, 0.1, 0.6), SpringEnd(3, 0.05, -0.4), 80.0, 0.01, 2.0),)
+    (Spring(Place(2, (0.1, 0.6)), Place(3, (0.05, -0.4)), 80.0, 0.01, 2.0),)
 )
 SCENES |= {
     f"{effect.key} near a limit": near_a_limit(effect)
@@ -130,7 +130,7 @@ def test_a_run_judges_the_bars_where_each_spring_is_nearest_to_its_rest(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     ends = fourbar.Point("P", 1, (0.2, 0.6)), fourbar.Point("Q", 3, (0.15, -0.4))
-    spring = Spring(SpringEnd(1, 0.2, 0.6), SpringEnd(3, 0.15, -0.4), 80.0, 0.2)
+    spring = Spring(Place(1, (0.2, 0.6)), Place(3, (0.15, -0.4)), 80.0, 0.2)
     table = Table((0.0, 1.0, 4.0, 6.2), (1.0, 1.0, -2.0, -2.0))  # 0 at 2 rad
     scene = Scene(
         FourBar(0.3, Bar(0.1), Bar(0.25), Bar(0.22)),

@@ -138,9 +138,8 @@ def motion(kind: str, number: int) -> Released:
             fourbar.Load(
                 int(rng.integers(2, 5)),
                 force,
-                (0.1, 1.0),
-                0.0,
-                str(rng.choice(["world", "bar"])),
+                from_centre=(0.1, 1.0),
+                frame=str(rng.choice(["world", "bar"])),
             )
         )
     branch, omega_2 = int(rng.choice([-1, 1])), float(rng.uniform(-5.0, 5.0))

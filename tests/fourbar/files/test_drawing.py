@@ -104,8 +104,8 @@ def test_places_of_the_drawing_are_where_they_are_drawn() -> None:
 
 CYLINDER = """\
 [drive]
-from = { bar = 1, at = { drawn = ["100 mm", "-50 mm"] } }
-to = { bar = 2, at = { drawn = ["10 mm", "60 mm"] } }
+from = { bar = 1, from_pin = { drawn = ["100 mm", "-50 mm"] } }
+to = { bar = 2, from_pin = { drawn = ["10 mm", "60 mm"] } }
 [motion]
 stroke = "drawn"
 side = "drawn"

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import fourbar
-from fourbar.effects import SpringEnd
+from fourbar.effects import Place
 from fourbar.errors import InputError
 from fourbar.files import dump, load, loads, save
 from fourbar.quantities.units import UnitError, to_si
@@ -207,21 +207,21 @@ free = { duration = "5 s", steps = 500 }
 [[loads]]
 bar = 3
 force = ["2 N", "90 deg"]
-at = ["1 cm", "0 deg"]
+from_centre = ["1 cm", "0 deg"]
 frame = "bar"
 [effects]
 viscous = { O2 = "0.01 N m s/rad", B = "1 N m s/rad" }
 friction = { A = "5 N cm" }
-springs = [{ from = { bar = 1 }, to = { bar = 4, at = ["20 cm", "0 deg"] }, gas = { extended = "50 cm", stroke = "20 cm", extended_force = "400 N", compressed_force = "520 N" } }]
+springs = [{ from = { bar = 1 }, to = { bar = 4, from_pin = ["20 cm", "0 deg"] }, gas = { extended = "50 cm", stroke = "20 cm", extended_force = "400 N", compressed_force = "520 N" } }]
 """  # noqa: E501
     )
     scene = loads(text)
     assert scene.motion.free == fourbar.Free(5.0, 500)
     assert scene.loads == (
-        fourbar.Load(3, (2.0, math.pi / 2), (0.01, 0.0), frame="bar"),
+        fourbar.Load(3, (2.0, math.pi / 2), from_centre=(0.01, 0.0), frame="bar"),
     )
     gas = fourbar.Spring.gas(
-        SpringEnd(1, 0.0, 0.0), SpringEnd(4, 0.2, 0.0), 0.5, 0.2, 400.0, 520.0
+        Place(1, (0.0, 0.0)), Place(4, (0.2, 0.0)), 0.5, 0.2, 400.0, 520.0
     )
     springs = fourbar.Springs((gas,))
     assert scene.effects == (
@@ -301,9 +301,11 @@ def test_any_scene_reads_back_bit_for_bit(scene: fourbar.Scene) -> None:
 PLACES = {
     "bars.coupler.centre": '[bars.coupler]\nmass = "1 kg"\ncentre = {}\n',
     "points.P.from_pin": "[points]\nP = {{ bar = 3, from_pin = {} }}\n",
-    "loads[0].at": '[[loads]]\nbar = 4\nforce = ["1 N", "0 deg"]\nat = {}\n',
-    "drive.from.at": '[drive]\nfrom = {{ bar = 1, at = {} }}\nto = {{ bar = 2, at = ["90 mm", "0 deg"] }}\n',
-    "effects.springs[0].to.at": "[effects]\nsprings = [{{ from = {{ bar = 1 }}, to = {{ bar = 4, at = {} }}, "
+    "loads[0].from_pin": '[[loads]]\nbar = 4\nforce = ["1 N", "0 deg"]\nfrom_pin = {}\n',
+    "drive.from.from_pin": "[drive]\nfrom = {{ bar = 1, from_pin = {} }}\n"
+    'to = {{ bar = 2, from_pin = ["90 mm", "0 deg"] }}\n',
+    "effects.springs[0].to.from_pin": "[effects]\n"
+    "springs = [{{ from = {{ bar = 1 }}, to = {{ bar = 4, from_pin = {} }}, "
     'stiffness = "9 N/m", length = "1 mm" }}]\n',
 }
 

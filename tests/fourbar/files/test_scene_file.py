@@ -32,7 +32,7 @@ bar = 2
 [[loads]]
 bar = 4
 force = ["3 N", "40 deg"]
-at = ["5 cm", "0 deg"]
+from_pin = ["5 cm", "0 deg"]
 [effects]
 gravity = ["9.81 m/s^2", "-90 deg"]
 viscous = { O2 = "0.01 N m s/rad" }
@@ -68,7 +68,7 @@ MISTAKES = [
     ("ground has no mass", "[bars.input]", "[bars.ground]", ["bars.ground", "input, coupler, output"]),
     ("unknown effect", "gravity", "gravitiy", ["effects.gravitiy", 'did you mean "gravity"?']),
     ("unknown pin", "{ O2 =", "{ O3 =", ["effects.viscous.O3", "O2, A, B, O4"]),
-    ("unknown key of a load", "at =", "where =", ["loads[0].where"]),
+    ("unknown key of a load", "from_pin =", "where =", ["loads[0].where"]),
     ("wrong dimension", '"0.1 m"', '"48 kg"', ["lengths.input", "48 kg", "does not convert to m"]),
     ("wrong force unit", '"3 N"', '"3 kg"', ["loads[0].force[0]", "3 kg", "N"]),
     ("Hz is no angular speed", '"10 rad/s"', '"10 Hz"', ["motion.omega_2", "10 Hz", "rad/s"]),
@@ -106,8 +106,8 @@ MISTAKES = [
     ("drive as text", "[drive]\nbar = 2", '[drive]\nbar = "2"', ["drive.bar", "'2'"]),
     ("drive as truth", "[drive]\nbar = 2", "[drive]\nbar = true", ["drive.bar", "True"]),
     ("load on the ground", "bar = 4", "bar = 1", ["loads[0].bar", "1"]),
-    ("load that does nothing", 'force = ["3 N", "40 deg"]\nat = ["5 cm", "0 deg"]\n', "", ["loads[0]", "force"]),
-    ("arm without a force", 'force = ["3 N", "40 deg"]', 'moment = "1 N m"', ["loads[0].at", "needs a force"]),
+    ("load that does nothing", 'force = ["3 N", "40 deg"]\nfrom_pin = ["5 cm", "0 deg"]\n', "", ["loads[0]", "force"]),
+    ("arm without a force", 'force = ["3 N", "40 deg"]', 'moment = "1 N m"', ["loads[0].from_pin", "needs a force"]),
     ("force without an angle", '["3 N", "40 deg"]', '"3 N"', ["loads[0].force", "pair"]),
     ("force by coordinates", '["3 N", "40 deg"]', '{ x = "1 N", y = "2 N" }', ["loads[0].force", "a pair like"]),
     ("force with three parts", '["3 N", "40 deg"]', '["3 N", "40 deg", "1 m"]', ["loads[0].force", "pair"]),

@@ -60,7 +60,7 @@ def scene(drive_bar: int) -> fourbar.Scene:
         0.3,
     )
     loads = (
-        fourbar.Load(3, (5.0, 1.0), (0.05, 0.3), 0.2, "bar"),
+        fourbar.Load(3, (5.0, 1.0), from_centre=(0.05, 0.3), moment=0.2, frame="bar"),
         fourbar.Load(4, (-3.0, 0.5)),
     )
     effects = (
@@ -106,7 +106,7 @@ def test_the_model_mechanism_of_the_thesis(inertias: tuple[float, float]) -> Non
         fourbar.Bar(0.2, 0.2, inertias[1]),
         math.radians(45),
     )
-    loads = [fourbar.Load(2, (10, 0), (0.05, math.radians(265)))]
+    loads = [fourbar.Load(2, (10, 0), arm=(0.05, math.radians(265)))]
     loads += [fourbar.Load(k, moment=-0.15) for k in (2, 3, 4)]
     s = fourbar.solve(
         fourbar.Scene(link, fourbar.Motion(math.radians(135), 0.2244), 4, tuple(loads))
@@ -250,7 +250,7 @@ def test_bars_without_mass_hold_a_load_where_the_input_turns_back() -> None:
     link = fourbar.FourBar(
         0.5, fourbar.Bar(0.4), fourbar.Bar(0.3), fourbar.Bar(0.25), 0.2
     )
-    loads = (fourbar.Load(3, (2.0, 0.3), (0.1, 0.02)),)
+    loads = (fourbar.Load(3, (2.0, 0.3), arm=(0.1, 0.02)),)
     on, close, near = (
         fourbar.solve(
             fourbar.Scene(
@@ -309,7 +309,7 @@ def test_a_force_beside_B_has_its_moment_there(beside: float) -> None:
     link = fourbar.FourBar(
         0.3, fourbar.Bar(0.1), fourbar.Bar(b, centre=(0.0, 0.0)), fourbar.Bar(0.22)
     )
-    load = fourbar.Load(3, (1.0, direction), (b + beside, 0.0), frame="bar")
+    load = fourbar.Load(3, (1.0, direction), from_centre=(b + beside, 0.0), frame="bar")
     s = fourbar.solve(
         fourbar.Scene(link, fourbar.Motion(np.linspace(0.1, 6.0, 7), 0.0), 4, (load,))
     )

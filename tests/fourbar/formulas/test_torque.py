@@ -45,9 +45,9 @@ def random_case(rng: np.random.Generator) -> tuple[fourbar.FourBar, tuple, Comma
     linkage = fourbar.FourBar(lengths[0], *bars, ground_angle=rng.uniform(-3, 3))
     pins = {"O2": 0.1, "A": 0.2, "B": 0.3, "O4": 0.1}
     terms = (
-        fourbar.Load(2, (3.0, 0.7), (0.05, 1.0)),
-        fourbar.Load(3, (2.0, 0.3), (0.1, 2.0), 0.4, "bar"),
-        fourbar.Load(4, (1.0, 0.9), (0.2, -1.0), -0.3),
+        fourbar.Load(2, (3.0, 0.7), arm=(0.05, 1.0)),
+        fourbar.Load(3, (2.0, 0.3), from_centre=(0.1, 2.0), moment=0.4, frame="bar"),
+        fourbar.Load(4, (1.0, 0.9), arm=(0.2, -1.0), moment=-0.3),
         fourbar.Gravity(),
         fourbar.Viscous.at(**pins),
         fourbar.Friction.at(**pins),
@@ -213,7 +213,7 @@ def test_statics_of_motiongenesis() -> None:
         """The torque that holds it at rest, and theta_3, theta_4."""
         position = state_of(linkage, angle, branch).position
         theta_3, theta_4 = float(np.angle(position.u3)), float(np.angle(position.u4))
-        loads = (fourbar.Load(3, (200.0, np.pi / 2), (1.0, theta_3)),)
+        loads = (fourbar.Load(3, (200.0, np.pi / 2), arm=(1.0, theta_3)),)
         motion = fourbar.Motion(angle, 0.0, branch=branch)
         s = solve(
             fourbar.Scene(linkage, motion, 2, loads, (fourbar.Gravity(9.81, 0.0),)),
@@ -343,11 +343,11 @@ def test_springs_tables_and_rest_have_the_torque_of_the_thirteen_equations(
     """What depends on O4, on theta_2 and on rest next to motion, in one sweep."""
     linkage = of(SHAPES["crank-rocker"])
     ends = (
-        fourbar.effects.SpringEnd(1, 0.2, 0.3),
-        fourbar.effects.SpringEnd(4, 0.15, 0.2),
+        fourbar.effects.Place(1, (0.2, 0.3)),
+        fourbar.effects.Place(4, (0.15, 0.2)),
     )
     table = fourbar.effects.Table((0.0, 2.0, 6.0), (1.0, 3.0, -1.0))
-    loads = (fourbar.Load(3, (2.0, 0.3), (0.1, 2.0), 0.4, table=table),)
+    loads = (fourbar.Load(3, (2.0, 0.3), arm=(0.1, 2.0), moment=0.4, table=table),)
     effects = (
         fourbar.effects.Springs((fourbar.effects.Spring(*ends, 300.0, 0.05),)),
         fourbar.Friction.at(O2=0.1, B=0.3),

@@ -191,7 +191,7 @@ KEPT = crank_rocker(
     effects=JOINTS,
 )
 """All of it is in a file for Genesis."""
-ENDS = fourbar.effects.SpringEnd(1, 0.1, -1.5), fourbar.effects.SpringEnd(3, 0.08, 0.3)
+ENDS = fourbar.effects.Place(1, (0.1, -1.5)), fourbar.effects.Place(3, (0.08, 0.3))
 WHOLE = crank_rocker(
     motion=KEPT.motion,
     effects=(*JOINTS, fourbar.Springs((fourbar.Spring(*ENDS, 200.0, 0.02),))),

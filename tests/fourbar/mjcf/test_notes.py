@@ -14,7 +14,7 @@ import pytest
 
 import fourbar
 from fourbar.effects import Friction
-from fourbar.effects.spring import SpringEnd
+from fourbar.effects.place import Place
 from fourbar.linkage import BAR_NAMES
 from fourbar.mjcf import write_mjcf_for
 from fourbar.mjcf.document import SETTLING, Drive
@@ -38,9 +38,7 @@ MATRIX = Path(__file__).parents[3] / "docs" / "examples" / "benchmark.csv"
 
 def acted_on(**changes: Any) -> Scene:
     """Everything that has a counterpart in MJCF acts; a load of each kind on each bar, and the drive is on bar 4."""
-    spring = fourbar.Spring(
-        SpringEnd(1, 0.1, -1.5), SpringEnd(3, 0.08, 0.3), 200.0, 0.02
-    )
+    spring = fourbar.Spring(Place(1, (0.1, -1.5)), Place(3, (0.08, 0.3)), 200.0, 0.02)
     effects = (
         fourbar.Gravity(),
         fourbar.Viscous.at(O2=0.02, B=0.03),
@@ -50,10 +48,10 @@ def acted_on(**changes: Any) -> Scene:
         fourbar.Flywheel(0.02, 4),
     )
     loads = (
-        fourbar.Load(2, (2.0, 0.4), (0.03, 2.0), 0.1),
-        fourbar.Load(3, (4.0, -1.0), (0.05, 0.7), frame="bar"),
+        fourbar.Load(2, (2.0, 0.4), arm=(0.03, 2.0), moment=0.1),
+        fourbar.Load(3, (4.0, -1.0), from_centre=(0.05, 0.7), frame="bar"),
         fourbar.Load(3, moment=-0.2),
-        fourbar.Load(4, (3.0, 0.7), (0.05, 1.0)),
+        fourbar.Load(4, (3.0, 0.7), arm=(0.05, 1.0)),
     )
     motion = fourbar.Motion(fourbar.Sweep(0.4, 0.4 + math.tau, 60), 10.0)
     return crank_rocker(
@@ -417,9 +415,9 @@ SAID: dict[str, Callable[[Opened], None]] = {
     "MuJoCo before 3.7": was_wrong_before_3_7,
 }
 """By how a sentence begins, what it promises."""
-CYLINDER = fourbar.LinearDrive(SpringEnd(1, 0.17, -1.1), SpringEnd(3, 0.09, 0.7))
+CYLINDER = fourbar.LinearDrive(Place(1, (0.17, -1.1)), Place(3, (0.09, 0.7)))
 PRELOADED = fourbar.Spring(
-    SpringEnd(1, 0.1, -1.5), SpringEnd(3, 0.08, 0.3), 200.0, 0.02, 30.0
+    Place(1, (0.1, -1.5)), Place(3, (0.08, 0.3)), 200.0, 0.02, 30.0
 )
 """A spring that pulls even where its ends meet: a tendon's rest length cannot express it."""
 FILES: dict[str, tuple[Scene, Drive]] = {

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 import fourbar
-from fourbar.effects import SpringEnd, Table
+from fourbar.effects import Place, Table
 from fourbar.errors import InputError
 from fourbar.files import loads
 from fourbar.quantities.units import DEFINITIONS, UnitError, to_si
 
-ENDS = SpringEnd(1, 0.1, 0.0), SpringEnd(4, 0.2, np.pi)
+ENDS = Place(1, (0.1, 0.0)), Place(4, (0.2, np.pi))
 SAME: list[tuple[Callable[..., Any], tuple[Any, ...], tuple[Any, ...]]] = [
     (
         fourbar.Bar,
@@ -32,7 +32,9 @@ SAME: list[tuple[Callable[..., Any], tuple[Any, ...], tuple[Any, ...]]] = [
     ),
     (fourbar.Point, ("P", 3, ("5 cm", "180 deg")), ("P", 3, (0.05, np.pi))),
     (
-        fourbar.Load,
+        lambda bar, force, at, moment: fourbar.Load(
+            bar, force, from_pin=at, moment=moment
+        ),
         (4, ("2 kN", "180 deg"), ("5 cm", 0), "3 N cm"),
         (4, (2000.0, np.pi), (0.05, 0.0), 0.03),
     ),
@@ -50,8 +52,8 @@ SAME: list[tuple[Callable[..., Any], tuple[Any, ...], tuple[Any, ...]]] = [
     (
         fourbar.Spring,
         (
-            SpringEnd(1, "10 cm", 0),
-            SpringEnd(4, "20 cm", "180 deg"),
+            Place(1, ("10 cm", 0)),
+            Place(4, ("20 cm", "180 deg")),
             "2 N/mm",
             "5 cm",
             "3 N",

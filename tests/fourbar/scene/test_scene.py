@@ -45,7 +45,7 @@ DIFFERENCE = 1e-6
 BARS = [Bar(0.1, 0.2), Bar(0.25, 0.5, 0.01, (0.12, 0.2)), Bar(0.22, 0.4)]
 LOADED = Scene(
     FourBar(0.3, *BARS, 0.4),
-    loads=(Load(3, (10.0, 0.3), (0.05, 0.1)),),
+    loads=(Load(3, (10.0, 0.3), arm=(0.05, 0.1)),),
     effects=(Gravity(9.81, -1.5),),
 )
 OTHERS = {2: (3, 4), 3: (2, 4), 4: (2, 3)}

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import fourbar
-from fourbar.effects import LinearDrive, SpringEnd
+from fourbar.effects import LinearDrive, Place
 from fourbar.errors import FourBarError, InputError
 from fourbar.files.scene_file import loads
 from fourbar.files.scene_text import dump
@@ -25,8 +25,8 @@ BARS = 10.0
 """Of an error bar, as `stability` allows."""
 OF_LONGER_NUMBERS = 1.1
 """Of an error bar: what the longer numbers lose themselves is a thousandth of what doubles lose, or some of them."""
-ENDS = {2: SpringEnd(2, 0.12, 0.4), 4: SpringEnd(4, 0.15, -0.6)}
-GROUND = SpringEnd(1, 0.3, 2.2)
+ENDS = {2: Place(2, (0.12, 0.4)), 4: Place(4, (0.15, -0.6))}
+GROUND = Place(1, (0.3, 2.2))
 SAMPLED = 0.02
 """Relative, of the standard deviation of 256 quasi-random samples, whose tails end at half a sample."""
 DIFFERENCES = 1e-5
@@ -178,8 +178,8 @@ def test_a_study_of_strokes_is_as_its_members_one_by_one(
     )
     values = {
         "lengths.input": [0.1, 0.11],
-        "drive.to.at.0": [0.12, 0.14],
-        "drive.from.at.1": [2.2, 2.3],
+        "drive.to.from_pin.0": [0.12, 0.14],
+        "drive.from.from_pin.1": [2.2, 2.3],
     }
     values |= {"lengths.ground_angle": [0.0, 0.2], "motion.stroke_speed": [0.2, -0.3]}
     study = fourbar.solve(fourbar.vary(by_stroke, values))
@@ -223,7 +223,7 @@ def test_sensitivities_at_a_stroke_are_its_differences(bar: int, stroke: float) 
         "motion.stroke",
         "motion.stroke_speed",
         "motion.stroke_acceleration",
-        "drive.to.at.1",
+        "drive.to.from_pin.1",
     } <= set(slopes.keys)
     for key in slopes.keys:
         value = (
@@ -254,7 +254,7 @@ def test_sensitivities_at_a_stroke_are_its_differences(bar: int, stroke: float) 
 
 
 def test_tolerances_at_a_stroke_spread_as_first_order_says() -> None:
-    drawn = fourbar.Tolerance("drive.to.at.0", 1e-5, sigma=True)
+    drawn = fourbar.Tolerance("drive.to.from_pin.0", 1e-5, sigma=True)
     by_stroke = replace(
         scene(2, Sweep(0.25, 0.35, 5), stroke_speed=0.2), tolerances=(drawn,)
     )

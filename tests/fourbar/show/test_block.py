@@ -10,7 +10,7 @@ import pytest
 
 import fourbar
 from fourbar.cli import status
-from fourbar.effects import SpringEnd
+from fourbar.effects import Place
 from fourbar.scene.motion import Law
 from fourbar.show.block import WIDTH, write_block, write_motor
 from fourbar.show.summary import summarize
@@ -24,7 +24,7 @@ BENDING = 1e-6
 """Relative, of a largest moment against that of steps of 0.01 degrees: (0.01 deg)^2 times its curvature."""
 PSI = 0.45359237 * 9.80665 / 0.0254**2
 CYLINDER = fourbar.LinearDrive(
-    SpringEnd(1, 0.25, math.radians(-160.0)), SpringEnd(2, 0.09, 0.17)
+    Place(1, (0.25, math.radians(-160.0))), Place(2, (0.09, 0.17))
 )
 D, A, B, C = 0.3, 0.1, 0.25, 0.22
 TURN = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.0, math.tau, 360), 10.0))

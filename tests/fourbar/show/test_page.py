@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import fourbar
-from fourbar.effects import SpringEnd
+from fourbar.effects import Place
 from fourbar.files import loads
 from fourbar.show import animate
 from fourbar.show.tolerances import PAGE_SAMPLES
@@ -192,7 +192,7 @@ def test_a_free_motion_plays_once_in_its_own_time(browse) -> None:
 
 
 DRIVE = fourbar.LinearDrive(
-    SpringEnd(1, 0.25, math.radians(-160.0)), SpringEnd(2, 0.09, 0.17)
+    Place(1, (0.25, math.radians(-160.0))), Place(2, (0.09, 0.17))
 )
 STROKES = fourbar.Motion(
     stroke=fourbar.Sweep(0.17, 0.33, 40), stroke_speed=0.2, side="left"
@@ -265,7 +265,7 @@ def test_the_numbers_of_an_axis_stand_clear_of_each_other_and_a_stroke_stays_in_
     browse, width: int
 ) -> None:
     drive = fourbar.LinearDrive(
-        SpringEnd(1, 1.45, math.radians(-160.0)), SpringEnd(2, 0.29, 0.17)
+        Place(1, (1.45, math.radians(-160.0))), Place(2, (0.29, 0.17))
     )
     motion = fourbar.Motion(
         stroke=fourbar.Sweep(1.2, 1.7, 40), stroke_speed=0.2, side="left"
@@ -353,8 +353,8 @@ def test_what_is_downloaded_is_the_scene_on_the_branch_shown(
 
 
 def test_what_acts_is_drawn_at_its_place_and_dimensions_on_request(browse) -> None:
-    spring = fourbar.Spring(SpringEnd(1, 0.1, -0.5), SpringEnd(4, 0.08, 0.0), 20.0, 0.1)
-    load = fourbar.Load(3, (2.0, 0.5), (0.03, 1.0), frame="bar")
+    spring = fourbar.Spring(Place(1, (0.1, -0.5)), Place(4, (0.08, 0.0)), 20.0, 0.1)
+    load = fourbar.Load(3, (2.0, 0.5), from_centre=(0.03, 1.0), frame="bar")
     scene = crank_rocker(
         loads=(load,), effects=(fourbar.Springs((spring,)), fourbar.Gravity())
     )

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import fourbar
-from fourbar.effects import SpringEnd
+from fourbar.effects import Place
 from fourbar.scene import Command
 from fourbar.scene.motion import Law
 from fourbar.show.summary import list_sizes, locate_between
@@ -39,8 +39,8 @@ stroke = { from = "44 in", to = "90.6 in", steps = 120 }
 stroke_speed = "3 in/s"
 side = "left"
 [drive]
-from = { bar = 1, at = ["67 in", "172 deg"] }
-to = { bar = 2, at = ["23.6 in", "0 deg"] }
+from = { bar = 1, from_pin = ["67 in", "172 deg"] }
+to = { bar = 2, from_pin = ["23.6 in", "0 deg"] }
 [effects]
 gravity = ["1 g_0", "-90 deg"]
 """
@@ -165,7 +165,7 @@ def test_a_motion_law_is_looked_at_between_its_instants_and_a_list_of_angles_is_
 
 def test_the_largest_force_of_a_stroke_is_that_of_fine_steps() -> None:
     drive = fourbar.LinearDrive(
-        SpringEnd(1, 0.25, math.radians(-160.0)), SpringEnd(2, 0.09, 0.17)
+        Place(1, (0.25, math.radians(-160.0))), Place(2, (0.09, 0.17))
     )
 
     def of(steps: int) -> fourbar.Scene:

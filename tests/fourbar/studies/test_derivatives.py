@@ -23,7 +23,11 @@ from fourbar_lab.tally import Tally
 from tests.fourbar.studies.test_study import ANGLES, DRIVEN, LINK, LOADS, RUBBING, scene
 
 TABLED = Load(
-    4, (2.0, 0.1), (0.0, 0.0), 0.3, "world", Table((0.0, 2.0, 6.0), (0.0, 1.0, 2.0))
+    4,
+    (2.0, 0.1),
+    moment=0.3,
+    frame="world",
+    table=Table((0.0, 2.0, 6.0), (0.0, 1.0, 2.0)),
 )
 EXACT = 1e-10
 """Of the derivative, or of what the quantity would change by if it were proportional to the number."""

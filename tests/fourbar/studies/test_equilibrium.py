@@ -27,7 +27,7 @@ from fourbar import (
     Torsion,
 )
 from fourbar.cli import status
-from fourbar.effects import SpringEnd
+from fourbar.effects import Place
 from fourbar.mjcf import write_mjcf
 from fourbar.scene.motion import Free
 from fourbar.studies.circuit_curve import SAMPLES, CircuitCurve
@@ -155,13 +155,13 @@ def springy(seed: int) -> Scene:
         for x in lengths[1:]
     ]
     linkage = FourBar(lengths[0], *bars, random.uniform(-3, 3))  # type: ignore[arg-type,misc]
-    ends = [SpringEnd(bar, *random.uniform(0.05, 0.4, 2)) for bar in (1, 3, 2, 4)]
+    ends = [Place(bar, random.uniform(0.05, 0.4, 2)) for bar in (1, 3, 2, 4)]
     springs = [
         Spring(ends[i], ends[i + 1], random.uniform(50, 300), random.uniform(0, 0.3))
         for i in (0, 2)
     ]
     loads = (
-        Load(3, tuple(random.uniform(0, 9, 2)), (0.1, 1.0)),
+        Load(3, tuple(random.uniform(0, 9, 2)), arm=(0.1, 1.0)),
         Load(4, moment=random.uniform(-1, 1)),
     )
     low, high = fourbar.formulas.mobility.choose_range(linkage)
@@ -343,7 +343,7 @@ def test_what_has_no_answer_says_so() -> None:
     assert math.remainder(
         only.place.theta_2 - math.pi / 2, 2 * math.pi
     ) == pytest.approx(0.0, abs=1e-5)
-    spring = Springs((Spring(SpringEnd(1, 0.3, 1.0), SpringEnd(2, 0.1, 0.0), 100.0),))
+    spring = Springs((Spring(Place(1, (0.3, 1.0)), Place(2, (0.1, 0.0)), 100.0),))
     massless = replace(
         crank_as_pendulum(spring), linkage=FourBar(0.3, Bar(0.1), Bar(0.25), Bar(0.22))
     )
@@ -517,7 +517,7 @@ def test_a_zero_that_falls_on_a_sample_is_found() -> None:
 
 
 DRIVE = fourbar.LinearDrive(
-    SpringEnd(1, 0.25, math.radians(-160.0)), SpringEnd(2, 0.09, 0.17)
+    Place(1, (0.25, math.radians(-160.0))), Place(2, (0.09, 0.17))
 )
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import fourbar
-from fourbar.effects import SpringEnd
+from fourbar.effects import Place
 from fourbar.errors import InputError
 from tests.support.scenes import crank_rocker
 from tests.validation.run.shipped.test_shipped import rows_of
@@ -25,7 +25,7 @@ def solved(scene: fourbar.Scene, bar: int, stations: object = None) -> object:
 def test_a_force_across_the_coupler_bends_it_as_a_beam_on_two_supports() -> None:
     """P a b/L under a load P at a from one end: sagging to the right of the bar, which is clockwise before it."""
     load = fourbar.Load(
-        3, (8.0, math.radians(-90.0)), (0.05, math.pi), frame="bar"
+        3, (8.0, math.radians(-90.0)), from_centre=(0.05, math.pi), frame="bar"
     )  # 75 mm from A
     internal = solved(
         fourbar.Scene(BARE, AT, loads=(load,)), 3, [0.0, 0.03, 0.08, 0.1, 0.25]
@@ -41,9 +41,7 @@ def test_a_force_across_the_coupler_bends_it_as_a_beam_on_two_supports() -> None
 
 
 def test_a_couple_on_the_output_jumps_where_it_acts() -> None:
-    load = fourbar.Load(
-        4, None, (0.06, math.pi), moment=3.0, frame="bar"
-    )  # 50 mm from O4
+    load = fourbar.Load(4, (0.0, 0.0), from_pin=(0.05, 0.0), moment=3.0)
     internal = solved(fourbar.Scene(BARE, AT, loads=(load,)), 4, [0.049999, 0.05, 0.1])
     before, after = internal.M[0, :2]
     assert before - after == pytest.approx(3.0, rel=1e-4) and internal.V[
@@ -109,13 +107,13 @@ EVERYTHING = (
     fourbar.Torsion.at(B=(0.3, 0.2, 0.1)),
     fourbar.Flywheel(0.02, 2),
     fourbar.Springs((
-        fourbar.Spring(SpringEnd(1, 0.1, -0.5), SpringEnd(4, 0.3, 0.2), 20.0, 0.1),
-        fourbar.Spring(SpringEnd(2, 0.05, 0.3), SpringEnd(3, 0.1, 0.1), 30.0, 0.05),
+        fourbar.Spring(Place(1, (0.1, -0.5)), Place(4, (0.3, 0.2)), 20.0, 0.1),
+        fourbar.Spring(Place(2, (0.05, 0.3)), Place(3, (0.1, 0.1)), 30.0, 0.05),
     )),
 )  # fmt: skip
 
 
-LINE = fourbar.LinearDrive(SpringEnd(1, 0.25, -2.8), SpringEnd(3, 0.09, 0.17))
+LINE = fourbar.LinearDrive(Place(1, (0.25, -2.8)), Place(3, (0.09, 0.17)))
 
 
 @pytest.mark.parametrize(

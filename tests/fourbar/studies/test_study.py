@@ -26,8 +26,8 @@ from fourbar.effects import (
     LinearDrive,
     Load,
     PinFriction,
+    Place,
     Spring,
-    SpringEnd,
     Springs,
     Torsion,
     Viscous,
@@ -48,12 +48,12 @@ LINK = FourBar(
     0.4,
 )
 LOADS = (
-    Load(3, (10.0, 0.3), (0.05, 0.2)),
-    Load(4, None, (0.0, 0.0), -0.15),
-    Load(2, (3.0, 0.2), (0.01, 0.1), 0.0, "bar"),
+    Load(3, (10.0, 0.3), arm=(0.05, 0.2)),
+    Load(4, None, moment=-0.15),
+    Load(2, (3.0, 0.2), from_centre=(0.01, 0.1), moment=0.0, frame="bar"),
 )
 SPRINGS = Springs(
-    (Spring(SpringEnd(1, 0.1, -1.5), SpringEnd(4, 0.08, 0.1), 200.0, 0.12, 3.0),)
+    (Spring(Place(1, (0.1, -1.5)), Place(4, (0.08, 0.1)), 200.0, 0.12, 3.0),)
 )
 DRIVEN = (
     *(Gravity(9.81, -1.5), Viscous.at(O2=0.01, A=0.02), Friction.at(B=0.05)),
@@ -75,7 +75,7 @@ RANGES = {
     "motion.omega_2": (-5.0, 5.0),
     "motion.alpha_2": (-5.0, 5.0),
     "loads.0.force.0": (0.0, 5.0),
-    "loads.0.at.1": (0.0, 5.0),
+    "loads.0.from_centre.1": (0.0, 5.0),
     "loads.1.moment": (-1.0, 1.0),
     "effects.gravity.0": (5.0, 10.0),
     "effects.gravity.1": (-2.0, 2.0),
@@ -83,7 +83,7 @@ RANGES = {
     "effects.friction.B": (0.0, 0.1),
     "effects.torsion.B.rest": (-1.0, 1.0),
     "effects.springs.0.stiffness": (100.0, 200.0),
-    "effects.springs.0.from.at.0": (0.0, 0.2),
+    "effects.springs.0.from.from_pin.0": (0.0, 0.2),
     "effects.flywheel.inertia": (0.0, 0.1),
     "effects.pin_friction.A.coefficient": (0.0, 0.3),
     "effects.pin_friction.O4.radius": (0.001, 0.03),
@@ -273,7 +273,7 @@ REFUSED = {
 
 
 def test_a_key_has_the_unit_that_a_scene_file_has() -> None:
-    drive = LinearDrive(SpringEnd(1, 0.1, -1.5), SpringEnd(3, 0.08, 0.1))
+    drive = LinearDrive(Place(1, (0.1, -1.5)), Place(3, (0.08, 0.1)))
     linkage = FourBar(
         0.3, *(Bar(size, 0.2, 0.001, (0.04, 0.2)) for size in (0.1, 0.25, 0.22)), 0.4
     )

@@ -16,7 +16,7 @@ import pytest
 from click.testing import CliRunner
 
 import fourbar
-from fourbar.effects import Friction, Gravity, Spring, SpringEnd, Springs, Torsion
+from fourbar.effects import Friction, Gravity, Place, Spring, Springs, Torsion
 from fourbar.errors import InputError
 from fourbar.mjcf import write_mjcf
 from fourbar.quantities import PIN_FORCES, UNKNOWNS
@@ -61,7 +61,7 @@ BARE = Scene(
     effects=CRANK_ROCKER.effects,
     title="no loads",
 )
-SPRING = Spring(SpringEnd(1, 0.1, -1.5), SpringEnd(4, 0.08, 0.2), 200.0, 0.05)
+SPRING = Spring(Place(1, (0.1, -1.5)), Place(4, (0.08, 0.2)), 200.0, 0.05)
 TORQUE_AND_PINS = ("torque", *PIN_FORCES)
 STIFF = 'solref="0.02 1" solimp="0.9999 0.9999 0.001 0.5 2"'
 FLOOR = 1e-4
@@ -509,7 +509,7 @@ def test_a_servo_and_another_equality_are_taken_off_and_reported() -> None:
 
 
 def test_a_cylinder_of_ones_own_is_what_the_force_is_solved_for() -> None:
-    drive = fourbar.LinearDrive(SpringEnd(2, 0.17, -1.1), SpringEnd(4, 0.09, 0.7))
+    drive = fourbar.LinearDrive(Place(2, (0.17, -1.1)), Place(4, (0.09, 0.7)))
     scene = replace(CRANK_ROCKER, drive_bar=None, drive=drive)
     text, driven = write_mjcf(scene), '<general name="cylinder" tendon="cylinder" />'
     servo = '<position name="ram" tendon="cylinder" kp="400" kv="3" gear="2" ctrlrange="-1 1" forcerange="-1 1"/>'

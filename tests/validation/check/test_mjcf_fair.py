@@ -270,7 +270,7 @@ def test_the_cause_that_explains_the_error_stands_first(
 
 def test_where_no_force_gives_the_acceleration_is_said() -> None:
     """The tendon of a cylinder that carries at most a part of what the motion asks for."""
-    end, start = fourbar.SpringEnd(4, 0.09, 0.7), fourbar.SpringEnd(1, 0.1, -1.0)
+    end, start = fourbar.Place(4, (0.09, 0.7)), fourbar.Place(1, (0.1, -1.0))
     scene = replace(
         BARE, drive_bar=None, drive=fourbar.LinearDrive(start, end),
         motion=BARE.motion.replace(acceleration=50.0),

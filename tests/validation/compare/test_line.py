@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import fourbar
-from fourbar.effects import LinearDrive, SpringEnd
+from fourbar.effects import LinearDrive, Place
 from fourbar.scene import Scene
 from fourbar_validation.compare.rows import AGREES, FAILS
 from fourbar_validation.engines.exact import BallArithmetic
@@ -28,7 +28,7 @@ PINS = fourbar.PinFriction.at(A=(0.1, 0.005), O4=(0.2, 0.004))
 
 
 def driven(one: int, other: int, **changes: Any) -> Scene:
-    ends = SpringEnd(one, 0.17, -1.1), SpringEnd(other, 0.09, 0.7)
+    ends = Place(one, (0.17, -1.1)), Place(other, (0.09, 0.7))
     motion = fourbar.Motion(np.linspace(0.1, 6.2, 25), 10.0, 5.0)
     return crank_rocker(motion=motion, drive=LinearDrive(*ends), **changes)
 
@@ -108,7 +108,7 @@ def test_the_direction_of_a_line_is_as_uncertain_as_its_ends_are_near(
     ).theta_4
     on_bar = linkage.ground + 0.2 * np.exp(1j * (theta_4 + 0.4 - linkage.ground_angle))
     drive = LinearDrive(
-        SpringEnd(1, abs(on_bar + gap), np.angle(on_bar + gap)), SpringEnd(4, 0.2, 0.4)
+        Place(1, (abs(on_bar + gap), np.angle(on_bar + gap))), Place(4, (0.2, 0.4))
     )
     scene = crank_rocker(
         motion=fourbar.Motion(1.0 + gap * np.linspace(-1.0, 1.0, 7), 10.0), drive=drive

@@ -44,7 +44,10 @@ def test_the_scale_is_the_greatest_value_of_the_well_conditioned_positions_and_e
 
 def test_where_everything_cancels_the_scale_is_that_of_the_forces_that_cancel() -> None:
     """Two opposite forces at one point of bar 2 of a linkage at rest: no torque; 2 x 50 N on 0.25 m cancel."""
-    loads = (Load(2, (50.0, 0.0), (0.05, 0.0)), Load(2, (-50.0, 0.0), (0.05, 0.0)))
+    loads = (
+        Load(2, (50.0, 0.0), arm=(0.05, 0.0)),
+        Load(2, (-50.0, 0.0), arm=(0.05, 0.0)),
+    )
     scene = Scene(ROCKER, Motion(Sweep(0.5, 0.6, 3), 0.0), loads=loads)
     solution = solve(scene)
     scale = scale_of("torque", scene, solution, solution.torque)

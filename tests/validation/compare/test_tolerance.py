@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import fourbar
-from fourbar.effects import LinearDrive, SpringEnd
+from fourbar.effects import LinearDrive, Place
 from fourbar_validation.compare.tolerance import (
     compute_difference,
     divide,
@@ -67,7 +67,7 @@ def test_the_worst_error_is_the_one_that_is_no_number() -> None:
 def test_of_a_stroke_the_angle_of_its_bar_is_conditioned_by_the_lever() -> None:
     """From O2 to the line over the longer of both arms; what follows by |sin(theta_4 - theta_3)| too."""
     r, arm = 0.25, 0.09
-    drive = LinearDrive(SpringEnd(1, r, 2.5), SpringEnd(2, arm, 0.3))
+    drive = LinearDrive(Place(1, (r, 2.5)), Place(2, (arm, 0.3)))
     motion = fourbar.Motion(
         stroke=np.array([0.2, 0.3, 0.339]), side="left", stroke_speed=0.1
     )

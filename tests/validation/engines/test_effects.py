@@ -17,8 +17,8 @@ from fourbar.effects import (
     Gravity,
     Load,
     PinFriction,
+    Place,
     Spring,
-    SpringEnd,
     Springs,
     Table,
     Torsion,
@@ -44,18 +44,18 @@ ACTING: dict[str, Effect] = {
     "torsion": Torsion.at(O4=(2.0, 1.9, 0.1), B=(1.0, 0.8, -0.2)),
     "springs": Springs(
         (
-            Spring(SpringEnd(1, 0.1, -1.5), SpringEnd(4, 0.08, 0.2), 200.0, 0.05, 3.0),
-            Spring(SpringEnd(2, 0.05, 0.5), SpringEnd(3, 0.1, 0.3), 50.0, 0.05, 1.0),
-            Spring.gas(
-                SpringEnd(1, 0.2, 2.0), SpringEnd(3, 0.05, 1.0), 0.5, 0.3, 4.0, 7.0
-            ),
-            Spring(SpringEnd(1, 0.15, -0.6), SpringEnd(4, 0.1, 0.4), 0.0, preload=-2.0),
-            Spring(SpringEnd(1, 0.12, -2.0), SpringEnd(2, 0.05, 0.4), 30.0, 0.0, 2.0),
+            Spring(Place(1, (0.1, -1.5)), Place(4, (0.08, 0.2)), 200.0, 0.05, 3.0),
+            Spring(Place(2, (0.05, 0.5)), Place(3, (0.1, 0.3)), 50.0, 0.05, 1.0),
+            Spring.gas(Place(1, (0.2, 2.0)), Place(3, (0.05, 1.0)), 0.5, 0.3, 4.0, 7.0),
+            Spring(Place(1, (0.15, -0.6)), Place(4, (0.1, 0.4)), 0.0, preload=-2.0),
+            Spring(Place(1, (0.12, -2.0)), Place(2, (0.05, 0.4)), 30.0, 0.0, 2.0),
         )
     ),
     "flywheel": Flywheel(0.02, 2),
-    "load": Load(4, (3.0, 0.7), (0.05, 1.0), 0.2, "bar"),
-    "load over theta_2": Load(3, (4.0, 0.7), (0.05, 1.0), 0.2, "world", TABLE),
+    "load": Load(4, (3.0, 0.7), from_centre=(0.05, 1.0), moment=0.2, frame="bar"),
+    "load over theta_2": Load(
+        3, (4.0, 0.7), arm=(0.05, 1.0), moment=0.2, frame="world", table=TABLE
+    ),
 }
 EXACT = [engine for engine in ENGINES if not engine.through_time]
 SIMULATED = [replace(engine, order=None) for engine in ENGINES if engine.through_time]

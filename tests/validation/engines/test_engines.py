@@ -18,7 +18,7 @@ from fourbar.effects import (
     LinearDrive,
     Load,
     PinFriction,
-    SpringEnd,
+    Place,
     Viscous,
 )
 from fourbar.errors import InputError
@@ -54,9 +54,9 @@ PRINTED = 5e-10
 """The last digit of the figures, which were computed with ten."""
 
 LOADS = (
-    Load(2, (10.0, 1.0), (0.05, 2.0), -0.15),
-    Load(3, (4.0, 0.3), (0.1, 0.5), 0.3, "bar"),
-    Load(4, (3.0, 0.1), (0.02, 2.0), 1.0),
+    Load(2, (10.0, 1.0), arm=(0.05, 2.0), moment=-0.15),
+    Load(3, (4.0, 0.3), from_centre=(0.1, 0.5), moment=0.3, frame="bar"),
+    Load(4, (3.0, 0.1), arm=(0.02, 2.0), moment=1.0),
 )
 EFFECTS = (
     Gravity(),
@@ -485,12 +485,12 @@ MOVED = (
 OUTPUT, COUPLER = np.linspace(1.8, 2.5, 8), np.linspace(0.4, 0.8, 8)
 STROKES = {
     2: (
-        LinearDrive(SpringEnd(1, 0.3, 2.2), SpringEnd(2, 0.12, 0.4)),
+        LinearDrive(Place(1, (0.3, 2.2)), Place(2, (0.12, 0.4))),
         fourbar.Sweep(0.25, 0.35, 8),
         "left",
     ),
     4: (
-        LinearDrive(SpringEnd(1, 0.5, -0.5), SpringEnd(4, 0.09, 0.7)),
+        LinearDrive(Place(1, (0.5, -0.5)), Place(4, (0.09, 0.7))),
         fourbar.Sweep(0.33, 0.36, 8),
         "right",
     ),

@@ -17,8 +17,8 @@ from fourbar.effects import (
     Gravity,
     Load,
     PinFriction,
+    Place,
     Spring,
-    SpringEnd,
     Springs,
     Viscous,
 )
@@ -141,7 +141,7 @@ def test_a_lever_of_an_upright_rectangle(
     F14: tuple[int, int],
 ) -> None:
     """10 N push bar 4 at B along the coupler; the bars are upright and 0.1 m long, and the coupler a two-force bar."""
-    load = Load(4, (10.0, 0.0), (0.05, math.pi / 2))
+    load = Load(4, (10.0, 0.0), arm=(0.05, math.pi / 2))
     got = answered(Scene(RECTANGLE, fourbar.Motion(math.pi / 2, 0.0), drive, (load,)))
     assert got["torque"][0] == pytest.approx(torque, abs=1e-14)
     for name, force in {"F12": F12, "F32": F32, "F43": F43, "F14": F14}.items():
@@ -166,7 +166,7 @@ def test_weight_of_a_crank_and_a_flywheel() -> None:
 
 
 SPRING = Springs(
-    (Spring(SpringEnd(1, 0.1, -1.5), SpringEnd(4, 0.08, 0.2), 200.0, 0.05, 3.0),)
+    (Spring(Place(1, (0.1, -1.5)), Place(4, (0.08, 0.2)), 200.0, 0.05, 3.0),)
 )
 TORSION = fourbar.effects.Torsion.at(O4=(2.0, 1.9, 0.1))
 

@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 import fourbar
-from fourbar.effects.spring import SpringEnd
+from fourbar.effects.place import Place
 from fourbar.errors import InputError
 from fourbar.files import save
 from fourbar.scene.motion import Free
@@ -374,7 +374,7 @@ def test_a_guest_is_asked_for_what_its_hello_names(tmp_path: Path) -> None:
     stroke = fourbar.Motion(
         stroke=fourbar.Sweep(0.25, 0.35, 8), stroke_speed=0.2, side="left"
     )
-    drive = fourbar.LinearDrive(SpringEnd(1, 0.3, 2.2), SpringEnd(2, 0.12, 0.4))
+    drive = fourbar.LinearDrive(Place(1, (0.3, 2.2)), Place(2, (0.12, 0.4)))
     for scene in (four, crank_rocker(motion=stroke, drive=drive)):
         by_engine = judged(scene, "OfAnyBar", "Right")
         assert (
@@ -626,7 +626,7 @@ def test_our_own_adapters_answer_the_same_bytes_through_the_host(engine: Any) ->
     stroke = fourbar.Motion(
         stroke=fourbar.Sweep(0.25, 0.35, 8), stroke_speed=0.2, side="left"
     )
-    drive = fourbar.LinearDrive(SpringEnd(1, 0.3, 2.2), SpringEnd(2, 0.12, 0.4))
+    drive = fourbar.LinearDrive(Place(1, (0.3, 2.2)), Place(2, (0.12, 0.4)))
     theta_4 = fourbar.Motion(theta_4=fourbar.Sweep(1.8, 2.5, 8), omega_4=3.0)
     for scene in (
         loaded,

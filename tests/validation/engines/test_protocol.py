@@ -14,6 +14,7 @@ from fourbar.files import dump
 from fourbar.scene import command as list_positions
 from fourbar_validation.compare.answer import Answer, EngineError
 from fourbar_validation.engines import protocol
+from fourbar_validation.engines.description import state_from_pins
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.places import MODELS
 from fourbar_validation.run.question import ask_at
@@ -37,11 +38,11 @@ def through_text(data):
 
 
 def stated(scene):
-    """What a guest is told: no words, pictures, points, tolerances, the motion apart, and no place of no force."""
-    loads = tuple(
-        load if load.force else replace(load, at=(0.0, 0.0)) for load in scene.loads
-    )
-    scene = replace(scene, loads=loads)
+    """What a guest is told: every place from its bar's pin, the motion apart.
+
+    No words, pictures, points and tolerances.
+    """
+    scene = state_from_pins(scene)
     return replace(
         scene,
         motion=fourbar.Motion(),
@@ -127,7 +128,7 @@ def test_nothing_travels_that_the_formulas_computed():
     assert data["loads"][0] == {
         "bar": 4,
         "force": [3.0, 0.7],
-        "at": [0.05, 1.0],
+        "arm": [0.05, 1.0],
         "moment": 0.0,
         "frame": "world",
     }
@@ -144,7 +145,7 @@ def test_nothing_travels_that_the_formulas_computed():
 
 
 def test_a_gas_spring_travels_as_its_file_is_written_and_a_table_in_radians():
-    ends = fourbar.SpringEnd(1, 0.1, -1.0), fourbar.SpringEnd(4, 0.05, 0.2)
+    ends = fourbar.Place(1, (0.1, -1.0)), fourbar.Place(4, (0.05, 0.2))
     gas = fourbar.Spring.gas(*ends, 0.4, 0.1, 100.0, 150.0)
     table = fourbar.Table((0.0, math.pi, 2 * math.pi), (1.0, 0.5, 1.0))
     scene = crank_rocker(

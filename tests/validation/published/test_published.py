@@ -387,7 +387,7 @@ def test_inputs_are_those_of_the_model(scene: fourbar.Scene) -> None:
         assert (load.force is None) == (their.force is None)
         if load.force is not None:
             assert load.force == pytest.approx(their.force, rel=TYPED)
-            assert load.at == pytest.approx(their.at, rel=TYPED)
+            assert load.arm == pytest.approx(their.arm, rel=TYPED)
 
 
 def test_the_command_explains_every_difference() -> None:

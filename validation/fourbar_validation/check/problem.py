@@ -20,7 +20,7 @@ from fourbar_validation.compare.rows import make_plain, write_one_line
 from fourbar_validation.compare.tolerance import EPS, K, magnitude
 from fourbar_validation.engines import protocol
 
-SCHEMA, RESULT = "fourbar-problem/2", "fourbar-result/1"
+SCHEMA, RESULT = "fourbar-problem/3", "fourbar-result/1"
 LEVELS = {"A": 1e-9, "B": 1e-6, "C": 1e-3}
 """Largest error of each level, of the largest value; D is worse. Error bars of the problem are allowed."""
 WORSE, MISSING = "D", "-"

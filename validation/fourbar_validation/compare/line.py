@@ -5,11 +5,12 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fourbar.effects import PointDrive
 from fourbar.linkage import FourBar
 from fourbar_validation.compare.answer import Array
 
 if TYPE_CHECKING:
-    from fourbar.effects import LinearDrive
+    from fourbar.effects import ForceDrive
 
 Complex = NDArray[np.complex128]
 
@@ -18,13 +19,13 @@ class DriveLine(NamedTuple):
     """The line at n positions."""
 
     linkage: FourBar
-    drive: "LinearDrive"
+    drive: "ForceDrive"
     directions: dict[int, Complex]
     """e^{i theta} of bars 1 to 4."""
-    arms: tuple[Complex, Complex]
-    """Vectors from the first pins of the bars to the ends of the drive, m."""
+    arms: tuple[Complex, ...]
+    """Vectors from the first pins of the bars to the points where the drive acts, m."""
     across: Complex
-    """Vector from one end of the drive to the other, m."""
+    """Vector from one end of the drive to the other, m; of a force at a point its unit vector."""
 
     @property
     def stroke(self) -> Array:
@@ -39,24 +40,23 @@ class DriveLine(NamedTuple):
 
     def speed(self, omega: dict[int, Array]) -> Array:
         """Compute the rate of the stroke at angular velocities of bars 1 to 4, m/s: each arm swings across itself."""
-        swung = []
-        for point, arm in zip(
-            (self.drive.start, self.drive.end), self.arms, strict=True
-        ):
+        rate: Complex | float = 0.0
+        for (sense, point), arm in zip(self.drive.ends, self.arms, strict=True):
             velocity = 1j * omega[point.bar] * arm
             if point.bar == 3:
                 velocity = (
                     velocity
                     + 1j * omega[2] * self.linkage.input.length * self.directions[2]
                 )
-            swung.append(velocity)
-        return np.asarray((np.conj(self.unit) * (swung[1] - swung[0])).real)
+            rate = rate + sense * velocity
+        return np.asarray((np.conj(self.unit) * rate).real)
 
     @property
     def lever(self) -> Array:
         """Distance of a cylinder's line from the ground pin of its bar 2 or 4, over the longer of both arms."""
-        on_bar, on_ground = (0, 1) if self.drive.start.bar != 1 else (1, 0)
-        point = (self.drive.start, self.drive.end)[on_bar]
+        points = [point for _, point in self.drive.ends]
+        on_bar, on_ground = (0, 1) if points[0].bar != 1 else (1, 0)
+        point = points[on_bar]
         to_ground = self.arms[on_ground] - (
             0.0 if point.bar == 2 else self.linkage.ground * self.directions[1]
         )
@@ -70,9 +70,11 @@ class DriveLine(NamedTuple):
         """Return the greatest possible movement of its ends, as `condition` counts it, m."""
         _, a, b, c = self.linkage.lengths
         reach = {1: (0.0, 0.0), 2: (0.0, 1.0), 3: (a, a / b), 4: (0.0, a / c)}
-        return sum(
-            reach[p.bar][0] + reach[p.bar][1] * abs(p.distance)
-            for p in (self.drive.start, self.drive.end)
+        return float(
+            sum(
+                reach[p.bar][0] + reach[p.bar][1] * abs(p.distance)
+                for _, p in self.drive.ends
+            )
         )
 
     @property
@@ -91,7 +93,7 @@ class DriveLine(NamedTuple):
 
 
 def place_line(
-    linkage: FourBar, drive: "LinearDrive", theta: dict[int, Array]
+    linkage: FourBar, drive: "ForceDrive", theta: dict[int, Array]
 ) -> DriveLine:
     """Place the ends at angles of bars 2, 3, 4, each (n,)."""
     directions = {bar: np.exp(1j * angle) for bar, angle in theta.items()}
@@ -102,10 +104,16 @@ def place_line(
         3: linkage.input.length * directions[2],
         4: linkage.ground * directions[1],
     }
-    ends = (drive.start, drive.end)
-    arms = [
+    points = [point for _, point in drive.ends]
+    arms = tuple(
         point.distance * np.exp(1j * point.angle) * directions[point.bar]
-        for point in ends
-    ]
-    across = feet[drive.end.bar] + arms[1] - feet[drive.start.bar] - arms[0]
-    return DriveLine(linkage, drive, directions, (arms[0], arms[1]), across)
+        for point in points
+    )
+    if isinstance(drive, PointDrive):
+        across = np.exp(1j * drive.direction) * np.ones(len(theta[2]))
+        if drive.frame == "bar":
+            across = across * directions[drive.place.bar]
+        return DriveLine(linkage, drive, directions, arms, across)
+    start, end = points
+    across = feet[end.bar] + arms[1] - feet[start.bar] - arms[0]
+    return DriveLine(linkage, drive, directions, arms, across)

@@ -13,7 +13,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from fourbar.effects import LinearDrive
+from fourbar.effects import ForceDrive
 from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.quantities import LINE, OK, UNITS
 from fourbar.scene import Scene
@@ -59,6 +59,7 @@ def sum_terms(quantity: str, scene: Scene, formulas: Solution) -> Array:
 
     Raises KeyError for a quantity of a unit that has no such sum here: nothing is judged by another's scale.
     """
+    scene = scene.in_pairs_from_pins()
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.asarray(
             TERMS[UNITS[quantity]](quantity, scene, formulas), dtype=float
@@ -179,8 +180,8 @@ TERMS: dict[str, Callable[[str, Scene, Solution], Array]] = {
 
 def _compute_drive_arms(scene: Scene) -> dict[int, float]:
     """Compute the distances of the ends of a linear drive from the first pins of their bars, m."""
-    ends = () if scene.drive is None else (scene.drive.start, scene.drive.end)
-    return {end.bar: abs(end.distance) for end in ends}
+    ends = () if scene.drive is None else scene.drive.ends
+    return {end.bar: abs(end.distance) for _, end in ends}
 
 
 def _compute_arm(scene: Scene, number: int) -> float:
@@ -224,6 +225,7 @@ def has_angles(answer: Answer) -> bool:
 
 def make_reference(scene: Scene, answer: Answer) -> Solution | None:
     """Make a solution of an answer, its conditions by the sines between its own angles; None without angles."""
+    scene = scene.in_pairs_from_pins()
     if answer.at is None or not has_angles(answer):
         return None
     answered = answer.quantities
@@ -275,14 +277,13 @@ def make_reference(scene: Scene, answer: Answer) -> Solution | None:
 
 
 def _add_line(
-    linkage: FourBar, drive: LinearDrive, theta: dict[int, Array], reference: Solution
+    linkage: FourBar, drive: ForceDrive, theta: dict[int, Array], reference: Solution
 ) -> None:
     """Add stroke, direction, speed and leverage of a linear drive, from the answer's own angles and speeds."""
     line = place_line(linkage, drive, theta)
-    reference.stroke, reference.drive_line = (
-        line.stroke,
-        np.stack((line.unit.real, line.unit.imag), axis=1),
-    )
+    if drive.has_stroke:
+        reference.stroke = line.stroke
+    reference.drive_line = np.stack((line.unit.real, line.unit.imag), axis=1)
     if (
         reference.omega_2 is not None
         and reference.omega_3 is not None

@@ -103,7 +103,8 @@ def make_bodies(scene: Scene, command: Command) -> thirteen.FreeBodies:
         list_bodies(scene.linkage, scene.effects),
     )
     n = len(state.theta_2)
-    actions = Actions(state, parts).add((*scene.loads, *scene.effects))
+    placed = scene.settled()
+    actions = Actions(state, parts).add((*placed.loads, *placed.effects))
     acting = actions.wrenches(Wrenches())
     first, second, force, moment = {}, {}, {}, {}
     for k, body in zip(MOVING_BARS, parts, strict=True):

@@ -16,6 +16,8 @@ from fourbar.effects import (
     Friction,
     Gravity,
     LinearDrive,
+    Place,
+    PointDrive,
     Springs,
     Table,
     Torsion,
@@ -68,8 +70,10 @@ def collect_inputs(scene: Scene, angle: float) -> dict[str, float]:
         )
     )
     if scene.drive is not None:
-        for name, point in zip(ENDS, (scene.drive.start, scene.drive.end), strict=True):
-            values |= {name: point.distance, f"{name}_angle": point.angle}
+        for name, (_, point) in zip(ENDS, scene.drive.ends, strict=False):
+            values |= _collect_place(scene, point, name, f"{name}_angle")
+        if isinstance(scene.drive, PointDrive):
+            values["direction"] = scene.drive.direction
     for k in MOVING_BARS:
         bar = link.bar(k)
         values |= {f"m{k}": bar.mass, f"I{k}": find_inertia(bar)}
@@ -77,7 +81,10 @@ def collect_inputs(scene: Scene, angle: float) -> dict[str, float]:
     for k, load in enumerate(scene.loads):
         f, f_angle = load.force or (0.0, 0.0)
         values |= {f"F_{k}": f, f"F_angle_{k}": f_angle, f"M_{k}": load.moment}
-        values |= {f"at_{k}": load.at[0], f"at_angle_{k}": load.at[1]}
+        if load.arm is not None:
+            values |= {f"at_{k}": load.arm[0], f"at_angle_{k}": load.arm[1]}
+        elif load.place is not None:
+            values |= _collect_place(scene, load.place, f"at_{k}", f"at_angle_{k}")
     for effect in scene.effects:
         if isinstance(effect, Gravity):
             values |= {"g": effect.magnitude, "g_angle": effect.angle}
@@ -102,15 +109,45 @@ def collect_inputs(scene: Scene, angle: float) -> dict[str, float]:
                 }
                 values[f"pull_{k}"] = spring.preload
                 for end, point in (("start", spring.start), ("end", spring.end)):
-                    values |= {
-                        f"{end}_{k}": point.distance,
-                        f"{end}_angle_{k}": point.angle,
-                    }
+                    keys = f"{end}_{k}", f"{end}_angle_{k}"
+                    values |= _collect_place(scene, point, *keys)
         else:
             raise NotImplementedError(
                 f"the reference knows no effect {type(effect).__name__}"
             )
     return values
+
+
+def find_stated(scene: Scene, place: Place) -> Place:
+    """Return a place by its numbers: of a named point, the point's."""
+    if place.point is None:
+        return place
+    return next(point.place for point in scene.points if point.name == place.point)
+
+
+def _collect_place(
+    scene: Scene, place: Place, distance: str, angle: str
+) -> dict[str, float]:
+    """Collect the two numbers that state a place, under two names."""
+    stated = find_stated(scene, place)
+    pair = stated.from_centre if stated.from_pin is None else stated.from_pin
+    assert pair is not None
+    return {distance: pair[0], angle: pair[1]}
+
+
+def place_from_pin(
+    stated: Place,
+    distance: Ball,
+    angle: Ball,
+    w: dict[int, Complex],
+    centre: dict[int, Complex],
+) -> Complex:
+    """Return the vector from a bar's first pin to a place on it, by the two numbers that state it.
+
+    `w`: directions of the bars; `centre`: vectors from their first pins to G.
+    """
+    arm = w[stated.bar] * polar(distance, angle)
+    return arm if stated.from_centre is None else centre[stated.bar] + arm
 
 
 def make_balls(scene: Scene, angle: float, **motion: float) -> Values:
@@ -187,11 +224,7 @@ def compute_outputs(scene: Scene, branch: int, inputs: Values) -> Values | None:
     y |= {f"omega_{bar}": bars.omega[bar] for bar in MOVING_BARS}
     y |= {f"alpha_{bar}": bars.alpha[bar] for bar in MOVING_BARS}
     _put(y, bars.points())
-    line = (
-        find_line(scene.drive, x, bars.directions(x), bars.first_pin)
-        if scene.drive
-        else None
-    )
+    line = find_line(scene, x, bars) if scene.drive else None
     if line is None:
         drive, y["drive_condition"], speed = (
             "torque",
@@ -204,7 +237,9 @@ def compute_outputs(scene: Scene, branch: int, inputs: Values) -> Values | None:
             compute_condition(line, x, bars.tip[2], sines),
         )
         speed = line.speed({1: acb(0), **bars.v_pin}, {1: arb(0), **bars.omega})
-        y |= {"stroke": line.stroke, "stroke_speed": speed}
+        y["stroke_speed"] = speed
+        if line.stroke is not None:
+            y["stroke"] = line.stroke
         _put(y, {"drive_line": line.line})
     drives = {bar: (arb(0), arb(0), arb(bar == scene.drive_bar)) for bar in MOVING_BARS}
     if line is not None:
@@ -312,13 +347,20 @@ def _sum_acting(
         factor = (
             _interpolate_factor(load.table, theta_2, x, k) if load.table else arb(1)
         )
+        moment[load.bar] += factor * x[f"M_{k}"]
+        if load.force is None:
+            continue
         axes = w[load.bar] if load.frame == "bar" else acb(1)
-        f, arm = (
-            axes * polar(x[f"{name}_{k}"], x[f"{name}_angle_{k}"])
-            for name in ("F", "at")
-        )
+        f = axes * polar(x[f"F_{k}"], x[f"F_angle_{k}"])
+        if load.arm is not None:
+            arm = polar(x[f"at_{k}"], x[f"at_angle_{k}"])
+        else:
+            assert load.place is not None
+            stated = find_stated(scene, load.place)
+            at = x[f"at_{k}"], x[f"at_angle_{k}"]
+            arm = place_from_pin(stated, *at, w, centre) - centre[load.bar]
         force[load.bar] += factor * f
-        moment[load.bar] += factor * (wedge(arm, f) + x[f"M_{k}"])
+        moment[load.bar] += factor * wedge(arm, f)
     for effect in scene.effects:
         if isinstance(effect, Flywheel):
             moment[effect.bar] -= x["J"] * bars.alpha[effect.bar]
@@ -334,9 +376,16 @@ def _sum_acting(
         elif isinstance(effect, Springs):
             for k, spring in enumerate(effect.springs):
                 start, end = spring.start.bar, spring.end.bar
+                ends = ((spring.start, "start"), (spring.end, "end"))
                 arms = [
-                    w[bar] * polar(x[f"{name}_{k}"], x[f"{name}_angle_{k}"])
-                    for bar, name in ((start, "start"), (end, "end"))
+                    place_from_pin(
+                        find_stated(scene, place),
+                        x[f"{name}_{k}"],
+                        x[f"{name}_angle_{k}"],
+                        bars.directions(x),
+                        centre,
+                    )
+                    for place, name in ends
                 ]
                 across = first_pin[end] + arms[1] - first_pin[start] - arms[0]
                 if (
@@ -460,11 +509,15 @@ def turn_by_stroke(scene: Scene, x: Values) -> Values | None:
     With l and r from the pin to the ends: s^2 = l^2 + r^2 - 2 l r cos beta, twice differentiated.
     """
     drive, motion = scene.drive, scene.motion
-    assert drive is not None and motion.side is not None
+    assert isinstance(drive, LinearDrive) and motion.side is not None
     (_, on_ground), (bar, on_bar) = sorted(
         zip((drive.start.bar, drive.end.bar), ENDS, strict=True)
     )
-    held = polar(x[on_bar], x[f"{on_bar}_angle"])
+    stated = find_stated(scene, drive.start if drive.end.bar == 1 else drive.end)
+    centre = {bar: polar(x[f"r{bar}"], x[f"phi{bar}"])}
+    at_zero = {bar: acb(1)}
+    at = x[on_bar], x[f"{on_bar}_angle"]
+    held = place_from_pin(stated, *at, at_zero, centre)
     fixed = polar(x[on_ground], x[f"{on_ground}_angle"] + x["theta_1"])
     if bar == 4:
         fixed -= polar(x["d"], x["theta_1"])
@@ -490,7 +543,8 @@ def turn_by_stroke(scene: Scene, x: Values) -> Values | None:
 class BallLine(NamedTuple):
     """Line of the drive between its two points, at one position of the linkage."""
 
-    stroke: Ball
+    stroke: Ball | None
+    """None of a force at a point."""
     line: Complex
     """Unit vector from one point to the other."""
     arms: dict[int, Complex]
@@ -514,15 +568,23 @@ class BallLine(NamedTuple):
         return force.real, force.imag, wedge(self.arms[bar] - centre, force)
 
 
-def find_line(
-    drive: LinearDrive, x: Values, w: dict[int, Complex], first_pin: dict[int, Complex]
-) -> BallLine:
+def find_line(scene: Scene, x: Values, bars_in_motion: BallBars) -> BallLine:
     """Find the line of a drive from the directions and first pins of all bars, the ground's too."""
-    bars = drive.start.bar, drive.end.bar
+    drive, first_pin = scene.drive, bars_in_motion.first_pin
+    assert drive is not None
+    w, centre = bars_in_motion.directions(x), bars_in_motion.centre
     arms = {
-        k: w[k] * polar(x[name], x[f"{name}_angle"])
-        for k, name in zip(bars, ENDS, strict=True)
+        place.bar: place_from_pin(
+            find_stated(scene, place), x[name], x[f"{name}_angle"], w, centre
+        )
+        for (_, place), name in zip(drive.ends, ENDS, strict=False)
     }
+    if isinstance(drive, PointDrive):
+        unit = polar(arb(1), x["direction"])
+        if drive.frame == "bar":
+            unit = unit * w[drive.place.bar]
+        return BallLine(None, unit, arms, {drive.place.bar: 1})
+    bars = [place.bar for _, place in drive.ends]
     start, end = (first_pin[k] + arms[k] for k in bars)
     stroke = abs(end - start)
     return BallLine(

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fourbar.effects import Effect, Gravity
+from fourbar.effects import Effect, ForceDrive, Gravity, Place
 from fourbar.linkage import MOVING_BARS, Bar, FourBar
 from fourbar.quantities import COUPLE, LINE, UNKNOWNS
 from fourbar.scene import Command, Scene
@@ -154,6 +154,23 @@ def place(point: Any, ground_angle: float) -> tuple[float, float]:
     return rotate(ground_angle, *offset) if point.bar == 1 else offset
 
 
+def state_from_pins(scene: Scene) -> Scene:
+    """State every place of a scene by a pair from its bar's first pin, by arithmetic apart from the formulas'."""
+    stated = {point.name: point.place for point in scene.points}
+
+    def convert(place: Place) -> Place:
+        if place.point is not None:
+            place = stated[place.point]
+        if place.from_centre is None:
+            return place
+        x, y = resolve(*find_centre(scene.linkage.bar(place.bar)))
+        along, across = resolve(*place.from_centre)
+        x, y = x + along, y + across
+        return Place(place.bar, (math.hypot(x, y), math.atan2(y, x)))
+
+    return scene.with_places(convert)
+
+
 def list_speeds(command: Command) -> tuple[Array, Array]:
     """Return speed and acceleration of the commanded bar at each position, (n,); a speed that is not stated is 0."""
     rates = (
@@ -168,6 +185,11 @@ def list_speeds(command: Command) -> tuple[Array, Array]:
 def name_driving(scene: Scene) -> str:
     """Name what is solved for of a scene's drive: its torque, or the force of a linear one."""
     return (COUPLE if scene.drive is None else LINE).value
+
+
+def name_drive(drive: ForceDrive) -> str:
+    """Name the kind of a drive that exerts a force, as an engine's hello lists it."""
+    return "cylinder" if drive.has_stroke else "push"
 
 
 def list_unknowns(scene: Scene, names: Iterable[str] = UNKNOWNS) -> list[str]:
@@ -188,7 +210,7 @@ def find_unknown(
     `linear`: whether a drive along a line is known.
     """
     if scene.drive is not None and scene.motion.free is None and not linear:
-        return "the linear drive (drive.from, drive.to) has no model here"
+        return "a drive that exerts a force has no model here"
     return next(
         (
             f"the effect {effect.key!r} has no model here"

@@ -107,17 +107,19 @@ def _apply_flywheel(effect: "Flywheel", bars: Loaded) -> None:
 
 
 def _load(load: "Load", bars: Loaded) -> None:
-    """Apply a force at its point and a couple; in the bar's frame both vectors rotate with the engine's bar."""
-    force, arm = (
-        np.array(resolve(*(load.force or (0.0, 0.0)))),
-        np.array(resolve(*load.at)),
-    )
+    """Apply a force at its place, which the engine's bar carries along, and a couple."""
     factor = 1.0 if load.table is None else look_up(load.table, bars.angle(2))
-    if load.frame == "bar":
-        f, point = bars.rotate(load.bar, *force), bars.rotate(load.bar, *arm)
-    else:
-        f, point = force, arm
-    bars.push(load.bar, factor * f, bars.point(f"G{load.bar}") + point)
+    if load.force is not None:
+        along, across = resolve(*load.force)
+        force = np.array((along, across))
+        if load.frame == "bar":
+            force = bars.rotate(load.bar, along, across)
+        if load.arm is not None:
+            point = bars.point(f"G{load.bar}") + np.array(resolve(*load.arm))
+        else:
+            assert load.place is not None
+            point = bars.end(load.place)
+        bars.push(load.bar, factor * force, point)
     bars.twist(load.bar, factor * load.moment)
 
 

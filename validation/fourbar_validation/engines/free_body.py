@@ -24,6 +24,7 @@ from fourbar_validation.engines.description import (
     find_centre,
     find_unknown,
     list_speeds,
+    state_from_pins,
 )
 from fourbar_validation.engines.free_body_closure import (
     Complex,
@@ -70,6 +71,7 @@ class FreeBody:
 
     def answer(self, scene: Scene, command: Command) -> Answer:
         """Answer, or refuse by naming an effect that it does not know."""
+        scene = state_from_pins(scene)
         if reason := find_unknown(scene, has_wrench, linear=True):
             return Answer(NAME, "exact", refusal=reason)
         if command.bar != 2 and scene.counts_turns:
@@ -316,6 +318,7 @@ def _solve_unit_couples(
 
 def count_solutions(scene: Scene, command: Command) -> Array:
     """Count the pin forces and friction couples that balance the linkage at each position, where it moves, (n,)."""
+    scene = state_from_pins(scene)
     signs = with_signs(scene.linkage, command).branch
     closed = close(scene.linkage, command.angle, signs, command.bar)
     theta = np.insert(closed.theta, command.bar - 2, command.angle, axis=0)
@@ -390,9 +393,7 @@ def _make_matrix(scene: Scene, motion: BodyMotion) -> Array:
         matrix[:, ROWS[scene.drive_bar][0] + 2, DRIVE] = 1.0
     else:
         unit = BodyWrenches(len(motion.theta_2))
-        for sense, point, arm in zip(
-            (-1.0, 1.0), (line.drive.start, line.drive.end), line.arms, strict=True
-        ):
+        for (sense, point), arm in zip(line.drive.ends, line.arms, strict=True):
             unit.push(point.bar, sense * line.unit, arm)
         matrix[:, :, DRIVE] = -_make_right_sides(motion.linkage, unit)
     for row, (force, reaction) in ((9, ("F32", "F23")), (11, ("F43", "F34"))):

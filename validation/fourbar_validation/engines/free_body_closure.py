@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fourbar.effects import LinearDrive
 from fourbar.linkage import FourBar
 from fourbar.scene import Command, Scene
 from fourbar.scene.motion import Motion
@@ -169,7 +170,7 @@ STROKE_HALVINGS = 80
 def measure_cylinder(scene: Scene) -> tuple[complex, complex]:
     """Measure from the ground pin of its bar, at angle 0, to a cylinder's end on it, and to that on the ground, m."""
     drive = scene.drive
-    assert drive is not None
+    assert isinstance(drive, LinearDrive)
     on_bar, on_ground = (
         (drive.end, drive.start) if drive.start.bar == 1 else (drive.start, drive.end)
     )

@@ -214,16 +214,25 @@ def sum_acting(scene: Scene, motion: BodyMotion) -> BodyWrenches:
 
 
 def apply_load(load: Any, motion: BodyMotion, wrenches: BodyWrenches) -> None:
-    """Apply a force at its point, from the mass centre, and a couple; in the bar's frame both rotate with the bar."""
-    turned = motion.unit[load.bar] if load.frame == "bar" else 1.0
+    """Apply a force where it acts, from the bar's first pin, and a couple."""
     factor = (
         1.0 if load.table is None else _interpolate_factor(load.table, motion.theta_2)
     )
-    arm = motion.to_centre(load.bar) + turned * make_vector(load.at)
-    wrenches.push(
-        load.bar, factor * turned * make_vector(load.force or (0.0, 0.0)), arm
-    )
+    if load.force is not None:
+        force: Any = make_vector(load.force)
+        if load.frame == "bar":
+            force = motion.unit[load.bar] * force
+        wrenches.push(load.bar, factor * force, find_arm(load, motion))
     wrenches.twist(load.bar, factor * load.moment)
+
+
+def find_arm(load: Any, motion: BodyMotion) -> Any:
+    """Return the vector from the bar's first pin to where a load acts; to G where it is a couple alone."""
+    if load.arm is not None:
+        return motion.to_centre(load.bar) + make_vector(load.arm)
+    if load.place is None:
+        return motion.to_centre(load.bar)
+    return motion.unit[load.bar] * make_vector(load.place.from_pin)
 
 
 def _interpolate_factor(table: Any, theta_2: Array) -> Array:

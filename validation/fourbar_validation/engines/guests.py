@@ -23,6 +23,7 @@ from fourbar_validation.compare.compare import COMPARED
 from fourbar_validation.compare.rows import FORMULAS, write_one_line
 from fourbar_validation.compare.tolerance import EQUIVALENCE, ErrorBound, hold_simulated
 from fourbar_validation.engines import protocol
+from fourbar_validation.engines.description import name_drive
 from fourbar_validation.engines.processes import Ask, Program, Running
 from fourbar_validation.engines.registry import SIMULATED_TO_ERROR, Engine
 from fourbar_validation.places import CHECKOUT, PACKAGE
@@ -302,7 +303,9 @@ def find_needs(scene: Scene) -> list[str]:
     needs = [effect.key for effect in scene.effects]
     needs += ["loads"] * bool(scene.loads)
     needs += (
-        ["cylinder"] if scene.drive is not None else ["drive"] * (scene.drive_bar != 2)
+        [name_drive(scene.drive)]
+        if scene.drive is not None
+        else ["drive"] * (scene.drive_bar != 2)
     )
     return needs
 

@@ -25,6 +25,11 @@ class Boundary(NamedTuple):
     engine: str = "mujoco-simulated"
 
 
+NO_PUSH = (
+    "a force at a point drives, and the file that is simulated drives bar 2: the inverse "
+    "dynamics of the same program solve for the force"
+)
+"""Reason of a simulation to refuse a `PointDrive`."""
 NEAREST_TOGGLE = Boundary(
     "|sin(theta_4 - theta_3)|, least",
     0.05,

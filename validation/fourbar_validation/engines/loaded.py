@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from fourbar.effects import PointDrive
 from fourbar.linkage import MOVING_BARS
 from fourbar.scene import Scene
 from fourbar_validation.compare.answer import Array
@@ -18,8 +19,8 @@ from fourbar_validation.engines.description import (
 )
 
 if TYPE_CHECKING:
-    from fourbar.effects import LinearDrive
-    from fourbar.effects.spring import SpringEnd
+    from fourbar.effects import ForceDrive
+    from fourbar.effects.place import Place
 
 PASSES = 1000
 """Passes over pin loads and the friction they make; each lessens the error where the friction is far from a jam."""
@@ -84,8 +85,8 @@ class Loaded(EngineBars, Protocol):
     """
 
     drive_bar: int
-    linear: "LinearDrive | None" = None
-    """The drive, where it is along a line."""
+    linear: "ForceDrive | None" = None
+    """The drive, where it exerts a force."""
     driving: str
     """Name of the drive's quantity that is solved for."""
     field: tuple[float, float] = (0.0, 0.0)
@@ -142,7 +143,7 @@ class Loaded(EngineBars, Protocol):
         """Locate the first pin of a bar (O2, O2, A, O4 of bars 1, 2, 3, 4), m, (2,)."""
         return np.zeros(2) if bar == 1 else self.point(f"first_pin{bar}")
 
-    def end(self, point: "SpringEnd") -> Array:
+    def end(self, point: "Place") -> Array:
         """Locate an end of a spring or of a linear drive, m, (2,)."""
         return self.first_pin(point.bar) + self.rotate(
             point.bar, *resolve(point.distance, point.angle)
@@ -152,28 +153,40 @@ class Loaded(EngineBars, Protocol):
         """Measure it with the bars laid down along +x."""
         assert self.linear is not None
         self.place((0.0, 0.0, 0.0))
-        on_bar, on_ground = sorted(
-            (self.linear.start, self.linear.end), key=lambda end: -end.bar
-        )
+        ends = [end for _, end in self.linear.ends]
+        on_bar, on_ground = sorted(ends, key=lambda end: -end.bar)
         x, y = (
             (self.end(point) - self.first_pin(bar)).tolist()
             for point in (on_bar, on_ground)
         )
         return complex(*x), complex(*y)
 
-    def line(self) -> tuple[Array, Array, Array]:
-        """Place the linear drive: both ends, m, and the unit vector from the one to the other."""
+    def line(self) -> tuple[list[tuple[float, int, Array]], float | None, Array]:
+        """Place the drive: sense, bar and point of each end, m; its stroke, m; and its direction.
+
+        A force at a point has no stroke.
+        """
         assert self.linear is not None
-        one, second = self.end(self.linear.start), self.end(self.linear.end)
-        return one, second, (second - one) / math.hypot(*(second - one))
+        ends = [
+            (sense, place.bar, self.end(place)) for sense, place in self.linear.ends
+        ]
+        if isinstance(self.linear, PointDrive):
+            along = np.array(resolve(1.0, self.linear.direction))
+            if self.linear.frame == "bar":
+                along = self.rotate(self.linear.place.bar, *along.tolist())
+            return ends, None, along
+        (*_, one), (*_, second) = ends
+        stroke = math.hypot(*(second - one))
+        return ends, stroke, (second - one) / stroke
 
     def work(self, size: float) -> None:
         """Let the drive act with a torque, N m, or a force, N."""
         if self.linear is None:
-            return self.twist(self.drive_bar, size)
-        one, second, along = self.line()
-        self.push(self.linear.start.bar, -size * along, one)
-        return self.push(self.linear.end.bar, size * along, second)
+            self.twist(self.drive_bar, size)
+            return
+        ends, _, along = self.line()
+        for sense, bar, point in ends:
+            self.push(bar, sense * size * along, point)
 
     def gravity(self, field: tuple[float, float]) -> None:
         """Set a field (g_x, g_y) for the engine's own gravity, m/s^2."""

@@ -26,6 +26,7 @@ from fourbar_validation.engines.description import (
     list_unknowns,
     name_driving,
     reduce_angle,
+    state_from_pins,
 )
 from fourbar_validation.engines.free_body_closure import (
     LONGEST_STEP,
@@ -197,6 +198,7 @@ class Exact:
 
     def answer(self, scene: Scene, command: Command) -> Answer:
         """Answer, or refuse by naming what it does not know or cannot hold."""
+        scene = state_from_pins(scene)
         try:
             bars = self.build(scene)
         except LimitError as error:

@@ -23,8 +23,9 @@ from fourbar.scene import command as command_of
 from fourbar.scene.motion import COMMANDS, STROKE_COMMAND, Free, Motion
 from fourbar_validation.compare.answer import Answer, Array, EngineError, ReleasedAnswer
 from fourbar_validation.compare.rows import write_one_line
+from fourbar_validation.engines.description import state_from_pins
 
-PROTOCOL = 1
+PROTOCOL = 3
 """Number of the contract; a change that an engine must know of raises it."""
 FURTHEST = 0.1
 """rad, and part of the greatest speed and acceleration: a motion that ends further from the command than this answers
@@ -51,8 +52,11 @@ class _Numbers(Reader):
 
 
 def scene_to_json(scene: Scene) -> dict[str, Any]:
-    """Write lengths, bars, drive, loads and effects of a scene; InputError for an effect that no scene file holds."""
-    tables: dict[str, Any] = _take_numbers(describe(scene))
+    """Write lengths, bars, drive, loads and effects of a scene; InputError for an effect that no scene file holds.
+
+    Every place is a pair from its bar's first pin, but for the arm of a load.
+    """
+    tables: dict[str, Any] = _take_numbers(describe(state_from_pins(scene)))
     return {name: table for name, table in tables.items() if table}
 
 

@@ -21,7 +21,7 @@ from fourbar_validation.engines.description import ON_BARS, POINTS
 from fourbar_validation.engines.loaded import Act, Loaded, Values, make_no_wrenches
 
 if TYPE_CHECKING:
-    from fourbar.effects.spring import SpringEnd
+    from fourbar.effects.place import Place
 OMEGAS, ALPHAS = (
     tuple(f"{name}_{bar}" for bar in MOVING_BARS) for name in ("omega", "alpha")
 )
@@ -116,15 +116,12 @@ class Tree(Loaded, Protocol):
         if self.linear is None:
             return self.turns[self.drive_bar]
         *_, along = self.line()
-        return np.asarray(
-            along
-            @ (
-                self.end_jacobian(self.linear.end)
-                - self.end_jacobian(self.linear.start)
-            )
+        rate = sum(
+            sense * self.end_jacobian(place) for sense, place in self.linear.ends
         )
+        return np.asarray(along @ rate)
 
-    def end_jacobian(self, point: "SpringEnd") -> Array:
+    def end_jacobian(self, point: "Place") -> Array:
         """Return the derivative of an end of the drive, (2, 3), m: its bar's first pin, and the arm turned across."""
         if point.bar == 1:
             return np.zeros((2, 3))

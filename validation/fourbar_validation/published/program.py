@@ -98,7 +98,7 @@ def make_scene(theta_2: Array | float, branch: int = 1) -> fourbar.Scene:
         fourbar.Bar(c, MASSES[4], 1e-4 * compute_inertia(4), centre[4]),
         ground_angle=to_ours(THETA_1),
     )
-    loads = [fourbar.Load(2, (LOAD, 0.0), (0.01 * LOAD_ARM, LOAD_ANGLE))]
+    loads = [fourbar.Load(2, (LOAD, 0.0), arm=(0.01 * LOAD_ARM, LOAD_ANGLE))]
     loads += [fourbar.Load(bar, moment=0.01 * COUPLE) for bar in (2, 3, 4)]
     return fourbar.Scene(
         linkage, fourbar.Motion(theta_2, OMEGA_2, branch=branch), 4, tuple(loads)

@@ -209,9 +209,10 @@ def _sum_actions(question: Question) -> tuple[Actions, Array]:
         if bar != command.bar
     }
     state = state._replace(moving=state.moving._replace(**speeds))
+    placed = scene.settled()
     with np.errstate(all="ignore"):
         actions = Actions(state, list_bodies(scene.linkage, scene.effects)).add(
-            (*scene.loads, *scene.effects)
+            (*placed.loads, *placed.effects)
         )
         for term in scene.effects:
             if term.loaded_pins:

@@ -36,7 +36,7 @@ from fourbar_validation.compare.tolerance import (
     magnitude,
     sum_lengths,
 )
-from fourbar_validation.engines.description import list_speeds
+from fourbar_validation.engines.description import list_speeds, state_from_pins
 from fourbar_validation.engines.exact import BallArithmetic, find_refusal
 from fourbar_validation.engines.free_body import move
 from fourbar_validation.engines.free_body_effects import sum_acting
@@ -103,9 +103,9 @@ def compare_points(
     error = np.zeros(n)
     usable = (solution.status_code == OK) & (reference.condition >= least)
     usable &= find_condition("F12", link, reference) * NOTHING_TO_TELL > EPS
-    for point in scene.points:
+    for point in state_from_pins(scene).points:
         arms, first_pin = (
-            swing(point.bar, *point.from_pin),
+            swing(point.bar, *point.place.polar_from_pin()),
             first_pins.get(point.bar, [zero, zero, zero]),
         )
         tables, like = (
@@ -278,6 +278,7 @@ def _compute_pulls(
         solution.theta_3,
         solution.theta_4,
     )
+    scene = state_from_pins(scene)
     alone: list[Scene] = [
         replace(scene, loads=(load,), effects=())
         for load in scene.loads

@@ -60,7 +60,7 @@ def dress(lengths: Lengths, seed: int = 0) -> Scene:
         Load(
             4,
             (weight, float(rng.uniform(-3, 3))),
-            (0.2 * moving[2], float(rng.uniform(-3, 3))),
+            arm=(0.2 * moving[2], float(rng.uniform(-3, 3))),
         ),
         Load(3, moment=0.1 * weight * moving[1]),
     )

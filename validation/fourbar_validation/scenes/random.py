@@ -14,8 +14,8 @@ from fourbar.effects import (
     Friction,
     Gravity,
     Load,
+    Place,
     Spring,
-    SpringEnd,
     Springs,
     Torsion,
     Viscous,
@@ -92,7 +92,7 @@ class Ranges:
 
 Angles = Callable[[np.random.Generator, FourBar], Any]
 """Commanded theta_2, rad, of a linkage whose bars are drawn."""
-Place = tuple[Sequence[float], Angles]
+DrawnLinkage = tuple[Sequence[float], Angles]
 """Lengths (ground, input, coupler, output), m, and the angles that are commanded of them."""
 
 
@@ -100,7 +100,7 @@ Place = tuple[Sequence[float], Angles]
 class RandomFamily:
     """Random scenes of one kind."""
 
-    draw_place: Callable[[np.random.Generator], Place]
+    draw_place: Callable[[np.random.Generator], DrawnLinkage]
     ranges: Ranges
 
     def draw(self, rng: np.random.Generator) -> Scene:
@@ -162,6 +162,10 @@ def draw_scene(
     return Scene(linkage, motion, int(rng.choice(MOVING_BARS)), loads, tuple(effects))
 
 
+PLACES_OF_A_FORCE = ("from_pin", "from_centre", "arm")
+"""Forms in which a drawn load states where it acts; an arm is for a fixed direction."""
+
+
 def _draw_load(
     rng: np.random.Generator, linkage: FourBar, weight: float, ranges: Ranges
 ) -> Load:
@@ -169,9 +173,13 @@ def _draw_load(
     bar = int(rng.choice(MOVING_BARS))
     length, size = linkage.bar(bar).length, weight * ranges.load(rng)
     force = None if rng.random() < ranges.without_force else (size, ANY_ANGLE(rng))
-    arm = (length * ranges.arm(rng), ANY_ANGLE(rng))
+    place = (length * ranges.arm(rng), ANY_ANGLE(rng))
     moment = float(rng.choice([0.0, size * length * EITHER_SIGN(rng)]))
-    return Load(bar, force, arm, moment, "bar" if rng.random() < 0.5 else "world")
+    frame = "bar" if rng.random() < 0.5 else "world"
+    forms = PLACES_OF_A_FORCE if frame == "world" else PLACES_OF_A_FORCE[:2]
+    form = str(rng.choice(forms))
+    at: Any = {} if force is None else {form: place}
+    return Load(bar, force, moment=moment, frame=frame, **at)
 
 
 def _draw_springs(
@@ -185,7 +193,7 @@ def _draw_springs(
             int(bar) for bar in rng.choice([1, *MOVING_BARS], 2, replace=False)
         )
         start, end = (
-            SpringEnd(bar, linkage.lengths[bar - 1] * ranges.arm(rng), ANY_ANGLE(rng))
+            Place(bar, (linkage.lengths[bar - 1] * ranges.arm(rng), ANY_ANGLE(rng)))
             for bar in (one, second)
         )
         length = max(linkage.lengths)
@@ -300,7 +308,7 @@ UNEVEN = Ranges(
 """Masses, inertias, arms, loads and speeds each over ten decades."""
 
 
-def _draw_uneven_place(rng: np.random.Generator) -> Place:
+def _draw_uneven_place(rng: np.random.Generator) -> DrawnLinkage:
     lengths, psi = draw_uneven_lengths(rng, TEN_DECADES, TEN_DECADES)
     size = 10.0 ** rng.uniform(-3.0, 3.0)
 
@@ -328,7 +336,7 @@ MACHINES = Ranges(
 """Bars as machines have them."""
 
 
-def _draw_machine_place(kind: DrawnType, rng: np.random.Generator) -> Place:
+def _draw_machine_place(kind: DrawnType, rng: np.random.Generator) -> DrawnLinkage:
     """Draw a linkage of a type, with POSITIONS angles over the range in which it can move."""
     size = 10.0 ** rng.uniform(-1.5, 1.0)
     lengths = [size * x for x in draw_lengths(rng, kind)]

@@ -19,8 +19,8 @@ from fourbar.effects import (
     Effect,
     Flywheel,
     PinFriction,
+    Place,
     Spring,
-    SpringEnd,
     Springs,
     Torsion,
 )
@@ -306,7 +306,7 @@ EFFECTS = (
     Torsion.at(B=(0.5, 1.0, 0.1)),
     Springs(
         tuple(
-            Spring(SpringEnd(i, 0.1, -1.5), SpringEnd(j, 0.08, 0.2), 50.0, 0.05)
+            Spring(Place(i, (0.1, -1.5)), Place(j, (0.08, 0.2)), 50.0, 0.05)
             for i, j in SPRUNG
         )
     ),
@@ -314,12 +314,10 @@ EFFECTS = (
 )
 
 
-CYLINDER = fourbar.LinearDrive(SpringEnd(2, 0.17, -1.1), SpringEnd(4, 0.09, 0.7))
+CYLINDER = fourbar.LinearDrive(Place(2, (0.17, -1.1)), Place(4, (0.09, 0.7)))
 
 
-BETWEEN_NEIGHBOURS = fourbar.LinearDrive(
-    SpringEnd(2, 0.17, -1.1), SpringEnd(3, 0.09, 0.7)
-)
+BETWEEN_NEIGHBOURS = fourbar.LinearDrive(Place(2, (0.17, -1.1)), Place(3, (0.09, 0.7)))
 
 
 @pytest.mark.parametrize(
@@ -660,7 +658,7 @@ def test_units_get_the_prefix_that_suits() -> None:
     assert choose_unit(0.0, "N") == (1.0, "N")
 
 
-BOTTOM, SIDE = SpringEnd(1, 0.25, math.radians(-160.0)), SpringEnd(2, 0.09, 0.17)
+BOTTOM, SIDE = Place(1, (0.25, math.radians(-160.0))), Place(2, (0.09, 0.17))
 COMMANDS = {
     r"$\theta_3$ (°)": fourbar.Motion(
         theta_3=fourbar.Sweep(1.25, 0.67, 40), omega_3=-2.0

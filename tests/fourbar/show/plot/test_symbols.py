@@ -29,7 +29,7 @@ from tests.fourbar.show.plot.test_plot import clashes, composed
 from tests.fourbar.show.test_animate import embedded
 from tests.support.scenes import crank_rocker
 
-TURNING = Load(3, (2.0, 0.5), (0.03, 1.0), frame="bar")
+TURNING = Load(3, (2.0, 0.5), from_centre=(0.03, 1.0), frame="bar")
 TABLED = Load(4, (5.0, 0.2), table=Table((0.0, math.pi, math.tau), (1.0, -1.0, 1.0)))
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import fourbar
-from fourbar.effects import SpringEnd
+from fourbar.effects import Place
 from fourbar.mjcf import RECIPE, WindowMotion
 from fourbar.quantities import UNKNOWNS
 from fourbar_validation.compare.answer import Answer
@@ -44,8 +44,8 @@ def scene(
         for x, turn in ((a, 0.2), (b, 0.3), (c, -0.2))
     ]
     loads = (
-        fourbar.Load(4, (3.0, 0.7), (0.05, 1.0)),
-        fourbar.Load(3, (2.0, 0.3), (0.03, 0.2), frame="bar"),
+        fourbar.Load(4, (3.0, 0.7), arm=(0.05, 1.0)),
+        fourbar.Load(3, (2.0, 0.3), from_centre=(0.03, 0.2), frame="bar"),
         fourbar.Load(2, moment=-0.2),
     )
     expected: dict[str, object] = {
@@ -305,7 +305,7 @@ def by_quantity(scene: fourbar.Scene) -> dict[str, Row]:
 def test_its_own_actuator_between_two_sites_gives_the_force_of_a_cylinder(
     one: int, other: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    drive = fourbar.LinearDrive(SpringEnd(one, 0.17, -1.1), SpringEnd(other, 0.09, 0.7))
+    drive = fourbar.LinearDrive(Place(one, (0.17, -1.1)), Place(other, (0.09, 0.7)))
     scene = crank_rocker(
         motion=fourbar.Motion(TURN, 10.0, 5.0),
         drive=drive,

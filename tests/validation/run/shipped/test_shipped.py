@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import fourbar
-from fourbar.effects import SpringEnd
+from fourbar.effects import Place
 from fourbar.scene import Scene, command
 from fourbar.studies.keys import read_numbers
 from fourbar_lab.fault_scenes import FAULT_SCENES
@@ -151,7 +151,7 @@ def test_equilibria_near_a_limit_are_compared_too(gravity: float) -> None:
 
 
 NEARLY_MEET = fourbar.Spring(
-    SpringEnd(1, 0.05, 0.0), SpringEnd(2, 0.05005, 0.0), 2e4, 0.1, 3e3
+    Place(1, (0.05, 0.0)), Place(2, (0.05005, 0.0)), 2e4, 0.1, 3e3
 )
 """Its ends come within 0.05 mm of each other: there its line turns by half a turn within 1 mrad of the input."""
 MASSLESS = {
@@ -243,7 +243,7 @@ COMMANDS = {
 
 
 def commanding(name: str) -> Scene:
-    ends = SpringEnd(1, 0.25, -2.8), SpringEnd(2, 0.09, 0.17)
+    ends = Place(1, (0.25, -2.8)), Place(2, (0.09, 0.17))
     return crank_rocker(
         motion=COMMANDS[name],
         drive=fourbar.LinearDrive(*ends),

@@ -13,6 +13,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from fourbar.effects import PointDrive
 from fourbar.errors import InputError
 from fourbar.mjcf import RECIPE, Settings, write_mjcf
 from fourbar.mjcf.model import unwind
@@ -20,7 +21,8 @@ from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Command, Scene, with_signs
 from fourbar.scene import command as command_of
 from fourbar_validation.compare.answer import Answer, Array, ReleasedAnswer
-from fourbar_validation.engines.description import name_driving
+from fourbar_validation.engines.description import name_driving, state_from_pins
+from fourbar_validation.engines.limits import NO_PUSH
 from fourbar_validation.engines.loaded import Values
 from fourbar_validation.engines.loop import Angles, Assembler, read_each
 from fourbar_validation.engines.mujoco.closed_loop import O2, ClosedLoop
@@ -135,6 +137,9 @@ class MujocoOneState:
 
     def answer(self, scene: Scene, command: Command) -> Answer:
         """Answer, or refuse a bar that MuJoCo cannot hold."""
+        scene = state_from_pins(scene)
+        if isinstance(scene.drive, PointDrive):
+            return Answer(self.name, "", refusal=NO_PUSH)
         began = time.perf_counter()
         setting = (
             "extrapolated"

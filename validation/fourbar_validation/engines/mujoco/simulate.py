@@ -8,6 +8,7 @@ from functools import partial
 
 import numpy as np
 
+from fourbar.effects import PointDrive
 from fourbar.errors import InputError, LimitError
 from fourbar.mjcf import RECIPE, Settings, write_mjcf
 from fourbar.mjcf.document import compute_mass_ratio
@@ -19,9 +20,11 @@ from fourbar_validation.engines.description import (
     list_speeds,
     list_unknowns,
     name_driving,
+    state_from_pins,
 )
 from fourbar_validation.engines.limits import (
     NEAREST_TOGGLE,
+    NO_PUSH,
     compute_least_sine,
     find_exceeded,
 )
@@ -89,6 +92,9 @@ class MujocoSimulated:
 
     def answer(self, scene: Scene, command: Command) -> Answer:
         """Run the sweep through in time; read every quantity at the crank's own angle, speed and acceleration."""
+        scene = state_from_pins(scene)
+        if isinstance(scene.drive, PointDrive):
+            return Answer(self.name, "", refusal=NO_PUSH)
         began, lead = time.perf_counter(), None
         try:
             if scene.motion.free is not None:

@@ -27,7 +27,7 @@ from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Answer, Array
 from fourbar_validation.compare.compare import COMPARED, mark_turning
 from fourbar_validation.compare.tolerance import divide, magnitude
-from fourbar_validation.engines.description import name_driving
+from fourbar_validation.engines.description import name_driving, state_from_pins
 from fourbar_validation.engines.loop import (
     MADE,
     Assembler,
@@ -385,6 +385,7 @@ class SimulatedToError:
 
     def answer(self, scene: Scene, command: Command) -> Answer:
         """Simulate with as many steps as the laws ask for, and more while its own residuals say so."""
+        scene = state_from_pins(scene)
         steps, tc = guess(self.error)
         spent, runs = 0.0, 0
         for _ in range(ROUNDS):

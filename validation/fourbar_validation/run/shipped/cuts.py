@@ -17,13 +17,14 @@ from fourbar_validation.compare.answer import Answer, Array
 from fourbar_validation.compare.line import place_line
 from fourbar_validation.compare.rows import Row
 from fourbar_validation.compare.tolerance import ErrorBound, divide
-from fourbar_validation.engines.description import find_centre
+from fourbar_validation.engines.description import find_centre, state_from_pins
 from fourbar_validation.engines.free_body import move
 from fourbar_validation.engines.free_body_effects import (
     BodyMotion,
     BodyWrenches,
     apply_effect,
     apply_load,
+    find_arm,
     list_sliding_pins,
     make_vector,
 )
@@ -51,7 +52,8 @@ def internal_forces(question: Question) -> list[Row]:
     for bar in MOVING_BARS:
         length = scene.linkage.bar(bar).length
         cuts = np.array([part * length for part in WHERE])
-        pieces = [_free(scene, motion, answer, bar, cut) for cut in cuts]
+        stated = state_from_pins(scene)
+        pieces = [_free(stated, motion, answer, bar, cut) for cut in cuts]
         forces = fourbar.internal_forces(scene, solution, bar, cuts)
         for name, ours in (("N", forces.N), ("V", forces.V), ("M", forces.M)):
             theirs = np.stack([getattr(piece, name) for piece in pieces], axis=1)
@@ -154,8 +156,7 @@ def _free(
     _push_drive(scene, motion, answer, piece)
     for load in scene.loads:
         if load.bar == bar:
-            turned = motion.unit[bar] if load.frame == "bar" else 1.0
-            arm = motion.to_centre(bar) + turned * make_vector(load.at)
+            arm = find_arm(load, motion)
             piece.place = (np.conj(motion.unit[bar]) * arm).real
             apply_load(load, motion, piece)
             piece.place = 0.0
@@ -215,7 +216,5 @@ def _push_drive(
     theta = {bar: np.angle(motion.unit[bar]) for bar in MOVING_BARS}
     line = place_line(scene.linkage, scene.drive, theta)
     force: Array = answer.quantities["drive_force"]
-    for sense, point, arm in zip(
-        (-1.0, 1.0), (line.drive.start, line.drive.end), line.arms, strict=True
-    ):
+    for (sense, point), arm in zip(line.drive.ends, line.arms, strict=True):
         piece.push(point.bar, sense * force * line.unit, arm)

@@ -65,10 +65,10 @@ def furnish(scene: Scene, question: Question) -> Scene:
         load = Load(
             3,
             (force, 0.3),
-            (0.2 * coupler.length, 0.5),
-            0.1 * force * coupler.length,
-            "bar",
-            table,
+            from_centre=(0.2 * coupler.length, 0.5),
+            moment=0.1 * force * coupler.length,
+            frame="bar",
+            table=table,
         )
         scene = replace(scene, loads=(*scene.loads, load))
     return scene

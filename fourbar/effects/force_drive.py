@@ -1,0 +1,89 @@
+"""Base class of the drives that exert a force instead of a couple.
+
+Per newton of the drive the bars get unit vectors at its points. The power of that over the speed of the independent
+angle q is ds/dq, and virtual work gives the force,
+    F ds/dq = J q'' + J'/2 q'^2 - Q,
+as it gives the torque on a bar k, where h_k stands for ds/dq. There is no force where
+    P = (ds/dtheta_2) sin(theta_4 - theta_3) = 0,
+which is of the same form, with (theta_2', theta_3', theta_4') = (sin(theta_4 - theta_3), (a/b) sin(theta_2 - theta_4),
+(a/c) sin(theta_2 - theta_3)) for the coefficients h_k, and so is finite where these are not.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from typing import Any, ClassVar, Self
+
+from fourbar.effects.effect import Actions
+from fourbar.effects.place import Place
+from fourbar.formulas.arithmetic import Number
+from fourbar.formulas.motion import State
+from fourbar.formulas.pin_forces import Body
+from fourbar.linkage import FourBar
+
+MASSLESS = (Body(0.0, 0.0, 0.0j),) * 3
+
+
+class ForceDrive(ABC):
+    """A drive that exerts a force, N; a subclass says where and in which direction."""
+
+    __slots__ = ()
+    has_stroke: ClassVar[bool] = False
+    """True if the drive is between two points, whose distance is its stroke."""
+
+    @property
+    @abstractmethod
+    def ends(self) -> tuple[tuple[float, Place], ...]:
+        """Places at which it acts, each with the sense of the force along the drive's direction."""
+
+    @property
+    @abstractmethod
+    def apart(self) -> tuple[int, ...]:
+        """Bars of which one may be left out so that the moments of the other two give the force between them."""
+
+    @abstractmethod
+    def with_places(self, change: Callable[[Place], Place]) -> Self:
+        """Return the same drive with its places changed."""
+
+    @abstractmethod
+    def require_motion(self, linkage: FourBar) -> None:
+        """Raise InputError where the drive does no work at any position."""
+
+    @abstractmethod
+    def line(self, state: State) -> tuple[Any, Number]:
+        """Compute the stroke, m (None: there is none), and the unit vector of the direction."""
+
+    @abstractmethod
+    def act(self, actions: Actions, force: Number) -> None:
+        """Exert a force, N."""
+
+    @abstractmethod
+    def status(self, state: State, sines: dict[int, Number]) -> Number:
+        """Return the status of positions at which there is no force; None: nowhere."""
+
+    def gain(self, state: State) -> Number:
+        """Compute ds/dq, m: the work of 1 N over the change of the independent angle."""
+        return self.per_newton(Actions(state, MASSLESS)).work()[0]
+
+    def per_newton(self, actions: Actions) -> Actions:
+        """Make what 1 N of it does to the bars."""
+        single = Actions(actions.state, actions.bodies)
+        self.act(single, 1.0)
+        return single
+
+    def leverage(self, state: State, sines: dict[int, Number]) -> tuple[Number, Number]:
+        """Compute P and the most that it could be: L, the sum of what each end could move, m.
+
+        That is r on bar 2, a + r a/b on bar 3, r a/c on bar 4, r its distance from the bar's first pin.
+
+        `sines`: of theta_4 - theta_3, theta_4 - theta_2, theta_3 - theta_2, as of a drive on bar 2, 3, 4.
+        """
+        _, a, b, c, _, _ = state.lengths
+        h2, h3, h4 = sines[2], (-a / b) * sines[3], (-a / c) * sines[4]
+        turned = state._replace(
+            k=state.k._replace(h2=h2, h3=h3, h4=h4, h23=h2 - h3, h43=h4 - h3)
+        )
+        reach = {1: (0.0, 0.0), 2: (0.0, 1.0), 3: (a, a / b), 4: (0.0, a / c)}
+        most = sum(
+            reach[p.bar][0] + reach[p.bar][1] * abs(p.distance) for _, p in self.ends
+        )
+        return self.gain(turned), most

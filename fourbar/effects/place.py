@@ -1,0 +1,199 @@
+"""Places of bars: from the bar's first pin, from its mass centre, or at a named point."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import fields
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from fourbar.errors import InputError
+from fourbar.formulas.arithmetic import (
+    angle,
+    dot,
+    polar,
+    sine_of,
+    vector,
+)
+from fourbar.formulas.motion import State
+from fourbar.linkage import (
+    BAR_NAMES,
+    SECOND_PIN,
+    Declared,
+    FourBar,
+    require_pair,
+    require_whole,
+)
+
+STATED_PLACES = {
+    "from_pin": Declared("m", left_out=None, pair=True),
+    "from_centre": Declared("m", left_out=None, pair=True),
+}
+"""Forms in which numbers state a place that turns with its bar; `point` is a name."""
+AT_FIRST_PIN = (0.0, 0.0)
+"""Place of the bar's first pin, m and rad."""
+
+
+class Place(NamedTuple):
+    """A place of a bar, which turns with it; one of `from_pin`, `from_centre`, `point`.
+
+    Parameters
+    ----------
+    bar : 1 (the ground), 2, 3 or 4.
+    from_pin : (distance, angle) from the bar's first pin (O2, O2, A, O4), m, the angle
+        from the bar's line, rad.
+    from_centre : likewise from the bar's mass centre G.
+    point : name of one of the scene's points on this bar.
+    """
+
+    bar: int
+    from_pin: tuple[float, float] | None = None
+    from_centre: tuple[float, float] | None = None
+    point: str | None = None
+
+    def settle(self, linkage: FourBar, points: Mapping[str, "Place"]) -> "Place":
+        """Return the same place from the bar's first pin, by numbers that are stated.
+
+        A place from G becomes the sum of both: `from_pin` is that of G, `from_centre`
+        stays. Nothing is rounded, and numbers may be arrays of any kind.
+
+        `points`: places of the scene's points by name.
+        """
+        if self.point is not None:
+            return points[self.point].settle(linkage, points)
+        if self.from_centre is None or self.from_pin is not None:
+            return self
+        return self._replace(from_pin=linkage.bar(self.bar).mass_centre)
+
+    def in_one_pair(self) -> "Place":
+        """Return a settled place as one pair from the bar's first pin."""
+        if self.from_centre is None:
+            return self
+        return Place(self.bar, self.polar_from_pin())
+
+    def vector(self) -> Any:
+        """Compute the vector from the bar's first pin to a settled place, in the bar's frame, complex, m."""
+        assert self.from_pin is not None
+        z = polar(*self.from_pin)
+        return z if self.from_centre is None else z + polar(*self.from_centre)
+
+    def polar_from_pin(self) -> tuple[Any, Any]:
+        """Return distance (m) and angle (rad) of a settled place from the bar's first pin."""
+        assert self.from_pin is not None
+        if self.from_centre is None:
+            return self.from_pin
+        if type(self.from_centre[0]) is float and self.from_centre[0] == 0.0:
+            return self.from_pin
+        z = self.vector()
+        return (abs(z) if type(z) is complex else np.abs(z)), angle(z)
+
+    @property
+    def distance(self) -> Any:
+        """Distance of a settled place from the bar's first pin, m."""
+        return self.polar_from_pin()[0]
+
+    @property
+    def angle(self) -> Any:
+        """Angle of a settled place from the bar's line, rad."""
+        return self.polar_from_pin()[1]
+
+    @property
+    def in_bar(self) -> Any:
+        """Vector in the bar's frame, along + i across its line, m; an array, so products round alike."""
+        z = self.vector()
+        return np.asarray(z) if isinstance(z, complex) else z
+
+    def arm_from(self, pin: str, state: State) -> tuple[Any, Any]:
+        """Return the vector from one of the bar's pins in the bar's frame, complex, m, and the square of its length."""
+        arm = self.in_bar
+        if pin != SECOND_PIN[self.bar]:
+            return arm, self.distance * self.distance
+        length = state.lengths[self.bar - 1]
+        if self.from_centre is not None:
+            arm = arm - length
+            return arm, dot(arm, arm)
+        assert self.from_pin is not None
+        distance, turned = self.from_pin
+        half = sine_of(
+            0.5 * turned
+        )  # r cos phi - L near the pin, where the cosine rounds to 1
+        arm = vector((distance - length) - 2.0 * distance * half * half, arm.imag)
+        return arm, dot(arm, arm)
+
+    def locate(self, state: State) -> Any:
+        """Return the position of the place, complex, m."""
+        return state.foot(self.bar) + self.in_bar * state.direction(self.bar)
+
+
+def require_place(key: str, place: object) -> Place:
+    """Return a place, checked; InputError for what is none."""
+    if not isinstance(place, Place):
+        raise InputError(key, place, "must be a fourbar.Place")
+    bar = require_whole(f"{key}.bar", place.bar, BAR_NAMES, "must be 1, 2, 3 or 4")
+    forms = {
+        name: value for name, value in place._asdict().items() if value is not None
+    }
+    del forms["bar"]
+    if len(forms) != 1:
+        raise InputError(
+            key,
+            ", ".join(forms) or None,
+            "must be a pair from_pin or from_centre, or a point",
+        )
+    if place.point is not None:
+        if not isinstance(place.point, str):
+            raise InputError(f"{key}.point", place.point, "must be a point's name")
+        return Place(bar, point=place.point)
+    ((name, pair),) = forms.items()
+    if name == "from_centre":
+        require_mass_centre(key, bar)
+    checked: Any = {name: require_pair(f"{key}.{name}", pair, STATED_PLACES[name].unit)}
+    return Place(bar, **checked)
+
+
+def require_mass_centre(key: str, bar: int) -> None:
+    """Raise InputError for a place from the mass centre of the ground."""
+    if bar == 1:
+        raise InputError(
+            f"{key}.from_centre", bar, "the ground has no mass centre: state from_pin"
+        )
+
+
+def require_ends(key: str, start: object, end: object) -> tuple[Place, Place]:
+    """Return the ends of a line between two bars, checked; InputError for what is none."""
+    ends = tuple(
+        require_place(f"{key}.{name}", place)
+        for name, place in (("from", start), ("to", end))
+    )
+    if ends[0].bar == ends[1].bar:
+        raise InputError(
+            f"{key}.to.bar", ends[1].bar, "must be another bar than that of `from`"
+        )
+    return ends[0], ends[1]
+
+
+def change_each(terms: Any, change: Callable[[Place], Place]) -> Any:
+    """Return terms with their places changed: the same tuple where no place is."""
+    changed = tuple(term.with_places(change) for term in terms)
+    same = all(one is other for one, other in zip(changed, terms, strict=True))
+    return terms if same else changed
+
+
+def copy_with(description: Any, **changed: Any) -> Any:
+    """Return a frozen description with some fields changed, itself where none is.
+
+    The new values may be arrays; nothing is checked again.
+    """
+    if all(value is getattr(description, name) for name, value in changed.items()):
+        return description
+    copied = object.__new__(type(description))
+    for name in _list_names(description.__class__):
+        value = changed[name] if name in changed else getattr(description, name)
+        object.__setattr__(copied, name, value)
+    return copied
+
+
+@cache
+def _list_names(kind: type) -> tuple[str, ...]:
+    """List the names of a dataclass's fields."""
+    return tuple(field.name for field in fields(kind))

@@ -1,0 +1,87 @@
+"""A drive that pushes a point of a bar in a direction: a hand on a lid, the handle of pliers.
+
+Per newton the bar gets the unit vector of the direction at the point; ds/dq is the component in that direction of the
+point's derivative by the independent angle.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from fourbar.effects.effect import Actions
+from fourbar.effects.force_drive import ForceDrive
+from fourbar.effects.load import require_frame
+from fourbar.effects.place import Place, copy_with, require_place
+from fourbar.effects.spring import COINCIDE
+from fourbar.errors import InputError
+from fourbar.formulas.arithmetic import Number, is_any, polar
+from fourbar.formulas.motion import State
+from fourbar.formulas.path import NO_DIGIT_LEFT
+from fourbar.linkage import MOVING_BARS, FourBar, require, require_bar
+from fourbar.quantities import NO_LEVER, OK
+
+
+@dataclass(frozen=True, slots=True)
+class PointDrive(ForceDrive):
+    """A force at a place of bar 2, 3 or 4 in a direction, N, positive along it.
+
+    Parameters
+    ----------
+    place : where the force acts, which turns with its bar.
+    direction : angle of the force, rad.
+    frame : "world": the direction is from +x; "bar": from the bar's line, and turns with it.
+    """
+
+    place: Place
+    direction: float
+    frame: str = "world"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "place", require_place("drive", self.place))
+        require_bar("drive.bar", self.place.bar)
+        direction = require("drive.direction", self.direction, "rad")
+        object.__setattr__(self, "direction", direction)
+        require_frame("drive.frame", self.frame)
+
+    def with_places(self, change: Callable[[Place], Place]) -> "PointDrive":
+        """Return the same drive with its place changed."""
+        return copy_with(self, place=change(self.place))  # type: ignore[no-any-return]
+
+    @property
+    def ends(self) -> tuple[tuple[float, Place], ...]:
+        """Return the place, along the direction."""
+        return ((1.0, self.place),)
+
+    @property
+    def apart(self) -> tuple[int, ...]:
+        """Bars of which one may be left out so that the moments of the other two give the force between them.
+
+        The force on bar 2 or 4 is in the moment of that bar alone, as a couple is; on bar 3 it is in any pair's.
+        """
+        return MOVING_BARS if self.place.bar == 3 else (self.place.bar,)
+
+    def require_motion(self, linkage: FourBar) -> None:
+        """Raise InputError where the point is a fixed pin."""
+        bar, distance = self.place.bar, abs(self.place.distance)
+        if bar != 3 and distance <= COINCIDE * linkage.bar(bar).length:
+            allowed = "is a fixed pin, at which a force does no work: state another"
+            raise InputError("drive", f"the first pin of bar {bar}", allowed)
+
+    def line(self, state: State) -> tuple[None, Number]:
+        """Return no stroke, and the unit vector of the direction in world axes."""
+        unit = polar(1.0, self.direction)
+        if self.frame == "bar":
+            return None, unit * state.direction(self.place.bar)
+        return None, unit + 0.0 * state.direction(self.place.bar)
+
+    def act(self, actions: Actions, force: Number) -> None:
+        """Push its point."""
+        direction = self.line(actions.state)[1]
+        actions.force(self.place.bar, force * direction, self.place.in_bar)
+
+    def status(self, state: State, sines: dict[int, Number]) -> Number:
+        """Return NO_LEVER where P lies within its rounding; None: nowhere."""
+        lever, most = self.leverage(state, sines)
+        none = abs(lever) <= NO_DIGIT_LEFT * most
+        return np.where(none, NO_LEVER, OK) if is_any(none) else None

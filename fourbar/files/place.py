@@ -1,0 +1,72 @@
+"""Places of bars in scene files: `from_pin`, `from_centre` or `point`, polar or by x and y."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from fourbar.effects.place import STATED_PLACES, Place
+from fourbar.files.fields import Reader
+
+PLACES_OF_POINTS = tuple(STATED_PLACES)
+PLACES_OF_ENDS = (*STATED_PLACES, "point")
+"""Keys of which one states where an end of a spring or cylinder lies, or where a force acts."""
+PLACES_OF_A_LOAD = (*PLACES_OF_ENDS, "arm")
+AT_OF_A_LOAD = {
+    "bar": "write from_centre, with the same numbers, or from_pin, or point",
+    "world": "write from_pin or from_centre = [distance, angle from the bar's line], or "
+    "point; an arm from G that keeps its direction is now written arm",
+}
+"""What replaces `at` in a load of an old file, by the load's frame."""
+
+
+def read_table_with_place(
+    read: Reader, key: str, value: object, allowed: Iterable[str], instead: str = ""
+) -> dict[str, Any]:
+    """Read a table in which a place is stated; `at`, of old files, is refused with what to write.
+
+    `instead`: that, where it is not `from_pin`.
+    """
+    if isinstance(value, dict) and "at" in value:
+        allowed = instead or "write from_pin = [distance, angle from the bar's line]"
+        raise read.refuse(f"{key}.at", value["at"], f"is no key any more: {allowed}")
+    return read.table(key, value, allowed)
+
+
+def read_stated_place(
+    read: Reader,
+    key: str,
+    entry: Mapping[str, Any],
+    bars: Mapping[str, int],
+    forms: Sequence[str],
+    least: int = 1,
+) -> Place:
+    """Read the bar of an entry and its place on it, which one of some keys states.
+
+    Parameters
+    ----------
+    bars : the bar of each named point, which the entry need not state again.
+    forms : keys of which one may state the place; none: it is the bar's first pin.
+    least : number of the first bar allowed, 1 or 2.
+    """
+    stated = [name for name in forms if name in entry]
+    if len(stated) > 1:
+        allowed = f"{stated[0]} states the place already; state one of them"
+        raise read.refuse(f"{key}.{stated[1]}", entry[stated[1]], allowed)
+    name = entry.get("point") if "point" in stated else None
+    if name is not None:
+        read.choice(f"{key}.point", name, bars)
+        bar = entry.get("bar", bars[name])
+    else:
+        bar = entry.get("bar")
+    place = Place(read.whole(f"{key}.bar", bar, least, 4))
+    if name is not None:
+        if place.bar != bars[name]:
+            allowed = f"the point {name} is on bar {bars[name]}"
+            raise read.refuse(f"{key}.bar", bar, allowed)
+        return place._replace(point=name)
+    for form in set(stated) & STATED_PLACES.keys():
+        if form == "from_centre" and place.bar == 1:
+            allowed = "the ground has no mass centre: write from_pin"
+            raise read.refuse(f"{key}.{form}", entry[form], allowed)
+        stated_pair: Any = {form: read.polar(f"{key}.{form}", entry[form], "m")}
+        place = place._replace(**stated_pair)
+    return place

@@ -1,0 +1,319 @@
+"""Where forces act: places of bars in every form, loads at them, and the cases that people brought."""
+
+import cmath
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fourbar
+from fourbar.effects import Load, Place
+from fourbar.errors import InputError
+from fourbar.files import dump, loads
+from fourbar.scene import Scene
+from tests.support.scenes import crank_rocker
+
+PRINTED = 6e-7
+"""N m: a half of the last digit of right values with six decimals."""
+ROUND_OFF = 1e-13
+"""Relative; two evaluations of some fifty roundings each, far from limits."""
+
+HUNG_WEIGHT = """
+title = "Weight hung at the tip of the rocker"
+[lengths]
+ground = "300 mm"
+input = "100 mm"
+coupler = "250 mm"
+output = "220 mm"
+[motion]
+theta_2 = ["0 deg", "90 deg", "180 deg", "270 deg"]
+omega_2 = "0 rad/s"
+[[loads]]
+bar = 4
+force = ["10 N", "-90 deg"]
+from_pin = ["300 mm", "0 deg"]
+"""
+PULL_AT_THE_TIP = """
+title = "Force along x at the rocker's end"
+[lengths]
+ground = "12 cm"
+input = "5 cm"
+coupler = "10 cm"
+output = "8 cm"
+[motion]
+theta_2 = "60 deg"
+omega_2 = "10 deg/s"
+alpha_2 = "5 deg/s^2"
+[[loads]]
+bar = 4
+force = ["50 N", "0 deg"]
+from_pin = ["8 cm", "0 deg"]
+"""
+
+
+def test_a_weight_hung_at_the_tip_of_the_rocker() -> None:
+    """Right values by virtual work with a circle intersection, apart from this program."""
+    torque = fourbar.solve(loads(HUNG_WEIGHT)).torque
+    right = [0.441477, -0.417152, -0.621733, 0.532516]
+    assert torque is not None
+    np.testing.assert_allclose(torque, right, atol=PRINTED, rtol=0.0)
+
+
+def test_a_pull_at_the_tip_of_massless_bars() -> None:
+    torque = fourbar.solve(loads(PULL_AT_THE_TIP)).torque
+    assert torque is not None
+    assert torque[0] == pytest.approx(1.656231, abs=PRINTED)
+
+
+PLACES: dict[str, dict[str, Any]] = {
+    "from_pin": {"from_pin": (0.17, 0.4)},
+    "from_centre": {"from_centre": (0.06, -0.7)},
+    "point": {"point": "P"},
+    "left out": {},
+}
+
+
+def find_place(scene: Scene, load: Load, s: fourbar.Solution) -> np.ndarray:
+    """Where a load acts at each position, x + i y, from the solution's points and angles alone."""
+    bar = scene.linkage.bar(load.bar)
+    angle = {3: s.theta_3, 4: s.theta_4}[load.bar]
+    d, theta_1 = scene.linkage.ground, scene.linkage.ground_angle
+    pin = {3: s.A @ [1.0, 1j], 4: cmath.rect(d, theta_1)}[load.bar]
+    G = bar.mass_centre or (0.5 * bar.length, 0.0)
+    turned = np.exp(1j * np.asarray(angle))
+    if load.point is not None:
+        return s.points[load.point] @ [1.0, 1j]
+    if load.from_pin is not None:
+        return pin + cmath.rect(*load.from_pin) * turned
+    arm = cmath.rect(*(load.from_centre or (0.0, 0.0)))
+    return pin + (cmath.rect(*G) + arm) * turned
+
+
+@pytest.mark.parametrize("frame", ["world", "bar"])
+@pytest.mark.parametrize("bar", [3, 4])
+@pytest.mark.parametrize("form", PLACES)
+def test_a_force_does_the_work_of_its_place_and_its_direction(
+    form: str, bar: int, frame: str
+) -> None:
+    """T2 dtheta_2 = -F . dr of a massless linkage at rest, dr by a central difference of the place."""
+    force = Load(bar, (7.0, 0.9), frame=frame, **PLACES[form])
+    theta_2, step = np.linspace(0.3, 6.0, 7), 1e-6
+    point = fourbar.Point("P", bar, from_centre=(0.05, 1.1))
+    base = crank_rocker(effects=(), loads=(force,), points=(point,))
+
+    def at(shift: float) -> fourbar.Solution:
+        motion = fourbar.Motion(theta_2 + shift, 0.0)
+        return fourbar.solve(replace(base, motion=motion))
+
+    here, ahead, behind = at(0.0), at(step), at(-step)
+    moved = find_place(base, force, ahead) - find_place(base, force, behind)
+    direction = np.full(len(theta_2), 0.9)
+    if frame == "bar":
+        direction = direction + np.asarray({3: here.theta_3, 4: here.theta_4}[bar])
+    along = (np.conj(7.0 * np.exp(1j * direction)) * moved).real
+    # the difference errs by step^2, and by the rounding of the places over the step
+    np.testing.assert_allclose(here.torque, -along / (2.0 * step), atol=1e-8)
+
+
+def test_an_arm_in_world_axes_keeps_its_lever_about_G() -> None:
+    """It is the force at G and a couple, which is how the thesis has it."""
+    size, direction, arm, angle = 10.0, 0.3, 0.05, 4.6
+    couple = arm * size * math.sin(direction - angle)
+    with_arm = crank_rocker(loads=(Load(2, (size, direction), arm=(arm, angle)),))
+    at_G = crank_rocker(loads=(Load(2, (size, direction), moment=couple),))
+    one, other = fourbar.solve(with_arm), fourbar.solve(at_G)
+    np.testing.assert_allclose(one.torque, other.torque, rtol=ROUND_OFF)
+    np.testing.assert_allclose(one.F43, other.F43, rtol=1e-10)
+
+
+def test_one_place_in_three_forms_is_one_load() -> None:
+    bar = crank_rocker().linkage.coupler
+    G = bar.to_centre
+    place = cmath.rect(0.19, -0.4)
+    forms: tuple[dict[str, Any], ...] = (
+        {"from_pin": cmath.polar(place)},
+        {"from_centre": cmath.polar(place - G)},
+        {"point": "P"},
+    )
+    point = fourbar.Point("P", 3, cmath.polar(place))
+    torques = []
+    for form in forms:
+        acting = Load(3, (5.0, 1.2), frame="world", **form)
+        scene = crank_rocker(loads=(acting,), points=(point,))
+        torques.append(fourbar.solve(scene).torque)
+        engines = scene.settled().loads[0].place
+        assert engines is not None and engines.vector() == pytest.approx(place)
+    for torque in torques[1:]:
+        np.testing.assert_allclose(torque, torques[0], rtol=1e-11)
+
+
+def test_a_member_of_a_study_moves_its_load_with_the_point_and_with_the_centre() -> (
+    None
+):
+    """A place at a named point or from G follows these, as the same scene stated anew does."""
+    point = fourbar.Point("P", 4, (0.2, 0.1))
+    acting = (
+        Load(4, (5.0, 0.3), point="P"),
+        Load(3, (2.0, 1.0), from_centre=(0.05, 0.2)),
+    )
+    scene = crank_rocker(loads=acting, points=(point,))
+    keys = {"points.P.from_pin.0": [0.25], "bars.coupler.centre.0": [0.21]}
+    varied = fourbar.solve(fourbar.vary(scene, keys))
+    coupler = replace(scene.linkage.coupler, centre=(0.21, 0.3))
+    moved = replace(
+        scene,
+        linkage=replace(scene.linkage, coupler=coupler),
+        points=(fourbar.Point("P", 4, (0.25, 0.1)),),
+    )
+    expected = fourbar.solve(moved)
+    assert varied.torque is not None and expected.torque is not None
+    np.testing.assert_array_equal(varied.torque[0], expected.torque)
+    assert not np.allclose(expected.torque, fourbar.solve(scene).torque)
+
+
+def test_ends_of_springs_and_cylinders_state_their_places_likewise() -> None:
+    G = crank_rocker().linkage.coupler.to_centre
+    place = cmath.rect(0.19, -0.4)
+    ends = (
+        Place(3, cmath.polar(place)),
+        Place(3, from_centre=cmath.polar(place - G)),
+        Place(3, point="P"),
+    )
+    point = fourbar.Point("P", 3, cmath.polar(place))
+    ground = Place(1, (0.2, 2.0))
+    springs, cylinders = [], []
+    for end in ends:
+        spring = fourbar.Spring(ground, end, 200.0, 0.05)
+        sprung = crank_rocker(effects=(fourbar.Springs((spring,)),), points=(point,))
+        springs.append(fourbar.solve(sprung).torque)
+        line = fourbar.LinearDrive(ground, end)
+        pushed = crank_rocker(drive=line, points=(point,))
+        cylinders.append(fourbar.solve(pushed).drive_force)
+    for torques in (springs, cylinders):
+        np.testing.assert_allclose(torques[1], torques[0], rtol=1e-9)
+        np.testing.assert_array_equal(torques[2], torques[0])
+
+
+EVERY_FORM = """
+[lengths]
+ground = "300 mm"
+input = "100 mm"
+coupler = "250 mm"
+output = "220 mm"
+[points]
+P = { bar = 3, from_centre = ["20 mm", "10 deg"] }
+Q = { bar = 1, from_pin = { x = "5 mm", y = "-60 mm" } }
+[[loads]]
+point = "P"
+force = ["1 N", "10 deg"]
+[[loads]]
+bar = 4
+force = ["1 N", "10 deg"]
+from_centre = { x = "5 mm", y = "7 mm" }
+frame = "bar"
+[[loads]]
+bar = 2
+force = ["1 N", "10 deg"]
+arm = ["5 mm", "7 deg"]
+[effects]
+springs = [
+  { from = { point = "Q" }, to = { point = "P" }, stiffness = "9 N/m", length = "1 mm" },
+  { from = { bar = 1 }, to = { bar = 4, from_centre = ["3 mm", "0 deg"] }, stiffness = "9 N/m", length = "1 mm" },
+]
+"""
+
+
+def test_every_form_reads_back_as_it_was_written() -> None:
+    scene = loads(EVERY_FORM)
+    assert [load.bar for load in scene.loads] == [3, 4, 2]
+    text = dump(scene)
+    assert loads(text) == scene
+    assert 'point = "P"' in text and "from_centre = { x = " in text and "arm = " in text
+    assert "at = " not in text
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        (
+            "arm = ",
+            "at = ",
+            "loads[2].at = ['5 mm', '7 deg']: is no key any more: write from_pin or from_centre",
+        ),
+        (
+            "from_centre = { x",
+            "at = { x",
+            "loads[1].at = a table of 2 entries: is no key any more: write from_centre,",
+        ),
+        (
+            'bar = 4, from_centre = ["3',
+            'bar = 4, at = ["3',
+            "effects.springs[1].to.at = ['3 mm', '0 deg']: is no key any more: write from_pin",
+        ),
+        ("from_pin = { x", "at = { x", "points.Q.at = a table"),
+        ('point = "P"\n', 'point = "R"\n', "loads[0].point = 'R'"),
+        ('point = "P"\n', 'point = "P"\nbar = 4\n', "P is on bar 3"),
+        (
+            "arm = ",
+            'from_pin = ["1 mm", "0 deg"]\narm = ',
+            "from_pin states the place already",
+        ),
+        (
+            "Q = { bar = 1, from_pin",
+            "Q = { bar = 1, from_centre",
+            "the ground has no mass centre",
+        ),
+        ("arm = ", 'frame = "bar"\narm = ', "loads[2].arm"),
+    ],
+)
+def test_a_place_that_is_stated_wrongly_is_refused_with_what_to_write(
+    old: str, new: str, words: str
+) -> None:
+    with pytest.raises(InputError) as refused:
+        loads(EVERY_FORM.replace(old, new, 1))
+    assert words in str(refused.value) and "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: Load(3, (1.0, 0.0), from_pin=(0.1, 0.0), arm=(0.1, 0.0)),
+        lambda: Load(3, None, from_pin=(0.1, 0.0), moment=1.0),
+        lambda: Load(3, (1.0, 0.0), arm=(0.1, 0.0), frame="bar"),
+        lambda: crank_rocker(loads=(Load(3, (1.0, 0.0), point="P"),)),
+        lambda: crank_rocker(
+            loads=(Load(3, (1.0, 0.0), point="P"),),
+            points=(fourbar.Point("P", 4, (0.1, 0.0)),),
+        ),
+        lambda: fourbar.Point("P", 1, from_centre=(0.1, 0.0)),
+        lambda: fourbar.Point("P", 3),
+        lambda: fourbar.Spring(Place(1), Place(4, (0.1, 0.0)), 1.0),
+        lambda: fourbar.Spring(
+            Place(1, from_centre=(0.1, 0.0)), Place(4, (0.1, 0.0)), 1.0
+        ),
+    ],
+)
+def test_python_refuses_what_is_no_place(make: Any) -> None:
+    with pytest.raises(InputError):
+        make()
+
+
+def test_places_of_loads_are_given_by_keyword() -> None:
+    with pytest.raises(TypeError):
+        Load(3, (1.0, 0.0), (0.1, 0.0))  # type: ignore[misc]
+
+
+def test_the_error_bar_covers_a_place_from_the_centre() -> None:
+    """The error bar of the torque holds against 40 digits of virtual work."""
+    flint = pytest.importorskip("flint")
+    from fourbar_validation.engines.balls import compute_outputs, make_balls
+
+    loads_ = (Load(3, (1e3, 0.3), from_centre=(0.01, 1.0)),)
+    scene = crank_rocker(loads=loads_, effects=(), motion=fourbar.Motion(1.1, 0.0))
+    s = fourbar.solve(scene, "error")
+    exact = compute_outputs(scene, 1, make_balls(scene, 1.1))
+    assert exact is not None and s.torque is not None and s.torque_error is not None
+    gap = abs(flint.arb(float(s.torque[0])) - exact["torque"])
+    assert float(gap) <= float(s.torque_error[0])

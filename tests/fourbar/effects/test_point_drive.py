@@ -1,0 +1,173 @@
+"""A force at a point as the drive: its size by virtual work, its pin forces, and how a file states it."""
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fourbar
+from fourbar.effects import Place, PointDrive
+from fourbar.errors import InputError
+from fourbar.files import dump, loads
+from fourbar.scene import Scene
+from fourbar_validation.engines.free_body import FreeBody
+from tests.support.scenes import crank_rocker
+
+ROUND_OFF = 1e-11
+"""Relative, times the condition: two ways of some hundred roundings each."""
+DIRECTION = 1.1
+
+PLIERS = """
+title = "Pliers: a hand at the handle, the jaw's grip as the load"
+[lengths]
+ground = "2.4 in"
+input = "0.8 in"
+coupler = "1.23 in"
+output = "1.55 in"
+[motion]
+theta_2 = "49 deg"
+omega_2 = "1 rad/s"
+[points]
+handle = { bar = 2, from_pin = ["4.26 in", "0 deg"] }
+jaw = { bar = 4, from_pin = ["1 in", "0 deg"] }
+[drive]
+point = "handle"
+direction = "90 deg"
+frame = "bar"
+[[loads]]
+point = "jaw"
+force = ["-1 lbf", "90 deg"]
+frame = "bar"
+"""
+
+
+def test_pliers_multiply_the_force_of_the_hand() -> None:
+    """Right: omega_4/omega_2 0.1332544 and a force ratio of 4.26/0.1332544 = 31.969."""
+    s = fourbar.solve(loads(PLIERS))
+    assert s.drive_force is not None and s.omega_4 is not None
+    assert s.omega_4[0] / s.omega_2[0] == pytest.approx(0.1332544, abs=5e-8)
+    grip = 4.4482216152605
+    assert grip / s.drive_force[0] == pytest.approx(31.969, abs=5e-4)
+    # the same by the speeds of the two points
+    handle, jaw = s.velocity["handle"][0], s.velocity["jaw"][0]
+    ratio = np.hypot(*handle) / np.hypot(*jaw)
+    assert grip / s.drive_force[0] == pytest.approx(ratio, rel=1e-12)
+
+
+def driven(bar: int, frame: str, **changes: Any) -> Scene:
+    return crank_rocker(
+        drive=PointDrive(Place(bar, (0.15, 0.3)), DIRECTION, frame), **changes
+    )
+
+
+@pytest.mark.parametrize("frame", ["world", "bar"])
+@pytest.mark.parametrize("bar", [2, 3, 4])
+def test_the_power_of_the_force_is_that_of_a_couple_on_the_input(
+    bar: int, frame: str
+) -> None:
+    """F (e . v_P) = T2 omega_2, v_P the velocity of the point as the solution has it."""
+    point = fourbar.Point("P", bar, (0.15, 0.3))
+    scene = driven(bar, frame, points=(point,))
+    s = fourbar.solve(scene)
+    couple = fourbar.solve(replace(scene, drive=None, drive_bar=2))
+    angle = np.full(len(s), DIRECTION)
+    if frame == "bar":
+        angle = angle + {2: s.theta_2, 3: s.theta_3, 4: s.theta_4}[bar]
+    along = (s.velocity["P"] * np.stack([np.cos(angle), np.sin(angle)], axis=1)).sum(1)
+    power = couple.torque * s.omega_2
+    np.testing.assert_allclose(s.drive_force * along, power, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(s.stroke_speed, along, atol=1e-12)
+    np.testing.assert_allclose(s.power, power, rtol=1e-9, atol=1e-9)
+    unit = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    np.testing.assert_allclose(s.drive_line, unit, atol=1e-13)
+    assert s.torque is None and s.stroke is None and s.drive_bar is None
+
+
+@pytest.mark.parametrize("frame", ["world", "bar"])
+@pytest.mark.parametrize("bar", [2, 3, 4])
+def test_the_pin_forces_are_those_of_a_load_of_this_size_and_no_couple(
+    bar: int, frame: str
+) -> None:
+    """With the drive's force as a load, the couple on the input is zero and the pins carry the same."""
+    scene = driven(bar, frame, motion=fourbar.Motion(0.7, 10.0, 5.0))
+    s = fourbar.solve(scene)
+    push = fourbar.Load(
+        bar, (float(s.drive_force[0]), DIRECTION), from_pin=(0.15, 0.3), frame=frame
+    )
+    loaded = replace(scene, drive=None, drive_bar=2, loads=(*scene.loads, push))
+    other = fourbar.solve(loaded)
+    size = float(np.hypot(*s.F43[0]))
+    assert abs(other.torque[0]) < 1e-10 * size
+    for name in ("F12", "F32", "F43", "F14"):
+        ours, theirs = getattr(s, name), getattr(other, name)
+        np.testing.assert_allclose(ours, theirs, atol=1e-10 * size)
+
+
+@pytest.mark.parametrize("frame", ["world", "bar"])
+@pytest.mark.parametrize("bar", [2, 3, 4])
+def test_free_bodies_find_the_same_force(bar: int, frame: str) -> None:
+    scene = driven(bar, frame)
+    s = fourbar.solve(scene)
+    answer = FreeBody().answer(scene, fourbar.command(scene))
+    theirs = answer.quantities["drive_force"]
+    condition = s.drive_condition
+    np.testing.assert_allclose(
+        condition * theirs / s.drive_force, condition, atol=ROUND_OFF
+    )
+    np.testing.assert_allclose(
+        answer.quantities["drive_condition"], condition, rtol=1e-9
+    )
+
+
+def test_where_the_point_moves_across_the_direction_there_is_no_lever() -> None:
+    """A crank pushed along itself: the point has no speed in that direction."""
+    drive = PointDrive(Place(2, (0.1, 0.0)), 0.0, "bar")
+    s = fourbar.solve(crank_rocker(drive=drive, motion=fourbar.Motion(0.7, 10.0)))
+    assert s.status == ["no_lever"]
+    assert np.isnan(s.drive_force[0]) and np.isnan(s.F12[0]).all()
+
+
+def test_a_study_and_a_file_carry_it() -> None:
+    scene = loads(PLIERS)
+    assert loads(dump(scene)) == scene
+    keys = {"drive.direction": [math.pi / 2, 1.2], "points.handle.from_pin.0": 0.1}
+    varied = fourbar.solve(fourbar.vary(scene, keys))
+    assert isinstance(scene.drive, PointDrive)
+    handle = fourbar.Point("handle", 2, (0.1, 0.0))
+    for k, direction in enumerate((math.pi / 2, 1.2)):
+        one = replace(
+            scene,
+            drive=replace(scene.drive, direction=direction),
+            points=(handle, scene.points[1]),
+        )
+        assert varied.drive_force is not None
+        assert varied.drive_force[k] == fourbar.solve(one).drive_force
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('direction = "90 deg"\n', "", "drive.direction"),
+        ('point = "handle"\n', "bar = 2\n", "drive.point"),
+        ('point = "handle"\n', 'point = "hand"\n', "drive.point = 'hand'"),
+        ('point = "handle"\n', 'from = { bar = 1 }\npoint = "handle"\n', "from and to"),
+        ('point = "handle"\n', 'bar = 1\nfrom_pin = ["1 m", "0 deg"]\n', "drive.bar"),
+        ('frame = "bar"\n[[', 'frame = "body"\n[[', "drive.frame"),
+        ('point = "handle"\n', 'at = ["1 m", "0 deg"]\nbar = 2\n', "no key any more"),
+        ('point = "handle"\n', 'bar = 2\nfrom_pin = ["0 m", "0 deg"]\n', "fixed pin"),
+    ],
+)
+def test_a_drive_that_is_stated_wrongly_is_refused_in_one_line(
+    old: str, new: str, words: str
+) -> None:
+    with pytest.raises(InputError) as refused:
+        loads(PLIERS.replace(old, new, 1))
+    assert words in str(refused.value) and "\n" not in str(refused.value)
+
+
+def test_a_stroke_is_of_a_cylinder_alone() -> None:
+    motion = fourbar.Motion(stroke=0.3, stroke_speed=0.1, side="left")
+    with pytest.raises(InputError, match="no cylinder"):
+        crank_rocker(drive=PointDrive(Place(2, (0.1, 0.0)), 1.0), motion=motion)
