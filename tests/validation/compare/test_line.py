@@ -198,7 +198,7 @@ def test_a_fault_in_the_drive_is_caught(
 def test_who_cannot_do_it_refuses_in_one_line_that_names_it() -> None:
     scene = driven(1, 4)
     assert (
-        "the linear drive (drive.from, drive.to)"
+        "a drive that exerts a force"
         in BallArithmetic().answer(scene, fourbar.command(scene)).refusal
     )
     outside = GuestClient("outside", Program(("none",)), Hello("outside"))

@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.effects import LinearDrive
 from fourbar.linkage import FourBar
 from fourbar.scene import Command, Scene
 from fourbar.scene.motion import Motion
@@ -170,9 +169,9 @@ STROKE_HALVINGS = 80
 def measure_cylinder(scene: Scene) -> tuple[complex, complex]:
     """Measure from the ground pin of its bar, at angle 0, to a cylinder's end on it, and to that on the ground, m."""
     drive = scene.drive
-    assert isinstance(drive, LinearDrive)
-    on_bar, on_ground = (
-        (drive.end, drive.start) if drive.start.bar == 1 else (drive.start, drive.end)
+    assert drive is not None and drive.has_stroke
+    on_ground, on_bar = sorted(
+        (place for _, place in drive.ends), key=lambda place: place.bar
     )
     d, theta_1 = scene.linkage.ground, scene.linkage.ground_angle
     pivot = complex(*resolve(d, theta_1)) if on_bar.bar == 4 else 0.0j
