@@ -15,6 +15,7 @@ import fourbar
 from fourbar.effects import Gravity
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import command as list_positions
+from fourbar.scene import with_signs
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.compare import COMPARED
 from fourbar_validation.compare.tolerance import EPS, K, magnitude
@@ -83,9 +84,11 @@ def test_the_page_s_engine_answers_what_the_formulas_do(
         motion = motion.replace(speed=1.0)
     scene = replace(scene, motion=motion, loads=(), effects=gravity, drive_bar=2)
     commanded = list_positions(scene)
+    # an engine is told the sign of the command's own sine at each position
+    told = with_signs(scene.linkage, commanded)
     question = {
         "scene": protocol.scene_to_json(scene),
-        "command": protocol.command_to_json(scene, commanded),
+        "command": protocol.command_to_json(scene, told),
     }
     hello, reply = ask(
         engine, {"ask": "hello", "protocol": 3}, {"ask": "answer", **question}
@@ -146,9 +149,11 @@ def test_what_the_judge_writes_is_what_the_schema_says() -> None:
 def test_what_an_engine_writes_is_what_the_schema_says(engine: Path) -> None:
     scene = replace(crank_rocker(), loads=())
     commanded = list_positions(scene)
+    # an engine is told the sign of the command's own sine at each position
+    told = with_signs(scene.linkage, commanded)
     question = {
         "scene": protocol.scene_to_json(scene),
-        "command": protocol.command_to_json(scene, commanded),
+        "command": protocol.command_to_json(scene, told),
     }
     hello, reply = ask(
         engine, {"ask": "hello", "protocol": 3}, {"ask": "answer", **question}
