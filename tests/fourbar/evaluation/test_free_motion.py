@@ -31,7 +31,6 @@ def test_one_window_of_iftomm_a02() -> None:
         -1.0,
         1,
         np.array([0.0, 10.0]),
-        follow=True,
     )
     x, y, w = (
         math.cos(m.command.theta_2[-1]),
