@@ -11,7 +11,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.effects import Effect
 from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.scene import Scene, command, with_signs
 from fourbar_validation.compare.answer import Array
@@ -190,12 +189,12 @@ WRENCH_OF: dict[str, Callable[[Any, BodyMotion, BodyWrenches], None]] = {
 """Function that applies an effect, by the effect's name in a scene file; others bring their own."""
 
 
-def has_wrench(effect: Effect) -> bool:
+def has_wrench(effect: Any) -> bool:
     """Return True if an effect can be applied to the free bodies."""
     return effect.key in WRENCH_OF or declares(effect, "act_on_free_bodies")
 
 
-def apply_effect(effect: Effect, motion: BodyMotion, wrenches: BodyWrenches) -> None:
+def apply_effect(effect: Any, motion: BodyMotion, wrenches: BodyWrenches) -> None:
     """Add what an effect does to the free bodies."""
     if effect.key in WRENCH_OF:
         WRENCH_OF[effect.key](effect, motion, wrenches)
