@@ -102,20 +102,20 @@ def test_what_slopes_cannot_follow_raises(change: Any) -> None:
 class Drag(Effect):
     """A couple on the input that grows with the square of its speed, written in two ways."""
 
-    size: float
+    strength: float
     form: str
     key: ClassVar[str] = "drag"
     numbers: ClassVar[dict[str, Any]] = {
-        "size": fourbar.effects.effect.Declared("N m s^2/rad^2")
+        "strength": fourbar.effects.effect.Declared("N m s^2/rad^2")
     }
 
     def act(self, actions: Actions, state: State) -> None:
         omega = state.omega(2)
-        square = self.size * omega * omega
+        square = self.strength * omega * omega
         if self.form == "copysign":
             actions.moment(2, -np.copysign(square, omega))
         elif self.form == "absolute":
-            actions.moment(2, -self.size * omega * np.abs(omega))
+            actions.moment(2, -self.strength * omega * np.abs(omega))
         else:
             actions.moment(2, -np.maximum(square, 0.0) * np.sign(omega))
 
