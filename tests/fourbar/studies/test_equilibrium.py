@@ -455,7 +455,7 @@ def test_the_command_prints_what_python_finds(
     text = capsys.readouterr().out
     assert (
         "0.759439193" in text
-        and "found between 7200 positions" in text
+        and "found between 3600 positions" in text
         and "stable" in text
     )
     assert (
