@@ -18,7 +18,7 @@ import numpy as np
 
 from fourbar.errors import FourBarError, InputError
 from fourbar.files import dump, loads, save
-from fourbar.scene import Command, Scene, command
+from fourbar.scene import Command, Scene, command, with_signs
 from fourbar.solution import Solution
 from fourbar_validation.compare.compare import Comparison
 from fourbar_validation.compare.rows import FAILS, say_error
@@ -29,7 +29,7 @@ from fourbar_validation.places import CHECKOUT
 from fourbar_validation.report.machine import name_code
 from fourbar_validation.run.answers import check_statements
 from fourbar_validation.run.identities import check_identities
-from fourbar_validation.run.question import Question
+from fourbar_validation.run.question import Question, ask_at
 from fourbar_validation.run.store import Store
 from fourbar_validation.scenes.random import (
     DrawnLinkage,
@@ -272,11 +272,9 @@ def _check_assembly(scene: Scene, commanded: Command, solution: Solution) -> lis
 
     problems = []
     margin = np.abs(find_margin(scene.linkage, commanded.theta_2))
+    signs = with_signs(scene.linkage, commanded).branch
     for i, theta_2 in enumerate(commanded.theta_2):
-        closes = (
-            closure(make_balls(scene, float(theta_2)), int(commanded.branch[i]))
-            is not None
-        )
+        closes = closure(make_balls(scene, float(theta_2)), int(signs[i])) is not None
         if closes != bool(solution.assembled[i]) and margin[i] > TOUCHING_MARGIN:
             problems.append(
                 f"assembled: the formulas say {bool(solution.assembled[i])} at theta_2 = {theta_2!r}"
@@ -297,7 +295,7 @@ def _check_engines(question: Question) -> list[str]:
         list(check_identities(question)),
     )
     for engine in EXACT:
-        answer = engine.start().answer(scene, commanded)
+        answer = ask_at(engine.start(), scene, commanded)
         held = hold(engine, scene, commanded, answer)
         rows += Comparison("", scene, answer, solution, held).rows()
         if (

@@ -34,7 +34,7 @@ from fourbar_validation.engines.free_body import NAME as FREE_BODY
 from fourbar_validation.engines.registry import ENGINES, Engine, hold
 from fourbar_validation.run.answers import check_statements
 from fourbar_validation.run.identities import check_identities, compare_status
-from fourbar_validation.run.question import Question
+from fourbar_validation.run.question import Question, ask_at
 
 PAIRS = (
     *(
@@ -285,7 +285,7 @@ def make_baselines() -> list[Baseline]:
     for scene in choose_scenes():
         command = command_of(scene)
         answers = [
-            (w, w.start().answer(scene, command)) for w in ENGINES if w.name in EXACT
+            (w, ask_at(w.start(), scene, command)) for w in ENGINES if w.name in EXACT
         ]
         if is_caught(scene, command, answers):
             raise RuntimeError(f"the harness fails without a mutant: {scene.title}")

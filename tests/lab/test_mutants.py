@@ -37,7 +37,7 @@ def test_without_a_mutant_the_harness_holds() -> None:
     for scene in harness.choose_scenes()[-3:]:
         command = command_of(scene)
         answers = [
-            (w, w.start().answer(scene, command))
+            (w, harness.ask_at(w.start(), scene, command))
             for w in harness.ENGINES
             if w.name in harness.EXACT
         ]
@@ -49,7 +49,7 @@ def test_the_harness_alone_catches_a_wrong_sign(
 ) -> None:
     command = command_of(SCENE)
     answers = [
-        (w, w.start().answer(SCENE, command))
+        (w, harness.ask_at(w.start(), SCENE, command))
         for w in harness.ENGINES
         if w.name in harness.EXACT
     ]

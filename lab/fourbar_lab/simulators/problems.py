@@ -11,6 +11,7 @@ import numpy as np
 import fourbar
 from fourbar.quantities import PIN_FORCES, UNITS
 from fourbar.scene import command as list_positions
+from fourbar.scene import with_signs
 from fourbar.solution import Solution
 from fourbar.writing import write_text
 from fourbar_lab.simulators import slider_crank
@@ -45,7 +46,9 @@ def collect_problem(name: str) -> dict[str, Any]:
     solution = fourbar.solve(scene, "error")
     if scene.motion.free is None:
         asked: dict[str, Any] = {
-            "command": protocol.command_to_json(scene, list_positions(scene))
+            "command": protocol.command_to_json(
+                scene, with_signs(scene.linkage, list_positions(scene))
+            )
         }
         answers, errors = collect_answers(solution)
     else:

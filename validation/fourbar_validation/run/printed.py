@@ -42,7 +42,7 @@ from fourbar_validation.engines.free_body import move
 from fourbar_validation.engines.free_body_effects import sum_acting
 from fourbar_validation.engines.prediction import predict_from_data
 from fourbar_validation.engines.registry import find_missing
-from fourbar_validation.run.question import Question, select_positions
+from fourbar_validation.run.question import Question, ask_at, select_positions
 
 SAMPLE = 5
 """Positions of a scene at which the error bars are held to the true error, besides those nearest to a rest."""
@@ -222,7 +222,7 @@ def check_error_bars(question: Question) -> Iterator[Row]:
     ]
     sampled = select_positions(command, indices)
     exact, ours = (
-        BallArithmetic().answer(scene, sampled),
+        ask_at(BallArithmetic(), scene, sampled),
         solve(scene, "error", at=sampled),
     )
     reference = make_reference(scene, exact)
