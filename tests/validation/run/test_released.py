@@ -42,9 +42,16 @@ def test_every_engine_is_judged_through_limits_and_change_points(
     page = judge_for_report("falling", scene)
     assert {row.engine for row in page.rows} > set(free.FORWARD)
     assert all(row.passed for row in page.rows)
+    # past the line an engine keeps fewer digits the nearer the linkage is to a change point
     for engine in free.FORWARD:
-        assert row(page.rows, engine, "theta_2").error < 2e-6
+        passed = row(page.rows, engine, "theta_2")
+        assert passed.error < (0.05 if solution.change_points else 5e-4), passed
     assert page.figure is not None
+    first = int(np.flatnonzero(np.diff(solution.branch))[0])
+    before = scene.motion.replace(free=fourbar.Free(first / 100.0, first))
+    rows = judge("falling", replace(scene, motion=before)).rows
+    for engine in free.FORWARD:
+        assert row(rows, engine, "theta_2").error < 2e-6
 
 
 def answering(monkeypatch: pytest.MonkeyPatch, change: Any) -> list[Row]:
@@ -76,23 +83,16 @@ def test_an_engine_that_stops_before_fails(monkeypatch: pytest.MonkeyPatch) -> N
 
 
 @pytest.mark.slow
-def test_an_engine_that_is_nan_before_it_fails_and_one_that_is_nan_behind_the_limit_does_not(
-    monkeypatch: pytest.MonkeyPatch,
+@pytest.mark.parametrize("index", [20, 60])
+def test_an_engine_that_is_nan_before_the_limit_or_behind_it_fails(
+    monkeypatch: pytest.MonkeyPatch, index: int
 ) -> None:
-    def struck(index: int) -> Any:
-        def strike(answer: Any) -> Any:
-            answer.theta_2[index] = np.nan
-            return answer
+    def strike(answer: Any) -> Any:
+        answer.theta_2[index] = np.nan
+        return answer
 
-        return strike
-
-    with monkeypatch.context() as patch:
-        assert (
-            row(answering(patch, struck(20)), "pinocchio-forward", "theta_2").verdict
-            == FAILS
-        )
-    with monkeypatch.context() as patch:
-        assert all(row.passed for row in answering(patch, struck(60)))
+    rows = answering(monkeypatch, strike)
+    assert row(rows, "pinocchio-forward", "theta_2").verdict == FAILS
 
 
 def test_an_engine_is_run_at_twice_its_step_however_close_the_instants_are() -> None:

@@ -60,7 +60,7 @@ def _answer_pinocchio(step: float) -> Any:
 
 FORWARD = {
     "mujoco-forward": (_answer_mujoco, 1e-3, "mujoco"),
-    "pinocchio-forward": (_answer_pinocchio, 2e-3, "pinocchio"),
+    "pinocchio-forward": (_answer_pinocchio, 1e-3, "pinocchio"),
 }
 """Engines that integrate by themselves: function that starts one with a step, longest step (s), and library."""
 LONGEST_STEP = 2e-3
