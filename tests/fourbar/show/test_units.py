@@ -146,6 +146,12 @@ def test_the_table_names_its_units(capsys: pytest.CaptureFixture[str]) -> None:
             *["rad/s^2"] * 2,
             "of",
             "T",
+            "s",
+            *["kN"] * 3,
+            "N",
+            "mm",
+            "deg",
+            *["mm"] * 4,
         ]
     ]
     torque = [float(line.split()[1]) for line in lines[heading + 3 :]]
