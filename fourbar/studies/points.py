@@ -98,7 +98,7 @@ def coupler_curve(
             of,
             r_along,  # type: ignore[arg-type]  # checked there
             r_across,  # type: ignore[arg-type]
-            circuit or 0,
+            0 if circuit is None else circuit,
             branch=1 if branch is None else branch,
             steps=steps,
         )

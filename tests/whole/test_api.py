@@ -101,6 +101,7 @@ def calls() -> dict[str, tuple[Callable[..., object], tuple[Any, ...]]]:
         fourbar.command(scene),
         (fourbar.Place(2, (0.1, 0.2)), fourbar.Place(4, (0.1, 0.2))),
     )
+    drawn = ((0.0, 0.0), (0.0, 0.1), (0.175, 0.05), (0.25, 0.05))
     times, angles = (0.0, 1.0, 2.0, 3.0), (0.0, 0.1, 0.2, 0.1)
 
     def moving(motion: fourbar.Motion) -> object:
@@ -195,6 +196,13 @@ def calls() -> dict[str, tuple[Callable[..., object], tuple[Any, ...]]]:
         ),
         "Bar": (bars, (0.1, 0.2, 0.1, (0.1, 0.1))),
         "FourBar": (fourbar.FourBar, (0.3, link.input, link.coupler, link.output, 0.1)),
+        "DrawnPins": (
+            lambda *x: fourbar.solve(
+                fourbar.Scene(link, drawing=fourbar.DrawnPins(*x))
+            ),
+            drawn,
+        ),
+        "from_pins": (lambda *x: fourbar.solve(fourbar.from_pins(*x)), drawn),
         "FourBar.bar": (link.bar, (3,)),
         "Scene": (
             lambda *x: fourbar.solve(fourbar.Scene(*x)),
@@ -251,6 +259,10 @@ def calls() -> dict[str, tuple[Callable[..., object], tuple[Any, ...]]]:
                 fourbar.Scene(link, drive=fourbar.LinearDrive(*x))
             ),
             ends,
+        ),
+        "PointDrive": (
+            lambda *x: fourbar.solve(fourbar.Scene(link, drive=fourbar.PointDrive(*x))),
+            (ends[1], 0.3, "world"),
         ),
         "Springs": (
             lambda x: acting(fourbar.Springs(x)),
