@@ -339,9 +339,9 @@ class Counts:
 
     @property
     def headline(self) -> str:
-        """Give the verdict alone, for what does not fail."""
+        """Give the verdict alone, for what does not fail; where nothing was compared, what was done instead."""
         if self.nothing:
-            return f"Nothing was compared{self._write_where()}"
+            return self.sentence()
         hold = f"All {self.compared} comparisons{self._write_where()} hold"
         if self[DEGRADED]:
             hold += f"; {self[DEGRADED]} of them at hard positions, as predicted"
