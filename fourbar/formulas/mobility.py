@@ -471,8 +471,9 @@ def meet_change_points(
         for signs in EQUALITIES
         if abs(math.fsum(map(mul, signs, lengths))) <= allowed
     ]
-    if not missed or not allowed > 0.0:
-        return lengths
+    touching = TOUCHING * math.fsum(lengths)
+    if all(abs(math.fsum(map(mul, signs, lengths))) <= touching for signs in missed):
+        return lengths  # none is missed by more than the formulas count as nothing
     equalities = np.array(missed, dtype=float)
     weights = np.square(fine)
     gaps = np.array([math.fsum(map(mul, signs, lengths)) for signs in missed])
