@@ -24,12 +24,14 @@ function commanded() {
   const bar = stated.map(key => /^(?:theta|omega|alpha)_([34])$/.exec(key)?.[1]).find(Boolean) ?? Object.keys(plain.motion?.law ?? {}).map(key => /^theta_([34])$/.exec(key)?.[1]).find(Boolean);
   return `theta_${bar ?? 2}`;
 }
+const without = (table, left) => Object.fromEntries(Object.entries(table).filter(([key]) => key !== left));
 // The empty fields of a table: those that apply beside what is stated.
 function fieldsAt(path, example) {
+  if (!path.length && plain.pins) return without(example, "lengths");   // the pins state lengths and assembly
   if (path.length !== 1) return example;
   if (path[0] === "drive" && plain.drive?.from) return {};
   if (path[0] !== "motion") return example;
-  const fields = offers.commands[commanded()].fields;
+  const every = offers.commands[commanded()].fields, fields = plain.pins ? without(every, "branch") : every;
   return plain.motion?.law ? Object.fromEntries(Object.entries(fields).filter(([key]) => key === "branch")) : fields;
 }
 function commandField() {

@@ -252,17 +252,20 @@ def test_a_linkage_is_drawn_by_four_clicks_and_its_numbers_are_typed_over(
     pixels = {"O2": (120, 300), "A": (170, 220), "B": (400, 120), "O4": (380, 330)}
     click_pins(driver, "50 in", *pixels.values())
     scale = 50.0 / driver.find_element("id", "picture").size["width"]
-    wait_for(driver, "!sketch && plain.lengths.ground.endsWith(' in')")
+    wait_for(driver, "!sketch && plain.pins?.O4[0].endsWith(' in')")
     pins = {name: complex(x - 120, 300 - y) * scale for name, (x, y) in pixels.items()}
-    drawn = {
-        "ground": pins["O4"],
-        "input": pins["A"],
-        "coupler": pins["B"] - pins["A"],
-        "output": pins["B"] - pins["O4"],
+    bars = (pins["O4"], pins["A"], pins["B"] - pins["A"], pins["B"] - pins["O4"])
+    stated = {
+        name: complex(*(float(text.split()[0]) for text in place))
+        for name, place in driver.execute_script("return plain.pins").items()
     }
-    for name, bar in drawn.items():
-        length = float(driver.execute_script(f"return plain.lengths.{name}").split()[0])
-        assert length == pytest.approx(abs(bar), abs=PIXELS * scale)
+    for name, pin in pins.items():
+        vector = stated[name] - stated["O2"]
+        assert vector == pytest.approx(pin, abs=PIXELS * scale)
+    lengths = driver.execute_script("return data.lengths")
+    assert [length / 0.0254 for length in lengths] == pytest.approx(
+        [abs(bar) for bar in bars], abs=PIXELS * scale
+    )
     shown = driver.execute_script(
         "const p = at(row); return [p.A, p.B]"
     )  # the position shown is the one drawn
@@ -271,8 +274,10 @@ def test_a_linkage_is_drawn_by_four_clicks_and_its_numbers_are_typed_over(
             pins[pin], abs=2 * PIXELS * scale
         )
     assert "lbf" in driver.find_element("id", "forces").text  # results follow the file
-    type_into(driver, "field:lengths/input", "6 in")
-    wait_for(driver, "Math.abs(data.lengths[1] - 0.1524) < 1e-12")
+    assert not driver.find_elements("id", "field:lengths/input")  # the pins state them
+    type_into(driver, "field:pins/A/1", "6 in")
+    typed = 0.0254 * abs(complex(stated["A"].real, 6.0) - stated["O2"])
+    wait_for(driver, f"Math.abs(data.lengths[1] - {typed!r}) < 1e-12")
     driver.find_element("id", "sketch").click()
     wait_for(driver, "sketch")
     driver.find_element("id", "no-sketch").click()
@@ -308,7 +313,7 @@ def test_a_designer_draws_a_cylinder_drive_and_analyze_gives_the_same(
     driver.get(opened(path))
     wait_for(driver, "offers && sketch")
     click_pins(driver, "1000 mm", (120, 300), (170, 180), (400, 120), (380, 330))
-    wait_for(driver, "!sketch && plain.lengths.ground !== '300 mm'")
+    wait_for(driver, "!sketch && plain.pins")
     type_into(driver, "field:bars/output/mass", "80 kg")
     wait_for(driver, "plain.bars.output.mass === '80 kg'")
     driver.find_element("xpath", "//button[.='+ cylinder in place of the bar']").click()
@@ -320,7 +325,7 @@ def test_a_designer_draws_a_cylinder_drive_and_analyze_gives_the_same(
     ).click()
     wait_for(driver, "plain.drive.from.from_pin.x")
     for name, value in (("x", "300 mm"), ("y", "-250 mm")):
-        type_into(driver, f"field:drive/from/at/{name}", value)
+        type_into(driver, f"field:drive/from/from_pin/{name}", value)
         wait_for(driver, f"plain.drive.from.from_pin.{name} === '{value}'")
     driver.find_element("css selector", "#command option[value=stroke]").click()
     wait_for(
@@ -397,7 +402,7 @@ def test_the_keyboard_alone_draws_types_drags_undoes_and_saves(
         Keys.ENTER,
     )
     press(*[Keys.ARROW_DOWN] * 12, Keys.ENTER)
-    wait_for(driver, "!sketch && plain.lengths.ground !== '300 mm'")
+    wait_for(driver, "!sketch && plain.pins")
     lengths = driver.execute_script("return data.lengths")
     driver.execute_script("document.activeElement.blur(); window.scrollTo(0, 0)")
     reached = set()
@@ -423,14 +428,16 @@ def test_the_keyboard_alone_draws_types_drags_undoes_and_saves(
     wait_for(driver, "plain.bars.coupler.mass === '2 kg'")
     press(Keys.ARROW_UP)
     wait_for(driver, "plain.bars.coupler.mass === '2.01 kg'")
-    tab_to("[id='field:motion/branch']")
+    assert not driver.find_elements("id", "field:motion/branch")  # the pins state it
+    tab_to("[id='field:drive/bar']")
     press(Keys.ARROW_DOWN)
+    wait_for(driver, "plain.drive?.bar")
     tab_to(".handle[aria-label^='pin B']")
-    before = driver.execute_script("return plain.lengths.coupler")
+    before = driver.execute_script("return plain.pins.B[0]")
     press(Keys.ARROW_RIGHT)
-    wait_for(driver, f"plain.lengths.coupler !== {before!r}")
+    wait_for(driver, f"plain.pins.B[0] !== {before!r}")
     with_control("z")
-    wait_for(driver, f"plain.lengths.coupler === {before!r}")
+    wait_for(driver, f"plain.pins.B[0] === {before!r}")
     assert driver.execute_script("return data.lengths") == lengths
     with_control("s")
     wait_for(driver, SAVED)
