@@ -426,8 +426,12 @@ def _command(session: Session, asked: dict[str, Any]) -> None:
             write_rounded(factor * speed, abs(factor * speed) / 100.0, f"{unit}/s"),
         )
     pose, distances = _read_pose(before, middle), dict[str, float]()
-    for branch, side in product(BRANCHES, SIDES if place == "stroke" else [""]):
-        document.put(["motion", "branch"], branch)
+    # a drawing states the assembly by its pins, and refuses a branch beside them
+    branches = [""] if document.at(["pins"]) is not None else list(BRANCHES)
+    sides = SIDES if place == "stroke" else [""]
+    for branch, side in product(branches, sides):
+        if branch:
+            document.put(["motion", "branch"], branch)
         if side:
             document.put(["motion", "side"], side)
         after = solve(session.read(document.text()).scene, "position")
