@@ -241,10 +241,10 @@ class FromThePin:
                     d, theta_1 = scene.linkage.ground, scene.linkage.ground_angle
                     first = d * np.exp(1j * theta_1)
                 G = complex(*getattr(right, f"G{load.bar}")[i])
-                r, phi = load.at
+                r, phi = load.arm
                 place = first + r * np.exp(1j * phi) - G
                 loads.append(
-                    replace(load, at=(float(abs(place)), float(np.angle(place))))
+                    replace(load, arm=(float(abs(place)), float(np.angle(place))))
                 )
             here = at.part(np.array([i]))
             parts.append(FreeBody().answer(replace(scene, loads=tuple(loads)), here))
@@ -259,7 +259,7 @@ class FromThePin:
 def test_an_arm_from_the_pin_is_named_with_its_load() -> None:
     motion = fourbar.Motion(fourbar.Sweep(0.1, 6.0, 8), 10.0)
     scene = crank_rocker(
-        motion=motion, loads=(fourbar.Load(4, (3.0, 0.7), (0.05, 1.0)),)
+        motion=motion, loads=(fourbar.Load(4, (3.0, 0.7), arm=(0.05, 1.0)),)
     )
     causes = find_causes(FromThePin, scene)
     assert causes[0] == (
