@@ -15,12 +15,14 @@ from fourbar.effects import (
     Gravity,
     Load,
     Place,
+    PointDrive,
     Spring,
     Springs,
     Torsion,
     Viscous,
     list_kinds,
 )
+from fourbar.effects.load import FRAMES
 from fourbar.formulas.mobility import choose_range
 from fourbar.linkage import MOVING_BARS, PINS, Bar, FourBar
 from fourbar.scene import Scene
@@ -159,9 +161,17 @@ def draw_scene(
     omega = float(rng.choice([-1.0, 1.0])) * ranges.speed(rng)
     alpha = float(rng.choice([0.0, omega**2 * ranges.acceleration(rng)]))
     motion = Motion(0.0, omega, alpha, OPEN if rng.random() < 0.5 else CROSSED)
-    return Scene(linkage, motion, int(rng.choice(MOVING_BARS)), loads, tuple(effects))
+    bar = int(rng.choice(MOVING_BARS))
+    if rng.random() >= PUSHED:
+        return Scene(linkage, motion, bar, loads, tuple(effects))
+    length = linkage.bar(bar).length
+    place = Place(bar, (length * (1.0 + ranges.arm(rng)), ANY_ANGLE(rng)))
+    drive = PointDrive(place, ANY_ANGLE(rng), str(rng.choice(FRAMES)))
+    return Scene(linkage, motion, loads=loads, effects=tuple(effects), drive=drive)
 
 
+PUSHED = 0.2
+"""Part of the scenes that a force at a point drives."""
 PLACES_OF_A_FORCE = ("from_pin", "from_centre", "arm")
 """Forms in which a drawn load states where it acts; an arm is for a fixed direction."""
 
