@@ -28,8 +28,13 @@ def uses(scene: Scene) -> Iterator[Any]:
     motion, drive = scene.motion, scene.drive
     yield from (effect.key for effect in scene.effects)
     yield f"command of {motion.commanded}"
-    yield "drive", (drive.start.bar, drive.end.bar) if drive else scene.drive_bar
+    yield "drive", tuple(end.bar for _, end in drive.ends) if drive else scene.drive_bar
     yield from (f"load in {load.frame} axes" for load in scene.loads)
+    for load in scene.loads:
+        stated = ("from_pin", "from_centre", "point", "arm")
+        yield from (
+            f"load by {name}" for name in stated if getattr(load, name) is not None
+        )
     if any(load.table for load in scene.loads):
         yield "load over a table"
     if motion.law is not None:
@@ -56,12 +61,14 @@ def test_the_default_suite_uses_every_capability() -> None:
         f"command of {name}" for name in ("theta_2", "theta_3", "theta_4", "stroke")
     }
     wanted |= {("drive", pair) for pair in itertools.combinations((1, 2, 3, 4), 2)}
+    wanted |= {("drive", (4,))}  # a force at a point of the output
     wanted |= {("drive", bar) for bar in (2, 3, 4)} | {
         ("torsion", pin) for pin in ("O2", "A", "B", "O4")
     }
     wanted |= {
         "load in world axes",
         "load in bar axes",
+        *(f"load by {name}" for name in ("from_pin", "from_centre", "point", "arm")),
         "load over a table",
         "tolerances",
         "points",

@@ -108,6 +108,8 @@ def _at_rest(scene: Scene) -> Scene:
         raise NotAskedError(
             "how far its torsion springs are wound depends on the motion"
         )
+    # what acts at a named point keeps its place without the points
+    scene = scene.in_pairs_from_pins()
     effects = tuple(effect for effect in scene.effects if not effect.dry_pins)
     if not scene.loads and not effects:
         raise NotAskedError("nothing acts")

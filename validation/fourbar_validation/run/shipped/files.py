@@ -69,7 +69,9 @@ def _judge_file(
     question: Question, engine: str, read: Callable[[Scene], Contents]
 ) -> list[Row]:
     """Compare a file at its own position and at some more; loads are what a simulator adds."""
-    scene = replace(take_few(question), loads=(), points=())
+    # a drive at a named point keeps its place without the point
+    few = take_few(question).in_pairs_from_pins()
+    scene = replace(few, loads=(), points=())
     theta_2 = np.asarray(scene.motion.theta_2)
     opened = replace(scene, motion=scene.motion.replace(angle=theta_2[:1]))
     try:
