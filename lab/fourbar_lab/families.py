@@ -341,6 +341,14 @@ def _put_cylinder(
     return replace(scene, drive_bar=None, drive=LinearDrive(*ends))  # type: ignore[arg-type]
 
 
+def pushes(rng: np.random.Generator) -> Scene:
+    """Draw a force at a point of any moving bar that drives, in a direction that is fixed or turns."""
+    bar, frame = int(rng.choice(MOVING_BARS)), str(rng.choice(FRAMES))
+    distance, angle, direction = rng.uniform((0.05, -3.0, -3.0), (1.0, 3.0, 3.0))
+    drive = PointDrive(Place(bar, (float(distance), float(angle))), direction, frame)
+    return replace(ANYWHERE.draw(rng), drive_bar=None, drive=drive)  # type: ignore[arg-type]
+
+
 def near_pins(rng: np.random.Generator) -> Scene:
     """Draw a spring or a cylinder with an end at 1e-1 to 1e-11 m from the pin that joins its two bars, or a load there.
 
@@ -403,5 +411,6 @@ FAMILIES: dict[str, Callable[[np.random.Generator], Scene]] = {
     "tables": tables,
     "drives": drives,
     "strokes": strokes,
+    "pushes": pushes,
     "near_pins": near_pins,
 }

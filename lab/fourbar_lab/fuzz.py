@@ -32,6 +32,7 @@ from fourbar_validation.run.identities import check_identities
 from fourbar_validation.run.question import Question, ask_at
 from fourbar_validation.run.store import Store
 from fourbar_validation.scenes.random import (
+    PUSHED,
     DrawnLinkage,
     RandomFamily,
     Ranges,
@@ -45,6 +46,7 @@ POSITIONS = 2
 SIZES = {False: draw_decades(-0.7, 0.7), True: draw_decades(-6.0, 6.0)}
 """Lengths, masses, speeds and loads: ordinary, adversarial."""
 ORDINARY = Ranges(
+    pushed=PUSHED,
     mass=SIZES[False],
     inertia=draw_uniform(0.02, 0.4),
     centre=draw_uniform(-1.0, 2.0),

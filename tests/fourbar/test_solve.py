@@ -3,6 +3,7 @@
 import json
 import math
 import warnings
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -123,7 +124,7 @@ def scenes(draw: st.DrawFn) -> Scene:
         )
     )
     ends = [
-        st.builds(Place, st.just(bar), st.tuples(numbers, angles))
+        st.tuples(numbers, angles).map(partial(Place, bar))
         for bar in draw(st.permutations([1, *MOVING_BARS]))[:2]
     ]
     possible = [

@@ -125,11 +125,9 @@ class Equations:
         elif isinstance(term, Viscous):
             self.damping += [(*PINS[pin], arb(k)) for pin, k in term.coefficients]
         elif isinstance(term, Load):
-            k, (size, angle), (r, angle_of_place) = (
-                term.bar - 2,
-                term.force or (0.0, 0.0),
-                term.at,
-            )
+            k, (size, angle) = term.bar - 2, term.force or (0.0, 0.0)
+            # force and arm keep their directions in the same axes: so does the couple
+            r, angle_of_place = term.arm or term.from_centre or (0.0, 0.0)
             _push(
                 (self.own if term.frame == "bar" else self.world)[k],
                 arb(size),

@@ -134,14 +134,9 @@ def motion(kind: str, number: int) -> Released:
         )
     if rng.random() < 0.3:
         force = (float(rng.uniform(0, 2)), float(rng.uniform(-3, 3)))
-        terms.append(
-            fourbar.Load(
-                int(rng.integers(2, 5)),
-                force,
-                from_centre=(0.1, 1.0),
-                frame=str(rng.choice(["world", "bar"])),
-            )
-        )
+        bar, frame = int(rng.integers(2, 5)), str(rng.choice(["world", "bar"]))
+        place: Any = {"arm" if frame == "world" else "from_centre": (0.1, 1.0)}
+        terms.append(fourbar.Load(bar, force, frame=frame, **place))
     branch, omega_2 = int(rng.choice([-1, 1])), float(rng.uniform(-5.0, 5.0))
     rng.random()  # what follows stays as it was drawn
     while True:
@@ -159,7 +154,11 @@ def ours(case: Released, nudge: Sequence[float] = (0.0, 0.0)) -> OurMotion:
     signs = np.array([case.branch], dtype=np.int8)
     at_start = with_signs(case.linkage, Command(np.array(start[:1]), signs, None, 0.0))
     assembly = int(at_start.branch[0])
-    return integrate(case.linkage, case.terms, *start, assembly, TIMES)
+    terms = [
+        term.with_places(lambda place: place.settle(case.linkage, {}))
+        for term in case.terms
+    ]
+    return integrate(case.linkage, terms, *start, assembly, TIMES)
 
 
 def amplification(case: Released) -> float:

@@ -250,9 +250,9 @@ LOAD = st.builds(
     fourbar.Load,
     st.integers(2, 4),
     st.tuples(numbers(), numbers()),
-    st.tuples(numbers(), numbers()),
-    numbers(),
-    st.sampled_from(("world", "bar")),
+    from_pin=st.tuples(numbers(), numbers()),
+    moment=numbers(),
+    frame=st.sampled_from(("world", "bar")),
 )
 PER_PIN = st.dictionaries(
     st.sampled_from(("O2", "A", "B", "O4")), numbers(0.0), min_size=1

@@ -51,7 +51,7 @@ def random_scene(rng: np.random.Generator, kind: DrawnType) -> fourbar.Scene:
     motion = scene.motion.replace(
         angle=fourbar.Sweep(start + short, stop - short, 90), acceleration=0.0
     )
-    return replace(scene, motion=motion, drive_bar=2, loads=())
+    return replace(scene, motion=motion, drive=None, drive_bar=2, loads=())
 
 
 def at_keyframe(

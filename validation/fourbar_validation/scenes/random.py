@@ -60,6 +60,10 @@ ANY_ANGLE, ANY_PART, EITHER_SIGN = (
 ANY_SPEED = draw_decades(-1.0, 2.0)
 
 
+PUSHED = 0.2
+"""Share of the scenes of the suites that a force at a point drives."""
+
+
 @dataclass(frozen=True, slots=True)
 class Ranges:
     """Distributions from which a random scene is drawn."""
@@ -88,6 +92,8 @@ class Ranges:
     """Shares of the scenes that have such an effect."""
     sprung: float = 0.0
     """Share of the scenes that have a spring; likewise of a torsion spring, and of a flywheel."""
+    pushed: float = 0.0
+    """Share of the scenes that a force at a point drives."""
     by_length: bool = True
     """True if the mass is per metre."""
 
@@ -162,7 +168,7 @@ def draw_scene(
     alpha = float(rng.choice([0.0, omega**2 * ranges.acceleration(rng)]))
     motion = Motion(0.0, omega, alpha, OPEN if rng.random() < 0.5 else CROSSED)
     bar = int(rng.choice(MOVING_BARS))
-    if rng.random() >= PUSHED:
+    if not ranges.pushed or rng.random() >= ranges.pushed:
         return Scene(linkage, motion, bar, loads, tuple(effects))
     length = linkage.bar(bar).length
     place = Place(bar, (length * (1.0 + ranges.arm(rng)), ANY_ANGLE(rng)))
@@ -170,8 +176,6 @@ def draw_scene(
     return Scene(linkage, motion, loads=loads, effects=tuple(effects), drive=drive)
 
 
-PUSHED = 0.2
-"""Part of the scenes that a force at a point drives."""
 PLACES_OF_A_FORCE = ("from_pin", "from_centre", "arm")
 """Forms in which a drawn load states where it acts; an arm is for a fixed direction."""
 
@@ -302,6 +306,7 @@ def draw_uneven_lengths(
 
 TEN_DECADES = draw_decades(-5.0, 5.0)
 UNEVEN = Ranges(
+    pushed=PUSHED,
     mass=draw_chance(0.9, TEN_DECADES),
     inertia=draw_product(draw_uniform(0.02, 0.4), draw_chance(0.5, TEN_DECADES, 1.0)),
     centre=draw_product(draw_uniform(-1.0, 2.0), draw_chance(0.3, TEN_DECADES, 1.0)),
@@ -335,6 +340,7 @@ UNEVEN_FAMILY = RandomFamily(_draw_uneven_place, UNEVEN)
 
 
 MACHINES = Ranges(
+    pushed=PUSHED,
     mass=draw_decades(-1.0, 1.0),
     inertia=draw_uniform(1.0 / 24.0, 1.0 / 6.0),
     centre=draw_uniform(0.2, 0.8),
