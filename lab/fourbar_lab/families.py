@@ -12,11 +12,13 @@ from fourbar.effects import (
     LinearDrive,
     Load,
     Place,
+    PointDrive,
     Spring,
     Springs,
     Table,
     Torsion,
 )
+from fourbar.effects.load import FRAMES
 from fourbar.linkage import MOVING_BARS, PINS, SECOND_PIN, Bar, FourBar
 from fourbar.scene import Scene
 from fourbar.scene.motion import Motion
@@ -342,7 +344,7 @@ def _put_cylinder(
 
 
 def pushes(rng: np.random.Generator) -> Scene:
-    """Draw a force at a point of any moving bar that drives, in a direction that is fixed or turns."""
+    """Draw a force at a point of a moving bar that drives, along a fixed or turning line."""
     bar, frame = int(rng.choice(MOVING_BARS)), str(rng.choice(FRAMES))
     distance, angle, direction = rng.uniform((0.05, -3.0, -3.0), (1.0, 3.0, 3.0))
     drive = PointDrive(Place(bar, (float(distance), float(angle))), direction, frame)
