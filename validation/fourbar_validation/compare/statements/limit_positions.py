@@ -121,8 +121,12 @@ def compare_angles(
 BEYOND = 4.0 * TOUCHING_MARGIN
 """Part of the sum of the lengths by which the loop closes, or misses, past a limit where the engine is tried."""
 
-LENGTHS_ROUNDED = (EPS / 4.0, EPS)
-"""Bounds of the gap, in parts of the perimeter, between which either answer holds for a change point: lengths round."""
+LENGTHS_ROUNDED = (EPS / 4.0, 2.125 * EPS)
+"""Bounds of the gap, in parts of the perimeter, between which either answer holds.
+
+A length that is computed, as the distance of two points, is right to four units of
+round-off, 2 EPS; an eighth of EPS is for the comparison's own round-off.
+"""
 PAST = 1e-3
 """rad. This far on either side of a change point the speeds of the two motions differ visibly."""
 FAR = 0.1
