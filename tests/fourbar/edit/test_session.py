@@ -526,24 +526,21 @@ def test_every_linkage_that_people_know_has_an_answer(tmp_path: Path) -> None:
 
 def test_an_answer_takes_ten_bare_solves_at_most(session: Session) -> None:
     best = {"bare": math.inf, "answer": math.inf}
-    for turn in range(
-        60
-    ):  # by turns, and the quickest of each: the machine has other work too
-        start = time.perf_counter()
+    # by turns, in processor time, and the quickest of each: the machine has other work
+    for turn in range(60):
+        start = time.process_time()
         fourbar.solve(session.now.scene)
-        middle = time.perf_counter()
-        pack_frame(
-            session.do(
-                {
-                    "do": "set",
-                    "path": ["lengths", "input"],
-                    "value": f"{100 + turn % 9} mm",
-                    "gesture": "g",
-                }
-            )
-        )
-        spent = {"bare": middle - start, "answer": time.perf_counter() - middle}
-        best = {name: min(best[name], spent[name]) for name in best}
+        middle = time.process_time()
+        request = {
+            "do": "set",
+            "path": ["lengths", "input"],
+            "value": f"{100 + turn % 9} mm",
+            "gesture": "g",
+        }
+        pack_frame(session.do(request))
+        end = time.process_time()
+        best["bare"] = min(best["bare"], middle - start)
+        best["answer"] = min(best["answer"], end - middle)
     assert best["answer"] < BARE_SOLVES * best["bare"], best
 
 
