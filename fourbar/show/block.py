@@ -17,12 +17,12 @@ from fourbar.formulas.mobility import (
     turns_fully,
 )
 from fourbar.linkage import BAR_NAMES, PIN_FORCE
-from fourbar.quantities import PIN_FORCES
+from fourbar.quantities import LINE, PIN_FORCES
 from fourbar.scene import Scene
 from fourbar.scene.motion import BRANCH_NAMES
-from fourbar.show.duty import DUTY_UNITS, bearing_load, describe_drive, motor_duty
+from fourbar.show.duty import DUTY_UNITS, bearing_load, describe_drive
 from fourbar.show.position import PositionSheet
-from fourbar.show.summary import Facts, locate_between, summarize
+from fourbar.show.summary import Facts, find_duty, locate_between, summarize
 from fourbar.show.units import (
     COMMON,
     DIGITS,
@@ -312,7 +312,7 @@ class _Block:
         row = self._value(self._without_rounding(facts.peak.value), drive.unit)
         if duty is not None:
             rms = duty.rms_force if facts.linear else duty.rms_torque
-            beyond = " (of these positions)" if self._is_rough(drive.keys.value) else ""
+            beyond = self._beyond(drive.keys.value)
             row = f"peak {row} at {self._place(facts.peak.place)}{beyond}, RMS {self._value(rms or 0.0, drive.unit)}"
         lines.append(self._row(word, row))
         if facts.held is not None:
@@ -349,7 +349,7 @@ class _Block:
         if not duty.peak_power > 0.0:
             return []
         peak = self._value(duty.peak_power, "W")
-        row = f"peak {peak}"
+        row = f"peak {peak}{self._beyond('power')}"
         if (
             facts.kind != "list"
             and duty.energy_in is not None
@@ -421,15 +421,18 @@ class _Block:
             and facts.scene.motion.stroke is None
             and np.nanmax(np.abs(speed)) > 0.0
         ):
-            peak = self._value(float(np.nanmax(np.abs(speed))), "m/s")
-            lines.append(
-                self._row("speed", peak if facts.kind == "position" else f"peak {peak}")
-            )
+            largest = float(np.nanmax(np.abs(speed)))
+            if facts.duty is None:
+                row = self._value(largest, "m/s")
+            else:
+                peak = self._value(facts.duty.peak_speed, "m/s")
+                row = f"peak {peak}{self._beyond('speed')}"
+            lines.append(self._row("speed", row))
         return lines
 
     def _write_bore(self, pressure: float) -> list[str]:
         """Write the bore that pushes, and the area that pulls, at a pressure."""
-        values = self.facts.between.solution.drive_force
+        values = self.facts.between.bounded(LINE.value).drive_force
         assert values is not None
         push, pull = (
             max(0.0, float(np.nanmax(values))),
@@ -497,6 +500,10 @@ class _Block:
             self._value(value, unit, largest if alike or not value else None)
             for value in values
         ]
+
+    def _beyond(self, name: str) -> str:
+        """Write that a peak is that of the positions, where it is."""
+        return " (of these positions)" if self._is_rough(name) else ""
 
     def _is_rough(self, name: str) -> bool:
         """Tell whether a peak is that of the positions alone: between them it grows, or nothing was looked for."""
@@ -621,7 +628,7 @@ def write_motor(
 ) -> dict[str, Any] | None:
     """Write the duty and the loads of the pins as the JSON has them, in the units of the output; as `motor_duty`."""
     between = locate_between(scene, solution)
-    duty = motor_duty(solution, between.drive)
+    duty = find_duty(between)
     if duty is None:
         return None
     si = DUTY_UNITS if solution.drive is None else {**DUTY_UNITS, "peak_speed": "m/s"}

@@ -15,6 +15,9 @@ from fourbar.quantities import COUPLE, LINE, UNITS, DriveNames
 from fourbar.scene import Command, Scene, with_signs
 from fourbar.solution import Array, Solution
 
+SAME_RATE = 1e-9
+"""Part of its largest value up to which the difference of two rates of a spline is the rounding of its coefficients."""
+
 
 class BearingLoad(NamedTuple):
     """Load of one pin over the positions of a solution; of a study each number is an array (m,)."""
@@ -131,7 +134,7 @@ def bearing_load(solution: Solution, pin: str) -> BearingLoad:
     return BearingLoad(_find_peak(load), _find_rms(solution, load), _make_plain(place))
 
 
-def motor_duty(solution: Solution, located: Solution | None = None) -> MotorDuty | None:
+def motor_duty(solution: Solution) -> MotorDuty | None:
     """Return peak and RMS torque and power, peak speed, and the energy in and out by the trapezoidal rule.
 
     E = integral of P dt, dt = d theta/omega of the commanded bar, or ds/speed of the stroke, in a sweep; E_in of the
@@ -142,11 +145,10 @@ def motor_duty(solution: Solution, located: Solution | None = None) -> MotorDuty
 
     Parameters
     ----------
-    solution : positions of a sweep or of a motion law, to the stage "force".
-    located : the same with the positions of the peaks among its own, of which the peaks are taken.
+    solution : positions of a sweep or of a motion law, to the stage "force"; or of a study of one.
     """
     expect("solution", solution, Solution)
-    drive, located = read_drive(solution), solution if located is None else located
+    drive = read_drive(solution)
     if drive.values is None or not np.isfinite(drive.values).any():
         return None
     power, closed, linear = (
@@ -155,15 +157,15 @@ def motor_duty(solution: Solution, located: Solution | None = None) -> MotorDuty
         solution.drive is not None,
     )
     peak, rms = (
-        _find_peak(_require(located, drive.keys.value)),
+        _find_peak(_require(solution, drive.keys.value)),
         _find_rms(solution, drive.values),
     )
     energy_in, energy_out = _integrate_power(solution, power)
     return MotorDuty(
         peak_torque=None if linear else peak,
         rms_torque=None if linear else rms,
-        peak_speed=_find_peak(_require(located, drive.speed_key)),
-        peak_power=_find_peak(_require(located, "power")),
+        peak_speed=_find_peak(_require(solution, drive.speed_key)),
+        peak_power=_find_peak(power),
         rms_power=_find_rms(solution, power),
         energy_in=energy_in,
         energy_out=energy_out,
@@ -174,9 +176,10 @@ def motor_duty(solution: Solution, located: Solution | None = None) -> MotorDuty
 
 
 def is_once_round(solution: Solution) -> Any:
-    """Return True if a sweep covers whole turns, so that its last position repeats the first; for a study (m,).
+    """Return True if a motion covers whole turns, so that its last position repeats the first; for a study (m,).
 
-    An assembly with a single change point repeats after two turns.
+    An assembly with a single change point repeats after two turns. Speed and acceleration
+    must repeat too: a motion law may end at another speed than it begins with.
     """
     angle, bar = solution.at.angle, solution.at.bar
     if angle.shape[-1] == 1:
@@ -186,7 +189,19 @@ def is_once_round(solution: Solution) -> Any:
     if period.ndim > 1:  # of a study, a column
         period = period[:, 0]
     turns = np.abs(angle[..., -1] - angle[..., 0]) / (2.0 * np.pi * period)
-    return (turns > 0.5) & np.isclose(turns, np.round(turns), rtol=1e-12, atol=0.0)
+    once_round = (turns > 0.5) & np.isclose(
+        turns, np.round(turns), rtol=1e-12, atol=0.0
+    )
+    for rate in (solution.at.speed, solution.at.acceleration):
+        if rate is not None and np.shape(rate)[-1:] == angle.shape[-1:]:
+            once_round = once_round & _repeats(np.asarray(rate))
+    return once_round
+
+
+def _repeats(rate: Array) -> Any:
+    """Return True if a speed or an acceleration over the positions ends as it begins."""
+    gap = np.abs(rate[..., -1] - rate[..., 0])
+    return gap <= SAME_RATE * np.max(np.abs(rate), axis=-1)
 
 
 def _require(solution: Solution, name: str) -> Array:

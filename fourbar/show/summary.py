@@ -49,6 +49,8 @@ INSET = 1e-9
 """Part of a range that is left out at its limit positions, which may not assemble as doubles."""
 END_ROUNDS = 9
 """Rounds of cutting the interval in which the assembly ends by 40: down to the last digits of a double."""
+AS_WIDE = 1e-6
+"""rad. Ranges of angles are equally wide if they differ by less: an end in its last digits leaves some 1e-8."""
 IN_LINE = 1e-6
 """rad. Transmission angle that is zero: at a limit, a place in its last digits leaves some 1e-8."""
 Sizes = Callable[[Solution], dict[str, Array]]
@@ -87,11 +89,6 @@ class Between(NamedTuple):
     """Commanded angle or stroke, rad or m, and the pin at which dry friction reverses there: the pin forces jump."""
     growing: set[str]
     """Names of the magnitudes that grow without bound within a step; all of them where no step was searched."""
-
-    @property
-    def drive(self) -> Solution:
-        """Solution that holds the peaks of the drive."""
-        return self.bounded(read_drive(self.sweep).keys.value, "power", "speed")
 
     def bounded(self, *names: str) -> Solution:
         """Return the solution to take the peaks of magnitudes from: the sweep alone if one grows without bound."""
@@ -305,7 +302,7 @@ def _find_largest(
             cut[rows, np.clip(best + step, 0, CUTS)] for step in (0, -1, 1)
         )
         reached.append(values[rows, best])
-    growing = reached[-1] > (1.0 + GROWING) * reached[-3] if len(peaks) else rows > 0
+    growing = _find_growing(reached, values, best) if len(peaks) else rows > 0
     kept = (
         ~growing & (reached[-1] > reached[0]) & ~opens
     )  # beside a gap other magnitudes grow
@@ -313,6 +310,25 @@ def _find_largest(
         peak_places[kept],
         {name for name, grows in zip(names, growing, strict=True) if grows},
     )
+
+
+def _find_growing(reached: list[Array], values: Array, best: Array) -> Array:
+    """Mark the searches for a maximum that end beside a pole.
+
+    Towards a pole the values of the last calls rise. A call may hit the pole to within
+    rounding, after which nothing rises; the value then stands out from both beside it.
+
+    Parameters
+    ----------
+    reached : largest value of each search after each call, (k,) each.
+    values : values of the last call, (k, CUTS + 1).
+    best : index of the largest of them, (k,).
+    """
+    rises = reached[-1] > (1.0 + GROWING) * reached[-3]
+    padded = np.pad(values, ((0, 0), (1, 1)), constant_values=-1.0)
+    rows = np.arange(len(best))
+    beside = np.maximum(padded[rows, best], padded[rows, best + 2])
+    return rises | (reached[-1] > (1.0 + GROWING) * beside)
 
 
 class PinLoad(NamedTuple):
@@ -370,16 +386,9 @@ def summarize(scene: Scene, solution: Solution) -> Facts:
     places, codes = _list_places(solution), solution.status_code
     fine, stretches = solution, list[tuple[float | None, float | None]]()
     if smooth := kind in ("sweep", "turn", "law"):
-        fine = _solve_at(
-            scene, np.linspace(places[0], places[-1], FINE + 1), "position"
-        )
-        stretches = _list_stretches(scene, fine)
-        ends = np.array(
-            [end for stretch in stretches for end in stretch if end is not None]
-        )
-        fine = _solve_at(
-            scene, np.sort(np.concatenate([fine.at.places, ends])), "position"
-        )
+        fine, stretches = _solve_finely(scene, places)
+        if stretches and kind == "turn":
+            kind = "sweep"
 
     def find_range(values: Array) -> tuple[Peak, Peak]:
         low, high = (
@@ -394,7 +403,8 @@ def summarize(scene: Scene, solution: Solution) -> Facts:
     drive = None if released or solution.F12 is None else read_drive(solution)
     peak = None
     if drive is not None and np.isfinite(drive.values).any():  # type: ignore[arg-type]
-        peak = _find_peak(between.drive, read_drive(between.drive).values)
+        located = between.bounded(drive.keys.value)
+        peak = _find_peak(located, read_drive(located).values)
     return Facts(
         scene=scene,
         solution=solution,
@@ -403,14 +413,14 @@ def summarize(scene: Scene, solution: Solution) -> Facts:
             STATUS_NAMES[code]: int(np.sum(codes == code)) for code in np.unique(codes)
         },
         commanded=(float(places[0]), float(places[-1])),
-        angles={bar: find_range(getattr(fine, f"theta_{bar}")) for bar in (2, 3, 4)},
+        angles={
+            bar: find_range(_join_stretches(solution, fine, bar)) for bar in MOVING_BARS
+        },
         transmission=Peak(mu if mu > IN_LINE else 0.0, least.place),
         stretches=stretches,
         drive=drive if peak is not None else None,
         peak=peak,
-        duty=motor_duty(solution, between.drive)
-        if peak is not None and kind != "position"
-        else None,
+        duty=find_duty(between) if peak is not None and kind != "position" else None,
         held=None if drive is None else _find_held(solution, drive),
         pins=_list_pin_loads(solution, between),
         bending=locate_bending(scene, between),
@@ -488,6 +498,80 @@ def _list_stretches(
         ends.append(float(low if closes[i] else high))
     ends += [None] if closes[-1] else []
     return list(zip(ends[::2], ends[1::2], strict=True))
+
+
+def _solve_finely(
+    scene: Scene, places: Array
+) -> tuple[Solution, list[tuple[float | None, float | None]]]:
+    """Solve many positions of a sweep in its sense, with the ends of its stretches; and list the stretches."""
+    fine = _solve_at(scene, np.linspace(places[0], places[-1], FINE + 1), "position")
+    stretches = _list_stretches(scene, fine)
+    ends = [end for stretch in stretches for end in stretch if end is not None]
+    if not ends:
+        return fine, stretches
+    merged = np.sort(np.concatenate([fine.at.places, ends]))
+    if places[0] > places[-1]:
+        merged = merged[::-1]
+    return _solve_at(scene, merged, "position"), stretches
+
+
+def _join_stretches(solution: Solution, fine: Solution, bar: int) -> Array:
+    """Return the angles of a bar at the fine positions, rad, by the whole turns that belong together.
+
+    The first stretch has the angles of the solution. The linkage does not pass from one
+    stretch to the next, so that no turn of a later one follows from the first: it has
+    the one with which all stretches together cover least.
+    """
+    angles = np.array(getattr(fine, f"theta_{bar}"))
+    if bar == fine.at.bar and fine.at.stroke is None:
+        return angles  # as it is commanded
+    known = np.flatnonzero(np.isfinite(angles))
+    own = getattr(solution, f"theta_{bar}")
+    first = int(np.flatnonzero(np.isfinite(own))[0])
+    distances = _list_places(fine)[known] - _list_places(solution)[first]
+    nearest = known[np.argmin(np.abs(distances))]
+    angles += TURN * np.round((own[first] - angles[nearest]) / TURN)
+    low, high = math.inf, -math.inf
+    for stretch in np.split(known, np.flatnonzero(np.diff(known) > 1) + 1):
+        start, stop = angles[stretch].min(), angles[stretch].max()
+        if low < high:
+            turns = _find_turns(start, stop, low, high)
+            angles[stretch] += TURN * turns
+            start, stop = start + TURN * turns, stop + TURN * turns
+        low, high = min(low, start), max(high, stop)
+    return angles
+
+
+def _find_turns(start: float, stop: float, low: float, high: float) -> int:
+    """Return the whole turns by which an interval of angles is moved to cover least together with another."""
+    between = round((0.5 * (low + high) - 0.5 * (start + stop)) / TURN)
+
+    def measure(turns: int) -> tuple[int, int]:
+        moved = max(high, stop + TURN * turns) - min(low, start + TURN * turns)
+        return round(moved / AS_WIDE), abs(turns)
+
+    return min((between - 1, between, between + 1), key=measure)
+
+
+def find_duty(between: Between) -> MotorDuty | None:
+    """Return the duty of the drive, with each peak located between the positions where it is bounded."""
+    duty, drive = motor_duty(between.sweep), read_drive(between.sweep)
+    if duty is None:
+        return None
+
+    def find_largest(name: str, key: str) -> float:
+        values = getattr(between.bounded(name), key)
+        return float(np.nanmax(np.abs(values)))
+
+    return duty._replace(
+        **{
+            f"peak_{'torque' if between.sweep.drive is None else 'force'}": (
+                find_largest(drive.keys.value, drive.keys.value)
+            ),
+            "peak_speed": find_largest("speed", drive.speed_key),
+            "peak_power": find_largest("power", "power"),
+        }
+    )
 
 
 def _find_held(solution: Solution, drive: Driving) -> tuple[float, float] | None:

@@ -257,7 +257,12 @@ def _list_commands(
         )
     if scene.motion.stroke is None:
         branch = np.full(angle.shape, scene.motion.branch, dtype=np.int8)
-        return Command(angle, branch, speed, acceleration, bar=scene.motion.bar)
+        time = None
+        if scene.motion.law is not None:
+            time = np.broadcast_to(motion.time, angle.shape)
+        return Command(
+            angle, branch, speed, acceleration, time=time, bar=scene.motion.bar
+        )
     varied = replace_numbers(
         scene, {key: array[:, None] for key, array in numbers.items()}
     )

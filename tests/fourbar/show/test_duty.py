@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import fourbar
+from fourbar.scene.motion import Law
 from fourbar.show.block import write_motor
 from fourbar.show.duty import bearing_load, motor_duty, shaking_force, shaking_moment
 from fourbar.show.units import units
@@ -170,3 +171,83 @@ def test_a_study_has_what_each_of_its_members_has() -> None:
     speeds = {"motion.omega_2": np.array([0.0, 3.0]), "motion.theta_2": turn}
     rest = motor_duty(fourbar.solve(fourbar.vary(scene, speeds)))
     assert rest is not None and np.isfinite(rest.energy_in).tolist() == [False, True]  # type: ignore[arg-type]
+
+
+def test_a_study_of_a_motion_law_keeps_its_time() -> None:
+    """Its energies are integrals over time, as those of each member alone; speeds are zero at both ends."""
+    law = Law((0.0, 0.5, 1.0, 1.5, 2.0), (0.0, 0.0, 2.0, 2.0, 0.0), 20, "rest")
+    linkage = fourbar.uniform(0.3, 0.1, 0.25, 0.22)
+    scene = fourbar.Scene(
+        linkage, fourbar.Motion(law=law), effects=(fourbar.Gravity(),)
+    )
+    study = fourbar.solve(fourbar.vary(scene, {"bars.input.mass": [0.1, 0.1]}))
+    alone, duty = fourbar.solve(scene), motor_duty(study)
+    assert study.time is not None and alone.time is not None
+    assert np.array_equal(study.time, [alone.time, alone.time])
+    assert duty is not None
+    assert np.round(duty.energy_in, 4).tolist() == [0.4655, 0.4655]
+    one = motor_duty(alone)
+    assert one is not None and alone.power is not None
+    for name in ("energy_in", "energy_out"):
+        assert getattr(duty, name) == pytest.approx([getattr(one, name)] * 2, rel=1e-12)
+    by_hand = np.trapezoid(np.maximum(alone.power, 0.0), alone.time)
+    assert one.energy_in == pytest.approx(by_hand, rel=1e-12)
+    rows = study.to_csv()
+    assert rows is not None and len(rows.splitlines()) == 1 + 2 * 21
+    assert rows.splitlines()[0].split(",").count("time") == 1
+
+
+def test_a_law_over_one_turn_is_closed_where_speed_and_acceleration_repeat() -> None:
+    """Its last position counts once only if it is the first again, which its angle alone does not tell."""
+    time, angle = (0.0, 0.3, 0.7, 1.0), (0.0, 1.5, 5.0, math.tau)
+    linkage = fourbar.uniform(0.3, 0.1, 0.25, 0.22)
+    closed = {}
+    for ends in ("free", "rest", "periodic"):
+        motion = fourbar.Motion(law=Law(time, angle, 24, ends))
+        solution = fourbar.solve(
+            fourbar.Scene(linkage, motion, effects=(fourbar.Gravity(),))
+        )
+        duty = motor_duty(solution)
+        assert duty is not None and solution.torque is not None
+        closed[ends] = duty.closed
+        counted = solution.torque[: -1 if duty.closed else None]
+        rms = math.sqrt(np.square(counted).mean())
+        assert duty.rms_torque == pytest.approx(rms, rel=1e-12)
+    assert closed == {"free": False, "rest": False, "periodic": True}
+
+
+def test_a_law_of_one_turn_is_not_closed_where_the_assembly_needs_two() -> None:
+    linkage = fourbar.uniform(4.0, 1.0, 2.0, 3.0)
+    closed = []
+    for turns in (1, 2):
+        angles = (0.0, 0.4 * turns * math.tau, turns * math.tau)
+        law = Law((0.0, 0.5, 1.0), angles, 24, "periodic")
+        scene = fourbar.Scene(linkage, fourbar.Motion(law=law))
+        duty = motor_duty(fourbar.solve(scene))
+        assert duty is not None
+        closed.append(duty.closed)
+    assert closed == [False, True]
+
+
+@pytest.mark.parametrize("speed", (10.0, -10.0))
+def test_the_energy_of_a_backward_sweep_is_that_of_the_work_of_the_loads(
+    speed: float,
+) -> None:
+    """What the drive gives and takes back differs by the weight's rise: without mass but one, (m g z) at the ends."""
+    bars = fourbar.Bar(0.1), fourbar.Bar(0.25), fourbar.Bar(0.22, 0.4)
+    scene = fourbar.Scene(
+        fourbar.FourBar(0.3, *bars),
+        fourbar.Motion(fourbar.Sweep(2.0, 0.3, 2000), speed),
+        effects=(fourbar.Gravity(9.81),),
+    )
+    solution = fourbar.solve(scene)
+    duty, heights = motor_duty(solution), solution.G4[:, 1]
+    assert duty is not None and duty.energy_in is not None
+    assert duty.energy_out is not None
+    speeds = np.hypot(0.5 * 0.22, 0.22 / math.sqrt(12.0)) * solution.omega_4
+    energy = 0.4 * (9.81 * heights + 0.5 * speeds**2)
+    # with a speed against its steps the sweep is run from its end
+    gained = np.sign(-speed) * (energy[-1] - energy[0])
+    assert duty.energy_in >= 0.0 and duty.energy_out >= 0.0
+    assert duty.energy_in + duty.energy_out > 0.1 * abs(gained)
+    assert duty.energy_in - duty.energy_out == pytest.approx(gained, rel=1e-5)

@@ -1,0 +1,150 @@
+"""Summaries of motions that pass a pole, a change point or a gap between two positions of the sweep."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import fourbar
+from fourbar.effects import Place
+from fourbar.show.block import write_block, write_motor
+from fourbar.show.summary import Facts, locate_between, summarize
+from tests.support.scenes import crank_rocker
+
+CRANK = 0.09
+"""Distance of the cylinder's end from O2, m: the largest lever that its line has about O2."""
+CYLINDER = fourbar.LinearDrive(
+    Place(1, (0.25, math.radians(-160.0))), Place(2, (CRANK, 0.17))
+)
+PEAK = 1e-6
+"""Relative; five calls locate a peak to 1.6e-6 degrees, and its value to the square of that."""
+AT_A_LIMIT = 1e-6
+"""rad; near a limit an angle changes as the root of the distance, whose last digits are some 1e-16."""
+
+
+def sweep(
+    lengths: tuple[float, float, float, float], *degrees: float, **motion: object
+) -> fourbar.Scene:
+    """Make a scene of bars of 1 kg/m under gravity, swept between two angles of bar 2 in so many steps."""
+    start, stop, steps = degrees
+    angle = fourbar.Sweep(math.radians(start), math.radians(stop), int(steps))
+    command = fourbar.Motion(angle, 10.0, **motion)  # type: ignore[arg-type]
+    linkage = fourbar.uniform(*lengths)
+    return fourbar.Scene(linkage, command, effects=(fourbar.Gravity(9.81),))
+
+
+def find_facts(scene: fourbar.Scene) -> Facts:
+    return summarize(scene, fourbar.solve(scene))
+
+
+def write(scene: fourbar.Scene, **options: object) -> str:
+    lines = write_block(scene, fourbar.solve(scene, "error"), **options)  # type: ignore[arg-type]
+    return " ".join(" ".join(lines).split())
+
+
+@pytest.mark.parametrize("steps", (20, 37))
+def test_beside_a_pole_of_a_cylinder_force_and_bore_are_of_the_positions(
+    steps: int,
+) -> None:
+    motion = fourbar.Motion(fourbar.Sweep(0.1, 0.1 + math.tau, steps), 10.0)
+    scene = crank_rocker(motion=motion, drive=CYLINDER)
+    solution = fourbar.solve(scene)
+    assert solution.drive_force is not None
+    push, pull = solution.drive_force.max(), -solution.drive_force.min()
+    assert find_facts(scene).peak is not None
+    text = write(scene, pressure=1e6)
+    signed = push if push > pull else -pull
+    assert f"force peak {signed:.4g} N at" in text
+    assert "deg (of these positions), RMS" in text
+    bores = [1e3 * math.sqrt(4.0 * force / (math.pi * 1e6)) for force in (push, pull)]
+    assert f"bore at least {bores[0]:.4g} mm to push {push:.4g} N" in text
+    assert (
+        f"; {bores[1]:.4g} mm, and the rod's area besides, to pull {pull:.4g} N" in text
+    )
+
+
+def test_speed_and_power_beside_a_pole_of_the_force_are_located() -> None:
+    """The largest speed of the stroke is omega times the largest lever; no position of this sweep has it."""
+    motion = fourbar.Motion(fourbar.Sweep(0.1, 0.1 + math.tau, 20), 10.0)
+    scene = crank_rocker(motion=motion, drive=CYLINDER)
+    solution = fourbar.solve(scene)
+    duty = write_motor(scene, solution, {})
+    assert duty is not None and solution.stroke_speed is not None
+    assert duty["peak_speed"] == pytest.approx(10.0 * CRANK, rel=PEAK)
+    largest = np.abs(solution.stroke_speed).max()
+    assert duty["peak_speed"] > (1.0 + 100.0 * PEAK) * largest
+    assert "speed peak 0.9 m/s power" in write(scene)
+    fine = scene.motion.replace(angle=fourbar.Sweep(0.1, 0.1 + math.tau, 36_000))
+    power = fourbar.solve(replace(scene, motion=fine)).power
+    assert power is not None
+    assert duty["peak_power"] == pytest.approx(np.abs(power).max(), rel=PEAK)
+
+
+@pytest.mark.parametrize("steps", (36, 360))
+@pytest.mark.parametrize("start", (5.0, 6.3))
+def test_pin_forces_at_a_change_point_grow_and_the_torque_has_its_largest_value(
+    start: float, steps: int
+) -> None:
+    """Bars of 0.1, 0.3 and 0.1 kg: T2 = (0.05 + 0.3 + 0.05) kg g 0.1 m cos(theta_2), largest at the change points."""
+    scene = sweep((0.3, 0.1, 0.3, 0.1), start, start + 360.0, steps)
+    facts = find_facts(scene)
+    assert facts.between.growing == {"F12", "F32", "F43", "F14"}
+    assert facts.duty is not None and facts.peak is not None
+    weight = 0.4 * 9.81 * 0.1
+    assert facts.duty.peak_torque == pytest.approx(weight, rel=PEAK)
+    assert abs(facts.peak.value) == pytest.approx(weight, rel=PEAK)
+
+
+def test_a_search_that_hits_a_pole_still_finds_that_it_grows() -> None:
+    """The third call passes the change point at a distance of 4e-9 rad, after which no value is larger."""
+    a, b = 0.36419445229114195, 0.3900709389998438
+    angle = fourbar.Sweep(0.09096220141585265, 4.489191916441563, 36)
+    scene = fourbar.Scene(
+        fourbar.uniform(a, b, a, b),
+        fourbar.Motion(theta_4=angle, omega_4=0.0),
+        effects=(fourbar.Gravity(),),
+    )
+    between = locate_between(scene, fourbar.solve(scene))
+    assert between.growing == {"F12", "F32", "F43", "F14"}
+
+
+@pytest.mark.parametrize(
+    "lengths", ((0.37, 0.09, 0.09, 0.37), (0.4, 0.1, 0.3, 0.2), (0.3, 0.1, 0.25, 0.22))
+)
+def test_ranges_of_a_backward_sweep_are_those_of_its_angles(
+    lengths: tuple[float, float, float, float],
+) -> None:
+    scene = sweep(lengths, 160.0, -200.0, 90)
+    solution = fourbar.solve(scene)
+    facts = summarize(scene, solution)
+    for bar in (2, 3, 4):
+        angles = getattr(solution, f"theta_{bar}")
+        low, high = facts.angles[bar]
+        assert low.value <= angles.min() <= low.value + 0.1
+        assert high.value - 0.1 <= angles.max() <= high.value
+
+
+def test_the_swing_of_an_output_is_not_counted_over_a_gap() -> None:
+    """Both circuits are one for these lengths; over the gap the output goes on from the other end of its range."""
+    lengths = (0.2, 0.25, 0.21, 0.22)
+    widths = []
+    for start, stop in ((-170.0, 190.0), (40.0, 400.0), (400.0, 40.0)):
+        facts = find_facts(sweep(lengths, start, stop, 90))
+        low, high = facts.angles[4]
+        widths.append(high.value - low.value)
+        solution = facts.solution
+        first = solution.theta_4[np.flatnonzero(solution.assembled)[0]]
+        assert low.value - AT_A_LIMIT <= first <= high.value + AT_A_LIMIT
+    assert widths == pytest.approx([widths[0]] * 3, abs=AT_A_LIMIT)
+    assert widths[0] <= fourbar.swing(fourbar.uniform(*lengths)) + AT_A_LIMIT
+
+
+def test_a_gap_within_a_step_is_no_full_turn() -> None:
+    """The longest bar exceeds what lets bar 2 turn by 1 um; no position of the sweep lies in the gap."""
+    lengths = (0.3, 0.1, 0.25, 0.15 - 1e-6)
+    scene = sweep(lengths, 5.0, 365.0, 36)
+    assert fourbar.solve(scene).assembled.all()
+    text = write(scene)
+    assert "assembles up to theta_2 = " in text
+    assert "input turns fully" not in text and "per turn" not in text
