@@ -9,6 +9,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, TextIO
 
+import numpy as np
+
 if TYPE_CHECKING:
     import click
 
@@ -35,6 +37,8 @@ class InputError(FourBarError):
         self, key: str, value: object, allowed: str, file: str | None = None
     ) -> None:
         self.key, self.value, self.allowed, self.file = key, value, allowed, file
+        if isinstance(value, np.generic):
+            value = value.item()  # np.float64(0.21) is 0.21 to a reader
         shown = " ".join(repr(value).split())  # arrays take several lines
         if len(shown) > LONGEST_SHOWN:  # of a long path the end says which
             shown = (

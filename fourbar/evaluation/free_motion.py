@@ -32,7 +32,7 @@ from fourbar.formulas.pin_forces import Body
 from fourbar.formulas.position import HalfAngle, Position, loop
 from fourbar.formulas.torque import half_slope, inertia
 from fourbar.linkage import MOVING_BARS, FourBar
-from fourbar.quantities import Array
+from fourbar.quantities import NO_DIRECTION, Array
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.scene import Independent
 
@@ -257,6 +257,7 @@ class _Run:
             raise FourBarError(
                 "nothing that moves has inertia: the free motion is undetermined"
             )
+        self._require_directions(theta, position, k, omega)
         self._change_over()
         self.side = 0.0  # sense of motion if dry friction depends on it
         self.holding = (
@@ -271,6 +272,19 @@ class _Run:
         self.drift = self.largest = 0.0
         self.rows: list[tuple[float, ...]] = []
 
+    def _require_directions(
+        self, q: float, position: Position, k: Coefficients, rate: float
+    ) -> None:
+        """Raise a LimitError where a force has no direction at the start, which rounding would give it at each step."""
+        state = self._make_state(q, position, k, rate)
+        for term in self.terms:
+            codes = term.status(state, None)
+            if codes is not None and np.any(codes == NO_DIRECTION):
+                raise LimitError(
+                    f"effects.{term.key}: two points coincide where the linkage is "
+                    "released, and a force along their line has no direction"
+                )
+
     def _compute_inertia(self, position: Position, k: Coefficients) -> Any:
         return sum(inertia(self.lengths.a, self.bodies, position, k))
 
@@ -284,17 +298,22 @@ class _Run:
         self, q: float, position: Position, k: Coefficients, rate: float
     ) -> float:
         """Compute Q under everything that acts, at a speed that is not zero where friction has to have a sense."""
-        theta_2 = q if self.reading.bar == 2 else cmath.phase(position.u2)
-        state = State(
+        state = self._make_state(q, position, k, rate)
+        return float(Actions(state, self.bodies).add(self.terms).work()[0])
+
+    def _make_state(
+        self, q: float, position: Position, k: Coefficients, rate: float
+    ) -> State:
+        """Make the state of the linkage at an angle and a speed of the bar that it is read from."""
+        return State(
             self.lengths,
             self.linkage.ground_angle,
-            theta_2,
+            q if self.reading.bar == 2 else cmath.phase(position.u2),
             position,
             k,
             rate,
             rates(k, rate, 0.0),
         )
-        return float(Actions(state, self.bodies).add(self.terms).work()[0])
 
     def _try_both_senses(self) -> list[float]:
         q = float(self.y[0])
@@ -403,7 +422,7 @@ class _Run:
             message = solver.step()
             if solver.status == "failed":
                 raise FourBarError(
-                    f"the free motion cannot be continued beyond {self.t!r} s: {message}"
+                    f"the free motion cannot be continued beyond {self.t:.9g} s: {message}"
                 )
             if self.steps > STEPS:
                 allowed = f"this motion is followed for {STEPS} steps, here to {self.t:.6g} s; make it shorter"

@@ -49,7 +49,7 @@ from fourbar.files.place import (
 )
 from fourbar.files.scene_text import BARS, BRANCHES, SIGMA
 from fourbar.formulas.mobility import meet_change_points
-from fourbar.linkage import ANY, BAR_NAMES, MOST_STEPS, PINS, POSITIVE, Bar, FourBar
+from fourbar.linkage import BAR_NAMES, MOST_STEPS, PINS, POSITIVE, Bar, FourBar
 from fourbar.quantities.units import find_rounding
 from fourbar.scene import Scene
 from fourbar.scene.motion import (
@@ -68,10 +68,8 @@ from fourbar.scene.pictures import Picture
 from fourbar.solution import Array
 from fourbar.studies.keys import (
     COMMAND_KEYS,
-    LEFT_OUT,
-    is_left_out,
+    find_misfit,
     list_entries,
-    read_place,
     refuse_key,
 )
 
@@ -582,25 +580,12 @@ def _read_tolerances(
                 f'must be like "0.05 {entry.unit}" or ["0.02 {entry.unit}", "{SIGMA}"]',
             )
         width = stated[0] if sigma else stated
-        if is_left_out(scene, entry):
-            raise read.refuse(name, width, LEFT_OUT)
         size = read.quantity(name, width, entry.unit, POSITIVE)
         if size <= 0.0:
             raise read.refuse(name, width, "must be > 0")
-        tolerance, number = Tolerance(key, size, sigma), read_place(scene, entry.place)
-        if number is None:
-            raise read.refuse(
-                name,
-                width,
-                "is the tolerance of a number that the scene leaves out: state the number first",
-            )
-        if entry.bound != ANY and tolerance.reach >= number:
-            three = "three sigma of it " if sigma else ""
-            raise read.refuse(
-                name,
-                width,
-                f"{three}must be less than the number itself, {number:.6g} {entry.unit}",
-            )
+        tolerance = Tolerance(key, size, sigma)
+        if (misfit := find_misfit(scene, entry, tolerance)) is not None:
+            raise read.refuse(name, width, misfit)
         tolerances.append(tolerance)
     return tuple(tolerances)
 

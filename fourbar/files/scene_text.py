@@ -36,7 +36,7 @@ from fourbar.linkage import BAR_NAMES, MOVING_BARS, PINS, POSITIVE, Bar, FourBar
 from fourbar.scene import Scene
 from fourbar.scene.drawing import DrawnPins
 from fourbar.scene.motion import BRANCH_NAMES, FromLimit, Law, Motion, Sweep
-from fourbar.studies.keys import list_entries
+from fourbar.studies.keys import find_misfit, list_entries
 from fourbar.writing import write_text
 
 BRANCHES = {name: branch for branch, name in BRANCH_NAMES.items()}
@@ -60,7 +60,7 @@ def dump(scene: Scene) -> str:
     """Write the scene as TOML text, in SI and radians; `loads` gives the same numbers back, bit for bit.
 
     Raises InputError for a scene that a file cannot hold: two effects of one kind, a title that is
-    no valid text.
+    no valid text, a tolerance of a number that the scene leaves out or that exceeds it.
     """
     expect("scene", scene, Scene)
     top = {
@@ -318,15 +318,22 @@ def _write_value(key: str, value: object) -> str:
 
 
 def _write_tolerances(scene: Scene) -> dict[str, Any]:
-    """Write the table of tolerances."""
+    """Write the table of tolerances in their order, which dotted keys would not keep: TOML gathers their tables.
+
+    Raises InputError for a tolerance that reading the file would refuse.
+    """
     entries, rows = list_entries(scene), dict[str, Any]()
     for tolerance in scene.tolerances:
         if tolerance.key not in entries:
             raise InputError(
                 "tolerances", tolerance.key, "no number of the scene has this key"
             )
-        width = write_quantity(tolerance.width, entries[tolerance.key].unit)
-        rows[tolerance.key] = [width, SIGMA] if tolerance.sigma else width
+        entry = entries[tolerance.key]
+        width = write_quantity(tolerance.width, entry.unit)
+        if (misfit := find_misfit(scene, entry, tolerance)) is not None:
+            raise InputError(f"tolerances.{tolerance.key}", width, misfit)
+        key = json.dumps(tolerance.key)
+        rows[key] = [width, SIGMA] if tolerance.sigma else width
     return rows
 
 

@@ -11,6 +11,7 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fourbar.formulas.mobility import TURN, find_intervals
 from fourbar.linkage import MOVING_BARS, PIN_FORCE, PINS
@@ -302,7 +303,9 @@ def _find_largest(
             cut[rows, np.clip(best + step, 0, CUTS)] for step in (0, -1, 1)
         )
         reached.append(values[rows, best])
-    growing = _find_growing(reached, values, best) if len(peaks) else rows > 0
+    growing = np.zeros(0, dtype=bool)
+    if len(peaks):
+        growing = _find_growing(reached, values, best)
     kept = (
         ~growing & (reached[-1] > reached[0]) & ~opens
     )  # beside a gap other magnitudes grow
@@ -312,7 +315,9 @@ def _find_largest(
     )
 
 
-def _find_growing(reached: list[Array], values: Array, best: Array) -> Array:
+def _find_growing(
+    reached: list[Array], values: Array, best: NDArray[np.intp]
+) -> NDArray[np.bool_]:
     """Mark the searches for a maximum that end beside a pole.
 
     Towards a pole the values of the last calls rise. A call may hit the pole to within
@@ -324,7 +329,7 @@ def _find_growing(reached: list[Array], values: Array, best: Array) -> Array:
     values : values of the last call, (k, CUTS + 1).
     best : index of the largest of them, (k,).
     """
-    rises = reached[-1] > (1.0 + GROWING) * reached[-3]
+    rises: NDArray[np.bool_] = reached[-1] > (1.0 + GROWING) * reached[-3]
     padded = np.pad(values, ((0, 0), (1, 1)), constant_values=-1.0)
     rows = np.arange(len(best))
     beside = np.maximum(padded[rows, best], padded[rows, best + 2])
@@ -563,14 +568,13 @@ def find_duty(between: Between) -> MotorDuty | None:
         values = getattr(between.bounded(name), key)
         return float(np.nanmax(np.abs(values)))
 
+    peak = find_largest(drive.keys.value, drive.keys.value)
+    linear = between.sweep.drive is not None
     return duty._replace(
-        **{
-            f"peak_{'torque' if between.sweep.drive is None else 'force'}": (
-                find_largest(drive.keys.value, drive.keys.value)
-            ),
-            "peak_speed": find_largest("speed", drive.speed_key),
-            "peak_power": find_largest("power", "power"),
-        }
+        peak_torque=None if linear else peak,
+        peak_force=peak if linear else None,
+        peak_speed=find_largest("speed", drive.speed_key),
+        peak_power=find_largest("power", "power"),
     )
 
 

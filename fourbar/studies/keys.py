@@ -24,6 +24,7 @@ from fourbar.linkage import (
     FourBar,
 )
 from fourbar.scene import Scene
+from fourbar.scene.numbers import Tolerance
 
 COMMAND_KEYS = ("motion.theta_2", "motion.theta_3", "motion.theta_4", "motion.stroke")
 """Keys of the commanded angle or stroke."""
@@ -227,6 +228,22 @@ def is_left_out(scene: Scene, entry: SceneNumber) -> bool:
         return False
     bar = getattr(scene.linkage, str(entry.place[1]))
     return getattr(bar, str(entry.place[2])) is None
+
+
+def find_misfit(scene: Scene, entry: SceneNumber, tolerance: Tolerance) -> str | None:
+    """Say why a number of a scene cannot have a tolerance, as a file and its samples need it; None: it can."""
+    if is_left_out(scene, entry):
+        return LEFT_OUT
+    number = read_place(scene, entry.place)
+    if number is None:
+        return (
+            "is the tolerance of a number that the scene leaves out: state the number "
+            "first"
+        )
+    if entry.bound != ANY and tolerance.reach >= number:
+        three = "three sigma of it " if tolerance.sigma else ""
+        return f"{three}must be less than the number itself, {number:.6g} {entry.unit}"
+    return None
 
 
 def read_place(value: Any, place: Place) -> Any:

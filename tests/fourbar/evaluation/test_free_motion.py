@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import fourbar
+from fourbar.errors import LimitError
 from fourbar.evaluation import free_motion
 from fourbar.evaluation.free_motion import integrate
 from fourbar.solve import solve
@@ -317,3 +318,29 @@ def test_what_begins_to_move_against_friction_does_so_at_once() -> None:
         assert np.allclose(
             getattr(s, force), getattr(s, force)[1], rtol=1e-4, atol=1e-5
         )
+
+
+@pytest.mark.parametrize("preload", (0.0, 5.0))
+def test_a_spring_between_places_that_are_one_is_refused_where_it_is_released(
+    preload: float,
+) -> None:
+    """Rounding gives its pull a direction that differs at each step: the integration would never end."""
+    on_B = fourbar.Spring(
+        fourbar.Place(3, (0.25, 0.0)),
+        fourbar.Place(4, (0.22, 0.0)),
+        200.0,
+        0.05,
+        preload,
+    )
+    scene = fourbar.Scene(
+        HANGING,
+        fourbar.Motion(0.5, 0.0, free=fourbar.Free(1.0, 50)),
+        effects=(fourbar.Gravity(), fourbar.Springs((on_B,))),
+    )
+    with pytest.raises(LimitError, match="springs: two points coincide"):
+        fourbar.release(scene)
+    proportional = replace(on_B, length=0.0, preload=0.0)  # pulls with 0 there
+    alone = replace(scene, effects=(fourbar.Gravity(),))
+    with_it = replace(scene, effects=(*alone.effects, fourbar.Springs((proportional,))))
+    one, other = (fourbar.release(each).theta_2 for each in (with_it, alone))
+    assert np.abs(one - other).max() < 1e-9

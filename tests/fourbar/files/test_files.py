@@ -16,6 +16,7 @@ from fourbar.effects import Place
 from fourbar.errors import InputError
 from fourbar.files import dump, load, loads, save
 from fourbar.quantities.units import UnitError, to_si
+from tests.support.scenes import crank_rocker
 
 MODELS = sorted((Path(__file__).parents[3] / "models").glob("*.toml"))
 LENGTHS = '[lengths]\nground = "0.3 m"\ninput = "0.1 m"\ncoupler = "0.25 m"\noutput = "0.22 m"\n'
@@ -392,3 +393,56 @@ def test_what_a_bar_leaves_out_follows_its_length(length: float) -> None:
     assert output.moment_of_inertia == 3.0 and output.mass_centre == pytest.approx(
         (0.07, 0.0), rel=1e-15
     )
+
+
+WIDTHS = {
+    "loads.0.force.0": 0.1,
+    "lengths.input": 5e-5,
+    "bars.coupler.mass": 0.01,
+    "loads.1.moment": 1e-3,
+    "lengths.ground": 1e-5,
+    "effects.gravity.1": 1e-3,
+    "bars.input.mass": 0.002,
+    "lengths.ground_angle": 1e-4,
+}
+"""Tolerances whose tables in the file alternate."""
+
+
+@given(st.permutations(list(WIDTHS)))
+@settings(max_examples=10, deadline=None, database=None)
+def test_tolerances_read_back_in_their_order(keys: list[str]) -> None:
+    tolerances = tuple(
+        fourbar.Tolerance(key, WIDTHS[key], key.endswith("mass")) for key in keys
+    )
+    scene = crank_rocker(tolerances=tolerances)
+    assert loads(dump(scene)) == scene
+
+
+@pytest.mark.parametrize(
+    ("key", "width", "why"),
+    [
+        ("bars.input.inertia", 1e-6, "follows the length; state it"),
+        ("bars.input.centre.0", 1e-3, "follows the length; state it"),
+        ("lengths.input", 0.1, "must be less than the number itself, 0.1 m"),
+        ("loads.0.from_pin.0", 1e-3, "no number of the scene has this key"),
+        ("motion.theta_2", 1e-3, "no number of the scene has this key"),
+    ],
+)
+def test_no_tolerance_is_written_that_reading_refuses(
+    key: str, width: float, why: str
+) -> None:
+    scene = crank_rocker(tolerances=(fourbar.Tolerance(key, width),))
+    with pytest.raises(InputError, match=why) as refused:
+        dump(scene)
+    assert key in str(refused.value)
+
+
+def test_three_sigma_less_than_the_number_are_written_and_more_are_not() -> None:
+    for width, written in ((0.033, True), (0.034, False)):
+        tolerance = fourbar.Tolerance("lengths.input", width, sigma=True)
+        scene = crank_rocker(tolerances=(tolerance,))
+        if written:
+            assert loads(dump(scene)) == scene
+        else:
+            with pytest.raises(InputError, match="three sigma of it must be less"):
+                dump(scene)
