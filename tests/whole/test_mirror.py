@@ -19,7 +19,7 @@ SOURCES = {
 JUDGED_BY = {
     # what a command reads, does and prints is tested through the command
     "fourbar/cli/test_cli.py": "fourbar/cli: evaluate export given; fourbar/show: tables",
-    "whole/test_exits.py": "fourbar: errors; validation: cli; validation/report: terminal; lab: cli fuzz_files",
+    "whole/test_exits.py": "validation: cli; validation/report: terminal; lab: cli fuzz_files",
     "whole/test_kills.py": "validation/run: pool run store",
     "whole/test_results_format.py": "validation/compare: columns",
     "whole/test_package.py": "validation: places",
