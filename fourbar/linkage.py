@@ -7,7 +7,7 @@ Bars: 1 ground (length d), 2 input (a), 3 coupler (b), 4 output (c).
 import math
 from collections.abc import Container
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from numbers import Integral
 from typing import Any, ClassVar, NamedTuple
 
@@ -119,13 +119,20 @@ def require_numbers(
     return array.astype(float)
 
 
-def require_pair(key: str, value: Any, unit: str) -> tuple[float, float]:
-    """Return a pair (size in a unit, angle in rad) as floats, or raise an InputError."""
+def require_pair(
+    key: str, value: Any, unit: str, second: str = "rad", bound: str = ANY
+) -> tuple[float, float]:
+    """Return a pair of numbers, mostly a size and an angle, as floats, or raise an InputError.
+
+    `unit`, `second`: of the two; `bound`: of the first, and of the second unless it is an angle.
+    """
     try:
-        size, angle = value
+        size, other = value
     except (TypeError, ValueError):
-        raise InputError(key, value, "must be a pair (size, angle)") from None
-    return require(key, size, unit), require(key, angle, "rad")
+        names = "size, angle" if second == "rad" else f"{unit}, {second}"
+        raise InputError(key, value, f"must be a pair ({names})") from None
+    of_second = ANY if second == "rad" else bound
+    return require(key, size, unit, bound), require(key, other, second, of_second)
 
 
 def require_bar(key: str, value: object) -> int:
@@ -144,8 +151,18 @@ class Declared(NamedTuple):
     bound: str = ANY
     left_out: Any = REQUIRED
     """Value where a scene file leaves it out."""
-    pair: bool = False
-    """True for a magnitude in this unit with an angle in rad."""
+    pair: str = ""
+    """Unit of the second number of a pair, "rad" of a magnitude's angle; empty for one number."""
+
+    @property
+    def units(self) -> tuple[str, str]:
+        """Units of both numbers of a pair."""
+        return self.unit, self.pair
+
+    @property
+    def bounds(self) -> tuple[str, str]:
+        """Bounds of both numbers of a pair; an angle has none."""
+        return self.bound, ANY if self.pair == "rad" else self.bound
 
 
 def check_numbers(description: Any, key: str) -> None:
@@ -154,7 +171,7 @@ def check_numbers(description: Any, key: str) -> None:
         value, full_key = getattr(description, name), f"{key}.{name}".strip(".")
         if value is not None or stated.left_out is not None:
             checked = (
-                require_pair(full_key, value, stated.unit)
+                require_pair(full_key, value, stated.unit, stated.pair, stated.bound)
                 if stated.pair
                 else require(full_key, value, *stated[:2])
             )
@@ -174,21 +191,84 @@ class Bar:
     inertia : about the mass centre G, kg m^2, >= 0; left out: uniform slender bar, m L^2/12.
     centre : (r, phi), polar position of G from the bar's first pin (O2, A, O4), phi measured
         from the bar's line, m and rad; left out: mid-bar.
+    density : kg/m^3, > 0, in place of `mass`, which is then that of a uniform bar from pin to pin
+        and follows the length.
+    section : (height, thickness) of a rectangular cross-section, m: the height lies in the plane
+        of motion.
+    diameter : of a round cross-section, m, in place of `section`.
+
+    >>> Bar("0.4 m", density="7850 kg/m^3", section=("20 mm", "5 mm")).mass
+    0.314
     """
 
     length: float
     mass: float = 0.0
     inertia: float | None = None
     centre: tuple[float, float] | None = None
+    density: float | None = None
+    section: tuple[float, float] | None = None
+    diameter: float | None = None
     numbers: ClassVar[dict[str, Declared]] = {
         "length": Declared("m", POSITIVE),
         "mass": Declared("kg", AT_LEAST_ZERO, 0.0),
+        "density": Declared("kg/m^3", POSITIVE, None),
+        "section": Declared("m", POSITIVE, None, pair="m"),
+        "diameter": Declared("m", POSITIVE, None),
         "inertia": Declared("kg m^2", AT_LEAST_ZERO, None),
-        "centre": Declared("m", left_out=None, pair=True),
+        "centre": Declared("m", left_out=None, pair="rad"),
     }
+    """In this order: what is left out follows from numbers before it."""
 
     def __post_init__(self) -> None:
         check_numbers(self, "")
+        if self.section is not None and self.diameter is not None:
+            raise InputError(
+                "diameter", self.diameter, "must be left out beside a section"
+            )
+        if self.density is None:
+            return
+        if self.area is None:
+            raise InputError(
+                "density", self.density, "needs the cross-section: section or diameter"
+            )
+        stated = self.mass
+        object.__setattr__(self, "mass", self.weigh())
+        if stated not in (0.0, self.mass):
+            raise InputError(
+                "mass", stated, "must be left out: density and cross-section state it"
+            )
+
+    @property
+    def area(self) -> Any:
+        """Area of the cross-section, m^2; None if it is not stated."""
+        if self.section is not None:
+            return self.section[0] * self.section[1]
+        if self.diameter is not None:
+            return math.pi / 4.0 * (self.diameter * self.diameter)
+        return None
+
+    @property
+    def section_modulus(self) -> Any:
+        """Section modulus of bending in the plane of motion, m^3; None without a cross-section.
+
+        t h^2/6 of a rectangle of height h and thickness t, pi d^3/32 of a circle.
+        """
+        if self.section is not None:
+            height, thickness = self.section
+            return thickness * (height * height) / 6.0
+        if self.diameter is not None:
+            return math.pi / 32.0 * self.diameter**3
+        return None
+
+    def weigh(self) -> Any:
+        """Return the mass that density and cross-section state, from pin to pin, kg; without a density the mass."""
+        if self.density is None:
+            return self.mass
+        return self.density * self.area * self.length
+
+    def with_mass(self, mass: float) -> "Bar":
+        """Return the bar with a stated mass, kg, in place of its density."""
+        return replace(self, mass=mass, density=None)
 
     @property
     def moment_of_inertia(self) -> float:

@@ -28,8 +28,15 @@ WORDS = {
     "frame": [*FRAMES],
 }
 """Entries that are one of a few words."""
-EXAMPLES = {"m": "50 mm", "kg": "0.2 kg", "kg m^2": "2 kg cm^2"}
+EXAMPLES = {
+    "m": "50 mm",
+    "kg": "0.2 kg",
+    "kg m^2": "2 kg cm^2",
+    "kg/m^3": "7850 kg/m^3",
+}
 """Examples of the numbers of a bar by their SI unit."""
+SECTION = ("20 mm", "5 mm")
+"""Example of a pair of lengths: height and thickness of a cross-section."""
 MOVING = {
     **{"rad": "60 deg", "rad/s": "10 rad/s", "rad/s^2": "0 rad/s^2"},
     **{"m": "500 mm", "m/s": "100 mm/s", "m/s^2": "0 mm/s^2"},
@@ -52,21 +59,11 @@ def list_offers() -> dict[str, Any]:
     parts, pairs = offers["parts"], dict[str, list[str]]()
     for kind in (Bar, Point, Load):
         for name, number in kind.numbers.items():
-            if number.pair:
+            if number.pair == "rad":
                 pairs[name] = ["distance" if number.unit == "m" else "size", "angle"]
-    for bar in (BAR_NAMES[number] for number in MOVING_BARS):
-        for name, number in Bar.numbers.items():
-            if number.pair:
-                parts.append(
-                    {
-                        "at": ["bars", bar, name],
-                        "value": [EXAMPLES[number.unit], "0 deg"],
-                    }
-                )
-            elif number.left_out is not REQUIRED:
-                offers["fields"].setdefault("bars", {}).setdefault(bar, {})[name] = (
-                    EXAMPLES[number.unit]
-                )
+            elif number.pair:
+                pairs[name] = ["height", "thickness"]
+    _offer_bars(offers)
     for key, effect in list_kinds().items():
         value = tomllib.loads(effect.example)[key]
         parts.append({"at": ["effects", key], "value": value})
@@ -88,6 +85,19 @@ def list_offers() -> dict[str, Any]:
         "pairs": pairs,
         "bars": bars,
     }
+
+
+def _offer_bars(offers: dict[str, Any]) -> None:
+    """Add the numbers of the moving bars: pairs as parts, the others as fields."""
+    fields: dict[str, Any] = offers["fields"].setdefault("bars", {})
+    for bar in (BAR_NAMES[number] for number in MOVING_BARS):
+        for name, number in Bar.numbers.items():
+            if number.pair:
+                polar = [EXAMPLES[number.unit], "0 deg"]
+                value = polar if number.pair == "rad" else [*SECTION]
+                offers["parts"].append({"at": ["bars", bar, name], "value": value})
+            elif number.left_out is not REQUIRED:
+                fields.setdefault(bar, {})[name] = EXAMPLES[number.unit]
 
 
 def _offer_commands() -> dict[str, Any]:

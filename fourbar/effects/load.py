@@ -158,9 +158,9 @@ class Load(Effect):
     table: Table | None = None
     key: ClassVar[str] = "load"
     numbers: ClassVar[dict[str, Declared]] = {
-        "force": Declared("N", left_out=None, pair=True),
+        "force": Declared("N", left_out=None, pair="rad"),
         **STATED_PLACES,
-        "arm": Declared("m", left_out=None, pair=True),
+        "arm": Declared("m", left_out=None, pair="rad"),
         "moment": Declared("N m", left_out=0.0),
     }
 

@@ -26,8 +26,8 @@ from fourbar.linkage import (
 )
 
 STATED_PLACES = {
-    "from_pin": Declared("m", left_out=None, pair=True),
-    "from_centre": Declared("m", left_out=None, pair=True),
+    "from_pin": Declared("m", left_out=None, pair="rad"),
+    "from_centre": Declared("m", left_out=None, pair="rad"),
 }
 """Forms in which numbers state a place that turns with its bar; `point` is a name."""
 AT_FIRST_PIN = (0.0, 0.0)

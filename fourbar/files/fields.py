@@ -147,9 +147,7 @@ class Reader:
         if value is None and by.left_out is not REQUIRED:
             return by.left_out
         return (
-            self.polar(key, value, by.unit)
-            if by.pair
-            else self.quantity(key, value, *by[:2])
+            self.pair(key, value, by) if by.pair else self.quantity(key, value, *by[:2])
         )
 
     def numbers(
@@ -160,6 +158,19 @@ class Reader:
             name: self.declared(f"{key}.{name}".rstrip("."), given.get(name), by)
             for name, by in numbers.items()
         }
+
+    def pair(self, key: str, value: object, by: Declared) -> tuple[float, float]:
+        """Read a pair as it is declared: a magnitude with its angle, or two numbers of one kind."""
+        if by.pair == "rad":
+            return self.polar(key, value, by.unit)
+        if not isinstance(value, list) or len(value) != 2:
+            form = self.QUANTITIES.format(by.unit)
+            raise self.refuse(key, value, f"must be a pair like {form}")
+        first, second = (
+            self.quantity(f"{key}[{index}]", value[index], unit, by.bounds[index])
+            for index, unit in enumerate(by.units)
+        )
+        return first, second
 
     def quantities(self, key: str, value: object, unit: str) -> tuple[float, ...]:
         """Read a list of numbers with units, in `unit`."""
@@ -218,11 +229,9 @@ def write_quantity(value: float, unit: str) -> Any:
 
 def write_declared(value: Any, by: Declared) -> Any:
     """Write a number, or a magnitude with its angle, as it is declared."""
-    return (
-        write_polar(value[0], value[1], by.unit)
-        if by.pair
-        else write_quantity(value, by.unit)
-    )
+    if by.pair:
+        return write_pair(value[0], value[1], by.unit, by.pair)
+    return write_quantity(value, by.unit)
 
 
 def write_numbers(description: Any) -> dict[str, Any]:
@@ -235,9 +244,11 @@ def write_numbers(description: Any) -> dict[str, Any]:
     }
 
 
-def write_polar(magnitude: float, angle: float, unit: str) -> list[str]:
-    """Write a pair [magnitude, angle] likewise."""
-    return [write_quantity(magnitude, unit), write_quantity(angle, "rad")]
+def write_pair(
+    first: float, second: float, unit: str, of_second: str = "rad"
+) -> list[str]:
+    """Write a pair, mostly [magnitude, angle], likewise."""
+    return [write_quantity(first, unit), write_quantity(second, of_second)]
 
 
 def _suggest(word: object, names: list[str]) -> str:

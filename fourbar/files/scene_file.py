@@ -329,7 +329,12 @@ def _read_bar(read: Reader, key: str, value: object, length: float) -> Bar:
             entry.get("mass"),
             "must leave the inertia m L^2/12 a finite number",
         )
-    return Bar(length, **numbers)
+    try:
+        return Bar(length, **numbers)
+    except InputError as error:  # which knows of one bar alone
+        raise read.refuse(
+            f"{key}.{error.key}", entry.get(error.key), error.allowed
+        ) from None
 
 
 def _read_motion(read: Reader, value: object) -> Motion:

@@ -29,7 +29,7 @@ from fourbar.files.fields import (
     convert_to_polar,
     write_declared,
     write_numbers,
-    write_polar,
+    write_pair,
     write_quantity,
 )
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, PINS, POSITIVE, Bar, FourBar
@@ -121,7 +121,7 @@ def _restore_coordinates(
         with suppress(LookupError, TypeError):
             for step in into:
                 holder = holder[step]
-            if holder[last] == write_polar(*convert_to_polar(x, y), "m"):
+            if holder[last] == write_pair(*convert_to_polar(x, y), "m"):
                 holder[last] = {
                     "x": write_quantity(x, "m"),
                     "y": write_quantity(y, "m"),
@@ -160,7 +160,9 @@ def describe(scene: Scene) -> dict[str, Any]:
 def _write_bar(bar: Bar) -> dict[str, Any]:
     if bar == Bar(bar.length):
         return {}
-    return {name: text for name, text in write_numbers(bar).items() if name != "length"}
+    left_out = {"length"} if bar.density is None else {"length", "mass"}
+    numbers = write_numbers(bar).items()
+    return {name: text for name, text in numbers if name not in left_out}
 
 
 def _write_motion(motion: Motion) -> dict[str, Any]:
@@ -234,7 +236,7 @@ def _write_effect(effect: Effect) -> Any:
             "a scene file cannot state this effect",
         )
     if isinstance(effect, Gravity):
-        return write_polar(
+        return write_pair(
             effect.magnitude, effect.angle, effect.numbers["magnitude"].unit
         )
     if isinstance(effect, Springs):

@@ -483,13 +483,21 @@ class _Block:
                 f"{x}, {place}" for x, place in zip(places, positions, strict=True)
             ]
         moments = self._cells([bar.peak.value for bar in bending], "N m")
-        return _align(
-            [
-                ("bending", [f"bar {bar}" for bar in facts.bending]),
-                ("  moment", moments),
-                ("  at x", places),
-            ]
-        )
+        rows = [
+            ("bending", [f"bar {bar}" for bar in facts.bending]),
+            ("  moment", moments),
+            ("  at x", places),
+        ]
+        if any(facts.stresses.values()):
+            rows.append(("  stress", self._write_stresses()))
+        return _align(rows)
+
+    def _write_stresses(self) -> list[str]:
+        """Write the largest bending stress of each bar; a dash for one without a cross-section."""
+        stresses = self.facts.stresses
+        stated = [value for value in stresses.values() if value is not None]
+        cells = iter(self._cells(stated, "Pa"))
+        return ["-" if value is None else next(cells) for value in stresses.values()]
 
     def _cells(self, values: list[float], unit: str) -> list[str]:
         """Write quantities of one kind with the prefix of the largest; each with its own if they lie far apart."""

@@ -188,6 +188,17 @@ def locate_bending(scene: Scene, between: Between) -> dict[int, BarBending]:
     return bending
 
 
+def _list_stresses(
+    scene: Scene, bending: dict[int, BarBending]
+) -> dict[int, float | None]:
+    """List the largest bending stresses: the bending moment over the section modulus."""
+    stresses = dict[int, float | None]()
+    for bar, largest in bending.items():
+        modulus = scene.linkage.bar(bar).section_modulus
+        stresses[bar] = None if modulus is None else largest.peak.value / modulus
+    return stresses
+
+
 def _drop_rounding(bending: Bending, size: Array) -> Bending:
     """Return bending moments with zero where they are rounding of the pin forces: a two-force bar has none."""
     moment = np.where(np.abs(bending.moment) <= NO_BENDING * size, 0.0, bending.moment)
@@ -370,6 +381,8 @@ class Facts:
     """Least and greatest torque or force while dry friction holds a pin that is at rest."""
     pins: dict[str, PinLoad]
     bending: dict[int, BarBending]
+    stresses: dict[int, float | None]
+    """Largest bending stress of each bar, Pa; None where its cross-section is not stated."""
     stroke_range: tuple[Peak, Peak] | None
     """Smallest and largest stroke of the motion."""
     stroke_limits: tuple[float, float] | None
@@ -405,6 +418,7 @@ def summarize(scene: Scene, solution: Solution) -> Facts:
     least, _ = find_range(np.square(fine.sin_mu))
     mu = math.asin(min(1.0, math.sqrt(max(least.value, 0.0))))
     released = scene.motion.free is not None
+    bending = locate_bending(scene, between)
     drive = None if released or solution.F12 is None else read_drive(solution)
     peak = None
     if drive is not None and np.isfinite(drive.values).any():  # type: ignore[arg-type]
@@ -428,7 +442,8 @@ def summarize(scene: Scene, solution: Solution) -> Facts:
         duty=find_duty(between) if peak is not None and kind != "position" else None,
         held=None if drive is None else _find_held(solution, drive),
         pins=_list_pin_loads(solution, between),
-        bending=locate_bending(scene, between),
+        bending=bending,
+        stresses=_list_stresses(scene, bending),
         stroke_range=None if fine.stroke is None else find_range(fine.stroke),
         stroke_limits=None
         if solution.stroke is None

@@ -10,8 +10,8 @@ from fourbar.linkage import MOVING_BARS
 from fourbar.solution import DEGREES, SI, Conversion, find_unit_in
 
 ALLOWED = 'must be "SI", "imperial" or a list like "mm N N.mm deg rpm"'
-PRESETS = {"si": "", "imperial": "in lbf lbf.in lb deg rpm hp"}
-STATED = ("m", "N", "N m", "kg", "rad", "rad/s", "rad/s^2", "m/s", "m/s^2", "W")
+PRESETS = {"si": "", "imperial": "in lbf lbf.in lb deg rpm hp psi"}
+STATED = ("m", "N", "N m", "kg", "rad", "rad/s", "rad/s^2", "m/s", "m/s^2", "W", "Pa")
 """The SI units for which another one can be stated, each of a dimension of its own."""
 DERIVED = {"m/s": ("m", "{}/s"), "m/s^2": ("m", "{}/s^2"), "J": ("N m", "{}")}
 """Not stated, these follow another one: energy the unit of torque, speeds that of length."""

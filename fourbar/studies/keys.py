@@ -21,6 +21,7 @@ from fourbar.linkage import (
     MOVING_BARS,
     POSITIVE,
     Bar,
+    Declared,
     FourBar,
 )
 from fourbar.scene import Scene
@@ -44,6 +45,8 @@ SAME_FOR_ALL = (
     *("from", "to", "steps", "limit", "offset"),
 )
 """Parts of keys that name a word, a whole number, or what has another form in a study."""
+BY_MATERIAL = ("density", "section", "diameter")
+"""Numbers of a bar that are varied only where the scene states them."""
 Place = tuple[str | int, ...]
 """Attributes and indices that lead from a scene to one of its numbers."""
 
@@ -68,28 +71,28 @@ def _list_numbers(description: Any, key: str, place: Place) -> dict[str, SceneNu
     entries = dict[str, SceneNumber]()
     for name, stated in description.numbers.items():
         if stated.pair:
-            entries |= _make_pair(f"{key}.{name}", (*place, name), stated.unit)
+            entries |= _make_pair(f"{key}.{name}", (*place, name), stated)
         else:
             entries[f"{key}.{name}"] = SceneNumber((*place, name), *stated[:2])
     return entries
 
 
 def _make_pair(
-    key: str, place: Place, unit: str, names: tuple[str | int, str | int] = (0, 1)
+    key: str, place: Place, by: Declared, names: tuple[str | int, str | int] = (0, 1)
 ) -> dict[str, SceneNumber]:
-    """Make the two entries of a magnitude with its angle."""
+    """Make the two entries of a pair, mostly a magnitude with its angle."""
+    parts = zip(names, by.units, by.bounds, strict=True)
     return {
-        f"{key}.0": SceneNumber((*place, names[0]), unit),
-        f"{key}.1": SceneNumber((*place, names[1]), "rad"),
+        f"{key}.{index}": SceneNumber((*place, name), unit, bound)
+        for index, (name, unit, bound) in enumerate(parts)
     }
 
 
 def _list_effect(effect: Any, key: str, place: Place) -> dict[str, SceneNumber]:
     """List the entries of an effect under its key, at its place."""
     if isinstance(effect, Gravity):
-        return _make_pair(
-            key, place, effect.numbers["magnitude"].unit, ("magnitude", "angle")
-        )
+        of_gravity = effect.numbers["magnitude"]._replace(pair="rad")
+        return _make_pair(key, place, of_gravity, ("magnitude", "angle"))
     if isinstance(effect, PinRows):
         return {
             f"{key}.{row[0]}.{name}".removesuffix("."): SceneNumber(
@@ -129,16 +132,26 @@ def list_place(stated: Any, key: str, place: Place) -> dict[str, SceneNumber]:
     entries = dict[str, SceneNumber]()
     for name, declared in STATED_PLACES.items():
         if getattr(stated, name) is not None:
-            entries |= _make_pair(f"{key}.{name}", (*place, name), declared.unit)
+            entries |= _make_pair(f"{key}.{name}", (*place, name), declared)
     return entries
+
+
+def _list_bar(bar: Bar, number: int) -> dict[str, SceneNumber]:
+    """List the entries of a moving bar: its cross-section as it is stated, and no mass beside a density."""
+    entries = _list_numbers(Bar, "", ("linkage", BAR_NAMES[number]))
+    absent = {name for name in BY_MATERIAL if getattr(bar, name) is None}
+    if bar.density is not None:
+        absent.add("mass")
+    return {
+        key: entry for key, entry in entries.items() if entry.place[2] not in absent
+    }
 
 
 def list_entries(scene: Scene) -> dict[str, SceneNumber]:
     """List the numbers of a scene that a study varies, lengths first, by key; what is commanded is not among them."""
     of_ground = _list_numbers(FourBar, "lengths", ("linkage",))
     bars = {
-        BAR_NAMES[bar]: _list_numbers(Bar, "", ("linkage", BAR_NAMES[bar]))
-        for bar in MOVING_BARS
+        BAR_NAMES[bar]: _list_bar(scene.linkage.bar(bar), bar) for bar in MOVING_BARS
     }
     lengths = {
         f"lengths.{name}": numbers.pop(".length") for name, numbers in bars.items()
@@ -304,4 +317,6 @@ def replace_place(holder: Any, place: Place, values: Any) -> Any:
             else getattr(holder, field.name)
         )
         object.__setattr__(new, field.name, value)
+    if isinstance(new, Bar):
+        object.__setattr__(new, "mass", new.weigh())
     return new

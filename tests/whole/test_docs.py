@@ -211,9 +211,12 @@ def test_the_engine_of_the_guide_agrees(
 
 
 def test_the_scene_file_is_one(checkout: Path) -> None:
-    # a scene; its pins in place of the lengths; an example of each effect
-    text, pins, _ = blocks("toml", read("docs/scene-file.md"))
+    # a scene; a bar by its material; pins in place of the lengths; an example of each effect
+    text, material, pins, _ = blocks("toml", read("docs/scene-file.md"))
     fourbar.files.loads(pins)
+    lengths = text[text.index("[lengths]") : text.index("[bars.input]")]
+    steel = fourbar.files.loads(lengths + material).linkage.coupler
+    assert steel.mass == pytest.approx(7850.0 * 0.02 * 0.005 * steel.length)
     (checkout / "example.toml").write_text(text)
     scene = fourbar.load(checkout / "example.toml")
     assert set(fourbar.solve(scene).status) == {"ok"}

@@ -31,7 +31,7 @@ JUDGED_BY = {
     "fourbar/files/test_files.py": "fourbar/files: fields scene_text",
     "fourbar/formulas/test_formulas.py": "fourbar/formulas: arithmetic many_digits path",
     "fourbar/studies/test_equilibrium.py": "fourbar/studies: circuit_curve; fourbar/show: studies",
-    "fourbar/test_solve.py": "fourbar: linkage solution; fourbar/scene: motion; fourbar/evaluation: case",
+    "fourbar/test_solve.py": "fourbar: solution; fourbar/scene: motion; fourbar/evaluation: case",
     "fourbar/studies/test_study.py": "fourbar/scene: motion; fourbar/studies: keys",
     # parts of one document or picture
     "fourbar/mjcf/test_mjcf.py": "fourbar/mjcf: document model",

@@ -184,7 +184,7 @@ def _try_factors(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
         "moment of inertia",
         lambda bar, f: replace(bar, inertia=f * bar.moment_of_inertia),
     )
-    mass = ("mass", lambda bar, f: replace(bar, mass=f * bar.mass))
+    mass = ("mass", lambda bar, f: bar.with_mass(f * bar.mass))
     of_bars = [
         (
             f"{which[0] if len(which) == 1 else 'every bar'}: {word}",

@@ -82,7 +82,7 @@ def _scale_inertial(scene: Scene, command: Command) -> Iterator[Mistake]:
         return
     bare = replace(scene, loads=(), effects=())
     massless = {
-        name: replace(bar, mass=0.0, inertia=bar.moment_of_inertia)
+        name: replace(bar.with_mass(0.0), inertia=bar.moment_of_inertia)
         for name, bar in list_moving(bare)
     }
     pointlike = {name: replace(bar, inertia=0.0) for name, bar in list_moving(bare)}

@@ -17,6 +17,7 @@ from fourbar.files.fields import Reader, Written
 from fourbar.files.scene_file import read_scene
 from fourbar.files.scene_text import describe
 from fourbar.formulas.many_digits import DIGITS
+from fourbar.linkage import BAR_NAMES, MOVING_BARS, Bar
 from fourbar.quantities import VECTORS
 from fourbar.scene import Command, Scene, with_signs
 from fourbar.scene import command as command_of
@@ -54,9 +55,14 @@ class _Numbers(Reader):
 def scene_to_json(scene: Scene) -> dict[str, Any]:
     """Write lengths, bars, drive, loads and effects of a scene; InputError for an effect that no scene file holds.
 
-    Every place is a pair from its bar's first pin, but for the arm of a load.
+    Every place is a pair from its bar's first pin, but for the arm of a load. A bar has its mass, whatever states it.
     """
-    tables: dict[str, Any] = _take_numbers(describe(state_from_pins(scene)))
+    bars: dict[str, Any] = {
+        BAR_NAMES[number]: Bar(bar.length, bar.mass, bar.inertia, bar.centre)
+        for number, bar in zip(MOVING_BARS, scene.linkage.moving, strict=True)
+    }
+    plain = replace(scene, linkage=replace(scene.linkage, **bars))
+    tables: dict[str, Any] = _take_numbers(describe(state_from_pins(plain)))
     return {name: table for name, table in tables.items() if table}
 
 

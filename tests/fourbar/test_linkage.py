@@ -1,0 +1,117 @@
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import fourbar
+from fourbar import Bar, InputError
+from fourbar.files.scene_file import loads
+from fourbar_validation.engines.protocol import scene_to_json
+
+STEEL = 7850.0
+LENGTHS = (1.0, 0.4, 1.0, 0.8)
+CLOSE = 1e-6
+"""Relative: a difference quotient of second order against the derivative."""
+
+
+def make_scene(*, diameter: float = 0.02) -> fourbar.Scene:
+    d, *moving = LENGTHS
+    bars = (Bar(length, density=STEEL, diameter=diameter) for length in moving)
+    motion = fourbar.Motion(np.linspace(0.1, 6.0, 5), 2.0)
+    return fourbar.Scene(fourbar.FourBar(d, *bars), motion)
+
+
+def test_density_and_cross_section_give_the_mass_of_a_uniform_bar() -> None:
+    round_bar = Bar("0.4 m", density="7850 kg/m^3", diameter="20 mm")
+    flat = Bar("0.4 m", density="7850 kg/m^3", section=("20 mm", "5 mm"))
+    assert round_bar.mass == pytest.approx(STEEL * math.pi * 0.01**2 * 0.4, rel=1e-15)
+    assert flat.mass == pytest.approx(0.314, rel=1e-15)
+    assert flat.moment_of_inertia == pytest.approx(0.314 * 0.4**2 / 12.0, rel=1e-15)
+
+
+def test_the_section_modulus_is_that_of_the_second_moment_of_area() -> None:
+    """I over the distance of the outermost fibre, both integrated over strips of the area."""
+    y = np.linspace(-0.01, 0.01, 200_001)
+    chord = 2.0 * np.sqrt(np.maximum(0.01**2 - y * y, 0.0))
+    sections = {
+        Bar(1.0, section=(0.02, 0.005)): np.full_like(y, 0.005),
+        Bar(1.0, diameter=0.02): chord,
+    }
+    for bar, widths in sections.items():
+        second_moment = np.trapezoid(widths * y * y, y)
+        assert bar.section_modulus == pytest.approx(second_moment / 0.01, rel=1e-6)
+        assert bar.area == pytest.approx(np.trapezoid(widths, y), rel=1e-6)
+    assert Bar(1.0).section_modulus is None
+
+
+@pytest.mark.parametrize(
+    ("stated", "key"),
+    [
+        ({"density": STEEL}, "density"),
+        ({"density": STEEL, "diameter": 0.02, "mass": 1.0}, "mass"),
+        ({"density": STEEL, "diameter": 0.02, "section": (0.02, 0.01)}, "diameter"),
+        ({"section": (0.02, 0.0)}, "section"),
+        ({"section": "20 mm"}, "section"),
+        ({"density": "7850 kg/m^2", "diameter": 0.02}, "density"),
+    ],
+)
+def test_a_material_that_states_no_mass_is_refused(
+    stated: dict[str, object], key: str
+) -> None:
+    with pytest.raises(InputError) as error:
+        Bar(0.4, **stated)  # type: ignore[arg-type]
+    assert error.value.key == key
+
+
+def test_a_scene_file_names_the_bar_whose_material_is_wrong() -> None:
+    text = """\
+[lengths]
+ground = "1 m"
+input = "0.4 m"
+coupler = "1 m"
+output = "0.8 m"
+[bars.coupler]
+density = "7850 kg/m^3"
+"""
+    with pytest.raises(InputError, match=r"bars\.coupler\.density = '7850 kg/m"):
+        loads(text)
+
+
+def test_the_mass_follows_length_and_cross_section_in_a_study() -> None:
+    scene = make_scene()
+    varied = {"lengths.coupler": [1.0, 1.1], "bars.input.diameter": ["20 mm", "30 mm"]}
+    study = fourbar.solve(fourbar.vary(scene, varied))
+    coupler = Bar(1.1, density=STEEL, diameter=0.02)
+    input_bar = Bar(0.4, density=STEEL, diameter=0.03)
+    linkage = replace(scene.linkage, input=input_bar, coupler=coupler)
+    alone = fourbar.solve(replace(scene, linkage=linkage))
+    for name in ("torque", "F12", "F43"):
+        members = getattr(study, name)
+        assert np.array_equal(members[1], getattr(alone, name))
+        assert np.array_equal(members[0], getattr(fourbar.solve(scene), name))
+
+
+@pytest.mark.parametrize("key", ["lengths.coupler", "bars.coupler.diameter"])
+def test_the_sensitivity_to_a_length_counts_the_mass_that_follows(key: str) -> None:
+    scene, step = make_scene(), 1e-6
+    derived = fourbar.sensitivity(scene)
+    row = list(derived.keys).index(key)
+    nominal = derived.numbers[row]
+    beside = [nominal * (1.0 - step), nominal * (1.0 + step)]
+    low, high = fourbar.solve(fourbar.vary(scene, {key: beside})).torque
+    quotient = (high - low) / (2.0 * step * nominal)
+    assert derived.by["torque"][row] == pytest.approx(quotient, rel=CLOSE)
+
+
+def test_a_file_keeps_the_material_and_an_engine_is_told_the_mass() -> None:
+    scene = make_scene()
+    assert loads(fourbar.dump(scene)).linkage == scene.linkage
+    bars = scene_to_json(scene)["bars"]
+    assert bars["input"] == {"mass": scene.linkage.input.mass}
+
+
+def test_a_stated_mass_takes_the_place_of_the_density() -> None:
+    bar = make_scene().linkage.input
+    heavier = bar.with_mass(3.0)
+    assert (heavier.mass, heavier.density, heavier.diameter) == (3.0, None, 0.02)
