@@ -25,6 +25,7 @@ from fourbar.scene.motion import Free as Free
 from fourbar.scene.motion import FromLimit as FromLimit
 from fourbar.scene.motion import Law as Law
 from fourbar.scene.motion import Motion as Motion
+from fourbar.scene.motion import Rise as Rise
 from fourbar.scene.motion import Sweep as Sweep
 from fourbar.scene.numbers import Point as Point
 from fourbar.scene.numbers import Tolerance as Tolerance

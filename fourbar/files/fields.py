@@ -164,7 +164,7 @@ class Reader:
         if by.pair == "rad":
             return self.polar(key, value, by.unit)
         if not isinstance(value, list) or len(value) != 2:
-            form = self.QUANTITIES.format(by.unit)
+            form = f'["1 {by.unit}", "1 {by.pair}"]'
             raise self.refuse(key, value, f"must be a pair like {form}")
         first, second = (
             self.quantity(f"{key}[{index}]", value[index], unit, by.bounds[index])

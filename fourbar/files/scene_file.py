@@ -55,12 +55,14 @@ from fourbar.scene import Scene
 from fourbar.scene.motion import (
     COMMANDS,
     DEFAULT_STEPS,
+    KINDS,
     SPLINES,
     STROKE_COMMAND,
     Free,
     FromLimit,
     Law,
     Motion,
+    Rise,
     Sweep,
 )
 from fourbar.scene.numbers import Point, Tolerance
@@ -389,8 +391,10 @@ def _read_motion(read: Reader, value: object) -> Motion:
     return Motion(**arguments)
 
 
-def _read_law(read: Reader, value: object) -> Law:
+def _read_law(read: Reader, value: object) -> Law | Rise:
     key = "motion.law"
+    if isinstance(value, dict) and "kind" in value:
+        return _read_rise(read, key, value)
     angles = [names[0] for names in COMMANDS.values()]
     entry = read.table(key, value, ("time", *angles, "steps", "ends"))
     stated = [name for name in angles if name in entry] or angles[:1]
@@ -405,6 +409,14 @@ def _read_law(read: Reader, value: object) -> Law:
             for name in stated
         },
     )
+
+
+def _read_rise(read: Reader, key: str, value: object) -> Rise:
+    """Read a rise, a dwell, a fall and a rest by a standard law."""
+    entry = read.table(key, value, ("kind", *Rise.numbers, "steps"))
+    kind = read.choice(f"{key}.kind", entry["kind"], KINDS)
+    steps = read.whole(f"{key}.steps", entry.get("steps", DEFAULT_STEPS), 1, MOST_STEPS)
+    return Rise(kind, steps=steps, **read.numbers(key, entry, Rise.numbers))
 
 
 def _read_places(

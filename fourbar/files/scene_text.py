@@ -35,7 +35,7 @@ from fourbar.files.fields import (
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, PINS, POSITIVE, Bar, FourBar
 from fourbar.scene import Scene
 from fourbar.scene.drawing import DrawnPins
-from fourbar.scene.motion import BRANCH_NAMES, FromLimit, Law, Motion, Sweep
+from fourbar.scene.motion import BRANCH_NAMES, FromLimit, Law, Motion, Rise, Sweep
 from fourbar.studies.keys import find_misfit, list_entries
 from fourbar.writing import write_text
 
@@ -200,7 +200,9 @@ def _write_motion(motion: Motion) -> dict[str, Any]:
     return {key: value for key, value in entry.items() if value is not None}
 
 
-def _write_law(law: Law) -> dict[str, Any]:
+def _write_law(law: Law | Rise) -> dict[str, Any]:
+    if isinstance(law, Rise):
+        return {"kind": law.kind, **write_numbers(law), "steps": law.steps}
     times, angles = (
         [write_quantity(x, unit) for x in numbers]
         for numbers, unit in ((law.time, "s"), (law.angle, "rad"))

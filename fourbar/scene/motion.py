@@ -4,7 +4,7 @@ import math
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import accumulate, pairwise
 from typing import Any, ClassVar
 
 import numpy as np
@@ -12,10 +12,12 @@ import numpy as np
 from fourbar.errors import DependencyError, InputError, expect, say_install
 from fourbar.linkage import (
     A_BRANCH,
+    AT_LEAST_ZERO,
     MOST_STEPS,
     MOVING_BARS,
     POSITIVE,
     Declared,
+    check_numbers,
     require,
     require_numbers,
     require_whole,
@@ -43,6 +45,9 @@ SPLINES = {"free": "not-a-knot", "rest": "clamped", "periodic": "periodic"}
 FEWEST_POINTS = {"free": 4, "rest": 2, "periodic": 3}
 """Number of points that determine the cubic pieces."""
 MOST_POINTS = 100_000
+KINDS = ("cycloidal", "345")
+"""Standard laws of a rise."""
+TURN = 2.0 * math.pi
 
 
 @dataclass(frozen=True, slots=True)
@@ -223,6 +228,115 @@ class Law:
         return theta + mean * (time - t[0]), omega + mean, alpha
 
 
+def compute_law(kind: str, u: Array) -> tuple[Array, Array, Array]:
+    """Compute a law from 0 to 1 and its two derivatives at u in [0, 1]; speed and acceleration are 0 at both ends.
+
+    cycloidal: u - sin(2 pi u)/(2 pi);   345: 10 u^3 - 15 u^4 + 6 u^5.
+    """
+    v = 1.0 - u
+    if kind == "cycloidal":
+        near, rises = np.minimum(u, v), u <= v
+        sine, cosine = np.sin(TURN * near), np.cos(TURN * near)
+        place = near - sine / TURN
+        return (
+            np.where(rises, place, 1.0 - place),
+            1.0 - cosine,
+            TURN * np.where(rises, sine, -sine),
+        )
+    place = u**3 * (10.0 - 15.0 * u + 6.0 * u * u)
+    return place, 30.0 * (u * v) ** 2, 60.0 * u * v * (v - u)
+
+
+@dataclass(frozen=True, slots=True)
+class Rise:
+    """An angle that rises by a standard law, dwells, falls and rests.
+
+    Parameters
+    ----------
+    kind : "cycloidal" or "345".
+    rise : (angle, duration): how far the bar turns from its first angle and in which time, rad
+        and s; a negative angle turns clockwise.
+    theta_2, theta_3, theta_4 : first angle of the commanded bar, rad; the others are left out.
+    dwell : time at the end of the rise, s, >= 0.
+    fall : time in which the bar returns by the same law, s; left out: it does not.
+    rest : time at the first angle after the fall, s, >= 0.
+    steps : the law is evaluated at the ends of so many equal intervals of time.
+
+    >>> Rise("cycloidal", ("60 deg", "0.5 s"), theta_2="20 deg", dwell="0.2 s").time
+    (0.0, 0.5, 0.7)
+    """
+
+    kind: str
+    rise: tuple[float, float]
+    theta_2: float | None = None
+    dwell: float = 0.0
+    fall: float | None = None
+    rest: float = 0.0
+    steps: int = 360
+    theta_3: float | None = None
+    theta_4: float | None = None
+    numbers: ClassVar[dict[str, Declared]] = {
+        **{names[0]: Declared("rad", left_out=None) for names in COMMANDS.values()},
+        "rise": Declared("rad", pair="s"),
+        "dwell": Declared("s", AT_LEAST_ZERO, 0.0),
+        "fall": Declared("s", POSITIVE, None),
+        "rest": Declared("s", AT_LEAST_ZERO, 0.0),
+    }
+
+    def __post_init__(self) -> None:
+        key = "motion.law"
+        if self.kind not in KINDS:
+            allowed = "must be " + " or ".join(f'"{kind}"' for kind in KINDS)
+            raise InputError(f"{key}.kind", self.kind, allowed)
+        check_numbers(self, key)
+        if getattr(self, f"theta_{self.bar}") is None:
+            raise InputError(f"{key}.theta_2", None, "the first angle is missing")
+        if not self.rise[1] > 0.0:
+            raise InputError(f"{key}.rise", self.rise[1], "must last longer than 0 s")
+        if self.rest > 0.0 and self.fall is None:
+            raise InputError(f"{key}.rest", self.rest, "needs a fall before it")
+        steps = require_whole(f"{key}.steps", self.steps, *STEPS)
+        object.__setattr__(self, "steps", steps)
+
+    @property
+    def bar(self) -> int:
+        """Number of the bar whose angle the law gives: 2, 3 or 4."""
+        angles = {2: self.theta_2, 3: self.theta_3, 4: self.theta_4}
+        stated = {bar: (angle, None, 0.0) for bar, angle in angles.items()}
+        return find_bar("motion.law", stated) or 2
+
+    @property
+    def time(self) -> tuple[float, ...]:
+        """Times at which the rise, the dwell, the fall and the rest begin and end, as far as they last, s."""
+        durations = (self.rise[1], self.dwell, self.fall or 0.0, self.rest)
+        return tuple(accumulate((x for x in durations if x > 0.0), initial=0.0))
+
+    def times(self) -> Array:
+        """Return the times at which the law is evaluated, (steps + 1,), s."""
+        return np.linspace(0.0, self.time[-1], self.steps + 1)
+
+    def at(self, time: Array) -> tuple[Array, Array, Array]:
+        """Compute angle, speed and acceleration of the law's bar at times, each (n,)."""
+        time = require_numbers("time", time)
+        (angle, duration), first = self.rise, getattr(self, f"theta_{self.bar}")
+        place, speed, acceleration = _part(self.kind, time, duration)
+        if self.fall is not None:
+            late = time - (duration + self.dwell)
+            back = _part(self.kind, late, self.fall)
+            place, speed, acceleration = (
+                up - down
+                for up, down in zip((place, speed, acceleration), back, strict=True)
+            )
+        return first + angle * place, angle * speed, angle * acceleration
+
+
+def _part(kind: str, time: Array, duration: float) -> tuple[Array, Array, Array]:
+    """Compute a law from 0 to 1 over a duration, and its rates by time; before and after it stands still."""
+    u = np.clip(time / duration, 0.0, 1.0)
+    place, speed, acceleration = compute_law(kind, u)
+    return place, speed / duration, acceleration / (duration * duration)
+
+
 def _read_number(name: str, place: int) -> Any:
     """Make the property that reads a number of the command by its name; None (an acceleration: 0) if it has another."""
     field, otherwise = (
@@ -254,7 +368,7 @@ class Motion:
         points too. Where bar 3 is commanded it is sin(theta_4 - theta_2), by theta_3; where bar 4 is, it is
         sin(theta_3 - theta_2), for 180 deg < theta_4 - theta_1 < 360 deg.
     free : released motion instead of a prescribed one.
-    law : an angle over time instead of theta_2, omega_2 and alpha_2.
+    law : an angle over time instead of theta_2, omega_2 and alpha_2: a Law through points, or a Rise.
     theta_3, omega_3, alpha_3, theta_4, omega_4, alpha_4 : of the coupler or the output instead.
     stroke, stroke_speed, stroke_acceleration : of the scene's cylinder between the ground and bar 2 or 4 instead: one
         stroke, an array of them or a Sweep, m; m/s; m/s^2.
@@ -275,7 +389,7 @@ class Motion:
     branch: int
     """Assembly, +1 open or -1 crossed."""
     free: Free | None
-    law: Law | None
+    law: Law | Rise | None
     side: str | None
     numbers: ClassVar[dict[str, Declared]] = {
         name: Declared(f"{unit}{per}")
@@ -300,7 +414,7 @@ class Motion:
         alpha_2: float = 0.0,
         branch: int = OPEN,
         free: Free | None = None,
-        law: Law | None = None,
+        law: Law | Rise | None = None,
         theta_3: float | Array | Sweep | FromLimit | None = None,
         omega_3: float | None = None,
         alpha_3: float = 0.0,
@@ -312,7 +426,7 @@ class Motion:
         stroke_acceleration: float = 0.0,
         side: str | None = None,
     ) -> None:
-        expect("motion.law", law, Law, type(None))
+        expect("motion.law", law, Law, Rise, type(None))
         angles = {
             2: (theta_2, omega_2, alpha_2),
             3: (theta_3, omega_3, alpha_3),
@@ -346,7 +460,7 @@ class Motion:
         if law is not None and (stated is not None or free is not None):
             raise InputError(
                 "motion.law",
-                law.ends,
+                "a law",
                 f"stands alone: it gives {', '.join(names[:2])} and {names[2]}",
             )
         if isinstance(branch, str):
@@ -462,7 +576,7 @@ def require_steps(motion: Motion, most: int, place: str, file: str) -> None:
         ("law", motion.law),
         ("free", motion.free),
     ):
-        if isinstance(stated, (Sweep, Law, Free)) and stated.steps >= most:
+        if isinstance(stated, (Sweep, Law, Rise, Free)) and stated.steps >= most:
             raise InputError(
                 f"motion.{name}.steps",
                 stated.steps,

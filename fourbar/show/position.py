@@ -9,15 +9,13 @@ from fourbar.quantities import DERIVED_NAMES
 from fourbar.scene import Scene
 from fourbar.show.columns import read_column
 from fourbar.show.derived import derive
-from fourbar.show.units import POSITION_DIGITS, choose_unit
+from fourbar.show.units import POSITION_DIGITS, ROUND_OFF, choose_unit
 from fourbar.solution import Array, Conversion, Solution, find_values
 
 LABEL, CELL = 15, 15
 """Width of a label and of a cell: four of them and a unit are 80 columns."""
 NUMBER_LABEL = 22
 """Width of the label of a number that stands alone."""
-ROUND_OFF = 1e-13
-"""Part of the largest number of its kind below which a number is shown as zero."""
 FORCE_HEADS = {pin: f"{name} at {pin}" for pin, name in PIN_FORCE.items()}
 
 
@@ -42,6 +40,8 @@ class PositionSheet:
             if any(value is None for value in values):
                 continue
             numbers = np.array([value[0] for value in values])
+            largest = np.nanmax(np.abs(numbers), initial=0.0)
+            numbers = np.where(np.abs(numbers) <= ROUND_OFF * largest, 0.0, numbers)
             factor, name = choose_unit(0.0, unit, self.units)
             form = ".4f" if letter == "theta" else f".{POSITION_DIGITS}g"
             columns[f"{letter}, {name}"] = _write_numbers(factor * numbers, form)

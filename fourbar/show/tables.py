@@ -13,6 +13,7 @@ from fourbar.quantities import ANGLES, DERIVED_NAMES, OK, PIN_FORCES, UNITS
 from fourbar.show.columns import Column
 from fourbar.show.derived import derive
 from fourbar.show.duty import read_drive
+from fourbar.show.units import ROUND_OFF
 from fourbar.solution import (
     DEGREES,
     Array,
@@ -239,11 +240,19 @@ def make_table(
 
 
 def write_cells(values: Array, form: str = ".6g") -> list[str]:
-    """Write six digits, or another form; a dash where there is no value."""
-    return [
-        format(value, form) if math.isfinite(value) else "-"
-        for value in values.tolist()
-    ]
+    """Write six digits, or another form; a dash where there is no value, 0 for what is rounding of the others."""
+    sizes = np.abs(values[np.isfinite(values)])
+    # not the largest, which may stand beside a pole
+    usual = float(np.percentile(sizes, 90.0)) if sizes.size else 0.0
+    cells = []
+    for value in values.tolist():
+        text = format(0.0 if abs(value) <= ROUND_OFF * usual else value, form)
+        if not math.isfinite(value):
+            text = "-"
+        elif float(text) == 0.0:
+            text = text.removeprefix("-")
+        cells.append(text)
+    return cells
 
 
 def _count_digits(torque: Array, error: Array) -> list[str]:

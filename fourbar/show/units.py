@@ -155,6 +155,8 @@ def choose_unit(largest: float, unit: str, units: Conversion = SI) -> tuple[floa
     return 1.0 / size, prefix + unit
 
 
+ROUND_OFF = 1e-13
+"""Part of the largest number of its kind below which a number is shown as zero."""
 DIGITS, POSITION_DIGITS = 4, 6
 """Significant digits of a number of a summary, and of one about a single position."""
 

@@ -23,7 +23,7 @@ from fourbar.effects import (
 from fourbar.formulas.mobility import limit_positions
 from fourbar.linkage import PINS, Bar, FourBar, uniform
 from fourbar.scene import Scene
-from fourbar.scene.motion import CROSSED, Free, FromLimit, Law, Motion, Sweep
+from fourbar.scene.motion import CROSSED, Free, FromLimit, Law, Motion, Rise, Sweep
 from fourbar.scene.numbers import Point
 from fourbar_validation.scenes.suites import read_default_suite
 
@@ -35,6 +35,12 @@ CRANK = FourBar(
     ground_angle=0.2,
 )
 SLENDER = FourBar(0.3, Bar(0.1, 0.2), Bar(0.25, 0.5), Bar(0.22, 0.4), ground_angle=0.2)
+ROUND_AND_FLAT = FourBar(
+    0.3,
+    Bar(0.1, density=7850.0, diameter=0.02),
+    Bar(0.25, density=2700.0, section=(0.02, 0.005)),
+    Bar(0.22, 0.4),
+)
 ROCKER = FourBar(0.3, Bar(0.25, 0.7), Bar(0.1, 1.3), Bar(0.22, 0.9))
 TURN = Motion(Sweep(0.1, 0.1 + 2.0 * math.pi, 24), 10.0, 5.0)
 LOADS = (
@@ -213,6 +219,14 @@ FAULT_SCENES: dict[str, Scene] = {
     ),
     "law at rest": Scene(
         CRANK, Motion(law=Law((0.0, 0.3, 0.7, 1.0), (0.3, 1.0, 2.2, 3.0), 16, "rest"))
+    ),
+    "rises": Scene(
+        ROUND_AND_FLAT,
+        Motion(law=Rise("cycloidal", (1.2, 0.4), 0.3, 0.1, 0.3, 0.1, steps=24)),
+        effects=(WEIGHT,),
+    ),
+    "3-4-5 rise": Scene(
+        ROUND_AND_FLAT, Motion(law=Rise("345", (1.2, 0.4), 0.3, 0.1, steps=24))
     ),
     "free law": Scene(
         CRANK, Motion(law=Law((0.0, 0.3, 0.7, 1.0, 1.4), (0.3, 1.0, 2.2, 3.0, 3.3), 16))

@@ -200,3 +200,209 @@ def test_a_linkage_by_the_coordinates_of_its_joints(ask: Steps, tmp_path: Path) 
     curve = fourbar.coupler_curve(scene, "E", steps=4000)
     x, y = (np.asarray(z) + o for z, o in zip(curve[2:], scene.origin, strict=True))
     assert np.hypot(x + 0.02591, y - 0.01657).min() < 1e-4
+
+
+def list_columns(text: str) -> list[list[float]]:
+    """Return the rows of numbers of a printed table."""
+    below = text[text.index("──") :].splitlines()[1:]
+    rows = [line.split() for line in below if not line.startswith(("shown", "not"))]
+    return [[float(cell) for cell in row] for row in rows if row]
+
+
+def test_a_new_parallelogram_is_one_over_the_whole_turn(ask: Steps) -> None:
+    """Two commands; 0.3924 cos(theta_2), at 0 and 180 deg as the limit."""
+    ask("new", "tp.toml", "--lengths", "300mm", "100mm", "300mm", "100mm")
+    text = ask("analyze", "tp.toml")
+    assert text.startswith('Parallelogram "New linkage", open branch:')
+    assert "ntiparallelogram" not in text
+    assert "change points at theta_2 = 0 deg and 180 deg" in text
+    assert row_of(text, "torque")[0] == pytest.approx(392.4, rel=PRINTED)
+    rows = list_columns(ask("analyze", "tp.toml", "--columns", "theta_2,torque"))
+    assert len(rows) == 361
+    for theta_2, torque in rows:
+        right = 0.3924 * np.cos(np.radians(theta_2))
+        assert torque == pytest.approx(right, abs=2e-6), theta_2
+
+
+def test_the_static_torque_of_a_long_parallelogram(ask: Steps, tmp_path: Path) -> None:
+    """A command, an edit, a command: 1 kg on the coupler, g = 10 m/s^2, arms of 1 m."""
+    ask("new", "lift.toml", "--lengths", "3", "1", "3", "1", "--unit", "m")
+    text = (tmp_path / "lift.toml").read_text()
+    text = text.replace('mass = "1.0 kg"', 'mass = "0 kg"')
+    text = text.replace('mass = "3.0 kg"', 'mass = "1 kg"')
+    text = text.replace('"60 rpm"', '"0 rad/s"').replace('"9.81 m/s^2"', '"10 m/s^2"')
+    (tmp_path / "lift.toml").write_text(text)
+    text = ask("analyze", "lift.toml", "--at", "60 deg")
+    assert row_of(text, "torque") == pytest.approx([5.0], rel=PRINTED)
+    assert row_of(text, "bar 4") == pytest.approx([60.0, 0.0, 0.0], rel=PRINTED)
+
+
+HANGING = """\
+title = "Platform hanging on two equal arms"
+[pins]
+O2 = ["0 mm", "0 mm"]
+A = ["100 mm", "-173.205 mm"]
+B = ["400 mm", "-173.205 mm"]
+O4 = ["300 mm", "0 mm"]
+[bars.coupler]
+mass = "10 kg"
+[motion]
+theta_2 = { from = "-60 deg", to = "-120 deg", steps = 60 }
+omega_2 = "0 rad/s"
+[effects]
+gravity = ["9.81 m/s^2", "-90 deg"]
+"""
+
+
+def test_a_platform_that_hangs_on_two_arms_as_it_is_drawn(
+    ask: Steps, tmp_path: Path
+) -> None:
+    """Arms of 200 mm, whose drawn ends are rounded to a thousandth of a millimetre."""
+    (tmp_path / "platform.toml").write_text(HANGING)
+    text = ask("analyze", "platform.toml")
+    assert text.startswith("Parallelogram")
+    assert abs(row_of(text, "torque")[0]) == pytest.approx(9.81, rel=1e-4)
+    assert row_of(text, "peak") == pytest.approx([56.64] * 4, rel=1e-4)
+
+
+COUPLE = """\
+title = "Bar on two parallel links, given couple"
+[pins]
+O2 = ["0 m", "0 m"]
+A = ["1.5 m", "0 m"]
+B = ["1.5 m", "1.8 m"]
+O4 = ["0 m", "1.8 m"]
+[bars.coupler]
+mass = "150 kg"
+centre = { drawn = ["1.5 m", "1.2 m"] }
+[motion]
+theta_2 = "drawn"
+omega_2 = "0 rad/s"
+free = { duration = "1 s", steps = 200 }
+[[loads]]
+bar = 2
+moment = "5 kN m"
+[effects]
+gravity = ["9.81 m/s^2", "-90 deg"]
+"""
+
+
+def test_a_given_couple_moves_two_parallel_links_from_rest(
+    ask: Steps, tmp_path: Path
+) -> None:
+    """alpha = 14.8148 - 6.54 cos 30 deg; the upper link carries 2.139 kN."""
+    (tmp_path / "links.toml").write_text(COUPLE)
+    text = ask("analyze", "links.toml", "--at", "30 deg")
+    assert text.startswith("Parallelogram")
+    alpha = 14.8148148 - 6.54 * np.cos(np.radians(30.0))
+    right = [30.0, 2.9957, alpha]
+    assert row_of(text, "bar 2") == pytest.approx(right, rel=1e-4)
+    assert row_of(text, "F43 at B")[2] == pytest.approx(2.139, rel=1e-3)
+    assert row_of(text, "F14 at O4")[2] == pytest.approx(2.139, rel=1e-3)
+
+
+HUNG = """\
+title = "Weight hung at the tip of the rocker"
+[lengths]
+ground = "300 mm"
+input = "100 mm"
+coupler = "250 mm"
+output = "220 mm"
+[motion]
+theta_2 = ["0 deg", "90 deg", "180 deg", "270 deg"]
+omega_2 = "0 rad/s"
+[[loads]]
+bar = 4
+force = ["10 N", "-90 deg"]
+from_pin = ["300 mm", "0 deg"]
+"""
+
+
+def test_a_weight_hung_at_the_tip_of_the_rocker(ask: Steps, tmp_path: Path) -> None:
+    (tmp_path / "hung.toml").write_text(HUNG)
+    rows = list_columns(ask("analyze", "hung.toml", "--columns", "theta_2,torque"))
+    right = [0.441477, -0.417152, -0.621733, 0.532516]
+    assert [torque for _, torque in rows] == pytest.approx(right, rel=PRINTED)
+
+
+PULL = """\
+title = "Force along x at the rocker's end"
+[lengths]
+ground = "12 cm"
+input = "5 cm"
+coupler = "10 cm"
+output = "8 cm"
+[motion]
+theta_2 = "60 deg"
+omega_2 = "10 deg/s"
+alpha_2 = "5 deg/s^2"
+[[loads]]
+bar = 4
+force = ["50 N", "0 deg"]
+from_pin = ["8 cm", "0 deg"]
+"""
+
+
+def test_a_force_along_x_at_the_end_of_the_rocker(ask: Steps, tmp_path: Path) -> None:
+    (tmp_path / "pull.toml").write_text(PULL)
+    text = ask("analyze", "pull.toml")
+    assert row_of(text, "torque") == pytest.approx([1.656231], rel=PRINTED)
+    assert row_of(text, "bar 2") == pytest.approx([60.0, 10.0, 5.0], rel=PRINTED)
+
+
+RODS = """\
+title = "Steel rods at 20 rpm, no gravity"
+[lengths]
+ground = "1 m"
+input = "0.4 m"
+coupler = "1 m"
+output = "0.8 m"
+[bars]
+input = { density = "7957.748 kg/m^3", diameter = "20 mm" }
+coupler = { density = "7957.748 kg/m^3", diameter = "20 mm" }
+output = { density = "7957.748 kg/m^3", diameter = "20 mm" }
+[motion]
+theta_2 = { from = "0 deg", to = "360 deg", steps = 360 }
+omega_2 = "20 rpm"
+"""
+
+
+def test_steel_rods_by_their_density(ask: Steps, tmp_path: Path) -> None:
+    """A file, two commands: torque, pins and stress; the shaking force position by position."""
+    (tmp_path / "rods.toml").write_text(RODS)
+    text = ask("analyze", "rods.toml")
+    peak, place, rms = row_of(text, "torque")
+    assert (peak, rms) == pytest.approx((-3.04213, 1.01795), rel=2e-4)
+    assert place == pytest.approx(2.517, abs=0.02)
+    pins = row_of(text, "peak", after="pins")
+    assert pins == pytest.approx([14.974, 14.151, 8.728, 7.907], rel=5e-4)
+    moments, stresses = (
+        np.array(row_of(text, label, after="bending")) for label in ("moment", "stress")
+    )
+    modulus = np.pi * 0.02**3 / 32.0
+    assert 1e6 * stresses == pytest.approx(moments / modulus, rel=1e-3)
+    rows = list_columns(ask("analyze", "rods.toml", "--columns", "shaking_force"))
+    assert max(rows)[0] == pytest.approx(12.7176, rel=1e-4)
+
+
+MASSLESS = """\
+title = "Massless rocker"
+[lengths]
+ground = "2 m"
+input = "1 m"
+coupler = "3 m"
+output = "3 m"
+[bars.coupler]
+mass = "1 kg"
+[motion]
+omega_2 = "1 rad/s"
+[effects]
+gravity = ["9.81 m/s^2", "-90 deg"]
+"""
+
+
+def test_a_bar_without_mass_is_not_bent(ask: Steps, tmp_path: Path) -> None:
+    (tmp_path / "rocker.toml").write_text(MASSLESS)
+    text = ask("analyze", "rocker.toml")
+    assert row_of(text, "moment", after="bending")[2] == 0.0
+    assert "without bound" not in text

@@ -22,7 +22,7 @@ from fourbar.effects import (
 from fourbar.effects.pin_friction import MANY, NONE, ONE, solve_sliding
 from fourbar.errors import InputError, LimitError
 from fourbar.scene import Scene
-from fourbar.scene.motion import Law, Motion, Sweep
+from fourbar.scene.motion import Law, Motion, Rise, Sweep
 from fourbar.solve import solve
 from fourbar_validation.engines.effects import look_up
 from tests.support.scenes import crank_rocker
@@ -302,6 +302,64 @@ def test_speed_and_acceleration_are_the_slopes_of_the_law(ends: str) -> None:
     # central differences: third derivative times step^2/6, and rounding over the step
     assert here[1] == pytest.approx((after[0] - before[0]) / (2 * step), rel=1e-7)
     assert here[2] == pytest.approx((after[1] - before[1]) / (2 * step), rel=1e-7)
+
+
+CAM = {"rise": (1.0, 0.5), "dwell": 0.2, "fall": 0.4, "rest": 0.1}
+
+
+@pytest.mark.parametrize(
+    ("kind", "speed", "acceleration"),
+    [("cycloidal", 2.0, 2.0 * math.pi), ("345", 1.875, 10.0 / math.sqrt(3.0))],
+)
+def test_a_standard_law_has_the_factors_of_the_books(
+    kind: str, speed: float, acceleration: float
+) -> None:
+    """C_v = 2, C_a = 2 pi of the cycloidal law; 1.875 and 5.7735 of the 3-4-5 polynomial."""
+    law = Rise(kind, (1.0, 0.5), theta_2=0.3)
+    time = np.linspace(0.0, 0.5, 100_001)
+    theta, omega, alpha = law.at(time)
+    assert np.abs(omega).max() * 0.5 == pytest.approx(speed, rel=1e-8)
+    assert np.abs(alpha).max() * 0.25 == pytest.approx(acceleration, rel=1e-8)
+    assert theta[[0, 50_000, -1]] == pytest.approx([0.3, 0.8, 1.3], rel=1e-15)
+
+
+@pytest.mark.parametrize("kind", ["cycloidal", "345"])
+def test_rise_dwell_fall_and_rest_join_without_a_jump(kind: str) -> None:
+    law = Rise(kind, theta_4=-0.4, **CAM)  # type: ignore[arg-type]
+    assert law.bar == 4
+    assert law.time == pytest.approx((0.0, 0.5, 0.7, 1.1, 1.2))
+    theta, omega, alpha = law.at(np.array(law.time))
+    assert theta == pytest.approx([-0.4, 0.6, 0.6, -0.4, -0.4], abs=1e-15)
+    assert np.abs(omega).max() < 1e-15
+    assert np.abs(alpha).max() < 1e-12
+    inside, step = np.array([0.1, 0.3, 0.45, 0.6, 0.75, 0.9, 1.05, 1.15]), 1e-5
+    before, here, after = (law.at(inside + shift) for shift in (-step, 0.0, step))
+    for order in (1, 2):
+        slope = (after[order - 1] - before[order - 1]) / (2.0 * step)
+        assert here[order] == pytest.approx(slope, abs=1e-6)
+
+
+def test_a_rise_that_does_not_fall_stays() -> None:
+    theta, omega, alpha = Rise("345", (-1.0, 0.5), 2.0, dwell=0.3).at(
+        np.array([0.5, 0.65, 0.8])
+    )
+    assert theta.tolist() == [1.0, 1.0, 1.0]
+    assert [*omega, *alpha] == [0.0] * 6
+
+
+@pytest.mark.parametrize(
+    ("stated", "key"),
+    [
+        ({"kind": "harmonic", "rise": (1.0, 0.5), "theta_2": 0.0}, "kind"),
+        ({"kind": "345", "rise": (1.0, 0.0), "theta_2": 0.0}, "rise"),
+        ({"kind": "345", "rise": (1.0, 0.5)}, "theta_2"),
+        ({"kind": "345", "rise": (1.0, 0.5), "theta_2": 0.0, "rest": 0.1}, "rest"),
+        ({"kind": "345", "rise": (1.0, 0.5), "theta_2": 0.0, "dwell": -0.1}, "dwell"),
+    ],
+)
+def test_a_rise_that_cannot_be_is_refused(stated: dict[str, object], key: str) -> None:
+    with pytest.raises(InputError, match=f"law.{key}"):
+        Rise(**stated)  # type: ignore[arg-type]
 
 
 def test_each_position_of_a_law_is_that_motion_alone() -> None:

@@ -38,13 +38,19 @@ def through_text(data):
 
 
 def stated(scene):
-    """What a guest is told: every place from its bar's pin, the motion apart.
+    """What a guest is told: every place from its bar's pin, every mass, the motion apart.
 
     No words, pictures, points and tolerances.
     """
     scene = state_from_pins(scene)
+    link = scene.linkage
+    input_bar, coupler, output = (
+        replace(bar.with_mass(bar.mass), section=None, diameter=None)
+        for bar in link.moving
+    )
     return replace(
         scene,
+        linkage=replace(link, input=input_bar, coupler=coupler, output=output),
         motion=fourbar.Motion(),
         title="",
         source="",

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from fourbar.scene import Scene
+from fourbar.scene.motion import Law, Rise
 from fourbar_validation.engines.effects import TERM_OF
 from fourbar_validation.run import pool
 from fourbar_validation.run.judge import judge
@@ -38,9 +39,7 @@ def uses(scene: Scene) -> Iterator[Any]:
     if any(load.table for load in scene.loads):
         yield "load over a table"
     if motion.law is not None:
-        yield f"law with ends {motion.law.ends}"
-        if motion.law.ends == "periodic" and motion.law.time[0] != 0.0:
-            yield "periodic law that begins late"
+        yield from uses_of_law(motion.law)
     if motion.free is not None and any(
         effect.key == "flywheel" for effect in scene.effects
     ):
@@ -52,6 +51,15 @@ def uses(scene: Scene) -> Iterator[Any]:
         yield "tolerances"
     if scene.points:
         yield "points"
+
+
+def uses_of_law(law: Law | Rise) -> Iterator[str]:
+    if isinstance(law, Rise):
+        yield f"{law.kind} law"
+        return
+    yield f"law with ends {law.ends}"
+    if law.ends == "periodic" and law.time[0] != 0.0:
+        yield "periodic law that begins late"
 
 
 def test_the_default_suite_uses_every_capability() -> None:
@@ -75,6 +83,7 @@ def test_the_default_suite_uses_every_capability() -> None:
     }
     wanted |= {
         "law with ends rest",
+        "cycloidal law",
         "periodic law that begins late",
         "released with a flywheel",
     }

@@ -25,7 +25,12 @@ from fourbar.effects import (
 )
 from fourbar.linkage import MOVING_BARS
 from fourbar.scene import Scene
-from fourbar_validation.engines.description import PINS, find_centre, find_inertia
+from fourbar_validation.engines.description import (
+    PINS,
+    find_centre,
+    find_inertia,
+    find_mass,
+)
 
 Ball: TypeAlias = Any
 Complex: TypeAlias = Any
@@ -76,7 +81,7 @@ def collect_inputs(scene: Scene, angle: float) -> dict[str, float]:
             values["direction"] = scene.drive.direction
     for k in MOVING_BARS:
         bar = link.bar(k)
-        values |= {f"m{k}": bar.mass, f"I{k}": find_inertia(bar)}
+        values |= {f"m{k}": find_mass(bar), f"I{k}": find_inertia(bar)}
         values[f"r{k}"], values[f"phi{k}"] = find_centre(bar)
     for k, load in enumerate(scene.loads):
         f, f_angle = load.force or (0.0, 0.0)

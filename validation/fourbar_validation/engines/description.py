@@ -48,9 +48,23 @@ class ModelEntry(NamedTuple):
     attribute: str = ""
 
 
+def find_mass(bar: Bar) -> float:
+    """Return the mass, kg: as stated, or density times the volume from pin to pin."""
+    if bar.density is None:
+        return bar.mass
+    if bar.section is not None:
+        height, thickness = bar.section
+        return bar.density * (height * thickness) * bar.length
+    assert bar.diameter is not None
+    radius = bar.diameter / 2.0
+    return bar.density * (math.pi * (radius * radius)) * bar.length
+
+
 def find_inertia(bar: Bar) -> float:
     """Return the moment of inertia about G, kg m^2: as stated, or that of a uniform slender bar, m L^2/12."""
-    return bar.inertia if bar.inertia is not None else bar.mass * bar.length**2 / 12.0
+    if bar.inertia is not None:
+        return bar.inertia
+    return find_mass(bar) * bar.length**2 / 12.0
 
 
 def find_centre(bar: Bar) -> tuple[float, float]:
@@ -60,7 +74,7 @@ def find_centre(bar: Bar) -> tuple[float, float]:
 
 def about_first_pin(bar: Bar) -> float:
     """Compute the moment of inertia about the first pin, kg m^2."""
-    return find_inertia(bar) + bar.mass * find_centre(bar)[0] ** 2
+    return find_inertia(bar) + find_mass(bar) * find_centre(bar)[0] ** 2
 
 
 def resolve(size: float, angle: float) -> tuple[float, float]:
@@ -139,7 +153,7 @@ def list_parts(linkage: FourBar) -> list[Part]:
             Part(
                 number,
                 *first_pins[number],
-                bar.mass,
+                find_mass(bar),
                 find_inertia(bar),
                 bar.length,
                 points,

@@ -22,6 +22,7 @@ from fourbar_validation.engines.description import (
     SHARED,
     about_first_pin,
     find_centre,
+    find_mass,
     find_unknown,
     list_speeds,
     state_from_pins,
@@ -365,11 +366,11 @@ def _add_inertia(motion: BodyMotion, wrenches: BodyWrenches) -> None:
     for number in MOVING_BARS:
         bar = motion.linkage.bar(number)
         arm, alpha = motion.to_centre(number), motion.alpha[number]
-        wrenches.push(number, -bar.mass * motion.swing(number, arm), 0.0)
+        wrenches.push(number, -find_mass(bar) * motion.swing(number, arm), 0.0)
         wrenches.twist(number, -about_first_pin(bar) * alpha)
     wrenches.push(
         3,
-        -motion.linkage.coupler.mass * motion.swing(2, motion.first_pin[3]),
+        -find_mass(motion.linkage.coupler) * motion.swing(2, motion.first_pin[3]),
         motion.to_centre(3),
     )
 

@@ -14,7 +14,12 @@ from numpy.typing import NDArray
 from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.scene import Scene, command, with_signs
 from fourbar_validation.compare.answer import Array
-from fourbar_validation.engines.description import PINS, declares, find_centre
+from fourbar_validation.engines.description import (
+    PINS,
+    declares,
+    find_centre,
+    find_mass,
+)
 from fourbar_validation.engines.free_body_closure import Complex, close, cross
 
 HALF_TURN = math.pi * (1.0 - 1e-12)
@@ -111,7 +116,7 @@ def _apply_gravity(effect: Any, motion: BodyMotion, wrenches: BodyWrenches) -> N
     for bar in MOVING_BARS:
         wrenches.push(
             bar,
-            motion.linkage.bar(bar).mass
+            find_mass(motion.linkage.bar(bar))
             * make_vector((effect.magnitude, effect.angle)),
             motion.to_centre(bar),
         )

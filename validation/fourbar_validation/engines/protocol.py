@@ -24,7 +24,7 @@ from fourbar.scene import command as command_of
 from fourbar.scene.motion import COMMANDS, STROKE_COMMAND, Free, Motion
 from fourbar_validation.compare.answer import Answer, Array, EngineError, ReleasedAnswer
 from fourbar_validation.compare.rows import write_one_line
-from fourbar_validation.engines.description import state_from_pins
+from fourbar_validation.engines.description import find_mass, state_from_pins
 
 PROTOCOL = 3
 """Number of the contract; a change that an engine must know of raises it."""
@@ -58,7 +58,7 @@ def scene_to_json(scene: Scene) -> dict[str, Any]:
     Every place is a pair from its bar's first pin, but for the arm of a load. A bar has its mass, whatever states it.
     """
     bars: dict[str, Any] = {
-        BAR_NAMES[number]: Bar(bar.length, bar.mass, bar.inertia, bar.centre)
+        BAR_NAMES[number]: Bar(bar.length, find_mass(bar), bar.inertia, bar.centre)
         for number, bar in zip(MOVING_BARS, scene.linkage.moving, strict=True)
     }
     plain = replace(scene, linkage=replace(scene.linkage, **bars))

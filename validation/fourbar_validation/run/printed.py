@@ -11,6 +11,7 @@ from fourbar.evaluation.case import BLOCK
 from fourbar.linkage import MOVING_BARS, PIN_FORCE
 from fourbar.quantities import FORCES, OK, PIN_FORCES
 from fourbar.scene import Command, Scene
+from fourbar.scene.motion import Rise
 from fourbar.solution import Solution
 from fourbar.solve import solve
 from fourbar_validation.compare.rows import FAILS, FORMULAS, UNDECIDED, Row
@@ -349,6 +350,9 @@ def check_law(question: Question) -> Iterator[Row]:
     if law is None or command.time is None:
         return
     assert isinstance(command.speed, np.ndarray)
+    if isinstance(law, Rise):
+        yield _check_rise(question, law)
+        return
     t, angle = np.array(law.time), np.array(law.angle)
     h, rise = np.diff(t), np.diff(angle) / np.diff(t)
     speed = law.at(t)[1]
@@ -393,6 +397,53 @@ def check_law(question: Question) -> Iterator[Row]:
         IDENTITY.factor,
         "the piecewise cubic through the table, its acceleration continuous",
     )
+
+
+def _check_rise(question: Question, law: Rise) -> Row:
+    """Check a rise, its dwell and its fall by other forms of the standard laws, part by part.
+
+    cycloidal, with x = pi u:  u - sin x cos x/pi,  2 sin^2 x,  4 pi sin x cos x;
+    345: the polynomial of Bernstein with the coefficients 0, 0, 0, 1, 1, 1, and its derivatives.
+    """
+    command = question.at
+    assert command.time is not None
+    assert command.speed is not None
+    (rise, duration), start = law.rise, getattr(law, f"theta_{law.bar}")
+    parts = [(0.0, duration, rise)]
+    if law.fall is not None:
+        parts.append((duration + law.dwell, law.fall, -rise))
+    rates = np.zeros((3, len(command.time)))
+    rates[0] += start
+    for begin, lasts, height in parts:
+        u = np.clip((command.time - begin) / lasts, 0.0, 1.0)
+        for order, rate in enumerate(_restate_law(law.kind, u)):
+            rates[order] += height * rate / lasts**order
+    shortest = min(lasts for _, lasts, _ in parts)
+    stated = [command.angle, command.speed, command.acceleration]
+    size = abs(start) + abs(rise)
+    # the time of a position is rounded, as a part of the whole motion
+    late = law.time[-1] / shortest
+    along = [
+        np.abs(rate - np.asarray(value)) * shortest**order / (size * late)
+        for order, (rate, value) in enumerate(zip(rates, stated, strict=True))
+    ]
+    reason = f"the {law.kind} law in another form"
+    return question.row("law", np.max(along, axis=0), IDENTITY.factor, reason)
+
+
+def _restate_law(kind: str, u: Array) -> tuple[Array, Array, Array]:
+    """Compute a standard law from 0 to 1 and its two derivatives in other forms."""
+    v = 1.0 - u
+    if kind == "cycloidal":
+        sine, cosine = np.sin(np.pi * u), np.cos(np.pi * u)
+        return (
+            u - sine * cosine / np.pi,
+            2.0 * sine * sine,
+            4.0 * np.pi * sine * cosine,
+        )
+    place = u**3 * (10.0 * v * v + 5.0 * u * v + u * u)
+    speed = 30.0 * (u**4 - 2.0 * u**3 + u * u)
+    return place, speed, 60.0 * (2.0 * u**3 - 3.0 * u * u + u)
 
 
 def _interpolate_hermite(

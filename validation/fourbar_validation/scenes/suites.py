@@ -13,7 +13,7 @@ from fourbar import writing
 from fourbar.errors import InputError
 from fourbar.files import loads, read_text
 from fourbar.scene import Scene
-from fourbar.scene.motion import DEFAULT_STEPS, Free, Law, Sweep, require_steps
+from fourbar.scene.motion import DEFAULT_STEPS, Free, Law, Rise, Sweep, require_steps
 from fourbar_validation.compare.rows import make_plain
 from fourbar_validation.places import MODELS
 from fourbar_validation.scenes.random import DrawnType, draw_random_scene
@@ -141,7 +141,7 @@ def _count_positions(scene: Scene, file: Path) -> int:
     """Count the positions that a scene asks for, or what takes as long; InputError beyond the most."""
     require_steps(scene.motion, MOST_POSITIONS, "in a run", str(file))
     for stated in (scene.motion.angle, scene.motion.law, scene.motion.free):
-        if isinstance(stated, (Sweep, Law, Free)):
+        if isinstance(stated, (Sweep, Law, Rise, Free)):
             seconds = stated.duration if isinstance(stated, Free) else 0.0
             if seconds > MOST_SECONDS:
                 allowed = f"must not exceed {MOST_SECONDS:g} s in a run: engines go through it in steps of 1 ms"

@@ -12,7 +12,7 @@ import pytest
 import fourbar
 from fourbar.effects import Friction, Gravity, Load, Table
 from fourbar.scene import Scene
-from fourbar.scene.motion import Law
+from fourbar.scene.motion import Law, Rise
 from fourbar_validation.compare.rows import Row
 from fourbar_validation.engines.mujoco import runner, simulate
 from fourbar_validation.engines.mujoco.runner import OVERRUN, clip_angles
@@ -23,7 +23,7 @@ from tests.support.scenes import crank_rocker
 KINK = 1e-5
 """rad; where the cubic pieces of a law meet within a step of RK4 the motion errs by h^2: measured 3e-6 here."""
 SIMULATED = [replace(engine, order=None) for engine in ENGINES if engine.through_time]
-LAWS = {
+LAWS: dict[str, Law | Rise] = {
     "periodic": Law(
         (0.0, 0.2, 0.5, 1.0), (0.0, 1.0, 3.5, 2.0 * math.pi), 24, "periodic"
     ),
@@ -33,6 +33,7 @@ LAWS = {
     "backwards, time not from 0": Law(
         (1.0, 1.2, 1.5, 2.0, 2.2), (0.0, -1.0, -2.2, -2.5, -2.6), 24, "free"
     ),
+    "cycloidal, with a dwell": Rise("cycloidal", (1.2, 0.4), 0.3, 0.1, 0.3, steps=24),
     "at constant speed": Law((0.0, 0.1, 0.2, 0.3), (0.0, 1.0, 2.0, 3.0), 12, "free"),
 }
 PART_OF_A_TURN = Load(

@@ -29,7 +29,7 @@ from fourbar.mjcf import RECIPE, Settings, choose_run, write_mjcf
 from fourbar.mjcf.document import FULL_TURN
 from fourbar.mjcf.model import unwind
 from fourbar.scene import Command, Scene
-from fourbar.scene.motion import Law, Motion
+from fourbar.scene.motion import Law, Motion, Rise
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.engines.effects import look_up
 from fourbar_validation.engines.free_body_closure import find_angle
@@ -84,7 +84,9 @@ class Lawful:
 
     bar = 2
 
-    def __init__(self, law: Law, command: Command, segment: Sequence[int]) -> None:
+    def __init__(
+        self, law: Law | Rise, command: Command, segment: Sequence[int]
+    ) -> None:
         assert command.time is not None
         self.law, self.time = law, command.time
         self.began, ends = (
@@ -119,8 +121,10 @@ class Lawful:
         return float(abs(self.law.at(np.array([self.began + seconds]))[1][0]))
 
     def alpha(self, seconds: float) -> float:
-        """Interpolate linearly, as the second derivative of cubic pieces is."""
+        """Interpolate linearly, as the second derivative of cubic pieces is; that of a rise is its own."""
         instant, t, f = self.began + seconds, self.knots, self.at_knots
+        if isinstance(self.law, Rise):
+            return float(self.law.at(np.array([instant]))[2][0])
         k = min(max(bisect.bisect_right(t, instant), 1), len(t) - 1)
         part = (instant - t[k - 1]) / (t[k] - t[k - 1])
         return float(f[k - 1] + part * (f[k] - f[k - 1]))
@@ -129,7 +133,7 @@ class Lawful:
 MotionSegment = Steady | Lawful
 
 
-def find_extremes(law: Law) -> tuple[float, float]:
+def find_extremes(law: Law | Rise) -> tuple[float, float]:
     """Find the greatest |omega_2| and |alpha_2| of a law, for which flywheel and closure are laid out."""
     _, omega, alpha = law.at(np.linspace(law.time[0], law.time[-1], LOOKED_AT))
     return float(np.abs(omega).max()), float(np.abs(alpha).max())
