@@ -1,8 +1,8 @@
 """Positions of a case evaluated stage by stage: kinematics, forces, error bars, and what has no value.
 
-The error bar of a force is its distance to the value that the same formulas give in longer numbers. The stated numbers
-of bars, loads, effects and command are taken as exact; everything else is computed again, in numbers that round at
-most a thousandth as much as doubles.
+The error bar of a force is its distance to the value that the same formulas give in longer numbers, or what these
+resolve there, if that is more. The stated numbers of bars, loads, effects and command are taken as exact; everything
+else is computed again, in numbers that round at most a thousandth as much as doubles.
 """
 
 import cmath
@@ -13,7 +13,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fourbar.errors import InputError
 from fourbar.evaluation.case import Case, Dynamics, find_margin, find_sign
+from fourbar.formulas import longer as longer_numbers
 from fourbar.formulas.arithmetic import U, angle, is_any, select
 from fourbar.formulas.longer import lengthen, shorten
 from fourbar.formulas.motion import State
@@ -46,6 +48,14 @@ if TYPE_CHECKING:
     from fourbar.effects import ForceDrive
 
 FORCE, ERROR = STAGES.index("force"), STAGES.index("error")
+LONG_EPS = float(np.finfo(np.longdouble).eps)
+"""Distance of long doubles beside 1."""
+ROUNDINGS = 16.0
+"""Roundings of a chain of formulas that count in full: some fifty move a result by sqrt(50) = 7, here twice that."""
+STEP = 2.0**-14
+"""Part of s^2 by which an angle is moved for a slope: a force changes by that part, of which doubles leave digits."""
+LEAST_STEP = 2.0**-46
+"""Part of the angle, at least 1 rad: a shorter step is rounded to less than two digits."""
 WITHOUT_FORCES = (NO_DIRECTION, WOUND, NO_LEVER)
 """Statuses of positions at which an effect or the drive has no value, and so the forces have none."""
 
@@ -272,11 +282,55 @@ def compute_error_bars(
         strict=True,
     )
     *gaps, drive_gap = (np.abs(shorten(after - before)) for before, after in pairs)
+    gap = reduce(np.maximum, gaps)
+    if longer_numbers.HAS_LONG_DOUBLES and remainder is None:
+        unresolved, drive_unresolved = _compute_unresolved(
+            case, command, state, dynamics
+        )
+        gap = np.fmax(gap, unresolved)
+        drive_gap = np.fmax(drive_gap, drive_unresolved)
     drive_error = compute_error_bar(drive_gap, np.abs(dynamics.drive))
-    force_error = compute_error_bar(
-        reduce(np.maximum, gaps), reduce(np.maximum, map(np.abs, dynamics.pins))
-    )
+    force_error = compute_error_bar(gap, reduce(np.maximum, map(np.abs, dynamics.pins)))
     return {case.names.error: drive_error, "force_error": force_error}
+
+
+def _compute_unresolved(
+    case: Case, command: Command, state: State, dynamics: Dynamics
+) -> tuple[Any, Any]:
+    """Compute what long doubles do not resolve of the pin forces and of the drive, N and N m or N.
+
+    Near a limit, or beside a spring's free length, their own rounding shows in a double's digits. Where a double is
+    as far off by coincidence, its distance to the long double is no bound. What rounding does follows from the slope:
+        dF = (dF/dq) max(|q|, 1) LONG_EPS ROUNDINGS,
+    dF/dq by a step that is short against the distance to the limit, which is some s^2 (s the sine of the command).
+    NaN where no double lies a step away.
+    """
+    step = STEP * np.square(np.abs(state.sine))
+    moved = state.q + step
+    step = moved - state.q
+    shifted = case.assemble(
+        moved,
+        case.path.half_angle(moved),
+        find_sign(command.branch),
+        state.speed,
+        command.acceleration,
+        condition=command.condition,
+        margin=find_margin(command),
+    )
+    try:
+        there = case.dynamics(shifted, command.acceleration, case.side)
+    except InputError:  # a load's table ends here
+        return np.nan, np.nan
+    pairs = zip(
+        (*dynamics.pins, dynamics.drive), (*there.pins, there.drive), strict=True
+    )
+    with np.errstate(all="ignore"):
+        share = np.divide(
+            ROUNDINGS * LONG_EPS * np.fmax(np.abs(state.q), 1.0),
+            np.where(step >= LEAST_STEP * np.fmax(np.abs(state.q), 1.0), step, np.nan),
+        )
+        *pins, drive = (np.abs(after - before) * share for before, after in pairs)
+    return reduce(np.maximum, pins), drive
 
 
 def compute_error_bar(gap: Any, size: Any) -> Any:

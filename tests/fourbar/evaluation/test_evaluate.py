@@ -1,5 +1,6 @@
 """Error bars against the true error, by ball arithmetic, where they once were too small, too large, or none."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -214,3 +215,61 @@ def test_what_gravity_drops_of_its_direction_shows_in_the_error_bar() -> None:
     )
     error = np.abs(solution.torque - exact.quantities["torque"])
     assert (error <= printed.BARS * solution.torque_error).all()
+
+
+def near_a_limit_of_bar_3() -> fourbar.Scene:
+    """A position 1e-9 rad from a limit of theta_3."""
+    lengths = (
+        0.17339921633840288,
+        0.3243788955157556,
+        0.25387035792278817,
+        0.11411483234949293,
+    )
+    motion = fourbar.Motion(theta_3=-0.9625944120558366, omega_3=3.0)
+    return fourbar.Scene(
+        fourbar.uniform(*lengths), motion, effects=(fourbar.Gravity(),)
+    )
+
+
+def beside_a_free_length() -> fourbar.Scene:
+    """A position 6e-6 rad beside that at which a spring does not pull."""
+    spring = fourbar.Spring(
+        fourbar.Place(1, (0.1, -1.5)),
+        fourbar.Place(4, (0.08, 0.0)),
+        200.0,
+        0.293784713457564,
+    )
+    two, three, four = (fourbar.Bar(length) for length in (0.1, 0.25, 0.22))
+    return fourbar.Scene(
+        fourbar.FourBar(0.3, two, three, four),
+        fourbar.Motion(2.264630407249073 + 5.682965972475529e-06, 3.0),
+        effects=(fourbar.Springs((spring,)),),
+    )
+
+
+@pytest.mark.skipif(not longer.HAS_LONG_DOUBLES, reason="long doubles are doubles here")
+@pytest.mark.parametrize("make", (near_a_limit_of_bar_3, beside_a_free_length))
+def test_an_error_bar_holds_what_long_doubles_do_not_resolve(
+    make: Callable[[], fourbar.Scene], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Double and long double agree here and are both wrong; pairs of doubles have 32 digits."""
+    scene = make()
+    bars = fourbar.solve(scene, "error")
+    monkeypatch.setattr(longer, "HAS_LONG_DOUBLES", False)
+    errors = fourbar.solve(scene, "error")
+    for name in ("torque_error", "force_error"):
+        bar, error = getattr(bars, name)[0], getattr(errors, name)[0]
+        assert error <= bar <= 2.0**11 * error, name  # what doubles do not resolve
+
+
+def test_an_error_bar_at_the_end_of_a_table_of_a_load() -> None:
+    """The slope of the forces would be taken beyond the table."""
+    table = fourbar.Table((0.5, 1.0), (1.0, 2.0))
+    load = fourbar.Load(4, moment=1.0, table=table)
+    scene = fourbar.Scene(
+        fourbar.uniform(0.3, 0.1, 0.25, 0.22),
+        fourbar.Motion(np.array([0.7, 1.0]), 3.0),
+        loads=(load,),
+    )
+    error = fourbar.solve(scene, "error").torque_error
+    assert error is not None and np.all((error > 0.0) & (error < 1e-14))
