@@ -1,6 +1,7 @@
 """A polynomial in place of a loop: what it loses, and the best of each degree."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import mujoco
@@ -12,7 +13,12 @@ from fourbar.errors import InputError
 from fourbar.linkage import Bar, FourBar
 from fourbar.scene import Command, Scene
 from fourbar.solve import solve
-from fourbar_validation.robots.mimic import fit_minimax, measure_mimic
+from fourbar_validation.robots.mimic import (
+    fit_minimax,
+    fit_squares,
+    measure_mimic,
+    show_mimic,
+)
 
 KNEE = Scene(
     FourBar(0.3, Bar(0.04, 0.1), Bar(0.295, 0.12), Bar(0.045, 0.9), -0.5 * math.pi),
@@ -51,6 +57,12 @@ def test_what_the_file_loses_through_its_own_zero(tmp_path: Path) -> None:
     report = measure_mimic(write(tmp_path), "s", KNEE)
     assert math.degrees(report.file.angle) == pytest.approx(1.7507, abs=5e-5)
     assert report.file.ratio == pytest.approx(0.1267, abs=5e-5)
+    assert math.degrees(report.shifted) == pytest.approx(1.2722, abs=5e-5)
+    assert math.degrees(report.centred) == pytest.approx(0.8864, abs=5e-5)
+    squares = [math.degrees(one.angle) for one in report.squares]
+    assert squares[0] == pytest.approx(1.2716, abs=5e-5)
+    assert squares[2] == pytest.approx(0.0588, abs=5e-5)
+    assert report.squares[0].ratio == pytest.approx(0.1267, abs=5e-5)
     smallest = [math.degrees(best.angle) for best in report.fitted]
     assert smallest[0] == pytest.approx(0.783, abs=5e-4)
     assert smallest[2] == pytest.approx(0.0285, abs=5e-5)
@@ -60,6 +72,21 @@ def test_what_the_file_loses_through_its_own_zero(tmp_path: Path) -> None:
     theta_4 = solve(KNEE, "position", at=Command(leader, branch, None, 0.0)).theta_4
     off = np.abs(follower - (theta_4 - theta_4[20])).max()
     assert report.file.angle == pytest.approx(off, rel=1e-9)
+
+
+@pytest.mark.slow
+def test_each_error_stands_with_its_name(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    show_mimic(measure_mimic(write(tmp_path), "s", KNEE))
+    printed = capsys.readouterr().out
+    assert "1.7507 deg through the zero of the file" in printed
+    assert "1.2722 deg with the constant of least squares" in printed
+    assert "ratio omega_4/omega_2: 0.1267" in printed
+    rows = [line.split("  ") for line in printed.splitlines()[3:]]
+    cells = [[cell.strip() for cell in row if cell.strip()] for row in rows]
+    assert ["1", "least squares", "1.2716", "0.1267"] in [row[:4] for row in cells]
+    assert [row[0] for row in cells] == ["1", "1", "2", "2", "3", "3", "4", "4"]
 
 
 @pytest.mark.slow
@@ -85,6 +112,21 @@ def test_the_smallest_largest_error_is_that_of_the_textbooks(
     y = function(x)  # type: ignore[operator]
     left = np.polynomial.polynomial.polyval(x, fit_minimax(x, y, degree)) - y
     assert np.abs(left).max() == pytest.approx(smallest, rel=1e-5)
+
+
+def test_least_squares_are_the_normal_equations() -> None:
+    x = np.linspace(-0.7, 0.7, 41)
+    y = np.exp(x)
+    powers = np.vander(x, 4, increasing=True)
+    right = np.linalg.solve(powers.T @ powers, powers.T @ y)
+    np.testing.assert_allclose(fit_squares(x, y, 3), right, rtol=1e-10)
+
+
+@pytest.mark.slow
+def test_fewer_positions_than_a_fit_needs_are_refused(tmp_path: Path) -> None:
+    few = replace(KNEE, motion=KNEE.motion.replace(angle=np.linspace(-0.5, 0.5, 5)))
+    with pytest.raises(InputError, match="range of at least 6 positions"):
+        measure_mimic(write(tmp_path), "s", few)
 
 
 @pytest.mark.slow

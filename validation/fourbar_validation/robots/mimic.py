@@ -22,6 +22,9 @@ DEGREES = (1, 2, 3, 4)
 """Degrees of the polynomials that MuJoCo's polycoef holds; URDF's mimic has degree 1."""
 SAMPLES = 1001
 """Positions over the motion of the scene; a largest error between two of them is missed by some 1e-6 of it."""
+FEWEST = 6
+"""Positions of the scene from which a polynomial of degree 4 is fitted by least squares with an error to tell."""
+HEADINGS = ("degree", "fit", "angle, deg", "ratio", "polycoef")
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +49,11 @@ class MimicReport:
     file: MimicError
     """Angle counted from the position of the loop at the zero of the file."""
     shifted: float
-    """Largest error of the angle where the constant is free, rad."""
+    """Largest error of the angle with the constant of least squares in place of the file's, rad."""
+    centred: float
+    """Largest error of the angle with the constant that makes it smallest, rad."""
+    squares: tuple[MimicError, ...]
+    """Polynomials of DEGREES by least squares over the positions of the scene."""
     fitted: tuple[MimicError, ...]
     """Polynomials of DEGREES with the smallest largest error of the angle."""
 
@@ -63,28 +70,38 @@ def measure_mimic(path: Path, joint: str, scene: Scene) -> MimicReport:
     file = read_robot(path)
     with examine_guarded(path) as examined:
         equality: JointEquality = examined(READ, file, joint)
-    commanded = command(scene)
-    low, high = float(commanded.theta_2.min()), float(commanded.theta_2.max())
-    if low == high:
+    positions = np.unique(command(scene).theta_2)
+    low, high = float(positions[0]), float(positions[-1])
+    if len(positions) < FEWEST:
         raise InputError(
-            "motion.theta_2", low, "must be a range: a ratio is of a motion"
+            "motion.theta_2",
+            low if low == high else f"{len(positions)} positions",
+            f"must be a range of at least {FEWEST} positions: a ratio is of a motion",
         )
-    theta_2 = np.linspace(low, high, SAMPLES)
-    branch = int(commanded.branch[0])
-    theta_4, ratio = _follow(scene, theta_2, branch)
+    branch = int(command(scene).branch[0])
     zero = equality.leader_zero
-    through_zero = np.unique(np.append(theta_2, zero))
-    continued, _ = _follow(scene, through_zero, branch)
-    origin = float(continued[np.searchsorted(through_zero, zero)])
-    turned = equality.sense * (theta_4 - origin)
-    ratio = equality.sense * ratio
+    theta_2 = np.union1d(np.linspace(low, high, SAMPLES), positions)
+    through_zero = np.union1d(theta_2, zero)
+    theta_4, ratio = _follow(scene, through_zero, branch)
+    origin = theta_4[np.searchsorted(through_zero, zero)]
+    inside = np.searchsorted(through_zero, theta_2)
+    turned = equality.sense * (theta_4 - origin)[inside]
+    ratio = equality.sense * ratio[inside]
     x = theta_2 - zero
     own = _measure(equality.coefficients, x, turned, ratio)
     left = np.polynomial.polynomial.polyval(x, own.coefficients) - turned
-    fitted = tuple(
-        _measure(fit_minimax(x, turned, degree), x, turned, ratio) for degree in DEGREES
+    stated = np.searchsorted(theta_2, positions)
+    squares = (fit_squares(x[stated], turned[stated], degree) for degree in DEGREES)
+    fitted = (fit_minimax(x, turned, degree) for degree in DEGREES)
+    return MimicReport(
+        equality,
+        (low, high),
+        own,
+        float(np.abs(left - left[stated].mean()).max()),
+        float(np.ptp(left)) / 2.0,
+        tuple(_measure(one, x, turned, ratio) for one in squares),
+        tuple(_measure(one, x, turned, ratio) for one in fitted),
     )
-    return MimicReport(equality, (low, high), own, float(np.ptp(left)) / 2.0, fitted)
 
 
 def _follow(scene: Scene, theta_2: Array, branch: int) -> tuple[Array, Array]:
@@ -112,6 +129,12 @@ def _measure(
     angle = float(np.abs(polynomial(x) - turned).max())
     speed = float(np.abs(polynomial.deriv()(x) - ratio).max())
     return MimicError(tuple(coefficients), angle, speed)
+
+
+def fit_squares(x: Array, y: Array, degree: int) -> tuple[float, ...]:
+    """Fit a polynomial by least squares, lowest power first."""
+    power = np.polynomial.Polynomial.fit(x, y, degree).convert().coef
+    return tuple(np.pad(power, (0, degree + 1 - len(power))).tolist())
 
 
 def fit_minimax(x: Array, y: Array, degree: int) -> tuple[float, ...]:
@@ -151,24 +174,30 @@ def show_mimic(report: MimicReport) -> None:
         f"theta_2 is {equality.leader}, from {low} to {high} deg"
     )
     _say(
-        f"largest error: angle {_deg(own.angle)} deg (with a free constant {_deg(report.shifted)}), "
-        f"ratio omega_4/omega_2 {own.ratio:.4g}"
+        f"largest error of the angle: {_deg(own.angle)} deg through the zero of the "
+        f"file; {_deg(report.shifted)} deg with the constant of least squares, "
+        f"{_deg(report.centred)} deg with the best one; "
+        f"of the ratio omega_4/omega_2: {own.ratio:.4g}"
     )
-    _say("smallest largest error of the angle, by degree:")
-    for degree, best in zip(DEGREES, report.fitted, strict=True):
-        padded = (*best.coefficients, *[0.0] * (5 - len(best.coefficients)))
-        _say(
-            f"{degree}: angle {_deg(best.angle)} deg, ratio {best.ratio:.4g}, "
-            f'polycoef="{_write(padded)}"'
-        )
+    rows = []
+    for fit, errors in (
+        ("least squares", report.squares),
+        ("smallest largest error", report.fitted),
+    ):
+        for degree, best in zip(DEGREES, errors, strict=True):
+            padded = (*best.coefficients, *[0.0] * (5 - len(best.coefficients)))
+            ratio = f"{best.ratio:.4g}"
+            rows.append((str(degree), fit, _deg(best.angle), ratio, _write(padded)))
+    for row in (HEADINGS, *sorted(rows, key=lambda row: row[0])):
+        _say("{:6}  {:22}  {:>10}  {:>8}  {}".format(*row))
 
 
 def _deg(angle: float) -> str:
-    return f"{math.degrees(angle):.4g}"
+    return f"{math.degrees(angle):.5g}"
 
 
 def _write(coefficients: tuple[float, ...]) -> str:
-    return " ".join(f"{number:.10g}" for number in coefficients)
+    return " ".join(f"{number:.7g}" for number in coefficients)
 
 
 def _say(text: str) -> None:
