@@ -1,14 +1,25 @@
 """MJCF of robots with loops of known lengths, written from points in a plane."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
+
+from fourbar.scene import Scene
+from fourbar_validation.engines.mujoco.robots.loop import RobotFile
+from fourbar_validation.engines.mujoco.theirs import Examined, examine
 
 Point = tuple[float, float]
 TILT = (0.3, -0.2, 0.7, 0.5)
 """Quaternion of the ground's body, not normalized."""
+
+
+def examine_text(scene: Scene, text: str | None, names: Mapping[str, str]) -> Examined:
+    """Examine a text as a file that names no other; None: the file generated from the scene."""
+    file = None if text is None else RobotFile(Path("theirs.xml"), text)
+    return examine(scene, file, names)
 
 
 @dataclass

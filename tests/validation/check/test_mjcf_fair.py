@@ -16,17 +16,21 @@ from fourbar.effects import Flywheel, Friction
 from fourbar.errors import InputError
 from fourbar.linkage import Bar, FourBar
 from fourbar.mjcf import RECIPE, write_mjcf
+from fourbar.quantities import FORCES
 from fourbar.scene import Scene
 from fourbar.solve import solve
 from fourbar_validation.check.differences import find_differences
 from fourbar_validation.check.mjcf import ModelReport, examine_model
 from fourbar_validation.compare.answer import Answer
+from fourbar_validation.compare.rows import AGREES, DEGRADED
+from fourbar_validation.engines.mujoco.robots.loop import RobotFile
 from fourbar_validation.engines.mujoco.theirs import (
     ONE_STATE,
     THROUGH_TIME,
     Examined,
-    examine,
+    predict_softness,
 )
+from tests.support.robots import examine_text as examine
 
 ARM = FourBar(0.3, Bar(0.1, 0.2), Bar(0.25, 0.3), Bar(0.22, 0.3))
 SWEEP = fourbar.Motion(np.radians(np.linspace(30.0, 90.0, 61)), 1.0)
@@ -121,6 +125,47 @@ def test_a_file_with_dry_friction_is_right_to_the_softness_of_its_loop() -> None
         assert error_of(DRY, examined_dry(), how, "torque") < SOFT_FRICTION
         for pin in ("F12", "F32", "F43", "F14"):
             assert error_of(DRY, examined_dry(), how, pin) < SOFT_LOOP
+
+
+def written(text: str, folder: Path) -> Path:
+    path = folder / "theirs.xml"
+    path.write_text(text)
+    return path
+
+
+@pytest.mark.slow
+def test_a_file_that_is_as_right_as_a_soft_loop_can_be_is_called_right(
+    tmp_path: Path,
+) -> None:
+    """Its pin forces are 4.6e-5 off, which is what MuJoCo's stiffest constraint leaves; more of it is an error."""
+    report = examine_model("dry", DRY, written(default_friction(), tmp_path), {})
+    assert report.counts.status == 0
+    at_one_state = {
+        cost.row.quantity: cost.row.verdict
+        for cost in report.costs
+        if cost.row.engine == ONE_STATE
+    }
+    assert at_one_state["torque"] == AGREES
+    assert at_one_state["F43"] == DEGRADED
+    sentences = "\n".join(report.sentences())
+    assert "the stiffest (solimp 0.9999) leaves 4.56e-05 of F43" in sentences
+    softer = default_friction().replace('solimp="0.9999 0.9999', 'solimp="0.99 0.99')
+    report = examine_model("dry", DRY, written(softer, tmp_path), {})
+    assert report.counts.status == 1
+    assert "advise SCENE FILE.xml" in "\n".join(report.sentences())
+
+
+@pytest.mark.slow
+def test_what_the_stiffest_constraint_leaves_is_the_error_of_a_file_that_has_it() -> (
+    None
+):
+    file = RobotFile(Path("theirs.xml"), default_friction())
+    left = predict_softness(DRY, file, {})
+    ours = solve(DRY, "force")
+    for pin in ("F12", "F32", "F43", "F14"):
+        size = float(np.hypot(*np.asarray(getattr(ours, pin)).T).max())
+        off = error_of(DRY, examined_dry(), ONE_STATE, pin)
+        assert left[pin] / size == pytest.approx(off, rel=1e-3)
 
 
 @pytest.mark.slow
@@ -266,6 +311,48 @@ def test_the_cause_that_explains_the_error_stands_first(
         c.row.error for c in report.costs if c.row.quantity in ("torque", "F12", "F43")
     )
     assert cost is not None and cost > 0.1 * worst
+
+
+def force_errors(report: ModelReport) -> dict[tuple[str, str], float]:
+    return {
+        (cost.row.engine, cost.row.quantity): cost.row.error
+        for cost in report.costs
+        if cost.row.quantity in FORCES
+    }
+
+
+def set_attribute(text: str, name: str, value: str) -> str:
+    changed, times = re.subn(f' {name}="[^"]*"', f' {name}="{value}"', text)
+    assert times == 1
+    return changed
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("key", "was"),
+    [("closure.solimp", "0.9 0.95 0.001 0.5 2"), ("option.timestep", "0.003")],
+)
+def test_a_setting_costs_what_typing_it_into_the_file_gains(
+    key: str, was: str, tmp_path: Path
+) -> None:
+    """In the stiff file that is generated, a timestep would matter less, and the loop's impedance not at all."""
+    scene = replace(BARE, motion=FAST)
+    text = set_attribute(write_mjcf(scene, drive="none"), "integrator", "Euler")
+    name = key.partition(".")[2]
+    typed = re.search(f' {name}="([^"]*)"', write_mjcf(scene))
+    assert typed is not None
+    spoilt = set_attribute(text, name, was)
+    mended = set_attribute(text, name, typed[1])
+    reports = []
+    for name, content in (("spoilt", spoilt), ("mended", mended)):
+        path = tmp_path / f"{name}.xml"
+        path.write_text(content)
+        reports.append(examine_model("arm", scene, path, {}))
+    (difference,) = (d for d in reports[0].differences if d.key == key)
+    before, after = map(force_errors, reports)
+    gained = max(before[of] - after[of] for of in before)
+    assert gained > 1e-3
+    assert difference.cost == pytest.approx(gained, rel=0.02)
 
 
 def test_where_no_force_gives_the_acceleration_is_said() -> None:

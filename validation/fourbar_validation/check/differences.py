@@ -132,6 +132,14 @@ def order(differences: Sequence[Difference]) -> list[Difference]:
     return sorted(differences, key=lambda one: (one.cost is None, -(one.cost or 0.0)))
 
 
+def is_setting(key: str) -> bool:
+    """Tell whether an entry is no part of the mechanism: what it costs depends on the other settings of its file."""
+    settings = ("option.", "closure.sol", "closure.softness")
+    return key.startswith(settings) or key.endswith(
+        ("solreffriction", "solimpfriction")
+    )
+
+
 def _is_length(key: str) -> bool:
     return key.startswith("lengths.") and not key.endswith("angle")
 

@@ -4,12 +4,13 @@ The file is somebody's: it is compiled and run in a process of its own, with a l
 """
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import click
+import numpy as np
 
 from fourbar.errors import InputError
 from fourbar.quantities import FORCES, PIN_FORCES, UNKNOWNS
@@ -19,16 +20,33 @@ from fourbar.writing import write_text
 from fourbar_validation.check.differences import (
     Difference,
     find_differences,
+    is_setting,
     order,
     price,
 )
-from fourbar_validation.check.screen import list_unread, read_mjcf
+from fourbar_validation.check.unread import list_unread
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.compare import Comparison, Held
-from fourbar_validation.compare.rows import Counts, Row, make_plain, write_results
-from fourbar_validation.compare.tolerance import SIMULATED, ErrorBound, hold_simulated
+from fourbar_validation.compare.rows import (
+    DEGRADED,
+    FAILS,
+    Counts,
+    Row,
+    make_plain,
+    write_results,
+)
+from fourbar_validation.compare.tolerance import DEGRADED as TIMES_PREDICTED
+from fourbar_validation.compare.tolerance import (
+    SIMULATED,
+    Array,
+    ErrorBound,
+    Mask,
+    hold_simulated,
+)
+from fourbar_validation.engines.mujoco.robots.loop import RobotFile
 from fourbar_validation.report.templating import render, write_number
 from fourbar_validation.report.terminal import make_table
+from fourbar_validation.robots.files import read_robot
 from fourbar_validation.robots.guard import examine_guarded
 from fourbar_validation.robots.measure import (
     find_worst,
@@ -47,9 +65,13 @@ from fourbar_validation.robots.options import (
 from fourbar_validation.scenes.suites import read_scene_files
 
 ABOUT_COSTS = (
-    "cost: what this one entry, as in the file, adds to the error of the generated file; of a weld, contacts, a range "
-    "and a motor what it adds to the error of the file itself. Of torque and pin forces the one that grows most. "
-    "A dash: this entry cannot be set by itself, or the file holds what it is held to"
+    "cost: what this one entry adds to the error of the file itself, if it is a setting, a weld, contacts, a range or "
+    "a motor; of the others what it adds, as in the file, to the error of the generated one. Of torque and pin forces "
+    "the one that grows most. A dash: this entry cannot be set by itself, or the file holds what it is held to"
+)
+ADVICE = (
+    "What to type into the file for an error E, if its settings are the cause: "
+    "fourbar-validation advise SCENE FILE.xml --error E"
 )
 JUDGED = tuple(name for name in UNKNOWNS if name not in ("alpha_3", "alpha_4"))
 """Quantities that a file is held to. A soft loop lets the bars accelerate by themselves for an instant; what that does
@@ -58,6 +80,9 @@ HEADINGS = ("quantity", "theirs", "generated", "allowed", "verdict")
 EXAMINE = "fourbar_validation.engines.mujoco.theirs:examine"
 CHANGED = "fourbar_validation.engines.mujoco.theirs:examine_changed"
 MENDED = "fourbar_validation.engines.mujoco.theirs:examine_mended"
+SOFTNESS = "fourbar_validation.engines.mujoco.theirs:predict_softness"
+STIFFEST = "as what MuJoCo's stiffest constraint (solimp 0.9999) leaves in this file"
+"""Method by which the error of a file is predicted that nobody holds to another."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,6 +148,16 @@ class ModelReport:
                     f"the worst pin force, {worst}, by {write_number(errors[worst])}"
                 )
             yield f"{method}: {', '.join(parts)}, of its largest value."
+        soft = [cost.row for cost in self.costs if cost.row.verdict == DEGRADED]
+        if soft and not self.counts[FAILS]:
+            worst = max(soft, key=lambda row: row.error)
+            left = write_number(worst.allowed / TIMES_PREDICTED)
+            yield (
+                "The file is right as far as MuJoCo's constraints let it be: the "
+                f"stiffest (solimp 0.9999) leaves {left} of {worst.quantity} in it."
+            )
+        if self.counts[FAILS]:
+            yield ADVICE
 
     @property
     def counts(self) -> Counts:
@@ -149,65 +184,102 @@ def examine_model(
     scene: Scene,
     mjcf: Path,
     names: Mapping[str, str],
-    tolerance: ErrorBound = SIMULATED,
+    wanted: float | None = None,
+    assets: Path | None = None,
 ) -> ModelReport:
-    """Examine a file in a guarded process, and the generated one before; theirs is held to the tolerance."""
-    text = read_mjcf(mjcf)
+    """Examine a file in a guarded process, and the generated one before.
+
+    Parameters
+    ----------
+    wanted : relative error that theirs is held to; None: that of the generated file, and where its torque or pin forces
+        exceed this, what MuJoCo's stiffest constraint leaves in it.
+    """
+    tolerance = SIMULATED
+    if wanted is not None:
+        tolerance = hold_simulated(wanted, "what this file may be wrong by")
+    file = read_robot(mjcf, assets)
     with examine_guarded(mjcf) as examined:
         generated, theirs = (
             examined(EXAMINE, scene, None, {}),
-            examined(EXAMINE, scene, text, dict(names)),
+            examined(EXAMINE, scene, file, dict(names)),
         )
         ours = {
             (row.engine, row.quantity): row.error
             for row in _list_rows(name, scene, generated.answers, SIMULATED)
         }
+        softness: dict[str, float] = {}
         rows = _list_rows(name, scene, theirs.answers, tolerance)
+        if wanted is None and any(row.failed for row in rows):
+            softness = examined(SOFTNESS, scene, file, theirs.names)
+            rows = _list_rows(name, scene, theirs.answers, tolerance, softness)
         costs = [
             CostOfModel(row, ours.get((row.engine, row.quantity), math.nan))
             for row in rows
         ]
         differences = find_differences(generated.described, theirs.described)
         if any(row.failed for row in rows):
-            answered = examined(
-                CHANGED,
-                scene,
-                [(difference.key, difference.theirs) for difference in differences],
+            differences = _price(
+                name, scene, file, theirs, differences, rows, tolerance, examined
             )
-            unchanged, *changed = (
-                _list_rows(name, scene, answers or [], tolerance)
-                for answers in answered
-            )
-            differences = [
-                price(*pair, unchanged)
-                for pair in zip(differences, changed, strict=True)
-            ]
-            unpriced = [
-                difference.key for difference in differences if difference.cost is None
-            ]
-            answered = examined(MENDED, scene, text, theirs.names, unpriced)
-            for key, answers in zip(unpriced, answered, strict=True):
-                if answers is not None:
-                    mended = _list_rows(name, scene, answers, tolerance)
-                    differences = [
-                        price(one, rows, mended) if one.key == key else one
-                        for one in differences
-                    ]
     unread = (
-        [f"not looked at: {', '.join(parts)}"] if (parts := list_unread(text)) else []
+        [f"not looked at: {', '.join(parts)}"]
+        if (parts := list_unread(file.text))
+        else []
     )
     return ModelReport(order(differences), costs, [*theirs.notes, *unread])
 
 
+def _price(
+    name: str,
+    scene: Scene,
+    file: RobotFile,
+    theirs: Any,
+    differences: list[Difference],
+    rows: list[Row],
+    tolerance: ErrorBound,
+    examined: Callable[..., Any],
+) -> list[Difference]:
+    """Price differences: those of the mechanism in the generated file, settings and what it cannot hold in theirs."""
+    of_mechanism = [one for one in differences if not is_setting(one.key)]
+    answered = examined(CHANGED, scene, [(one.key, one.theirs) for one in of_mechanism])
+    unchanged, *changed = (
+        _list_rows(name, scene, answers or [], tolerance) for answers in answered
+    )
+    priced = {
+        one.key: price(one, its_rows, unchanged)
+        for one, its_rows in zip(of_mechanism, changed, strict=True)
+    }
+    for one in differences:
+        priced.setdefault(one.key, one)
+    left = [one for one in priced.values() if one.cost is None]
+    changes = [(one.key, one.generated) for one in left]
+    answered = examined(MENDED, scene, file, theirs.names, changes)
+    for one, answers in zip(left, answered, strict=True):
+        if answers is not None:
+            mended = _list_rows(name, scene, answers, tolerance)
+            priced[one.key] = price(one, rows, mended)
+    return [priced[one.key] for one in differences]
+
+
 def _list_rows(
-    name: str, scene: Scene, answers: list[Answer], tolerance: ErrorBound
+    name: str,
+    scene: Scene,
+    answers: list[Answer],
+    tolerance: ErrorBound,
+    softness: Mapping[str, float] | None = None,
 ) -> list[Row]:
+    """Hold answers to a tolerance and, where the softness of their loop is known, to what it leaves, N m and N."""
+
+    def predicted(quantity: str, mask: Mask) -> Array:
+        return np.full(len(mask), (softness or {}).get(quantity, 0.0))
+
+    held = Held(tolerance, JUDGED)
+    if softness:
+        held = held._replace(predicted=predicted, method=f", {STIFFEST}")
     rows = []
     for answer in answers:
         formulas = solve(scene, "force", at=answer.at)
-        rows += Comparison(
-            name, scene, answer, formulas, Held(tolerance, JUDGED)
-        ).rows()
+        rows += Comparison(name, scene, answer, formulas, held).rows()
     return rows
 
 
@@ -336,18 +408,14 @@ def command(
         show_measurement(measurement)
         worst = max(map(find_worst, measurement.loops))
         return int(wanted is not None and not worst <= wanted)
+    assets = robot.pop("assets")
     if any(robot.values()):
         raise click.UsageError(
             "the options of a robot need --loop, or FILE.xml without SCENE"
         )
     suite = read_scene_files(files[:1])
-    tolerance = (
-        SIMULATED
-        if wanted is None
-        else hold_simulated(wanted, "what this file may be wrong by")
-    )
     report = examine_model(
-        suite.name(0), suite.scene(0), theirs, read_names(names), tolerance
+        suite.name(0), suite.scene(0), theirs, read_names(names), wanted, assets
     )
     show(report, theirs, out)
     return report.counts.status

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ from fourbar.quantities import OK, UNITS
 from fourbar.scene import Command, Scene
 from fourbar.solve import solve
 from fourbar_validation.compare.answer import Array
+from fourbar_validation.compare.reversals import mark_reversing
 from fourbar_validation.compare.rows import make_plain
 from fourbar_validation.engines.mujoco.robots.answers import (
     QUANTITIES,
@@ -37,6 +38,8 @@ LIMIT = 600.0
 HEADINGS = ("method", "quantity", "error", "of its largest", "at")
 SETTING_HEADINGS = ("changed alone", "single states", "through time", "cost")
 STATES, THROUGH_TIME = "single states", "through time"
+SLIP = 1e-9
+"""Part of the speeds below which a pin with dry friction is at rest, so that it may rub either way."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,10 +92,20 @@ def list_errors(loop: LoopMeasurement) -> list[InsideError]:
     return errors
 
 
+def find_left_out(loop: LoopMeasurement) -> float:
+    """Return what the scene leaves out of the robot: the worst difference of rigid pins from the formulas, relative."""
+    rigid = [replace(row, soft=row.rigid) for row in loop.states.rows]
+    answer = replace(loop.states, rows=rigid)
+    return max(error.part for error in _compare(STATES, loop, answer))
+
+
 def _compare(
     method: str, loop: LoopMeasurement, answer: InsideAnswer
 ) -> Iterator[InsideError]:
-    """Compare an answer with the formulas at its own theta_2, omega_2 and alpha_2."""
+    """Compare an answer with the formulas at its own theta_2, omega_2 and alpha_2.
+
+    Where dry friction reverses the forces on both sides of the jump are right, and nothing is judged.
+    """
     rows = answer.rows
     motion = loop.scene.motion
     commanded = Command(
@@ -103,6 +116,7 @@ def _compare(
     )
     formulas = solve(loop.scene, "force", at=commanded)
     judged = formulas.status_code == OK
+    reversing = mark_reversing(loop.scene, formulas, SLIP)
     for name in QUANTITIES:
         ours = np.asarray(getattr(formulas, name))
         theirs = np.array([row.soft.values()[name] for row in rows])
@@ -110,6 +124,7 @@ def _compare(
             theirs = _turn(theirs, -loop.turned)
         sizes = measure_sizes(theirs - ours)
         sizes = np.where(judged & np.isfinite(sizes), sizes, math.inf)
+        sizes = np.where(judged & reversing, 0.0, sizes)
         worst = int(np.argmax(sizes))
         largest = float(np.max(measure_sizes(ours)[judged], initial=0.0))
         error = math.inf if answer.lost else float(sizes[worst])
@@ -151,6 +166,14 @@ def _show_loop(loop: LoopMeasurement) -> None:
         f"through time by armature (a tenth of it changes {loop.influence:.1e}); "
         "contacts, joint limits and actuators are off"
     )
+    if loop.switched_off:
+        names = ", ".join(loop.switched_off)
+        _say(f"switched off, because it ties its bars to joints that are held: {names}")
+    left_out = find_left_out(loop)
+    _say(
+        f"with rigid pins the robot differs from the formulas by {left_out:.1e} of the "
+        "largest: what the scene leaves out; the rest is MuJoCo's soft constraint"
+    )
     rows = [error.cells() for error in list_errors(loop)]
     Console().print(make_table(HEADINGS, rows, show_edge=False))
     if loop.through_time is None:
@@ -163,6 +186,14 @@ def _show_loop(loop: LoopMeasurement) -> None:
             f"gap through time: {1e3 * worst.gap:.3g} mm at {loop.joint} = "
             f"{math.degrees(worst.joint):.4g} deg; a step takes "
             f"{1e6 * loop.through_time.seconds_per_step:.3g} us"
+        )
+    sticking = {name for row in loop.states.rows for name in row.sticking}
+    for name in sorted(sticking):
+        count = sum(name in row.sticking for row in loop.states.rows)
+        _say(
+            f"note: {loop.name}: at {count} of {len(loop.states.rows)} states the dry "
+            f"friction of {name} is less than its couple: it turns too slowly there for "
+            "MuJoCo's soft friction (solreffriction and solimpfriction of the joint)"
         )
     _show_torn(loop)
     for remark in loop.remarks:

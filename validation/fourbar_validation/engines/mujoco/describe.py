@@ -458,8 +458,6 @@ def set_entry(
         elif subject == "loads":
             load, _, name = rest.rpartition(".")
             _set_load(root, generated, load, name, value)
-        elif key == "closure.softness":
-            _set_softness(root, generated[key], float(value))  # type: ignore[arg-type]
         elif value is None:
             _find(root, generated[key].element).clear()
         else:
@@ -570,15 +568,6 @@ def _set_inertial(
         )
 
 
-def _set_softness(root: ET.Element, entry: ModelEntry, value: float) -> None:
-    """Set the impedance at which the closure yields so much."""
-    closure = _find(root, entry.element)
-    first, *opening = closure.attrib["solimp"].split()
-    weights = float(entry.value) * float(first) / (1.0 - float(first))  # type: ignore[arg-type]
-    impedance = repr(1.0 / (1.0 + value / weights))
-    closure.set("solimp", " ".join((impedance, impedance, *opening[1:])))
-
-
 def _set_load(
     root: ET.Element,
     generated: Mapping[str, ModelEntry],
@@ -618,10 +607,11 @@ def _set_load(
         )  # fmt: skip
 
 
-def mend_entry(topology: Topology, key: str) -> bool:
-    """Take an entry that the generated file cannot hold out of a model; False where that is not possible.
+def mend_entry(topology: Topology, key: str, value: Value | None) -> bool:
+    """Make one entry of a compiled model that of the generated file; False where that is not possible.
 
-    A weld becomes a pin, contacts are switched off, a stop and the motors at a pin are removed.
+    A weld becomes a pin, contacts are switched off, a stop and the motors at a pin are removed, the loop is made as
+    stiff as MuJoCo lets it be, and a setting gets its value.
     """
     model, (subject, _, rest) = topology.model, key.partition(".")
     pin, _, what = rest.partition(".")
@@ -635,6 +625,28 @@ def mend_entry(topology: Topology, key: str) -> bool:
         joint = topology.hinge[pin]
         for i in topology.list_actuators(joint):
             model.actuator_gainprm[i] = model.actuator_biasprm[i] = 0.0
+    elif subject == "option" and rest in KINDS:
+        setattr(model.opt, rest, _find_kind(rest, str(value)))
+    elif subject == "option":
+        was = getattr(model.opt, rest)
+        setattr(model.opt, rest, np.asarray(value).astype(np.asarray(was).dtype))
+    elif key == "closure.solref":
+        model.eq_solref[topology.closure] = value
+    elif key in ("closure.solimp", "closure.softness"):
+        model.eq_solimp[topology.closure, :2] = STIFFEST
+    elif subject == "pins" and what in FRICTION.values():
+        (field,) = (one for one, attribute in FRICTION.items() if attribute == what)
+        dof = model.jnt_dofadr[topology.hinge[pin]]
+        getattr(model, field)[dof] = value
     else:
         return False
     return True
+
+
+def _find_kind(name: str, word: str) -> int:
+    """Find the number of an integrator or a solver that MJCF calls by a word."""
+    return next(
+        int(kind)
+        for member, kind in KINDS[name].__members__.items()
+        if member.partition("_")[2] == word.upper()
+    )

@@ -12,8 +12,9 @@ import math
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain
+from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -26,6 +27,7 @@ from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Command, Scene
 from fourbar.scene import command as command_of
 from fourbar_validation.compare.answer import Answer, Array
+from fourbar_validation.compare.tolerance import magnitude
 from fourbar_validation.engines.description import Value, list_unknowns, name_driving
 from fourbar_validation.engines.loaded import Assembled, Values
 from fourbar_validation.engines.loop import (
@@ -48,6 +50,11 @@ from fourbar_validation.engines.mujoco.describe import (
     mend_entry,
     set_entry,
 )
+from fourbar_validation.engines.mujoco.robots.compiled import (
+    compile_robot,
+    list_unknown_parts,
+)
+from fourbar_validation.engines.mujoco.robots.loop import RobotFile
 from fourbar_validation.engines.mujoco.runner import (
     Stepper,
     find_assembled,
@@ -64,13 +71,15 @@ MOST_STEPS = 400_000
 """A revolution at 628 steps per turn is a thousandth of this; more would be minutes."""
 PRICING = 60.0
 """Seconds in which differences are tried one by one; each takes two evaluations."""
+STIFFEST = 0.9999
+"""Largest impedance of a constraint: MuJoCo clamps `solimp` there."""
 DRIVING = 1e3
 """Armature over the inertia of all else from which it is a flywheel that drives: the speed then ripples by 1e-3."""
+GENERATED = Path("generated.xml")
+"""Name of the file that is generated from a scene."""
 NO_BIAS = mujoco.mjtBias.mjBIAS_NONE
 SHARED = "theta_2, omega_2, alpha_2 and the branch; the rest is the file's"
 OWN = "assembly, speeds, accelerations, drive torque and pin forces, by MuJoCo from the file as compiled"
-MOST_KEYFRAMES = 100_000
-"""A linkage has one or a few; MuJoCo reserves as many as a file asks for, minutes long."""
 
 
 @dataclass(slots=True)
@@ -101,43 +110,25 @@ def collect_warnings() -> Iterator[list[str]]:
         mujoco.set_mju_user_warning(before)
 
 
-def compile_text(text: str) -> mujoco.MjModel:
-    """Compile a text with MuJoCo; its complaint is an InputError of one line."""
-    try:
-        keyframes = mujoco.MjSpec.from_string(text).nkey
-        if keyframes > MOST_KEYFRAMES:
-            raise InputError(
-                "MJCF",
-                None,
-                f"asks for {keyframes} keyframes; up to {MOST_KEYFRAMES} are read",
-            )
-        model = mujoco.MjModel.from_xml_string(text)
-    except ValueError as error:
-        raise InputError(
-            "MJCF", None, " ".join(f"MuJoCo does not compile it: {error}".split())
-        ) from None
-    except RuntimeError:  # "unknown exception": a size that no memory holds
-        raise InputError(
-            "MJCF", None, "MuJoCo breaks down over it; is a size in it too large?"
-        ) from None
-    if not 0.0 < model.opt.timestep < math.inf:
-        raise InputError(
-            "MJCF", None, f"its timestep of {model.opt.timestep:g} s must be above 0"
-        )
-    return model
+def compile_topology(file: RobotFile, names: Mapping[str, str]) -> Topology:
+    """Compile a file whose bars have these names."""
+    return Topology(compile_robot(file).model, names)
 
 
-def examine(scene: Scene, text: str | None, names: Mapping[str, str]) -> Examined:
+def examine(scene: Scene, file: RobotFile | None, names: Mapping[str, str]) -> Examined:
     """Describe an MJCF, evaluate it at single states and through time; None: the one generated from the scene."""
     with collect_warnings() as warnings:
-        examined = _examine(scene, write_mjcf(scene) if text is None else text, names)
+        examined = _examine(
+            scene, file or RobotFile(GENERATED, write_mjcf(scene)), names
+        )
     examined.notes += [f"MuJoCo warns: {warning}" for warning in warnings]
     return examined
 
 
-def _examine(scene: Scene, text: str, names: Mapping[str, str]) -> Examined:
-    model = compile_text(text)
-    topology, guessed = find_topology(model, names, scene.linkage.lengths)
+def _examine(scene: Scene, file: RobotFile, names: Mapping[str, str]) -> Examined:
+    robot = compile_robot(file)
+    list_unknown_parts(robot, set(range(robot.model.nbody)))
+    topology, guessed = find_topology(robot.model, names, scene.linkage.lengths)
     loop = UserLoop(topology, scene)
     described = describe_model(topology, loop.flywheel)
     for key, (value, *_) in described.items():
@@ -146,7 +137,8 @@ def _examine(scene: Scene, text: str, names: Mapping[str, str]) -> Examined:
                 "MJCF", None, f"{key} is beyond the range of doubles: {value}"
             )
     answers = _list_answers(loop, scene)
-    notes = [*guessed, *loop.notes, *_free_unmet_stops(described, loop)]
+    notes = [*robot.notes, *guessed, *loop.notes]
+    notes += _free_unmet_stops(described, loop)
     return Examined(described, answers, notes, topology.names)
 
 
@@ -173,15 +165,15 @@ def examine_changed(
     None stands for an entry that cannot be set alone. After PRICING seconds the rest are not evaluated either.
     """
     start, answered = time.perf_counter(), list[list[Answer] | None]()
-    text = write_mjcf(scene, drive="none")
-    generated = describe_model(Topology(compile_text(text), {}))
-    texts = (set_entry(text, generated, key, value) for key, value in changes)
-    for changed in chain([text], texts):
+    file = RobotFile(GENERATED, write_mjcf(scene, drive="none"))
+    generated = describe_model(compile_topology(file, {}))
+    texts = (set_entry(file.text, generated, key, value) for key, value in changes)
+    for changed in chain([file.text], texts):
         answers = None
         if time.perf_counter() - start < PRICING and changed is not None:
             try:
                 with collect_warnings():
-                    topology = Topology(compile_text(changed), {})
+                    topology = compile_topology(replace(file, text=changed), {})
                     answers = _list_answers(UserLoop(topology, scene), scene)
             except (
                 FourBarError
@@ -192,18 +184,48 @@ def examine_changed(
 
 
 def examine_mended(
-    scene: Scene, text: str, names: Mapping[str, str], keys: Sequence[str]
+    scene: Scene,
+    file: RobotFile,
+    names: Mapping[str, str],
+    changes: Sequence[tuple[str, Value | None]],
 ) -> list[list[Answer] | None]:
-    """Answer with a file without one of its entries at a time; None where it cannot be taken out of the file."""
+    """Answer with a file one entry of which is that of the generated one; None where it cannot be."""
     start, answered = time.perf_counter(), list[list[Answer] | None]()
-    for key in keys:
-        topology = Topology(compile_text(text), names)
+    for key, value in changes:
+        topology = compile_topology(file, names)
         answers = None
-        if time.perf_counter() - start < PRICING and mend_entry(topology, key):
+        if time.perf_counter() - start < PRICING and mend_entry(topology, key, value):
             with collect_warnings():
                 answers = _list_answers(UserLoop(topology, scene), scene)
         answered.append(answers)
     return answered
+
+
+def predict_softness(
+    scene: Scene, file: RobotFile, names: Mapping[str, str]
+) -> dict[str, float]:
+    """Predict what the stiffest constraint of MuJoCo leaves of the torque and the pin forces of a file, N m and N.
+
+    The error of a soft constraint goes as (1 - d)/d in its impedance d. Between STIFFEST and an impedance of twice that
+    yield it grows by itself, so the error is measured without anything to compare the file with. Empty where no
+    connect or weld closes the loop.
+    """
+    answers = []
+    for times in (1.0, 2.0):
+        topology = compile_topology(file, names)
+        if topology.closure is None:
+            return {}
+        impedance = 1.0 / (1.0 + times * (1.0 / STIFFEST - 1.0))
+        topology.model.eq_solimp[topology.closure, :2] = impedance
+        loop = UserLoop(topology, scene)
+        with collect_warnings():
+            command = _choose_positions(command_of(scene))
+            answers.append(answer_one_state(loop, command).quantities)
+    stiff, softer = answers
+    return {
+        name: float(np.nanmax(magnitude(softer[name] - stiff[name]), initial=0.0))
+        for name in (name_driving(scene), *PIN_FORCES)
+    }
 
 
 def _list_answers(loop: "UserLoop", scene: Scene) -> list[Answer]:
@@ -546,6 +568,8 @@ def answer_through_time(loop: UserLoop, command: Command) -> Answer:
     data.qpos[:], data.qvel[:] = loop.data.qpos, loop.speeds(command.omega_2)
     heavy = max(loop.armature, size_flywheel(loop.scene))
     names = [*list_unknowns(loop.scene), *MADE]
+    # the loop starts exactly closed: only after the first step has it begun to yield
+    segment = segment[1:]
     out, seen = (
         make_blank(len(segment), names),
         {"closure_gap_m": 0.0, "speed_error": 0.0},

@@ -243,7 +243,7 @@ def test_another_hinge_of_the_ground_can_be_the_driven_one() -> None:
     assert loop.cut == "A"
     with pytest.raises(InputError, match="drives no four-bar"):
         loop_of(planar.text(), drive="A")
-    with pytest.raises(InputError, match="no such joint; the file has: O2"):
+    with pytest.raises(InputError, match="no such joint; the file has: joint 0, O2"):
         loop_of(planar.text(), drive="wheel")
 
 

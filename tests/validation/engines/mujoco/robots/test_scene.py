@@ -5,6 +5,7 @@ Newton's method on MuJoCo's own residual of the equality, its speeds and acceler
 MuJoCo's Jacobian.
 """
 
+import cmath
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -326,11 +327,17 @@ def test_a_scene_reads_back_and_says_what_it_is() -> None:
     assert "Held as they stand" in made.parts[2]
 
 
-def test_gravcomp_away_from_the_mass_centre_is_named() -> None:
+def test_gravcomp_away_from_the_mass_centre_is_a_load_where_it_acts() -> None:
     text = FOOT.replace('<body name="toe"', '<body name="toe" gravcomp="1"')
     made = read(text)
-    assert not made.scene.loads
-    assert any("gravcomp of 0.760" in remark for remark in made.remarks)
+    (load,) = made.scene.loads
+    assert load.bar == 4 and load.from_pin is not None
+    # the toe's mass centre from the ankle: 150, -50 mm; the foot's line ends at the rod
+    toe, rod = complex(0.15, -0.05), complex(-0.064, -0.006)
+    assert load.from_pin[0] == pytest.approx(abs(toe))
+    turned = math.remainder(cmath.phase(toe / rod) - load.from_pin[1], math.tau)
+    assert turned == pytest.approx(0.0, abs=1e-9)
+    compare(text, made)
 
 
 def test_a_loop_is_asked_for_where_there_are_several() -> None:

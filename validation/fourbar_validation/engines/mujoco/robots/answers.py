@@ -61,6 +61,8 @@ class InsideRow:
     """As rigid pins would have them, at the closed state of the same theta_2, omega_2, alpha_2."""
     gap: float
     """Distance of the ends of the closure, m."""
+    sticking: tuple[str, ...] = ()
+    """Hinges that turn and whose dry friction MuJoCo has not let reach its couple."""
 
 
 @dataclass(slots=True)
@@ -199,6 +201,8 @@ class LoopMeasurement:
     settings: RobotSettings
     held: int
     """Number of degrees of freedom that are held."""
+    switched_off: tuple[str, ...]
+    """Equalities between its moving bars and joints that are held."""
     states: InsideAnswer
     through_time: InsideAnswer | None
     refusal: str

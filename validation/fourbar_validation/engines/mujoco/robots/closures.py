@@ -452,7 +452,7 @@ class _Finder:
         motors = self._list_motors(chain.joints)
         remarks: list[str] = []
         # the ground lies between the pins at the end and at the beginning
-        driven, text = self._choose_driven(pins[0], pins[-1], motors, chain)
+        driven, text = self._choose_driven(pins[0], pins[-1], motors, number)
         remarks += text
         if driven != pins[0]:
             groups = [groups[0], *reversed(groups[1:])]
@@ -502,7 +502,7 @@ class _Finder:
         first: int | None,
         last: int | None,
         motors: list[tuple[int, int]],
-        chain: _Chain,
+        number: int,
     ) -> tuple[int, list[str]]:
         """Choose the driven hinge among those of the ground; say so where no motor decides it."""
         model = self.model
@@ -521,7 +521,8 @@ class _Finder:
                 f"motors act on {names}: {name_joint(model, chosen)} is taken as driven"
             )
             return chosen, [f"{text} (--drive states another)"]
-        chosen = at_ground[0]
+        pushed, by = self._find_pushed(at_ground, number)
+        chosen = min(at_ground) if pushed is None else pushed  # the first of the file
         taken = (
             f"{name_joint(model, chosen)} is taken as driven (--drive states another)"
         )
@@ -529,7 +530,25 @@ class _Finder:
             return chosen, [
                 f"the motor on {names} acts between two moving bars: {taken}"
             ]
-        return chosen, [f"no motor acts on it: {taken}"]
+        acts = f"{by} acts on it" if by else "no motor acts on it"
+        return chosen, [f"{acts}: {taken}"]
+
+    def _find_pushed(self, at_ground: list[int], number: int) -> tuple[int | None, str]:
+        """Return the one hinge of the ground whose bar another closure moves, and that closure's name."""
+        pushed: dict[int, str] = {}
+        bars = {self.root[int(self.model.jnt_bodyid[j])]: j for j in at_ground}
+        for other in range(self.model.neq):
+            kind = KINDS.get(int(self.model.eq_type[other]))
+            if other == number or kind not in ("connect", "weld"):
+                continue
+            ends = (end.body for end in find_ends(self.posed, other))
+            tied = {self.root[body] for body in ends} & bars.keys()
+            if self.model.eq_active0[other]:
+                pushed |= {bars[root]: self._name(other) for root in tied}
+        if len(pushed) != 1:
+            return None, ""
+        ((joint, name),) = pushed.items()
+        return joint, name
 
     def _sort_equalities(
         self,

@@ -2,7 +2,7 @@
 
 No joint is removed, for that would change the softness that is measured: MuJoCo sizes a constraint's softness by the
 bodies of the whole model. The loop's driven hinge moves as commanded, the other joints of the robot stay where they
-are, contacts, joint limits and actuators are off.
+are, contacts, joint limits and actuators are off, and so are equalities between the moving bars and joints that stay.
 
 At a state the joint forces follow from MuJoCo's own inverse dynamics of its soft constraints. The driven hinge has the
 acceleration alpha, a held joint none, and the accelerations x of the loop's other hinges are those at which
@@ -28,7 +28,11 @@ import numpy as np
 from fourbar.errors import LimitError
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.engines.mujoco.couple import find_couple
-from fourbar_validation.engines.mujoco.robots.ancestry import climb, find_tied_bodies
+from fourbar_validation.engines.mujoco.robots.ancestry import (
+    climb,
+    find_tied_bodies,
+    name_joint,
+)
 from fourbar_validation.engines.mujoco.robots.answers import (
     InsideAnswer,
     InsideRow,
@@ -54,6 +58,10 @@ HEAVY = 1e4
 move by about its inverse; beyond 1e5 MuJoCo's solver loses the light bars beside it: at 1e6 the gap was three times
 too large."""
 LIMIT = int(mujoco.mjtDisableBit.mjDSBL_LIMIT)
+SETTLED = 5.0
+"""Time constants after which the loop has yielded but for 1 %, at most half of the motion."""
+REACHED = 1.0 - 1e-6
+"""Part of its couple at which dry friction acts in full."""
 MOST_STEPS = 60_000
 """Steps of one run; at 0.1 ms a step of a humanoid these are six seconds."""
 FORCE_OF_PIN = {"O2": "F12", "A": "F32", "B": "F43", "O4": "F14"}
@@ -85,6 +93,8 @@ class LoopInside:
         for name in ("CONTACT", "LIMIT", "ACTUATION"):
             flag = int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{name}"))
             self.model.opt.disableflags |= flag
+        # while joints are held, what ties them to the moving bars would only be torn
+        self.model.eq_active0[list(loop.other_equalities)] = 0
         self.data = mujoco.MjData(self.model)
         dofs = {pin: int(model.jnt_dofadr[j]) for pin, j in loop.hinges.items()}
         self.drive = dofs["O2"]
@@ -197,7 +207,22 @@ class LoopInside:
         soft = PinsAndTorque(couple, self._read_forces(data))
         gap = self._measure_gap(qpos)
         joint = float(qpos[self.address])
-        return InsideRow(theta_2, omega_2, alpha_2, joint, soft, rigid, gap)
+        sticking = self._list_sticking()
+        return InsideRow(theta_2, omega_2, alpha_2, joint, soft, rigid, gap, sticking)
+
+    def _list_sticking(self) -> tuple[str, ...]:
+        """List the hinges of the loop that turn and whose dry friction has not reached its couple."""
+        model, data = self.model, self.data
+        rubbing = (
+            data.efc_type[: data.nefc] == mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF
+        )
+        names = []
+        for row in np.flatnonzero(rubbing):
+            dof = int(data.efc_id[row])
+            reached = abs(data.efc_force[row]) >= REACHED * model.dof_frictionloss[dof]
+            if dof in (self.drive, *self.passive) and not reached and data.qvel[dof]:
+                names.append(name_joint(model, int(model.dof_jntid[dof])))
+        return tuple(names)
 
     def _measure_gap(self, qpos: Array) -> float:
         """Measure the distance of the ends of the closure, m."""
@@ -207,7 +232,7 @@ class LoopInside:
     @property
     def name(self) -> str:
         """Name of the driven joint."""
-        return self.model.joint(self.loop.joint).name or f"joint {self.loop.joint}"
+        return name_joint(self.model, self.loop.joint)
 
     def _solve_rigid(
         self, state: RobotState, alpha_2: float
@@ -340,7 +365,8 @@ class LoopInside:
     ) -> InsideAnswer:
         """Step the whole robot through the angles, at the file's own timestep, integrator and solver.
 
-        Each joint that is held, and the driven one, gets an armature of `heavy` times the robot's largest inertia.
+        Each joint that is held, and the driven one, gets an armature of `heavy` times the robot's largest inertia. The
+        couple that a state asks for acts on the driven one until the next, so that its speed is kept.
         """
         answer = InsideAnswer()
         angles = sorted(theta_2, reverse=omega_2 < 0.0)
@@ -353,7 +379,12 @@ class LoopInside:
         if state is None:
             raise LimitError("the loop does not close where the motion starts")
         data.qpos[:], data.qvel[:] = state.qpos, state.qvel
-        data.qfrc_applied[self.drive] = armature * self.sense * alpha_2
+
+        def drive(row: InsideRow) -> None:
+            couple = armature * alpha_2 + row.soft.torque
+            data.qfrc_applied[self.drive] = self.sense * couple
+
+        drive(self.ask(state.qpos, state.qvel, alpha_2))
         stepper = Stepper(model, data, timestep)
         instants = [
             _find_instant(angles[0], angle, omega_2, alpha_2) for angle in angles
@@ -364,8 +395,11 @@ class LoopInside:
                 f"must be 1 to {MOST_STEPS}"
             )
         spent = 0.0
-        # the loop starts exactly closed: only after the first step has it begun to yield
+        # the loop starts exactly closed, and takes some time constants to yield as far as it does
+        settled = min(SETTLED * self.find_constant(), 0.5 * instants[-1])
         for instant in instants[1:]:
+            if instant < settled:
+                continue
             began = time.process_time()
             stepper.to(instant)
             spent += time.process_time() - began
@@ -375,8 +409,17 @@ class LoopInside:
                 break
             made = float(self.sense * data.qacc[self.drive])
             answer.rows.append(self.ask(data.qpos, data.qvel, made))
+            drive(answer.rows[-1])
         answer.seconds_per_step = spent / max(stepper.done, 1)
         return answer
+
+    def find_constant(self) -> float:
+        """Return the time constant of the closure, s."""
+        stiffness, damping = self.model.eq_solref[self.loop.equality]
+        if stiffness > 0.0:
+            return float(stiffness)
+        # stated as -stiffness and -damping: that of a critically damped closure
+        return 2.0 / abs(float(damping)) if damping else 0.0
 
     def answer_under_torque(
         self, theta_2: Iterable[float], torque: float, seconds: float

@@ -8,6 +8,7 @@ import numpy as np
 
 from fourbar.errors import InputError, LimitError
 from fourbar.scene import Scene, command
+from fourbar_validation.engines.mujoco.robots.ancestry import name_joint
 from fourbar_validation.engines.mujoco.robots.answers import (
     InsideAnswer,
     LoopMeasurement,
@@ -18,12 +19,13 @@ from fourbar_validation.engines.mujoco.robots.answers import (
 )
 from fourbar_validation.engines.mujoco.robots.closures import (
     choose_loop,
+    describe_equality,
     find_closures,
 )
 from fourbar_validation.engines.mujoco.robots.compiled import compile_robot
 from fourbar_validation.engines.mujoco.robots.inside import HEAVY, LoopInside
 from fourbar_validation.engines.mujoco.robots.loop import RobotFile, RobotLoop
-from fourbar_validation.engines.mujoco.robots.pose import pose_robot
+from fourbar_validation.engines.mujoco.robots.pose import PosedRobot, pose_robot
 from fourbar_validation.engines.mujoco.robots.scene import make_scene
 from fourbar_validation.engines.mujoco.robots.settings import (
     SettingsSearch,
@@ -37,10 +39,10 @@ TORN_POSITIONS = 5
 """Positions from which a motor's torque acts."""
 CONSTANTS = 10.0
 """Time constants of the closure during which it acts: the loop has then yielded as far as it does."""
+ALIKE = 1e-6
+"""Difference of the logarithms of lengths below which both ways round fit a scene alike."""
 LIGHTER = 0.1
 """Factor on what holds the other joints, to see what it matters."""
-FIRST_CONSTANT = 0.02
-"""s, time constant where the file states a stiffness in its place."""
 
 
 def measure_loops(
@@ -68,7 +70,8 @@ def measure_loops(
             reasons = "; ".join(f"{one.name}: {one.reason}" for one in closures)
             raise InputError("MJCF", reasons or None, "has no planar four-bar")
         measured = []
-        for loop in loops:
+        for one in loops:
+            loop = one if scene is None else _turn_to(scene, posed, one, options)
             made = make_scene(compiled, posed, loop, options.speed, loop.name)
             stated = made.scene if scene is None else scene
             remarks = made.remarks if scene is None else loop.remarks
@@ -77,6 +80,22 @@ def measure_loops(
     notes = [*compiled.notes, *posed.notes]
     notes += [f"MuJoCo warns: {warning}" for warning in warnings]
     return RobotMeasurement(tuple(measured), tuple(notes))
+
+
+def _turn_to(
+    scene: Scene, posed: PosedRobot, loop: RobotLoop, options: MeasureOptions
+) -> RobotLoop:
+    """Return the loop with the input of the scene as its driven bar, as far as the lengths tell it."""
+    ground, *moving = np.log(loop.lengths)
+    apart, turned = (
+        float(np.abs(np.log(scene.linkage.lengths) - lengths).sum())
+        for lengths in ([ground, *moving], [ground, *reversed(moving)])
+    )
+    output = loop.hinges.get("O4")
+    if options.pose.drive is not None or output is None or apart <= turned + ALIKE:
+        return loop
+    pose = replace(options.pose, drive=name_joint(posed.model, output))
+    return choose_loop(find_closures(posed, pose), loop.name)
 
 
 def _measure_loop(
@@ -93,7 +112,10 @@ def _measure_loop(
     motion = _choose_motion(scene, turned).thin_out(POSITIONS)
     states = inside.answer_states(*motion)
     if not states.rows:
-        raise LimitError(f"{loop.name} closes at none of the positions of the scene")
+        raise LimitError(
+            f"{loop.name} closes at none of the positions of the scene; its lengths "
+            f"are {loop.describe_lengths()}"
+        )
     closing = motion._replace(theta_2=tuple(row.theta_2 for row in states.rows))
     through: InsideAnswer | None = None
     refusal, influence = "", math.nan
@@ -107,8 +129,7 @@ def _measure_loop(
         refusal = str(error)
     torn: tuple[TornState, ...] = ()
     if options.torque is not None:
-        constant = float(model.eq_solref[loop.equality, 0])
-        seconds = CONSTANTS * (constant if constant > 0.0 else FIRST_CONSTANT)
+        seconds = CONSTANTS * inside.find_constant()
         starts = closing.thin_out(TORN_POSITIONS).theta_2
         torn = tuple(inside.answer_under_torque(starts, options.torque, seconds))
     advice = None
@@ -123,6 +144,7 @@ def _measure_loop(
         (),
         read_settings(model, loop),
         len(inside.held),
+        tuple(describe_equality(model, number) for number in loop.other_equalities),
         states,
         through,
         refusal,

@@ -95,13 +95,12 @@ def pose_robot(model: mujoco.MjModel, options: PoseOptions) -> PosedRobot:
 
 
 def find_joint(model: mujoco.MjModel, name: str, option: str) -> int:
-    """Find a joint by its name, or raise an InputError that lists what is there."""
-    number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name)
-    if number < 0:
-        names = [model.joint(i).name for i in range(model.njnt)]
-        listed = ", ".join(name for name in names if name)
+    """Find a joint by its name, as it is printed, or raise an InputError that lists what is there."""
+    names = [name_joint(model, joint) for joint in range(model.njnt)]
+    if name not in names:
+        listed = ", ".join(names) or "none"
         raise InputError(option, name, f"no such joint; the file has: {listed}")
-    return int(number)
+    return names.index(name)
 
 
 def find_outside(model: mujoco.MjModel, qpos: Array) -> list[int]:

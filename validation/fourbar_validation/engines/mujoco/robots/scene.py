@@ -4,6 +4,7 @@ What hangs on a bar by other joints is held as it stands and counts with its mas
 cannot hold is named with its size.
 """
 
+import cmath
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -369,27 +370,20 @@ class _SceneOfLoop:
             )
 
     def _list_loads(self) -> Iterator[Load]:
-        """List the forces by which bodies are held against gravity (gravcomp)."""
+        """List the forces by which bodies are held against gravity (gravcomp), where they act."""
         model, data = self.model, self.data
         if not hasattr(model, "body_gravcomp"):
             return
         for bar in MOVING_BARS:
             bodies = self.carried[bar]
             lifted = model.body_mass[bodies] * model.body_gravcomp[bodies]
-            total = float(lifted.sum())
-            force = -total * self._in_plane(self.gravity)
-            if not lifted.any() or not force:
+            force = -float(lifted.sum()) * self._in_plane(self.gravity)
+            if not force:
                 continue
-            masses = model.body_mass[bodies]
-            apart = (lifted / total - masses / masses.sum()) @ data.xipos[bodies]
-            if abs(self._in_plane(apart)) > NOTHING * self.loop.lengths[bar - 1]:
-                self._leave_out(
-                    f"gravcomp of {abs(force):.6g} N on the {BAR_NAMES[bar]}, which acts "
-                    "away from its mass centre"
-                )
-                continue
-            size, angle = abs(force), math.atan2(force.imag, force.real)
-            yield Load(bar, (round_off(size), round_angle(angle)))
+            place = self._find_polar(bar, lifted @ data.xipos[bodies] / lifted.sum())
+            size, angle = round_off(abs(force)), round_angle(cmath.phase(force))
+            from_pin = (round_off(place[0]), round_angle(place[1]))
+            yield Load(bar, (size, angle), from_pin=from_pin)
 
     def _find_sweep(self, linkage: FourBar) -> "_Path":
         """Follow the loop over the range of the driven hinge, as far as it assembles and no other hinge stops it."""

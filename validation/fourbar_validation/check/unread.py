@@ -1,0 +1,82 @@
+"""What somebody's MJCF states and the check does not look at."""
+
+from collections.abc import Iterator
+from xml.etree import ElementTree as ET
+
+ANY = "*"
+HINGE = "name class type pos axis ref damping frictionloss stiffness springref springdamper armature range limited"
+LOOKED_AT = {
+    **dict.fromkeys(
+        (
+            "mujoco",
+            "compiler",
+            "inertial",
+            "geom",
+            "site",
+            "worldbody",
+            "default",
+            "frame",
+        ),
+        ANY,
+    ),
+    **dict.fromkeys(
+        (
+            "equality",
+            "connect",
+            "weld",
+            "tendon",
+            "actuator",
+            "motor",
+            "contact",
+            "pair",
+            "exclude",
+        ),
+        ANY,
+    ),
+    **dict.fromkeys(
+        ("visual", "asset", "camera", "light", "sensor", "keyframe", "custom", "size"),
+        ANY,
+    ),
+    "option": "timestep integrator solver tolerance iterations ls_iterations noslip_iterations gravity density "
+    "viscosity wind jacobian",
+    "flag": "contact gravity limit spring damper passive frictionloss island sensor energy fwdinv",
+    "statistic": "extent center meansize meanmass",
+    "body": "name childclass pos quat axisangle euler xyaxes zaxis",
+    "joint": HINGE
+    + " solreffriction solimpfriction group user joint coef joint1 joint2 polycoef",
+    **dict.fromkeys(
+        ("fixed", "spatial"),
+        "name class stiffness damping frictionloss springlength solreffriction solimpfriction group width rgba "
+        "material user tendon1 tendon2 polycoef",
+    ),
+    **dict.fromkeys(
+        ("general", "position", "velocity"),
+        "name class group user joint tendon site refsite gear gaintype gainprm biastype biasprm kp kv dampratio "
+        "ctrlrange ctrllimited",
+    ),
+    "dcmotor": "name class group joint tendon site refsite gear input motorconst resistance cogging",
+}
+"""Elements and their attributes that the check compares, that enter what it compares, or that move nothing: of those
+that read and draw, of what collides only whether anything does, and of the drive nothing, for it is taken off."""
+SKIPPED = ("visual", "asset", "sensor", "keyframe", "custom")
+"""Elements whose whole content moves nothing."""
+
+
+def list_unread(text: str) -> list[str]:
+    """List what a screened MJCF states and the check does not look at, as "element attribute"."""
+
+    def walk(element: ET.Element) -> Iterator[str]:
+        looked_at = LOOKED_AT.get(element.tag)
+        if looked_at is None:
+            yield element.tag
+        elif looked_at != ANY:
+            yield from (
+                f"{element.tag} {name}"
+                for name in element.attrib
+                if name not in looked_at.split()
+            )
+        if element.tag not in SKIPPED:
+            for part in element:
+                yield from walk(part)
+
+    return sorted(set(walk(ET.fromstring(text))))
