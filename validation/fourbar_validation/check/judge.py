@@ -193,11 +193,16 @@ class Judge:
             + self.table.rounding[key]
         )
 
-    def explained(self, key: str, predicted: Array, times: float = 1.0) -> bool:
-        """Return whether all numbers of a key are as `predicted`, within `times` the allowed error."""
+    def explained(
+        self, key: str, predicted: Array, times: float = 1.0, left: float = 0.0
+    ) -> bool:
+        """Return whether all numbers of a key are as `predicted`.
+
+        Within `times` the allowed error, or the part `left` of the largest.
+        """
         mask = self.where(key)
         error, allowed, apart = (values[mask] for values in self.judged(key, predicted))
-        within = error <= times * allowed
+        within = error <= np.maximum(times * allowed, left)
         permitted = self.permitted(key, predicted)
         if permitted is not None:
             within |= apart <= permitted[mask]
@@ -290,6 +295,8 @@ class Mistake:
     """True if it was made in the calculation and shows in every quantity; a column's unit shows in that column only."""
     times: float = 1.0
     """Factor on the allowed error: a number that was fitted to rounded ones carries their rounding once more."""
+    left: float = 0.0
+    """Part of the largest value by which an engine that makes this mistake may miss the prediction."""
 
     def prediction(self, key: str, right: Solution) -> Array | None:
         """Return the numbers that this mistake predicts for a key of the table; None if it predicts none."""

@@ -319,7 +319,7 @@ def explain(judge: Judge, differing: list[str]) -> list[Explanation]:
                 predicted, judge.ours(key), equal_nan=True
             ):
                 continue
-            if judge.explained(key, predicted, mistake.times):
+            if judge.explained(key, predicted, mistake.times, mistake.left):
                 if key in differing:
                     explained.append(table.label(key))
             elif key not in differing:

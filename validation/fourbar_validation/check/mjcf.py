@@ -150,11 +150,11 @@ class ModelReport:
             yield f"{method}: {', '.join(parts)}, of its largest value."
         soft = [cost.row for cost in self.costs if cost.row.verdict == DEGRADED]
         if soft and not self.counts[FAILS]:
-            worst = max(soft, key=lambda row: row.error)
-            left = write_number(worst.allowed / TIMES_PREDICTED)
+            softest = max(soft, key=lambda row: row.error)
+            left = write_number(softest.allowed / TIMES_PREDICTED)
             yield (
                 "The file is right as far as MuJoCo's constraints let it be: the "
-                f"stiffest (solimp 0.9999) leaves {left} of {worst.quantity} in it."
+                f"stiffest (solimp 0.9999) leaves {left} of {softest.quantity} in it."
             )
         if self.counts[FAILS]:
             yield ADVICE
