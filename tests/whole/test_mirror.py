@@ -57,7 +57,7 @@ JUDGED_BY = {
     "validation/run/test_released.py": "validation/engines/mujoco: forward",
     "validation/check/test_check.py": "validation/check: calculated fitted judge "
     "mistakes theirs; validation/run: printed",
-    "validation/check/test_mjcf.py": "validation/check: differences screen; validation/robots: guard; "
+    "validation/check/test_mjcf.py": "validation/check: differences; validation/robots: guard; "
     "validation/engines/mujoco: describe theirs topology",
     "validation/engines/mujoco/robots/test_closures.py": "validation/engines/mujoco/robots: ancestry loop",
     "validation/robots/test_files.py": "validation/engines/mujoco/robots: compiled",

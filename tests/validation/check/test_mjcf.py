@@ -29,7 +29,6 @@ from fourbar_validation.check.differences import (
     order,
     price,
 )
-from fourbar_validation.check.unread import list_unread
 from fourbar_validation.cli import status
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.columns import read_columns
@@ -184,28 +183,6 @@ def test_a_planted_difference_is_named(
         for d in find_differences(generated(CRANK_ROCKER).described, described(text))
     }
     assert word in remarks[key]
-
-
-UNREAD = [
-    (
-        'joint name="O4"',
-        'joint name="O4" actuatorfrcrange="-1 1"',
-        "joint actuatorfrcrange",
-    ),
-    ('body name="coupler"', 'body name="coupler" gravcomp="1"', "body gravcomp"),
-    ('island="disable"', 'island="disable" eulerdamp="disable"', "flag eulerdamp"),
-    ("<statistic ", '<statistic meaninertia="2" ', "statistic meaninertia"),
-    ("</worldbody>", "</worldbody><deformable/>", "deformable"),
-]
-
-
-def test_what_the_check_does_not_know_is_named_as_not_looked_at() -> None:
-    assert list_unread(GENERATED) == list_unread(other_plane()) == []
-    text = GENERATED
-    for old, new, _ in UNREAD:
-        assert old in text
-        text = text.replace(old, new, 1)
-    assert list_unread(text) == sorted(name for _, _, name in UNREAD)
 
 
 DRY = replace(

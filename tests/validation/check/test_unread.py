@@ -1,0 +1,28 @@
+"""What an MJCF states and the check does not look at."""
+
+import fourbar
+from fourbar.mjcf import write_mjcf
+from fourbar_validation.check.unread import list_unread
+from tests.whole.test_imports import ROOT
+
+GENERATED = write_mjcf(fourbar.load(ROOT / "models" / "crank_rocker.toml"))
+UNREAD = [
+    (
+        'joint name="O4"',
+        'joint name="O4" actuatorfrcrange="-1 1"',
+        "joint actuatorfrcrange",
+    ),
+    ('body name="coupler"', 'body name="coupler" gravcomp="1"', "body gravcomp"),
+    ('island="disable"', 'island="disable" eulerdamp="disable"', "flag eulerdamp"),
+    ("<statistic ", '<statistic meaninertia="2" ', "statistic meaninertia"),
+    ("</worldbody>", "</worldbody><deformable/>", "deformable"),
+]
+
+
+def test_what_the_check_does_not_know_is_named_as_not_looked_at() -> None:
+    assert list_unread(GENERATED) == []
+    text = GENERATED
+    for old, new, _ in UNREAD:
+        assert old in text
+        text = text.replace(old, new, 1)
+    assert list_unread(text) == sorted(name for _, _, name in UNREAD)
