@@ -179,8 +179,8 @@ def test_error_bars_are_neither_too_small_nor_useless(
 ) -> None:
     for bar, families in (
         ("torque_error", 10),
-        ("drive_force_error", 3),
-        ("force_error", 12),
+        ("drive_force_error", 4),
+        ("force_error", 13),
     ):
         judged = [tally for tally in tallies.values() if bar in tally.too_small]
         assert (

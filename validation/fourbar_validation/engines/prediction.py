@@ -28,6 +28,7 @@ from fourbar_validation.compare.tolerance import (
     ROUNDINGS,
     Array,
     Mask,
+    mark_touching,
     sum_lengths,
 )
 from fourbar_validation.engines.description import find_centre, list_speeds
@@ -99,17 +100,21 @@ def predict_error(
     """Predict the absolute error of a quantity at each position, or at those of a mask, (n,).
 
     With `carried` the accelerations of the bars are differences of others as large as the fastest bar's at `reach`.
-    NaN where the loop does not close; infinite at a singular position, where the equations have no answer.
+    NaN where the loop does not close. Infinite at a singular position, where the
+    equations have no answer, and where rounding decides whether the loop closes.
     """
     n, (omega, alpha) = len(command.theta_2), list_speeds(command)
     command = with_signs(scene.linkage, command)
     errors = np.full(n, np.nan)
+    touching = mark_touching(scene.linkage, command.theta_2)
     for i in range(n) if mask is None else np.flatnonzero(mask).tolist():
         theta_2, branch = float(command.theta_2[i]), int(command.branch[i])
         moved = _compute_sensitivity(
             scene, theta_2, branch, float(omega[i]), float(alpha[i])
         )
         if moved is None:
+            if touching[i]:
+                errors[i] = math.inf
             continue
         lost = ROUNDINGS * EPS * moved.data["theta_4"] >= FIRST_ORDER * float(
             moved.data["condition"]
