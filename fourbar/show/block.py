@@ -545,8 +545,9 @@ class _Block:
                 "of these instants"
             )
         if facts.between.reversals:
-            places = ", ".join(
-                f"{self._place(place, named=False)} ({pin})"
+            unit = "rad" if facts.solution.at.stroke is None else "m"
+            places = ", ".join(  # of a motion law too by its angle, not by its time
+                f"{self._value(place, unit, self.longest if unit == 'm' else None)} ({pin})"
                 for place, pin in facts.between.reversals
             )
             name = facts.solution.commanded

@@ -11,7 +11,7 @@ from fourbar.effects import Gravity, PinFriction, Place, Spring, Springs, Torsio
 from fourbar.errors import LimitError
 from fourbar.formulas.mobility import choose_range
 from fourbar.linkage import PINS
-from fourbar.scene import Scene
+from fourbar.scene import Command, Scene
 from fourbar.scene.motion import Free, Motion, Sweep
 from fourbar.solve import solve
 from fourbar_validation.run.judge import judge
@@ -210,3 +210,30 @@ def test_a_free_motion_that_winds_a_spring_is_an_error() -> None:
         solve(Scene(linkage("crank-rocker"), free, effects=(weak,)))
     held = Torsion.at(O2=(2.0, 0.0, 0.0))
     assert len(solve(Scene(linkage("crank-rocker"), free, effects=(held, Gravity()))))
+
+
+@pytest.mark.parametrize("pin", ("O2", "A", "B", "O4"))
+@pytest.mark.parametrize("bar", (3, 4))
+def test_turns_are_counted_alike_whichever_bar_is_commanded(pin: str, bar: int) -> None:
+    """Every bar of a drag link turns; the spring is wound up where the pin has turned by half a turn from its rest."""
+    linkage = replace(fourbar.uniform(0.1, 0.25, 0.3, 0.28), ground_angle=0.4)
+    scene = fourbar.Scene(
+        linkage,
+        fourbar.Motion(fourbar.Sweep(0.5, 0.5 + 2.2 * math.tau, 90), 3.0),
+        effects=(Torsion.at(**{pin: (2.0, 0.7, 0.1)}),),
+    )
+    one = fourbar.solve(scene)
+    apart = one.theta_4 - one.theta_2 if bar == 3 else one.theta_3 - one.theta_2
+    branch = np.sign(np.sin(apart)).astype(np.int8)
+    assert np.ptp(branch) == 0
+    angle, speed, acceleration = (
+        getattr(one, f"{name}_{bar}") for name in ("theta", "omega", "alpha")
+    )
+    command = Command(angle, branch, speed, acceleration, bar=bar)
+    other = fourbar.solve(scene, at=command)
+    assert other.status == one.status
+    assert one.torque is not None and other.torque is not None
+    solved = np.isfinite(one.torque)
+    assert solved.any() and (pin in ("A", "B") or not solved.all())
+    size = np.abs(one.torque[solved]).max()
+    assert np.abs(other.torque - one.torque)[solved].max() < 1e-11 * size

@@ -274,3 +274,23 @@ def test_without_keyframe_no_position_is_written() -> None:
     assert mujoco.MjModel.from_xml_string(text).nkey == 0
     with pytest.raises(fourbar.InputError, match="timestep"):
         write_mjcf(crank_rocker(), keyframe=False)
+
+
+@pytest.mark.parametrize("pin", ("O2", "O4"))
+@pytest.mark.parametrize("theta_1", (0.0, 0.7, -2.0))
+def test_a_spring_at_a_ground_pin_rests_at_an_angle_from_the_ground(
+    pin: str, theta_1: float
+) -> None:
+    """Hinges count from the world's axis, a scene's rest from the ground bar; the preload moves it by -preload/k."""
+    turned = replace(crank_rocker().linkage, ground_angle=theta_1)
+    spring = Torsion.at(**{pin: (0.5, 0.4, 0.1)})
+    scene = crank_rocker(
+        linkage=turned,
+        motion=fourbar.Motion(1.0 + theta_1, 10.0),
+        loads=(),
+        effects=(spring,),
+    )
+    model, _ = opened(scene)
+    (sprung_joint,) = np.flatnonzero(model.jnt_stiffness)
+    assert model.jnt_stiffness[sprung_joint] == 0.5
+    assert model.qpos_spring[sprung_joint] == pytest.approx(0.4 + theta_1 - 0.2)

@@ -338,3 +338,75 @@ def test_a_new_scene_has_weight_and_sixty_turns_a_minute(
     capsys.readouterr()
     assert status(["analyze", str(tmp_path / "a.toml")]) == 0
     assert 12 <= len(capsys.readouterr().out.splitlines()) <= 19
+
+
+def test_the_range_at_rest_reaches_from_the_least_to_the_greatest_that_is_held() -> (
+    None
+):
+    """A friction couple of 0.5 N m at O2 holds the static torque, less or more as much, at each position."""
+    sweep = fourbar.Motion(fourbar.Sweep(0.2, 1.4, 6), 0.0)
+    bare = crank_rocker(motion=sweep, effects=(fourbar.Gravity(),))
+    static = fourbar.solve(bare).torque
+    assert static is not None and np.ptp(static) > 0.1
+    held = replace(bare, effects=(*bare.effects, fourbar.Friction.at(O2=0.5)))
+    facts = summarize(held, fourbar.solve(held))
+    outer = static.min() - 0.5, static.max() + 0.5
+    assert facts.held == pytest.approx(outer, rel=1e-12)
+    row = f"at rest  {1e3 * outer[0]:.4g} mN m to {1e3 * outer[1]:.4g} mN m: the range"
+    assert row in plain(block(held)).replace("at rest ", "at rest  ")
+
+
+def test_a_reversal_of_a_motion_law_is_named_by_its_angle() -> None:
+    """Half of A (1 - cos) swings from 0.3 to 2.0 rad and back: O2 reverses at the far end, at t = 1 s."""
+    time = np.linspace(0.0, 2.0, 41)
+    angle = 0.3 + 0.85 * (1.0 - np.cos(math.pi * time))
+    law = Law(tuple(time), tuple(angle), steps=30, ends="rest")
+    scene = crank_rocker(
+        motion=fourbar.Motion(law=law), effects=(fourbar.Friction.at(O2=0.05),)
+    )
+    facts = summarize(scene, fourbar.solve(scene))
+    ((place, pin),) = facts.between.reversals
+    assert pin == "O2" and place == pytest.approx(2.0, abs=1e-6)
+    assert "reverses, and the pin forces jump, at theta_2 = 114.6 deg (O2)" in plain(
+        block(scene)
+    )
+
+
+def test_digits_left_are_those_that_the_error_bar_leaves() -> None:
+    """A torque on bar 4 beside its dead centre: the whole digits of value over error bar."""
+    linkage = fourbar.uniform(D, A, B, C)
+    stretched = opposite(C, D, A + B)  # bars 2 and 3 in one line
+    said = {}
+    for away in (1e-6, 1e-9, 1e-10, 1e-11):
+        scene = fourbar.Scene(
+            linkage,
+            fourbar.Motion(stretched + away, 3.0),
+            4,
+            effects=(fourbar.Gravity(),),
+        )
+        s = fourbar.solve(scene, "error")
+        assert s.torque is not None and s.torque_error is not None
+        digits = math.floor(math.log10(abs(s.torque[0]) / s.torque_error[0]))
+        row = re.search(r"(\d+) digits left of T4 at", plain(block(scene)))
+        said[away] = (None if row is None else int(row.group(1)), digits)
+    for shown, digits in said.values():
+        assert shown == (digits if digits < 8 else None)
+    assert any(shown is not None for shown, _ in said.values())
+
+
+def test_the_json_names_the_angle_of_the_peak_that_is_located() -> None:
+    scene = swept_finely(24)
+    s = fourbar.solve(scene)
+    entry = write_motor(scene, s, {})
+    fine = fourbar.solve(swept_finely(36_000))
+    assert entry is not None
+    for pin, name in (("O2", "F12"), ("A", "F32"), ("B", "F43"), ("O4", "F14")):
+        load = np.hypot(*getattr(fine, name).T)
+        where = fine.theta_2[np.argmax(load)]
+        assert entry["pins"][pin]["theta_2"] == pytest.approx(where, abs=2e-4), pin
+        assert entry["pins"][pin]["peak"] == pytest.approx(load.max(), rel=LOCATED)
+
+
+def swept_finely(steps: int) -> fourbar.Scene:
+    motion = fourbar.Motion(fourbar.Sweep(0.1, 0.1 + math.tau, steps), 10.0)
+    return crank_rocker(motion=motion)

@@ -143,6 +143,18 @@ def test_at_a_limit_of_the_input_the_output_is_the_angle() -> None:
         )
 
 
+def test_the_frequency_at_a_limit_is_that_of_the_output_as_a_pendulum() -> None:
+    linkage = FourBar(0.3, Bar(0.4), Bar(0.2), Bar(0.25, M, INERTIA, (R, 0.0)), 0.5)
+    limit = fourbar.limit_positions(linkage)[0]
+    beside = Motion(np.array([limit.theta_2 + off for off in (0.01, -0.01)]))
+    scene = Scene(linkage, beside, effects=(Gravity(9.81, limit.theta_4),))
+    (hanging,) = [rest for rest in equilibrium(scene).found if rest.place.branch == 0][
+        :1
+    ]
+    pendulum = math.sqrt(M * 9.81 * R / (INERTIA + M * R * R)) / (2 * math.pi)
+    assert hanging.frequency == pytest.approx(pendulum, rel=1e-9)
+
+
 def springy(seed: int) -> Scene:
     """A linkage of any type with weights, two springs, a force and a couple, at random."""
     random = np.random.default_rng(seed)

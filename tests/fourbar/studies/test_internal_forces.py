@@ -173,3 +173,22 @@ def test_feet_that_differ_by_rounding_are_one() -> None:
         ).M
     ).max(axis=1)
     assert np.abs(largest.moment) == pytest.approx(beside, rel=1e-4)
+
+
+def test_beyond_its_second_pin_a_uniform_bar_bends_as_a_cantilever() -> None:
+    """The mass of a uniform bar ends at its pin: beyond, P (a - x) of the load alone, and nothing beyond the load."""
+    linkage = replace(BARE, output=fourbar.Bar(0.22, 0.4))
+    load = fourbar.Load(4, (8.0, math.radians(-90.0)), from_pin=(0.3, 0.0), frame="bar")
+    scene = fourbar.Scene(
+        linkage,
+        fourbar.Motion(1.1, 12.0, 30.0),
+        loads=(load,),
+        effects=(fourbar.Gravity(9.81),),
+    )
+    x = np.array([0.2200001, 0.25, 0.29, 0.31, 0.4])
+    internal = solved(scene, 4, x)
+    assert internal.uniform
+    arms = np.maximum(0.3 - x, 0.0)
+    np.testing.assert_allclose(np.abs(internal.M[0]), 8.0 * arms, atol=1e-13)
+    np.testing.assert_allclose(np.abs(internal.V[0]), 8.0 * (arms > 0.0), atol=1e-12)
+    np.testing.assert_allclose(internal.N[0], 0.0, atol=1e-12)
