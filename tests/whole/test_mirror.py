@@ -20,7 +20,7 @@ JUDGED_BY = {
     # what a command reads, does and prints is tested through the command
     "fourbar/cli/test_cli.py": "fourbar/cli: evaluate export given; fourbar/show: tables",
     "whole/test_exits.py": "validation: cli; validation/report: terminal; lab: cli fuzz_files",
-    "whole/test_kills.py": "validation/run: pool run store",
+    "whole/test_kills.py": "validation/run: pool run",
     "whole/test_results_format.py": "validation/compare: columns",
     "whole/test_package.py": "validation: places",
     # one table or one evaluation, whose rows are no use alone
@@ -64,16 +64,15 @@ JUDGED_BY = {
     "validation/robots/test_command.py": "validation/robots: options",
     "validation/published/test_published.py": "validation/published: comparison figures program textbook "
     "thesis thirteen",
-    "validation/regression/test_regression.py": "validation/regression: accept change changes fault "
-    "record render rules scenes; validation/report: junit",
+    "validation/regression/test_regression.py": "validation/regression: accept changes fault "
+    "record render rules scenes",
     "validation/report/test_report.py": "validation/report: figures machine overview record "
     "summary svg templating thumbnail words",
     # studies: each through its command
     "lab/test_bench.py": "lab: contenders",
     "lab/test_stability.py": "lab: families slopes tally",
     "lab/test_faults.py": "lab: fault_scenes injection",
-    "validation/cost/test_cost.py": "validation/cost: series formulas laws pictures study; "
-    "validation/advise: worst_errors",
+    "validation/cost/test_cost.py": "validation/cost: series formulas pictures study",
     "validation/advise/test_advise.py": "validation/advise: matters",
     "lab/test_benchmark.py": "lab/simulators: slider_engines slider_mujoco slider_pinocchio",
     "lab/simulators/test_problems.py": "lab/simulators: slider_crank; validation/check: problem",

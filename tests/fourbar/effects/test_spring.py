@@ -237,3 +237,37 @@ def test_turns_are_counted_alike_whichever_bar_is_commanded(pin: str, bar: int) 
     assert solved.any() and (pin in ("A", "B") or not solved.all())
     size = np.abs(one.torque[solved]).max()
     assert np.abs(other.torque - one.torque)[solved].max() < 1e-11 * size
+
+
+@pytest.mark.parametrize("pin", ("O2", "A", "B", "O4"))
+@pytest.mark.parametrize("branch", (1, -1))
+@pytest.mark.parametrize("theta_1", (0.0, 2.5))
+def test_turns_are_counted_where_the_output_is_a_crank(
+    pin: str, branch: int, theta_1: float
+) -> None:
+    """Angles that are continuous along two turns say where a pin is half a turn from where its spring rests."""
+    linkage = replace(fourbar.uniform(0.3, 0.22, 0.25, 0.1), ground_angle=theta_1)
+    rest = 0.7
+    scene = fourbar.Scene(
+        linkage,
+        fourbar.Motion(
+            theta_4=fourbar.Sweep(0.5, 0.5 + 2.2 * math.tau, 90),
+            omega_4=3.0,
+            branch=branch,
+        ),
+        effects=(Torsion.at(**{pin: (2.0, rest, 0.1)}),),
+    )
+    s = fourbar.solve(scene)
+    angles = {1: theta_1, 2: s.theta_2, 3: s.theta_3, 4: s.theta_4}
+    first, second = PINS[pin]
+    turned = np.asarray(angles[second] - angles[first]) - rest
+    turned = turned - math.tau * np.round(turned[0] / math.tau)
+    assert s.status == np.where(np.abs(turned) > math.pi, "wound", "ok").tolist()
+    couple = 0.1 + 2.0 * turned[s.status_code == 0]
+    ratio = (s.omega_2, s.omega_3, s.omega_4)
+    rates = dict(zip((1, 2, 3, 4), (0.0 * s.omega_2, *ratio), strict=True))
+    slip = (rates[second] - rates[first])[s.status_code == 0]
+    bare = fourbar.solve(replace(scene, effects=()))
+    assert s.power is not None and bare.power is not None
+    added = (s.power - bare.power)[s.status_code == 0]
+    assert np.abs(added - couple * slip).max() < 1e-11 * np.nanmax(np.abs(s.power))

@@ -524,3 +524,28 @@ def test_one_rule_of_agreement(
         ("a", "b", "c"), "F12", np.array(error), bound, "", places, 1.0, mask
     )
     assert (row.verdict, row.theta_2) == (verdict, worst + 1.0)
+
+
+def test_every_row_counts_however_many_there_are() -> None:
+    many = rows(agree=70, fail=1)
+    assert Counts(many)[AGREES] == 70 and Counts(many)[FAILS] == 1
+    assert Counts(many).status == FAILED and Counts(rows(agree=70)).status == HOLDS
+    counts = Counts()
+    counts.add_scene(rows(agree=40))
+    counts.add_scene(rows(refuse=3))
+    assert (counts.scenes, counts.scenes_compared, counts.total) == (2, 1, 43)
+
+
+def test_nothing_compared_is_no_success_whatever_was_refused() -> None:
+    for none in (rows(refuse=5), rows(undecided=5), [IDENTITY, IDENTITY], []):
+        assert Counts(none).nothing and Counts(none).status == FAILED
+    assert not any(row.passed for row in rows(refuse=1, undecided=1, fail=1))
+
+
+@pytest.mark.parametrize(("part", "passed"), [(0.9, True), (1.1, False), (8.0, False)])
+def test_a_row_agrees_up_to_what_is_allowed(part: float, passed: bool) -> None:
+    errors = np.array([0.0, part, 0.5]) * 1e-12
+    row = Row.judged(("a", "b", "-"), "c", errors, 1e-12, "why", np.arange(3.0))
+    assert row.passed == passed and row.theta_2 == 1.0
+    lone = Row.judged(("a", "b", "-"), "c", part * 1e-12, 1e-12, "why")
+    assert lone.passed == passed

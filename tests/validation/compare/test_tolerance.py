@@ -1,11 +1,16 @@
 """The one relative error: what a size of nothing demands, and that what is no number is never small."""
 
+import math
+
 import numpy as np
 import pytest
 
 import fourbar
 from fourbar.effects import LinearDrive, Place
+from fourbar_validation.compare.scales import scale_of
 from fourbar_validation.compare.tolerance import (
+    EQUIVALENCE,
+    IDENTITY,
     compute_difference,
     divide,
     find_condition,
@@ -13,6 +18,7 @@ from fourbar_validation.compare.tolerance import (
     find_lever,
     find_used,
     find_worst,
+    mark_touching,
     replace_zero_size,
 )
 from tests.support.scenes import crank_rocker
@@ -89,3 +95,56 @@ def test_of_a_stroke_the_angle_of_its_bar_is_conditioned_by_the_lever() -> None:
         motion=fourbar.Motion(theta_2=s.theta_2, omega_2=1.0), drive=drive
     )
     assert (find_condition("theta_2", linkage, fourbar.solve(at_angles)) == 1.0).all()
+
+
+def test_an_angle_is_compared_modulo_one_turn_and_not_half_a_turn() -> None:
+    ours = np.array([0.0, 1.0, -3.0])
+    for apart, error in ((math.pi, math.pi), (0.5, 0.5), (3.5, 2.0 * math.pi - 3.5)):
+        found = compute_difference("theta_3", ours, ours + apart)
+        assert found == pytest.approx(np.full(3, error))
+    assert compute_difference("omega_3", ours, ours + 7.0) == pytest.approx(7.0)
+
+
+def test_what_is_allowed_grows_as_the_condition_falls() -> None:
+    """50 eps at condition 1, a hundred times as much at 0.01; an identity is allowed the same everywhere."""
+    condition = np.array([1.0, 0.1, 0.01])
+    allowed = 50.0 * 2.0**-52 * np.array([1.0, 10.0, 100.0])
+    assert EQUIVALENCE.allowed(condition) == pytest.approx(allowed, rel=1e-12)
+    assert IDENTITY.allowed(condition) == pytest.approx(50.0 * 2.0**-52, rel=1e-12)
+
+
+def test_only_a_loop_that_misses_by_its_rounding_touches() -> None:
+    linkage = fourbar.uniform(0.3, 0.25, 0.1, 0.22)
+    limit = fourbar.limit_positions(linkage)[0].theta_2
+    off = np.array([0.0, 1e-9, -1e-9, 1e-3])
+    assert mark_touching(linkage, limit + off).tolist() == [True, False, False, False]
+
+
+@pytest.mark.parametrize("missing", (math.nan, math.inf, -math.inf))
+def test_an_error_that_is_no_number_is_the_worst(missing: float) -> None:
+    errors = np.array([0.0, missing, 1.0])
+    assert find_used(errors, np.ones(3))[1] == math.inf
+    if math.isnan(missing):
+        assert find_worst(errors) == 1
+
+
+def test_the_scale_is_of_positions_whose_condition_is_a_tenth_at_least() -> None:
+    """A rocker's pin forces grow towards its limit: those of worse conditions excuse no others."""
+    linkage = fourbar.uniform(0.3, 0.25, 0.1, 0.22)
+    limit = fourbar.limit_positions(linkage)[0].theta_2
+    away = np.array([0.3, 0.2, 1e-2, 1e-4, 1e-6])
+    solved = (
+        fourbar.solve(fourbar.Scene(linkage, motion, effects=(fourbar.Gravity(),)))
+        for motion in (
+            fourbar.Motion(limit + away, 0.0),
+            fourbar.Motion(limit - away, 0.0),
+        )
+    )
+    (s,) = (solution for solution in solved if solution.assembled.all())
+    assert s.F12 is not None and s.scene is not None
+    size = np.hypot(*s.F12.T)
+    well = s.condition >= 0.1
+    assert well.any() and not well.all() and size[~well].max() > 10.0 * size[well].max()
+    scale = scale_of("F12", s.scene, s, s.F12)
+    assert scale[well] == pytest.approx(size[well].max())
+    assert (scale[~well] < 2.0 * size[~well]).all()

@@ -208,7 +208,7 @@ def _sum_force_terms(scene: Scene, formulas: Solution) -> Array:
     return total
 
 
-SIZED_BY = ("omega_3", "alpha_3", "a_G2", "a_G3", "a_G4")
+SIZED_BY = ("omega_3", "omega_4", "alpha_3", "alpha_4", "a_G2", "a_G3", "a_G4")
 """Quantities from which the size of a force is computed; a reference without them has none."""
 
 

@@ -1,0 +1,111 @@
+"""Errors that the advice goes by, of answers that are off by a known part."""
+
+import math
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fourbar
+from fourbar.scene import command
+from fourbar_validation.advise import advise
+from fourbar_validation.advise.matters import judge_trial
+from fourbar_validation.advise.worst_errors import (
+    NO_ANSWER,
+    QUANTITIES,
+    WorstErrors,
+    compute_errors,
+    find_greatest,
+)
+from fourbar_validation.engines.mujoco.trial import Trial
+from tests.support.scenes import crank_rocker
+
+SCENE = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.1, 5.9, 39), 10.0))
+COMMAND = command(SCENE)
+
+
+def answer(**off: float) -> dict[str, Any]:
+    """Give the right torque and pin forces, off by a part of their largest value at the last position."""
+    solution = fourbar.solve(SCENE)
+    quantities = {name: np.array(getattr(solution, name)) for name in QUANTITIES}
+    for name, part in off.items():
+        values = quantities[name]
+        size = np.abs(values) if values.ndim == 1 else np.hypot(*values.T)
+        values[(-1, 0) if values.ndim == 2 else -1] += part * size.max()
+    return quantities
+
+
+@pytest.mark.parametrize("name", QUANTITIES)
+@pytest.mark.parametrize("part", (5e-6, 1e-9))
+def test_each_error_is_the_part_that_an_answer_is_off(name: str, part: float) -> None:
+    errors = compute_errors(SCENE, COMMAND, answer(**{name: part}))
+    for field, error in zip(QUANTITIES, errors, strict=True):
+        assert error == pytest.approx(
+            part if field == name else 0.0, rel=1e-4, abs=1e-12
+        )
+    assert errors.worst == pytest.approx(part, rel=1e-4)
+    assert errors.force == pytest.approx(0.0 if name == "torque" else part, abs=1e-12)
+
+
+def test_what_is_no_number_is_no_small_error() -> None:
+    for name in ("torque", "F32"):
+        errors = compute_errors(SCENE, COMMAND, answer(**{name: math.nan}))
+        assert getattr(errors, name) == errors.worst == math.inf
+    assert find_greatest([0.0, math.nan]) == find_greatest([]) == math.inf
+    lost = COMMAND._replace(angle=np.full(40, math.nan))
+    assert compute_errors(SCENE, lost, answer()) == NO_ANSWER
+
+
+def test_a_trial_that_lost_the_motion_has_no_error_that_serves() -> None:
+    trial = Trial(COMMAND, answer(), steps=40, broken="the loop came apart")
+    assert judge_trial(SCENE, trial) == NO_ANSWER
+    assert judge_trial(SCENE, Trial(COMMAND, answer(), steps=40)).worst < 1e-12
+
+
+class Pretended:
+    """A setup whose error falls with the fourth power of the steps, to a floor."""
+
+    omega, alpha = 10.0, 0.0
+
+    def __init__(self, floor: float = 0.0, broken: str = "") -> None:
+        self.floor, self.broken = floor, broken
+
+    def steps(self, settings: Any) -> int:
+        return round(settings.steps_per_revolution)
+
+    def try_out(self, settings: Any) -> Trial:
+        n = settings.steps_per_revolution
+        error = (10.0 / n) ** 4 + self.floor
+        return Trial(
+            COMMAND, answer(F43=error), self.steps(settings), n, (), self.broken
+        )
+
+    def make_clocks(self, settings: Any) -> Any:
+        return (lambda steps: 1e-6 * steps), (lambda readings: 1e-6 * readings)
+
+
+@pytest.mark.parametrize("wanted", (1e-4, 1e-6))
+def test_advice_reaches_the_error_with_room_and_with_few_steps(wanted: float) -> None:
+    advice = advise.advise(SCENE, wanted, Pretended())  # type: ignore[arg-type]
+    assert advice.reached and advice.best.errors.worst <= 0.7 * wanted
+    least = 10.0 * (0.7 * wanted) ** -0.25
+    assert advice.best.steps <= 1.3 * least
+
+
+@pytest.mark.parametrize(
+    "setup", (Pretended(floor=1e-3), Pretended(broken="it came apart"))
+)
+def test_what_no_setting_reaches_is_not_advised(setup: Pretended) -> None:
+    advice = advise.advise(SCENE, 1e-5, setup)  # type: ignore[arg-type]
+    assert not advice.reached and "No setting of plain MJCF" in advice.reason
+    assert advice.cells()[0].endswith("(not reached)")
+
+
+def test_the_greatest_deviation_of_the_speed_is_said() -> None:
+    speed = np.full(40, 10.0)
+    speed[7] = 10.5
+    trial = SimpleNamespace(at=COMMAND._replace(speed=speed))
+    found = advise._find_speed_error(Pretended(), trial)  # type: ignore[arg-type]
+    assert found == pytest.approx(0.05)
+    assert isinstance(NO_ANSWER, WorstErrors)

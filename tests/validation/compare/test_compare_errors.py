@@ -1,0 +1,154 @@
+"""An answer with one error, at one position, of one quantity: the comparison fails there and nowhere else."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import fourbar
+from fourbar_validation.compare.answer import Answer
+from fourbar_validation.compare.compare import COMPARED, Comparison, Held
+from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, UNDECIDED, Row
+from fourbar_validation.compare.tolerance import EPS, EQUIVALENCE, IDENTITY, Array, K
+from tests.support.scenes import crank_rocker
+
+POSITIONS = 40
+SCENE = crank_rocker(
+    motion=fourbar.Motion(fourbar.Sweep(0.1, 5.9, POSITIONS - 1), 10.0, 5.0)
+)
+FORMULAS = fourbar.solve(SCENE)
+FIRST, MIDDLE, LAST = 0, 17, POSITIONS - 1
+
+
+def make_answer(**changed: Array | None) -> Answer:
+    """Make an answer of an exact engine that agrees to the last digit but for what is changed; None: left out."""
+    quantities = {name: np.array(getattr(FORMULAS, name)) for name in COMPARED}
+    for name, values in changed.items():
+        if values is None:
+            del quantities[name]
+        else:
+            quantities[name] = values
+    assembled = np.ones(POSITIONS, dtype=bool)
+    return Answer("other", "exact", FORMULAS.at, assembled, quantities)
+
+
+def compare(answer: Answer, **held: object) -> dict[str, Row]:
+    comparison = Comparison(
+        "scene",
+        SCENE,
+        answer,
+        FORMULAS,
+        Held(EQUIVALENCE, COMPARED, **held),  # type: ignore[arg-type]
+    )
+    return {row.quantity: row for row in [*comparison.rows(), comparison.closure()]}
+
+
+def moved(name: str, place: int, by: float) -> Array:
+    """Return a quantity that is off by so many parts of its largest value at one position."""
+    values = np.array(getattr(FORMULAS, name))
+    values[place] += by * (1.0 if name[:5] == "theta" else np.abs(values).max())
+    return values
+
+
+def test_an_answer_without_an_error_agrees_in_every_quantity() -> None:
+    rows = compare(make_answer())
+    assert {row.verdict for row in rows.values()} == {AGREES}
+    assert {*COMPARED, "closure", "assembled", "undecided"} == rows.keys()
+
+
+@pytest.mark.parametrize("place", (FIRST, MIDDLE, LAST))
+@pytest.mark.parametrize("name", ("theta_3", "omega_4", "alpha_3", "torque", "F12"))
+def test_an_error_at_any_position_fails_its_row_there(name: str, place: int) -> None:
+    rows = compare(make_answer(**{name: moved(name, place, 1e-9)}))
+    failing = {row.quantity for row in rows.values() if row.failed}
+    assert failing - {"closure"} == {name}
+    assert rows[name].theta_2 == FORMULAS.theta_2[place]
+
+
+@pytest.mark.parametrize("factor", (0.2, 5.0))
+def test_what_is_allowed_is_fifty_last_digits_over_the_condition(factor: float) -> None:
+    """Of theta_3 that is 50 eps over |sin(theta_4 - theta_3)| and the shorter of bars 3, 4 over the longest bar."""
+    assert (K, EPS) == (50.0, 2.0**-52)
+    s = abs(math.sin(FORMULAS.theta_4[MIDDLE] - FORMULAS.theta_3[MIDDLE]))
+    allowed = 50.0 * 2.0**-52 / (s * 0.22 / 0.3)
+    answer = make_answer(theta_3=moved("theta_3", MIDDLE, factor * allowed))
+    row = compare(answer)["theta_3"]
+    assert row.failed == (factor > 1.0)
+    if row.failed:
+        assert row.allowed == pytest.approx(allowed, rel=1e-6)
+
+
+def test_both_components_of_a_force_count() -> None:
+    for axis in (0, 1):
+        force = np.array(FORMULAS.F43)
+        force[MIDDLE, axis] *= 1.0 + 1e-8
+        assert compare(make_answer(F43=force))["F43"].failed
+
+
+def test_a_quantity_that_is_missing_fails() -> None:
+    for name in ("torque", "F14", "alpha_4"):
+        row = compare(make_answer(**{name: None}))[name]
+        assert row.failed and row.reason == "no answer"
+
+
+@pytest.mark.parametrize("place", (FIRST, LAST))
+def test_no_value_where_the_loop_closes_fails(place: int) -> None:
+    for name in ("torque", "F32"):
+        row = compare(make_answer(**{name: moved(name, place, math.nan)}))[name]
+        assert row.failed and row.reason.startswith("NaN")
+
+
+def test_an_engine_that_closes_elsewhere_fails_either_way() -> None:
+    assembled = np.ones(POSITIONS, dtype=bool)
+    assembled[FIRST] = False
+    rows = compare(replace_assembled(make_answer(), assembled))
+    assert rows["assembled"].failed
+    longer = crank_rocker(linkage=fourbar.uniform(0.3, 0.25, 0.1, 0.22))
+    solution = fourbar.solve(longer, "position")
+    assert not solution.assembled.all() and solution.assembled.any()
+    answer = Answer("other", "exact", solution.at, np.ones(len(solution), dtype=bool))
+    held = Held(EQUIVALENCE, ())
+    (row, *_) = Comparison("", longer, answer, solution, held).rows()
+    assert row.quantity == "assembled" and row.failed
+
+
+def replace_assembled(answer: Answer, assembled: np.ndarray) -> Answer:  # type: ignore[type-arg]
+    answer.assembled = assembled
+    return answer
+
+
+def test_angles_that_do_not_close_the_loop_fail_beside_their_own_row() -> None:
+    rows = compare(make_answer(theta_4=moved("theta_4", FIRST, 1e-10)))
+    assert rows["closure"].failed
+    assert rows["closure"].allowed == pytest.approx(IDENTITY.factor, rel=1.0)
+
+
+@pytest.mark.parametrize(("times", "verdict"), [(9.0, DEGRADED), (11.0, FAILS)])
+def test_ten_times_its_prediction_an_error_is_degraded_and_no_more(
+    times: float, verdict: str
+) -> None:
+    most = np.abs(FORMULAS.torque).max()  # type: ignore[type-var]
+    expected = np.full(POSITIONS, 1e-10 * most)
+
+    def predict(name: str, where: object) -> Array:
+        return expected if name == "torque" else 0.0 * expected
+
+    answer = make_answer(torque=moved("torque", MIDDLE, times * 1e-10))
+    assert compare(answer, predicted=predict)["torque"].verdict == verdict
+
+
+def test_a_scene_of_which_most_numbers_are_undecided_does_not_hold() -> None:
+    """A tolerance that is wider than a thousandth at every position leaves nothing to decide by."""
+    blind = replace(FORMULAS)
+    for name in ("at", "lengths", "ground", "scene"):
+        setattr(blind, name, getattr(FORMULAS, name))
+    blind.condition = np.full(POSITIONS, 1e-14)
+    answer = make_answer()
+    held = Held(EQUIVALENCE, ("omega_3", "F12"))
+    rows = {
+        row.quantity: row
+        for row in Comparison("", SCENE, answer, blind, held, blind).rows()
+    }
+    assert rows["F12"].verdict == UNDECIDED
+    assert rows["undecided"].failed and rows["undecided"].allowed == 0.5

@@ -1,0 +1,93 @@
+"""Laws of the error and what is concluded from them, on points that follow a stated law."""
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from fourbar_validation.advise.worst_errors import QUANTITIES, WorstErrors
+from fourbar_validation.cost.conclusion import find_cheapest
+from fourbar_validation.cost.laws import (
+    ErrorLaw,
+    find_floor,
+    find_jumps,
+    find_pareto,
+    fit_laws,
+)
+from fourbar_validation.cost.study import STEPPED, CostPoint
+
+STEPS = [40.0 * 2**k for k in range(6)]
+
+
+def point(steps: float, error: float, seconds: float | None = None) -> CostPoint:
+    errors = WorstErrors(*[error] * len(QUANTITIES))
+    cost = 1e-6 * steps if seconds is None else seconds
+    return CostPoint(
+        "RK4, tc held",
+        STEPPED,
+        f"{steps:g} steps",
+        steps,
+        int(steps),
+        steps,
+        errors,
+        errors,
+        cost,
+        cost,
+        0.0,
+    )
+
+
+def fit_order(order: float) -> ErrorLaw:
+    """Fit the law of RK4 to errors of an order."""
+    ladder = [point(n, 1e-2 * (STEPS[0] / n) ** order) for n in STEPS]
+    (law,) = (
+        law for law in fit_laws({"RK4, tc held": ladder}) if law.quantity == "F12"
+    )
+    return law
+
+
+@pytest.mark.parametrize(("order", "holds"), [(4.0, True), (3.8, True), (3.5, False)])
+def test_a_law_holds_within_a_third_of_an_order(order: float, holds: bool) -> None:
+    law = fit_order(order)
+    assert law.exponent == pytest.approx(order, abs=1e-6) and law.expected == 4.0
+    assert law.decided and law.holds == holds
+
+
+def test_a_law_with_a_jump_does_not_hold_whatever_its_slope() -> None:
+    ladder = [point(n, 1e-2 * (STEPS[0] / n) ** 4) for n in STEPS]
+    ladder[3] = point(STEPS[3], 2e-2)
+    assert find_jumps(ladder, "F12") == [ladder[3]]
+    law = ErrorLaw("RK4", "F12", 4.0, 0.01, 4.0, 6, jumps=("at 320",))
+    assert law.decided and not law.holds
+    assert replace(law, jumps=()).holds
+
+
+def test_a_floor_is_the_last_error_that_twice_the_steps_do_not_lessen() -> None:
+    falling = [point(n, 1.0 / n) for n in STEPS]
+    assert find_floor(falling, "torque") is None
+    floored = [*falling, point(2560.0, 0.9 / STEPS[-1])]
+    assert find_floor(floored, "torque") == pytest.approx(0.9 / STEPS[-1])
+    lost = [*falling, point(2560.0, math.inf)]
+    assert find_floor(lost, "torque") is None
+
+
+def test_the_cheapest_within_an_error_is_judged_by_the_quantity_that_is_asked() -> None:
+    cheap = point(40.0, 1e-7)
+    cheap = replace(cheap, errors=cheap.errors._replace(F43=1e-3))
+    dear = point(400.0, 1e-7)
+    curves = {"RK4": [cheap, dear]}
+    assert find_cheapest(curves, "torque", 1e-6) is cheap
+    assert find_cheapest(curves, "force", 1e-6) is dear
+    assert find_cheapest(curves, "force", 1e-9) is None
+
+
+def test_nothing_on_the_front_is_beaten_in_cost_and_error() -> None:
+    points = [
+        point(10.0, 1e-3),
+        point(20.0, 1e-2),
+        point(30.0, 1e-5),
+        point(40.0, math.nan),
+        point(50.0, 1e-4),
+    ]
+    front = find_pareto(points, "F12")
+    assert [p.steps for p in front] == [10, 30]

@@ -1,0 +1,88 @@
+"""Cases of JUnit XML, and the first table of a report: what each row counts as."""
+
+import math
+import xml.etree.ElementTree as ET
+from dataclasses import replace
+
+import pytest
+
+from fourbar_validation.compare.rows import (
+    AGREES,
+    DEGRADED,
+    FAILS,
+    REFUSES,
+    UNDECIDED,
+    Row,
+)
+from fourbar_validation.report.junit import list_cases, write_document
+from fourbar_validation.report.overview import Overview
+from fourbar_validation.report.record import Record
+from fourbar_validation.report.summary import Summary, compute_shares
+
+ROW = Row("scene", "engine", "exact", "torque", 1e-15, 1e-14, AGREES, "", 1.0, 1.0)
+OUTCOMES = {
+    AGREES: "passed",
+    DEGRADED: "passed",
+    REFUSES: "skipped",
+    UNDECIDED: "skipped",
+    FAILS: "failure",
+}
+
+
+def record(*rows: Row) -> Record:
+    return Record("scene", title="Scene", rows=list(rows))
+
+
+@pytest.mark.parametrize("verdict", OUTCOMES)
+def test_a_verdict_is_its_outcome(verdict: str) -> None:
+    (case,) = list_cases([replace(ROW, verdict=verdict)])
+    assert case.outcome == OUTCOMES[verdict]
+    text = write_document("run", [case])
+    (suite,) = ET.fromstring(text)
+    assert suite.get("failures") == str(int(verdict == FAILS))
+    assert suite.get("skipped") == str(int(OUTCOMES[verdict] == "skipped"))
+
+
+def test_every_failure_is_a_case_after_many_that_hold() -> None:
+    bad = replace(ROW, verdict=FAILS)
+    cases = list(list_cases([*[ROW] * 60, bad, *[ROW] * 60, bad]))
+    assert len(cases) == 122
+    assert [case.outcome for case in cases].count("failure") == 2
+
+
+def test_the_worst_row_of_a_group_is_that_which_uses_most_of_its_allowance() -> None:
+    shares = {"F12": 0.2, "F32": 0.9, "F43": 0.5, "torque": 0.3}
+    rows = [
+        replace(ROW, quantity=name, error=share * 1e-14)
+        for name, share in shares.items()
+    ]
+    overview = Overview()
+    overview.add(record(*rows))
+    (line,) = overview.name_lines({})
+    cells = [str(cell) for cell in line.columns.values()]
+    assert any(cell.startswith("9.0e-15") for cell in cells)
+    assert (line.compared, line.failed) == (4, 0)
+
+
+def test_a_missing_answer_uses_all_that_is_allowed() -> None:
+    missing = replace(ROW, verdict=FAILS, error=math.nan)
+    assert compute_shares([ROW, missing]) == pytest.approx([0.1, math.inf])
+
+
+@pytest.mark.parametrize(
+    ("rows", "good"),
+    [
+        ((ROW,), True),
+        ((ROW, replace(ROW, quantity="F12", verdict=FAILS)), False),
+        ((replace(ROW, verdict=REFUSES),), False),
+    ],
+)
+def test_a_run_is_good_where_something_holds_and_nothing_fails(
+    rows: tuple[Row, ...], good: bool
+) -> None:
+    summary = Summary()
+    summary.add(record(*rows))
+    assert summary.good == good
+    assert ("hold" in summary.headline and "not hold" not in summary.headline) == good
+    summary.missing = [("engine", "not installed")]
+    assert not summary.good
