@@ -285,7 +285,7 @@ class Rise:
 
     def __post_init__(self) -> None:
         key = "motion.law"
-        if self.kind not in KINDS:
+        if not isinstance(self.kind, str) or self.kind not in KINDS:
             allowed = "must be " + " or ".join(f'"{kind}"' for kind in KINDS)
             raise InputError(f"{key}.kind", self.kind, allowed)
         check_numbers(self, key)

@@ -231,6 +231,10 @@ def calls() -> dict[str, tuple[Callable[..., object], tuple[Any, ...]]]:
         ),
         "Law": (law, (times, angles, 2, "free")),
         "Law.at": (fourbar.Law(times, angles).at, (np.array([0.5]),)),
+        "Rise": (
+            lambda *x: moving(fourbar.Motion(law=fourbar.Rise(*x))),
+            ("345", (0.1, 0.2), 0.3, 0.1, 0.2, 0.1, 8),
+        ),
         "Point": (
             lambda *x: fourbar.solve(fourbar.Scene(link, points=(fourbar.Point(*x),))),
             ("P", 3, (0.1, 0.2)),
