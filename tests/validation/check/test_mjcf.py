@@ -18,7 +18,7 @@ from click.testing import CliRunner
 import fourbar
 from fourbar.effects import Friction, Gravity, Place, Spring, Springs, Torsion
 from fourbar.errors import InputError
-from fourbar.mjcf import write_mjcf
+from fourbar.mjcf import Plane, write_mjcf
 from fourbar.quantities import PIN_FORCES, UNKNOWNS
 from fourbar.scene import Scene
 from fourbar.solve import solve
@@ -106,6 +106,17 @@ def errors(scene: Scene, examined: Examined, how: str) -> dict[str, float]:
 def test_the_generated_file_differs_in_nothing_and_agrees() -> None:
     examination = examine(CRANK_ROCKER, GENERATED, {})
     assert keys(CRANK_ROCKER, examination) == set()
+    for how in (ONE_STATE, THROUGH_TIME):
+        assert max(errors(CRANK_ROCKER, examination, how).values()) <= SIMULATED.factor
+
+
+@pytest.mark.parametrize("axis", [(0.3, 0.0, 1.0), (-2.0, 5.0, 1.0)])
+def test_a_tilted_file_differs_in_its_plane_alone(
+    axis: tuple[float, float, float],
+) -> None:
+    text = write_mjcf(CRANK_ROCKER, plane=Plane(axis, (1.0, -2.0, 0.5)))
+    examination = examine(CRANK_ROCKER, text, {})
+    assert keys(CRANK_ROCKER, examination) == {"plane"}
     for how in (ONE_STATE, THROUGH_TIME):
         assert max(errors(CRANK_ROCKER, examination, how).values()) <= SIMULATED.factor
 

@@ -14,6 +14,8 @@ from fourbar_validation.engines.description import ModelEntry, Value
 
 SAME = 1e-12
 """Relative; a number written with its digits in another order of operations."""
+SAME_SOFTNESS = 1e-9
+"""Relative; it follows from the places of both bodies in the world, which cost digits."""
 TENFOLD = 1e-9
 """Relative distance from a power of ten at which a ratio is called one."""
 ONE_SIDED = ("loads.", "tendons.", "actuators.")
@@ -164,10 +166,11 @@ def _is_same(key: str, ours: Value | None, theirs: Value | None, length: float) 
         )
     placed = any(part in key for part in ("centre", "plane", ".point", ".path"))
     floor = length if placed else 1.0 if key.startswith(("gravity", "loads")) else 0.0
+    same = SAME_SOFTNESS if key == "closure.softness" else SAME
     return bool(
         np.all(
             np.abs(first - second)
-            <= SAME * max(np.abs(first).max(), np.abs(second).max(), floor)
+            <= same * max(np.abs(first).max(), np.abs(second).max(), floor)
         )
     )
 

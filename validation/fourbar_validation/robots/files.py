@@ -22,7 +22,15 @@ LARGEST_ASSETS = 512 * 2**20
 DEEPEST = 100
 """Nested elements; the readers of XML recurse."""
 MOST_INCLUDES = 200
-REACHING_OUT = ("extension", "plugin", "attach", "composite", "flexcomp", "flex")
+REACHING_OUT = (
+    "extension",
+    "plugin",
+    "attach",
+    "model",
+    "composite",
+    "flexcomp",
+    "flex",
+)
 """Elements that load plugins or models, or make deformable bodies."""
 FOR_THE_EYE = ("texture", "skin", "layer")
 """Elements that are dropped; so is every attribute `texture`."""

@@ -164,7 +164,7 @@ def _show_loop(loop: LoopMeasurement) -> None:
     _say(
         f"{loop.held} other degrees of freedom are held: at single states by generalized forces, "
         f"through time by armature (a tenth of it changes {loop.influence:.1e}); "
-        "contacts, joint limits and actuators are off"
+        "contacts, joint limits and motors are off"
     )
     if loop.switched_off:
         names = ", ".join(loop.switched_off)

@@ -385,7 +385,7 @@ class UserLoop(Assembled):
                 self.topology.world(self.data, bar, self.topology.cut),
             )
             mujoco.mj_jac(self.model, self.data, self._jac, None, place, body)
-            rows.append(self._jac[list(self.topology.axes)] @ self.to_joints)
+            rows.append(self.topology.axes @ self._jac @ self.to_joints)
         return np.asarray(rows[0] - rows[1])
 
     def positions(self) -> dict[str, Array]:

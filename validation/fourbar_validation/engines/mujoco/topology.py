@@ -1,7 +1,7 @@
 """The four-bar in somebody's compiled MJCF: which body is which bar, where its pins are, what holds the loop closed.
 
 Any cut is understood: three of the pins are hinges, the fourth is an equality (connect, weld) or two sites by
-name. The plane may be any of the world's three.
+name. The plane may be any.
 """
 
 import math
@@ -14,13 +14,14 @@ import numpy as np
 from fourbar.errors import InputError
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, PINS
 from fourbar.linkage import ENDS as MOVING_ENDS
+from fourbar.mjcf import Plane
 from fourbar_validation.compare.answer import Array
 
 PIN_OF = {frozenset(bars): pin for pin, bars in PINS.items()}
 ENDS = {1: ("O2", "O4"), **MOVING_ENDS}
 """The pins between which a bar's line runs."""
 PLANES = {2: ("x-y", (0, 1)), 1: ("x-z", (0, 2)), 0: ("y-z", (1, 2))}
-"""Axis of the hinges: the plane they move in, and the world axes that stand for x and y there."""
+"""World axis of the hinges: the plane they move in, and the world axes that stand for x and y there."""
 STRAIGHT = 1e-9
 """A hinge tilted by more than this (sine) leaves the plane."""
 ROLES = tuple(BAR_NAMES[bar] for bar in MOVING_BARS)
@@ -144,10 +145,16 @@ class Topology:
             raise InputError(
                 "MJCF", None, "must have hinges at three of the pins O2, A, B, O4"
             )
-        across = int(np.argmax(np.abs(self.data.xaxis[np.argmax(hinges)])))
-        self.plane, self.axes = PLANES[across]
-        e = np.eye(3)
-        self.normal = np.cross(e[self.axes[0]], e[self.axes[1]])
+        axis = self.data.xaxis[np.argmax(hinges)]
+        across = int(np.argmax(np.abs(axis)))
+        self.plane, axes = PLANES[across]
+        self.axes = np.eye(3)[list(axes)]
+        if np.abs(axis[list(axes)]).max() > STRAIGHT:
+            # as `fourbar mjcf --axis` turns it
+            tilted = Plane(tuple(axis.tolist()))
+            self.plane = "normal to " + " ".join(f"{part:.6g}" for part in axis)
+            self.axes = tilted.rotation.T[:2]
+        self.normal = np.cross(*self.axes)
 
     def _add_hinge(self, joint: int) -> None:
         model, name = self.model, self.model.joint(joint).name or f"(unnamed {joint})"
@@ -171,7 +178,10 @@ class Topology:
         along = float(self.data.xaxis[joint] @ self.normal)
         if abs(along) < 1.0 - STRAIGHT**2:
             raise InputError(
-                "MJCF", name, f"the hinge must be normal to the {self.plane} plane"
+                "MJCF",
+                name,
+                "the hinge is not parallel to the others; --loop NAME measures a loop "
+                "whose axes differ a little",
             )
         self.hinge[pin], self.sense[pin] = joint, math.copysign(1.0, along)
         for bar in bars:
@@ -258,7 +268,7 @@ class Topology:
 
     def in_plane(self, vector: Array) -> Array:
         """Project on the linkage's plane, (2,)."""
-        return np.array(vector)[list(self.axes)]
+        return np.asarray(self.axes @ vector)
 
     def world(self, data: mujoco.MjData, bar: int, pin: str) -> Array:
         """Locate a bar's pin, world axes, (3,)."""

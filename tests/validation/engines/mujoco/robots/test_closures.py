@@ -21,7 +21,7 @@ from fourbar_validation.engines.mujoco.robots.loop import (
     RobotLoop,
     RobotReport,
 )
-from tests.support.robots import TILT, Planar, rotation
+from tests.support.robots import EXCAVATOR, TILT, Planar, rotation
 from tests.whole.test_imports import ROOT
 
 MODELS = ROOT / "models" / "robots"
@@ -154,6 +154,9 @@ def test_five_hinges_are_a_four_bar_once_one_is_held() -> None:
 def test_two_motors_are_named() -> None:
     text = FIVE_BAR.format(more='<motor name="two" joint="c"/>')
     assert "driven by 2 motors (one, two)" in closure_of(text).reason
+    assert "--hold a (or c) makes it a four-bar" in closure_of(text).reason
+    unnamed = text.replace('name="one" ', "")
+    assert "driven by 2 motors (on a, two)" in closure_of(unnamed).reason
     remarks = loop_of(text, held=("d",)).remarks
     assert "motors act on a, c: a is taken as driven" in remarks[0]
     assert not loop_of(text, held=("d",), drive="c").remarks
@@ -245,6 +248,41 @@ def test_another_hinge_of_the_ground_can_be_the_driven_one() -> None:
         loop_of(planar.text(), drive="A")
     with pytest.raises(InputError, match="no such joint; the file has: joint 0, O2"):
         loop_of(planar.text(), drive="wheel")
+
+
+def test_where_no_motor_acts_the_first_hinge_of_the_file_is_driven() -> None:
+    for cut in ("A", "B"):
+        planar = Planar(cut=cut, drive="")
+        loop = loop_of(planar.text())
+        first = min(loop.hinges[pin] for pin in ("O2", "O4") if pin in loop.hinges)
+        assert loop.joint == first
+        assert "no motor acts on it" in loop.remarks[0]
+
+
+def test_a_hinge_that_another_loop_moves_is_the_driven_one() -> None:
+    model = mujoco.MjModel.from_xml_string(EXCAVATOR)
+    loop = loop_of(EXCAVATOR)
+    assert model.joint(loop.joint).name == "rocker"
+    assert "piston_pin acts on it: rocker is taken as driven" in loop.remarks[0]
+    assert model.joint("rocker").id > model.joint("bucket").id
+    assert loop_of(EXCAVATOR, drive="bucket").joint == model.joint("bucket").id
+
+
+def test_a_joint_without_a_name_is_held_by_the_name_that_is_printed() -> None:
+    text = FIVE_BAR.format(more="").replace('<joint name="d"', "<joint")
+    assert "--hold b (or c, joint 3)" in closure_of(text).reason
+    assert loop_of(text, held=("joint 3",)).lengths == pytest.approx(
+        loop_of(FIVE_BAR.format(more=""), held=("d",)).lengths
+    )
+
+
+def test_a_loop_seen_from_behind_turns_the_other_way() -> None:
+    loop = loop_of(Planar().text())
+    behind = loop.seen_from_behind()
+    assert np.allclose(behind.angles, np.negative(loop.angles))
+    assert np.allclose(behind.axis, -loop.axis)
+    assert behind.senses == {pin: -sense for pin, sense in loop.senses.items()}
+    assert behind.lengths == loop.lengths
 
 
 def test_a_loop_is_chosen_by_its_name() -> None:

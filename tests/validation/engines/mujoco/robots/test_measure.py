@@ -6,12 +6,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import fourbar
 from fourbar.errors import InputError
+from fourbar.mjcf import Plane, write_mjcf
+from fourbar.scene import Scene
 from fourbar_validation.engines.mujoco.robots.answers import MeasureOptions
-from fourbar_validation.engines.mujoco.robots.loop import PoseOptions
+from fourbar_validation.engines.mujoco.robots.loop import PoseOptions, RobotFile
 from fourbar_validation.engines.mujoco.robots.measure import measure_loops
 from fourbar_validation.robots.files import read_robot
-from fourbar_validation.robots.measure import find_worst
+from fourbar_validation.robots.measure import find_left_out, find_worst
 
 ROBOTS = Path(__file__).parents[5] / "models" / "robots"
 
@@ -40,6 +43,74 @@ def test_a_scene_with_axes_of_its_own_gives_the_same_errors() -> None:
     )
     (other,) = measure_loops(file, options, turned).loops
     assert find_worst(other) == pytest.approx(find_worst(made), rel=1e-6)
+
+
+ROCKER = fourbar.load(ROBOTS.parent / "crank_rocker.toml")
+TILTED = Plane((-2.0, 5.0, 1.0), (1.0, -2.0, 0.5))
+
+
+def mirrored(scene: Scene) -> Scene:
+    """The scene in a mirror, y to -y: the same mechanism seen from behind."""
+    linkage = scene.linkage
+    bars = {
+        name: replace(bar, centre=(bar.centre[0], -bar.centre[1]))
+        for name, bar in zip(
+            ("input", "coupler", "output"), linkage.moving, strict=True
+        )
+        if bar.centre is not None
+    }
+    motion = scene.motion
+    return replace(
+        scene,
+        linkage=replace(linkage, ground_angle=-linkage.ground_angle, **bars),
+        motion=motion.replace(
+            angle=-np.asarray(fourbar.command(scene).theta_2),
+            speed=-motion.speed,
+            branch=-motion.branch,
+        ),
+        loads=(),
+        effects=(),
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("plane", [Plane(), TILTED], ids=["level", "tilted"])
+def test_loads_of_the_file_act_and_its_motor_does_not(plane: Plane) -> None:
+    """With rigid pins the robot's torque and forces are those of the scene, loads and all."""
+    assert len(ROCKER.loads) == 2
+    text = write_mjcf(ROCKER, drive="motor", plane=plane)
+    file = RobotFile(Path("arm.xml"), text)
+    (loop,) = measure_loops(file, MeasureOptions(PoseOptions()), ROCKER).loops
+    assert find_left_out(loop) < 1e-9
+    without = replace(ROCKER, loads=ROCKER.loads[:1])
+    (loop,) = measure_loops(file, MeasureOptions(PoseOptions()), without).loops
+    assert find_left_out(loop) > 1e-3
+
+
+@pytest.mark.slow
+def test_a_scene_may_see_the_loop_from_behind() -> None:
+    bare = replace(ROCKER, loads=(), effects=())
+    file = RobotFile(Path("arm.xml"), write_mjcf(bare, drive="motor"))
+    options = MeasureOptions(PoseOptions())
+    (front,) = measure_loops(file, options, bare).loops
+    (behind,) = measure_loops(file, options, mirrored(bare)).loops
+    assert find_left_out(front) < 1e-9
+    assert find_left_out(behind) < 1e-9
+    assert find_worst(behind) == pytest.approx(find_worst(front), rel=1e-3)
+
+
+@pytest.mark.slow
+def test_the_input_of_the_scene_is_driven_whatever_the_file_drives() -> None:
+    """Here the motor of the file acts on the output of the scene."""
+    scene = replace(ROCKER, loads=(), effects=())
+    text = write_mjcf(scene, drive="motor")
+    assert 'joint="O2"' in text
+    file = RobotFile(Path("arm.xml"), text.replace('joint="O2"', 'joint="O4"'))
+    (loop,) = measure_loops(file, MeasureOptions(PoseOptions()), scene).loops
+    assert loop.joint == "O2"
+    assert find_left_out(loop) < 1e-9
+    (loop,) = measure_loops(file, MeasureOptions(PoseOptions()), None).loops
+    assert loop.joint == "O4"
 
 
 def made_angles(made: object) -> list[float]:

@@ -1,4 +1,4 @@
-"""Bodies of a model and the joints between them."""
+"""Bodies of a model, the joints between them, and what acts on them."""
 
 import mujoco
 
@@ -61,3 +61,8 @@ def find_tied_bodies(model: mujoco.MjModel, equality: int) -> tuple[int, int]:
 def name_joint(model: mujoco.MjModel, joint: int) -> str:
     """Name a joint: as the file does, or by its number."""
     return model.joint(joint).name or f"joint {joint}"
+
+
+def takes_control(model: mujoco.MjModel, actuator: int) -> bool:
+    """Tell a motor from a load, a spring or a damper that is written as an actuator."""
+    return bool(model.actuator_gainprm[actuator].any())

@@ -23,6 +23,7 @@ from fourbar_validation.engines.mujoco.robots.ancestry import (
     find_tied_bodies,
     list_joints,
     name_joint,
+    takes_control,
 )
 from fourbar_validation.engines.mujoco.robots.compiled import compile_robot
 from fourbar_validation.engines.mujoco.robots.loop import (
@@ -359,16 +360,19 @@ class _Finder:
             return f"{closer}{count} in a plane cannot move"
         motors = self._list_motors(chain.joints)
         driven = {joint for joint, _ in motors}
+        several = (
+            len(driven) > 1
+        )  # motors hold: one of them is held while another moves
         candidates = [
             name
             for joint, name in zip(chain.joints, names, strict=True)
-            if joint not in driven
+            if (joint in driven) == several
         ] or names
         shared = self._list_shared(chain, number)
         also = f"; {shared}" if shared else ""
         by = (
             f", driven by {len(motors)} motors "
-            f"({', '.join(self.model.actuator(i).name or str(i) for _, i in motors)})"
+            f"({', '.join(self._name_motor(*motor) for motor in motors)})"
             if len(motors) > 1
             else ""
         )
@@ -380,6 +384,12 @@ class _Finder:
         return (
             f"{count} and {freedoms} freedoms{by}; {freedoms - 1} of "
             f"{', '.join(candidates)} held (--hold) make it a four-bar{also}"
+        )
+
+    def _name_motor(self, joint: int, actuator: int) -> str:
+        """Name an actuator: as the file does, or by the joint that it acts on."""
+        return self.model.actuator(actuator).name or (
+            f"on {name_joint(self.model, joint)}"
         )
 
     def _list_shared(self, chain: _Chain, number: int) -> str:
@@ -413,8 +423,8 @@ class _Finder:
         for number in range(model.nu):
             kind = transmission(int(model.actuator_trntype[number]))
             target = int(model.actuator_trnid[number, 0])
-            if not model.actuator_gainprm[number].any():
-                continue  # it takes no control: a load
+            if not takes_control(model, number):
+                continue
             if kind in (transmission.mjTRN_JOINT, transmission.mjTRN_JOINTINPARENT):
                 acted = [target]
             elif kind == transmission.mjTRN_TENDON:

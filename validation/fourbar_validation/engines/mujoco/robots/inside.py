@@ -2,7 +2,7 @@
 
 No joint is removed, for that would change the softness that is measured: MuJoCo sizes a constraint's softness by the
 bodies of the whole model. The loop's driven hinge moves as commanded, the other joints of the robot stay where they
-are, contacts, joint limits and actuators are off, and so are equalities between the moving bars and joints that stay.
+are, contacts, joint limits and motors are off, and so are equalities between the moving bars and joints that stay.
 
 At a state the joint forces follow from MuJoCo's own inverse dynamics of its soft constraints. The driven hinge has the
 acceleration alpha, a held joint none, and the accelerations x of the loop's other hinges are those at which
@@ -27,11 +27,13 @@ import numpy as np
 
 from fourbar.errors import LimitError
 from fourbar_validation.compare.answer import Array
+from fourbar_validation.engines.mujoco.closed_loop import load_force
 from fourbar_validation.engines.mujoco.couple import find_couple
 from fourbar_validation.engines.mujoco.robots.ancestry import (
     climb,
     find_tied_bodies,
     name_joint,
+    takes_control,
 )
 from fourbar_validation.engines.mujoco.robots.answers import (
     InsideAnswer,
@@ -90,9 +92,14 @@ class LoopInside:
     def __init__(self, model: mujoco.MjModel, loop: RobotLoop) -> None:
         self.loop, self.model = loop, copy(model)
         self.flags = int(model.opt.disableflags)
-        for name in ("CONTACT", "LIMIT", "ACTUATION"):
+        for name in ("CONTACT", "LIMIT"):
             flag = int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{name}"))
             self.model.opt.disableflags |= flag
+        motors = [i for i in range(model.nu) if takes_control(model, i)]
+        self.model.actuator_gainprm[motors] = 0.0
+        self.model.actuator_biasprm[motors] = 0.0
+        on_sites = model.actuator_trntype == mujoco.mjtTrn.mjTRN_SITE
+        self.loads = [int(i) for i in np.flatnonzero(on_sites) if i not in motors]
         # while joints are held, what ties them to the moving bars would only be torn
         self.model.eq_active0[list(loop.other_equalities)] = 0
         self.data = mujoco.MjData(self.model)
@@ -254,7 +261,7 @@ class LoopInside:
         accelerations[self.passive] = np.linalg.lstsq(free, due, rcond=1e-9)[0]
         needed = np.zeros(model.nv)
         mujoco.mj_mulM(model, data, needed, accelerations)
-        needed += data.qfrc_bias - data.qfrc_passive
+        needed += data.qfrc_bias - data.qfrc_passive - data.qfrc_actuator
         needed += self._friction * np.sign(state.qvel)
         multipliers = np.linalg.lstsq(free.T, needed[self.passive], rcond=1e-9)[0]
         couple = needed[self.drive] - rows[:, self.drive] @ multipliers
@@ -267,11 +274,13 @@ class LoopInside:
         """Return the joint forces under which the hinges that are not driven are left to themselves, (nv,)."""
         model, data = self.model, self.data
         accelerations = start.copy()
+        mujoco.mj_forward(model, data)
+        loads = data.qfrc_actuator.copy()
 
         def forces(at: Array) -> Array:
             data.qacc[:] = at
             mujoco.mj_inverse(model, data)
-            return np.array(data.qfrc_inverse)
+            return np.asarray(data.qfrc_inverse - loads)
 
         passive = self.passive
         left = forces(accelerations)
@@ -318,10 +327,19 @@ class LoopInside:
                 force, bar = self._read_closure(data, pin)
             else:
                 body = int(self.model.jnt_bodyid[joint])
-                force, bar = data.cfrc_int[body, 3:], self._find_bar(body, pin)
+                force, bar = self._read_hinge(data, body), self._find_bar(body, pin)
             sign = 1.0 if bar == FORCE_ON[name] else -1.0
             forces[name] = sign * (axes @ force)
         return forces
+
+    def _read_hinge(self, data: mujoco.MjData, body: int) -> Array:
+        """Return the force on a body from the one that bears it, (3,), N."""
+        force = data.cfrc_int[body, 3:].copy()
+        for load in self.loads:  # MuJoCo counts them into it
+            site = self.model.actuator_trnid[load, 0]
+            if body in climb(self.model, int(self.model.site_bodyid[site])):
+                force -= load_force(self.model, data, load)
+        return np.asarray(force)
 
     def _read_closure(self, data: mujoco.MjData, pin: str) -> tuple[Array, int]:
         """Sum the forces of the equalities at the cut pin; return the sum and the bar that it acts on."""

@@ -1,7 +1,7 @@
 """What is asked of a robot's file, and what is known of its closed loops: plain data, without MuJoCo."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from fourbar.linkage import BAR_NAMES
@@ -87,6 +87,15 @@ class RobotLoop:
     def joint(self) -> int:
         """Joint that is driven; pin O2 is always a hinge."""
         return self.hinges["O2"]
+
+    def seen_from_behind(self) -> "RobotLoop":
+        """Return the same loop with the other normal of its plane: all angles turn the other way."""
+        return replace(
+            self,
+            axis=-self.axis,
+            angles=tuple(-angle for angle in self.angles),
+            senses={pin: -sense for pin, sense in self.senses.items()},
+        )
 
     def describe_lengths(self) -> str:
         """Write the four lengths with four significant digits, in mm."""

@@ -8,6 +8,8 @@ import numpy as np
 
 from fourbar.errors import InputError, LimitError
 from fourbar.scene import Scene, command
+from fourbar.scene.motion import Motion
+from fourbar.solve import solve
 from fourbar_validation.engines.mujoco.robots.ancestry import name_joint
 from fourbar_validation.engines.mujoco.robots.answers import (
     InsideAnswer,
@@ -40,7 +42,7 @@ TORN_POSITIONS = 5
 CONSTANTS = 10.0
 """Time constants of the closure during which it acts: the loop has then yielded as far as it does."""
 ALIKE = 1e-6
-"""Difference of the logarithms of lengths below which both ways round fit a scene alike."""
+"""Difference of logarithms of lengths, or of angles in rad, below which two ways round fit a scene alike."""
 LIGHTER = 0.1
 """Factor on what holds the other joints, to see what it matters."""
 
@@ -68,14 +70,16 @@ def measure_loops(
             loops = [one.loop for one in closures if one.loop is not None]
         if not loops:
             reasons = "; ".join(f"{one.name}: {one.reason}" for one in closures)
-            raise InputError("MJCF", reasons or None, "has no planar four-bar")
+            why = reasons or "the file has no equality that closes a loop"
+            raise InputError("MJCF", None, f"has no planar four-bar: {why}")
         measured = []
         for one in loops:
             loop = one if scene is None else _turn_to(scene, posed, one, options)
             made = make_scene(compiled, posed, loop, options.speed, loop.name)
             stated = made.scene if scene is None else scene
             remarks = made.remarks if scene is None else loop.remarks
-            measurement = _measure_loop(posed.model, loop, stated, options, file)
+            share = 1.0 / len(loops)
+            measurement = _measure_loop(posed.model, loop, stated, options, file, share)
             measured.append(replace(measurement, remarks=(*remarks,)))
     notes = [*compiled.notes, *posed.notes]
     notes += [f"MuJoCo warns: {warning}" for warning in warnings]
@@ -85,17 +89,30 @@ def measure_loops(
 def _turn_to(
     scene: Scene, posed: PosedRobot, loop: RobotLoop, options: MeasureOptions
 ) -> RobotLoop:
-    """Return the loop with the input of the scene as its driven bar, as far as the lengths tell it."""
+    """Return the loop as the scene has it: its input driven, and its plane seen from the same side."""
     ground, *moving = np.log(loop.lengths)
     apart, turned = (
         float(np.abs(np.log(scene.linkage.lengths) - lengths).sum())
         for lengths in ([ground, *moving], [ground, *reversed(moving)])
     )
     output = loop.hinges.get("O4")
-    if options.pose.drive is not None or output is None or apart <= turned + ALIKE:
-        return loop
-    pose = replace(options.pose, drive=name_joint(posed.model, output))
-    return choose_loop(find_closures(posed, pose), loop.name)
+    if options.pose.drive is None and output is not None and turned < apart - ALIKE:
+        pose = replace(options.pose, drive=name_joint(posed.model, output))
+        loop = choose_loop(find_closures(posed, pose), loop.name)
+    behind = loop.seen_from_behind()
+    nearer = _miss_output(scene, behind) < _miss_output(scene, loop) - ALIKE
+    return behind if nearer else loop
+
+
+def _miss_output(scene: Scene, loop: RobotLoop) -> float:
+    """Return by how much the output of a scene misses that of a loop in its pose, rad; infinite where it is open."""
+    theta_1, theta_2, _, theta_4 = loop.angles
+    linkage = scene.linkage
+    angle = np.array([theta_2 - theta_1 + linkage.ground_angle])
+    motion = Motion(angle, branch=scene.motion.branch)
+    output = float(solve(Scene(linkage, motion), "position").theta_4[0])
+    away = output - linkage.ground_angle - (theta_4 - theta_1)
+    return abs(math.remainder(away, math.tau)) if math.isfinite(away) else math.inf
 
 
 def _measure_loop(
@@ -104,7 +121,9 @@ def _measure_loop(
     scene: Scene,
     options: MeasureOptions,
     file: RobotFile,
+    share: float,
 ) -> LoopMeasurement:
+    """Measure one loop; `share`: part of the time in which settings are looked for."""
     if options.speed is not None:
         scene = replace(scene, motion=scene.motion.replace(speed=options.speed))
     inside = LoopInside(model, loop)
@@ -134,7 +153,7 @@ def _measure_loop(
         torn = tuple(inside.answer_under_torque(starts, options.torque, seconds))
     advice = None
     if options.error is not None:
-        search = SettingsSearch(model, loop, closing)
+        search = SettingsSearch(model, loop, closing, share)
         advice = search.advise(options.error, file)
     return LoopMeasurement(
         loop.name,

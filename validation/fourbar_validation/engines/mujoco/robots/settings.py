@@ -91,13 +91,17 @@ class SettingsSearch:
     """Settings tried on one loop of a robot, for one motion."""
 
     def __init__(
-        self, model: mujoco.MjModel, loop: RobotLoop, motion: LoopMotion
+        self,
+        model: mujoco.MjModel,
+        loop: RobotLoop,
+        motion: LoopMotion,
+        share: float = 1.0,
     ) -> None:
         self.model, self.loop = model, loop
         self.motion = motion.thin_out(POSITIONS)
         self.own = read_settings(model, loop)
         self.tried: dict[RobotSettings, TriedSettings] = {}
-        self.end = time.process_time() + SECONDS
+        self.end = time.process_time() + SECONDS * share
 
     def advise(self, wanted: float, file: RobotFile) -> SettingsAdvice:
         """Find the cheapest combination within an error."""
