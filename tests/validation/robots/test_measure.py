@@ -16,8 +16,11 @@ def call(command: object, *arguments: str) -> Result:
 
 
 @pytest.mark.slow
-def test_a_loop_is_measured_in_its_robot_and_settings_are_advised() -> None:
-    checked = call(check_mjcf, FOOT, "--loop", "rod", "--speed", "2", "--torque", "5")
+def test_a_loop_is_measured_in_its_robot_and_settings_are_advised(
+    tmp_path: Path,
+) -> None:
+    asked = ("--loop", "rod", "--speed", "2", "--torque", "5", "-o", str(tmp_path))
+    checked = call(check_mjcf, FOOT, *asked)
     assert checked.return_value == 0, checked.output
     for words in ("through time", "F43", "gap through time", "under the torque"):
         assert words in checked.output

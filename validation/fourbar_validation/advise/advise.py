@@ -42,13 +42,13 @@ from fourbar_validation.report.terminal import make_table
 from fourbar_validation.robots.measure import (
     measure_robot,
     read_measure_options,
-    show_advice,
 )
 from fourbar_validation.robots.options import (
     loop_option,
     pose_options,
     speed_option,
 )
+from fourbar_validation.robots.report import describe_advice, show
 
 MARGIN = 0.7
 """The run must stay within this part of the required error: elsewhere it may be larger."""
@@ -381,7 +381,8 @@ def advise_robot(
     for measured in measurement.loops:
         click.echo(make_plain(f"{measured.name}, driven by {measured.joint}"))
         assert measured.advice is not None
-        show_advice(measured.advice)
+        for block in describe_advice(measured.advice):
+            show(block)
         reached &= measured.advice.reached
     for note in measurement.notes:
         click.echo(make_plain(f"note: {note}"))

@@ -52,7 +52,6 @@ from fourbar_validation.robots.measure import (
     find_worst,
     measure_robot,
     read_measure_options,
-    show_measurement,
 )
 from fourbar_validation.robots.mimic import measure_mimic, show_mimic
 from fourbar_validation.robots.options import (
@@ -62,6 +61,7 @@ from fourbar_validation.robots.options import (
     speed_option,
     torque_option,
 )
+from fourbar_validation.robots.report import report
 from fourbar_validation.scenes.suites import read_scene_files
 
 ABOUT_COSTS = (
@@ -375,7 +375,7 @@ def write_markdown(report: ModelReport, mjcf: Path) -> str:
     type=click.Path(path_type=Path, file_okay=False),
     default=Path("results"),
     show_default=True,
-    help="Folder for the report on the MJCF of a four-bar alone.",
+    help="Folder for the report: theirs.md and results.csv of a four-bar alone, robot.md and robot.csv of loops.",
 )
 def command(
     files: tuple[Path, ...],
@@ -405,7 +405,7 @@ def command(
             raise click.UsageError("--name is for the MJCF of a four-bar alone")
         options = read_measure_options(loop, wanted, robot)
         measurement = measure_robot(theirs, options, scene, robot["assets"])
-        show_measurement(measurement)
+        report(measurement, theirs, out)
         worst = max(map(find_worst, measurement.loops))
         return int(wanted is not None and not worst <= wanted)
     assets = robot.pop("assets")
@@ -414,8 +414,8 @@ def command(
             "the options of a robot need --loop, or FILE.xml without SCENE"
         )
     suite = read_scene_files(files[:1])
-    report = examine_model(
+    examined = examine_model(
         suite.name(0), suite.scene(0), theirs, read_names(names), wanted, assets
     )
-    show(report, theirs, out)
-    return report.counts.status
+    show(examined, theirs, out)
+    return examined.counts.status

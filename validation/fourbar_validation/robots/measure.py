@@ -1,4 +1,4 @@
-"""Torque and pin forces of a robot's loops against the formulas, and what to type: `check-mjcf` and `advise`."""
+"""Torque and pin forces of a robot's loops against the formulas: what `check-mjcf` and `advise` ask."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import click
 import numpy as np
 
 from fourbar.errors import InputError
@@ -16,18 +15,14 @@ from fourbar.scene import Command, Scene
 from fourbar.solve import solve
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.compare.reversals import mark_reversing
-from fourbar_validation.compare.rows import make_plain
 from fourbar_validation.engines.mujoco.robots.answers import (
     QUANTITIES,
     InsideAnswer,
     LoopMeasurement,
     MeasureOptions,
     RobotMeasurement,
-    SettingsAdvice,
-    TriedSettings,
     measure_sizes,
 )
-from fourbar_validation.report.terminal import make_table
 from fourbar_validation.robots.files import read_robot
 from fourbar_validation.robots.guard import examine_guarded
 from fourbar_validation.robots.options import read_pose, read_speed
@@ -35,8 +30,6 @@ from fourbar_validation.robots.options import read_pose, read_speed
 MEASURE = "fourbar_validation.engines.mujoco.robots.measure:measure_loops"
 LIMIT = 600.0
 """s; a busy machine takes several times the two minutes of an idle one."""
-HEADINGS = ("method", "quantity", "error", "of its largest", "at")
-SETTING_HEADINGS = ("changed alone", "single states", "through time", "cost")
 STATES, THROUGH_TIME = "single states", "through time"
 SLIP = 1e-9
 """Part of the speeds below which a pin with dry friction is at rest, so that it may rub either way."""
@@ -63,7 +56,7 @@ class InsideError:
         return self.error / self.largest if self.largest else 0.0
 
     def cells(self) -> tuple[str, ...]:
-        """Return the cells of a row under HEADINGS."""
+        """Return method, quantity, error, its part of the largest, and where it is, as text."""
         unit = UNITS[self.quantity]
         return (
             self.method,
@@ -140,125 +133,6 @@ def _turn(vectors: Array, angle: float) -> Array:
 def find_worst(loop: LoopMeasurement) -> float:
     """Return the worst error of torque and pin forces, over the largest of each."""
     return max(error.part for error in list_errors(loop))
-
-
-def show_measurement(measurement: RobotMeasurement) -> None:
-    """Print the loops of a robot, the worst first."""
-    for loop in sorted(measurement.loops, key=find_worst, reverse=True):
-        _show_loop(loop)
-        if loop.advice is not None:
-            show_advice(loop.advice)
-    for note in measurement.notes:
-        _say(f"note: {note}")
-
-
-def _show_loop(loop: LoopMeasurement) -> None:
-    from rich.console import Console
-
-    joints = [math.degrees(row.joint) for row in loop.states.rows]
-    speed = loop.states.rows[0].omega_2
-    _say(
-        f"{loop.name}: {loop.joint} from {min(joints):.4g} to {max(joints):.4g} deg at {speed:.4g} rad/s, "
-        "MuJoCo in the whole robot against the formulas"
-    )
-    _say(
-        f"{loop.held} other degrees of freedom are held: at single states by generalized forces, "
-        f"through time by armature (a tenth of it changes {loop.influence:.1e}); "
-        "contacts, joint limits and motors are off"
-    )
-    if loop.switched_off:
-        names = ", ".join(loop.switched_off)
-        _say(f"switched off, because it ties its bars to joints that are held: {names}")
-    left_out = find_left_out(loop)
-    _say(
-        f"with rigid pins the robot differs from the formulas by {left_out:.1e} of the "
-        "largest: what the scene leaves out; the rest is MuJoCo's soft constraint"
-    )
-    rows = [error.cells() for error in list_errors(loop)]
-    Console().print(make_table(HEADINGS, rows, show_edge=False))
-    if loop.through_time is None:
-        _say(f"not simulated: {loop.refusal}")
-    elif loop.through_time.lost:
-        _say(f"through time: {loop.through_time.lost}")
-    else:
-        worst = max(loop.through_time.rows, key=lambda row: row.gap)
-        _say(
-            f"gap through time: {1e3 * worst.gap:.3g} mm at {loop.joint} = "
-            f"{math.degrees(worst.joint):.4g} deg; a step takes "
-            f"{1e6 * loop.through_time.seconds_per_step:.3g} us"
-        )
-    sticking = {name for row in loop.states.rows for name in row.sticking}
-    for name in sorted(sticking):
-        count = sum(name in row.sticking for row in loop.states.rows)
-        _say(
-            f"note: {loop.name}: at {count} of {len(loop.states.rows)} states the dry "
-            f"friction of {name} is less than its couple: it turns too slowly there for "
-            "MuJoCo's soft friction (solreffriction and solimpfriction of the joint)"
-        )
-    _show_torn(loop)
-    for remark in loop.remarks:
-        _say(f"note: {loop.name}: {remark}")
-
-
-def _show_torn(loop: LoopMeasurement) -> None:
-    """Print the state of the largest gap under a motor's torque."""
-    if not loop.torn:
-        return
-    worst = max(loop.torn, key=lambda state: state.gap)
-    if not math.isfinite(worst.gap):
-        _say("under the torque the loop comes apart: MuJoCo lost the motion")
-        return
-    forces = ", ".join(
-        f"{name} {math.hypot(*force):.4g} N" for name, force in worst.forces.items()
-    )
-    _say(
-        f"under the torque: gap at most {1e3 * worst.gap:.3g} mm, at {loop.joint} = "
-        f"{math.degrees(worst.joint):.4g} deg with {forces}"
-    )
-
-
-def show_advice(advice: SettingsAdvice) -> None:
-    """Print what each setting does alone, and what to type."""
-    from rich.console import Console
-
-    table = make_table(
-        SETTING_HEADINGS,
-        [_write_tried(one) for one in (advice.before, *advice.alone)],
-        show_edge=False,
-    )
-    Console().print(table)
-    before, best = advice.before, advice.best
-    if not best.changes:
-        _say(f"The file is within {advice.wanted:g} as it is.")
-        return
-    change = (
-        f"error {before.error:.2g} -> {best.error:.2g}, gap {1e3 * before.gap:.2g} -> "
-        f"{1e3 * best.gap:.2g} mm, {1e6 * before.seconds_per_step:.3g} -> "
-        f"{1e6 * best.seconds_per_step:.3g} us a step"
-    )
-    if advice.reached:
-        _say(f"Type this for an error within {advice.wanted:g} ({change}):")
-    else:
-        _say(
-            f"None of {advice.tried} combinations was within {advice.wanted:g}; "
-            f"the best ({change}):"
-        )
-    for element in advice.typed:
-        click.echo(element)
-
-
-def _write_tried(tried: TriedSettings) -> tuple[str, ...]:
-    changes = " ".join(f'{name}="{value}"' for name, value in tried.changes.items())
-    return (
-        changes or "nothing",
-        f"{tried.states:.2g}",
-        f"{tried.through_time:.2g}",
-        f"{1e3 * tried.cost:.3g} ms/s",
-    )
-
-
-def _say(text: str) -> None:
-    click.echo(make_plain(text))
 
 
 def read_torque(text: str | None) -> float | None:

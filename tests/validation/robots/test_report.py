@@ -1,0 +1,87 @@
+"""The report on a robot's loops: printed, as a page, and every state as CSV."""
+
+import csv
+import io
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from fourbar_validation.engines.mujoco.robots.answers import (
+    MeasureOptions,
+    RobotMeasurement,
+)
+from fourbar_validation.engines.mujoco.robots.loop import PoseOptions, RobotFile
+from fourbar_validation.engines.mujoco.robots.measure import measure_loops
+from fourbar_validation.robots.report import (
+    STATES_FILE,
+    TextTable,
+    Typed,
+    describe_measurement,
+    report,
+    write_markdown,
+    write_states,
+)
+from tests.support.robots import FINGER
+
+
+@cache
+def measured() -> RobotMeasurement:
+    file = RobotFile(Path("finger.xml"), FINGER)
+    options = MeasureOptions(PoseOptions(), "pip_link-middle", torque=0.05)
+    return measure_loops(file, options, None)
+
+
+@pytest.mark.slow
+def test_what_was_switched_off_and_left_out_is_said() -> None:
+    said = [
+        block for block in describe_measurement(measured()) if isinstance(block, str)
+    ]
+    text = "\n".join(said)
+    assert (
+        "switched off, because it ties its bars to joints that are held: dip_loop"
+        in text
+    )
+    assert "contacts, joint limits and motors are off" in text
+    assert "under the torque: gap at most" in text
+    assert "with rigid pins the robot differs from the formulas by" in text
+
+
+@pytest.mark.slow
+def test_the_states_are_those_that_were_asked_at() -> None:
+    rows = list(csv.DictReader(io.StringIO(write_states(measured()))))
+    (loop,) = measured().loops
+    assert loop.through_time is not None
+    assert len(rows) == len(loop.states.rows) + len(loop.through_time.rows)
+    assert tuple(rows[0]) == STATES_FILE
+    first, row = rows[0], loop.states.rows[0]
+    assert float(first["torque [N m]"]) == row.soft.torque
+    assert float(first["gap [mm]"]) == 1e3 * row.gap
+    size = sum(part**2 for part in row.rigid.forces["F43"]) ** 0.5
+    assert float(first["F43 of rigid pins [N]"]) == pytest.approx(size, rel=1e-15)
+
+
+def test_a_page_holds_sentences_tables_and_elements() -> None:
+    blocks = [
+        "one *sentence*",
+        TextTable(("a", "b"), [("1|2", "3")]),
+        Typed("<connect/>"),
+    ]
+    page = write_markdown("robot.xml", blocks)
+    assert page.startswith("# robot.xml\n")
+    assert "one \\*sentence\\*" in page
+    assert "| a | b |\n| --- | --- |\n| 1\\|2 | 3 |" in page
+    assert "```xml\n<connect/>\n```" in page
+
+
+@pytest.mark.slow
+def test_the_report_is_printed_and_written(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    report(measured(), Path("finger.xml"), tmp_path / "new")
+    printed = capsys.readouterr().out
+    assert "single states" in printed and "written to" in printed
+    page = (tmp_path / "new" / "robot.md").read_text()
+    assert page.startswith("# The loops of finger.xml in MuJoCo")
+    assert "| single states | torque |" in page
+    assert (tmp_path / "new" / "robot.csv").read_text() == write_states(measured())

@@ -1,0 +1,228 @@
+"""What was measured of a robot's loops, as sentences and tables: on the terminal, in Markdown, as CSV."""
+
+import csv
+import io
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import click
+
+from fourbar.quantities import PIN_FORCES
+from fourbar.writing import write_text
+from fourbar_validation.compare.rows import make_plain, write_cell_text
+from fourbar_validation.engines.mujoco.robots.answers import (
+    LoopMeasurement,
+    RobotMeasurement,
+    SettingsAdvice,
+    TriedSettings,
+)
+from fourbar_validation.report.templating import write_cell
+from fourbar_validation.report.terminal import make_table
+from fourbar_validation.robots.measure import (
+    STATES,
+    THROUGH_TIME,
+    find_left_out,
+    find_worst,
+    list_errors,
+)
+
+ERRORS = ("method", "quantity", "error", "of its largest", "at")
+SETTINGS = ("changed alone", "single states", "through time", "cost")
+STATES_FILE = (
+    *("loop", "method", "joint [deg]", "omega_2 [rad/s]", "alpha_2 [rad/s^2]"),
+    *("torque [N m]", "torque of rigid pins [N m]"),
+    *(f"{name} [N]" for name in PIN_FORCES),
+    *(f"{name} of rigid pins [N]" for name in PIN_FORCES),
+    "gap [mm]",
+)
+"""Columns of the file of states; pin forces by their size."""
+
+
+@dataclass(frozen=True, slots=True)
+class TextTable:
+    """Rows of text under headings."""
+
+    headings: tuple[str, ...]
+    rows: Sequence[tuple[str, ...]]
+
+
+@dataclass(frozen=True, slots=True)
+class Typed:
+    """Element of MJCF to paste."""
+
+    text: str
+
+
+Block = str | TextTable | Typed
+"""A sentence, a table, or an element to paste."""
+
+
+def describe_measurement(measurement: RobotMeasurement) -> Iterator[Block]:
+    """Describe the loops of a robot, the worst first."""
+    for loop in sorted(measurement.loops, key=find_worst, reverse=True):
+        yield from _describe_loop(loop)
+        if loop.advice is not None:
+            yield from describe_advice(loop.advice)
+    for note in measurement.notes:
+        yield f"note: {note}"
+
+
+def _describe_loop(loop: LoopMeasurement) -> Iterator[Block]:
+    joints = [math.degrees(row.joint) for row in loop.states.rows]
+    speed = loop.states.rows[0].omega_2
+    yield (
+        f"{loop.name}: {loop.joint} from {min(joints):.4g} to {max(joints):.4g} deg at "
+        f"{speed:.4g} rad/s, MuJoCo in the whole robot against the formulas"
+    )
+    yield (
+        f"{loop.held} other degrees of freedom are held: at single states by "
+        "generalized forces, through time by armature (a tenth of it changes "
+        f"{loop.influence:.1e}); contacts, joint limits and motors are off"
+    )
+    if loop.switched_off:
+        names = ", ".join(loop.switched_off)
+        yield f"switched off, because it ties its bars to joints that are held: {names}"
+    left_out = find_left_out(loop)
+    yield (
+        f"with rigid pins the robot differs from the formulas by {left_out:.1e} of the "
+        "largest: what the scene leaves out; the rest is MuJoCo's soft constraint"
+    )
+    yield TextTable(ERRORS, [error.cells() for error in list_errors(loop)])
+    if loop.through_time is None:
+        yield f"not simulated: {loop.refusal}"
+    elif loop.through_time.lost:
+        yield f"through time: {loop.through_time.lost}"
+    else:
+        worst = max(loop.through_time.rows, key=lambda row: row.gap)
+        yield (
+            f"gap through time: {1e3 * worst.gap:.3g} mm at {loop.joint} = "
+            f"{math.degrees(worst.joint):.4g} deg; a step takes "
+            f"{1e6 * loop.through_time.seconds_per_step:.3g} us"
+        )
+    sticking = {name for row in loop.states.rows for name in row.sticking}
+    for name in sorted(sticking):
+        count = sum(name in row.sticking for row in loop.states.rows)
+        yield (
+            f"note: {loop.name}: at {count} of {len(loop.states.rows)} states the dry "
+            f"friction of {name} is less than its couple: it turns too slowly there for "
+            "MuJoCo's soft friction (solreffriction and solimpfriction of the joint)"
+        )
+    yield from _describe_torn(loop)
+    for remark in loop.remarks:
+        yield f"note: {loop.name}: {remark}"
+
+
+def _describe_torn(loop: LoopMeasurement) -> Iterator[Block]:
+    """Describe the state of the largest gap under a motor's torque."""
+    if not loop.torn:
+        return
+    worst = max(loop.torn, key=lambda state: state.gap)
+    if not math.isfinite(worst.gap):
+        yield "under the torque the loop comes apart: MuJoCo lost the motion"
+        return
+    forces = ", ".join(
+        f"{name} {math.hypot(*force):.4g} N" for name, force in worst.forces.items()
+    )
+    yield (
+        f"under the torque: gap at most {1e3 * worst.gap:.3g} mm, at {loop.joint} = "
+        f"{math.degrees(worst.joint):.4g} deg with {forces}"
+    )
+
+
+def describe_advice(advice: SettingsAdvice) -> Iterator[Block]:
+    """Describe what each setting does alone, and what to type."""
+    rows = [_write_tried(one) for one in (advice.before, *advice.alone)]
+    yield TextTable(SETTINGS, rows)
+    before, best = advice.before, advice.best
+    if not best.changes:
+        yield f"The file is within {advice.wanted:g} as it is."
+        return
+    change = (
+        f"error {before.error:.2g} -> {best.error:.2g}, gap {1e3 * before.gap:.2g} -> "
+        f"{1e3 * best.gap:.2g} mm, {1e6 * before.seconds_per_step:.3g} -> "
+        f"{1e6 * best.seconds_per_step:.3g} us a step"
+    )
+    if advice.reached:
+        yield f"Type this for an error within {advice.wanted:g} ({change}):"
+    else:
+        yield (
+            f"None of {advice.tried} combinations was within {advice.wanted:g}; "
+            f"the best ({change}):"
+        )
+    for element in advice.typed:
+        yield Typed(element)
+
+
+def _write_tried(tried: TriedSettings) -> tuple[str, ...]:
+    changes = " ".join(f'{name}="{value}"' for name, value in tried.changes.items())
+    return (
+        changes or "nothing",
+        f"{tried.states:.2g}",
+        f"{tried.through_time:.2g}",
+        f"{1e3 * tried.cost:.3g} ms/s",
+    )
+
+
+def show(block: Block) -> None:
+    """Print a sentence, a table or an element."""
+    if isinstance(block, TextTable):
+        from rich.console import Console
+
+        table = make_table(block.headings, block.rows, show_edge=False)
+        Console().print(table)
+    else:
+        click.echo(make_plain(block.text if isinstance(block, Typed) else block))
+
+
+def write_markdown(title: str, blocks: Sequence[Block]) -> str:
+    """Write sentences, tables and elements as a page of Markdown."""
+    parts = [f"# {write_cell(title)}"]
+    for block in blocks:
+        if isinstance(block, TextTable):
+            rule = ("---",) * len(block.headings)
+            rows = (block.headings, rule, *block.rows)
+            written = (
+                " | ".join(cell if row is rule else write_cell(cell) for cell in row)
+                for row in rows
+            )
+            parts.append("\n".join(f"| {row} |" for row in written))
+        elif isinstance(block, Typed):
+            parts.append(f"```xml\n{make_plain(block.text)}\n```")
+        else:
+            parts.append(write_cell(block))
+    return "\n\n".join(parts) + "\n"
+
+
+def write_states(measurement: RobotMeasurement) -> str:
+    """Write every state that MuJoCo was asked at as CSV, under STATES_FILE."""
+    text = io.StringIO()
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow(STATES_FILE)
+    for loop in measurement.loops:
+        for method, answer in (
+            (STATES, loop.states),
+            (THROUGH_TIME, loop.through_time),
+        ):
+            for row in () if answer is None else answer.rows:
+                numbers = [math.degrees(row.joint), row.omega_2, row.alpha_2]
+                numbers += [row.soft.torque, row.rigid.torque]
+                for pins in (row.soft, row.rigid):
+                    numbers += [math.hypot(*pins.forces[name]) for name in PIN_FORCES]
+                numbers.append(1e3 * row.gap)
+                name = write_cell_text(make_plain(loop.name))
+                table.writerow((name, method, *map(repr, map(float, numbers))))
+    return text.getvalue()
+
+
+def report(measurement: RobotMeasurement, robot: Path, out: Path) -> None:
+    """Print a measurement, and write robot.md and robot.csv into a folder."""
+    blocks = list(describe_measurement(measurement))
+    for block in blocks:
+        show(block)
+    out.mkdir(parents=True, exist_ok=True)
+    title = f"The loops of {robot.name} in MuJoCo"
+    write_text(out / "robot.md", write_markdown(title, blocks))
+    write_text(out / "robot.csv", write_states(measurement))
+    click.echo(make_plain(f"written to {out}"))
