@@ -8,7 +8,7 @@ from typing import Any
 
 from fourbar.errors import InputError
 from fourbar.linkage import ANY, REQUIRED, Declared, is_within
-from fourbar.quantities.units import UnitError, to_si
+from fourbar.quantities.units import UNIT_MISSING, UnitError, to_si
 
 BARE_KEY = re.compile(r"[A-Za-z0-9_-]{1,40}")
 LONGEST_SHOWN = 60
@@ -23,6 +23,14 @@ ELSEWHERE = (
     "Exudyn; "
 )
 """Where to go with another mechanism."""
+DIRECTIONS = {"up": "90 deg", "down": "-90 deg", "left": "180 deg", "right": "0 deg"}
+"""Words for directions, as the suggestions of an error know them."""
+MEANT = {
+    **{"weight": "mass", "torque": "moment", "couple": "moment"},
+    **{"rate": "stiffness", "k": "stiffness", "material": "density"},
+    **{"x": "from_pin", "y": "from_pin", "speed": "omega_2", "rpm": "omega_2"},
+}
+"""Words that are no keys, and the keys that may be meant by them."""
 LIKELY = {"rad": "deg", "m": "mm", "rad/s": "rpm"}
 """Units that a number without one may have been meant in, where that is not the SI unit."""
 
@@ -35,12 +43,12 @@ class Reader:
     QUANTITIES = '["1 {0}", "2 {0}"]'
     POLAR = '["1 {}", "0 deg"]'
     COORDINATES = 'or {{ x = "1 {0}", y = "0 {0}" }}'
-    """A place by coordinates; empty where it has to be polar."""
+    """A place or a force by its components; empty where it has to be polar."""
 
     def __init__(self, file: str) -> None:
         self.file = file
         self.coordinates: dict[str, tuple[float, float]] = {}
-        """x and y of the places that are stated by them, m, by their keys."""
+        """x and y of the places (m) and forces that are stated by them, by their keys."""
 
     def refuse(self, key: str, value: object, allowed: str) -> InputError:
         """Make the error for an entry, or for one that is left out (None), with the file's name."""
@@ -140,7 +148,12 @@ class Reader:
         try:
             return to_si(value, unit)
         except UnitError as error:
-            raise self.refuse(key, value, f"{error}; {wanted}") from None
+            hint = ""
+            if unit == "rad" and value.casefold() in DIRECTIONS:
+                hint = f'did you mean "{DIRECTIONS[value.casefold()]}"? '
+            elif str(error) == UNIT_MISSING:
+                hint = f'did you mean "{value.strip()} {LIKELY.get(unit, unit)}"? '
+            raise self.refuse(key, value, f"{error}; {hint}{wanted}") from None
 
     def declared(self, key: str, value: object, by: Declared) -> Any:
         """Read a number, or a magnitude with its angle, as it is declared."""
@@ -184,18 +197,18 @@ class Reader:
         )
 
     def polar(self, key: str, value: object, unit: str) -> tuple[float, float]:
-        """Read a pair [magnitude, angle], in `unit` and rad; that of a place may be { x, y } instead."""
-        if isinstance(value, dict) and unit == "m" and self.COORDINATES:
+        """Read a pair [magnitude, angle], in `unit` and rad, or its components { x, y }."""
+        if isinstance(value, dict) and self.COORDINATES:
             entry = self.table(key, value, ("x", "y"))
             x, y = (
                 self.quantity(f"{key}.{name}", entry.get(name), unit) for name in "xy"
             )
             if not math.isfinite(math.hypot(x, y)):
-                raise self.refuse(key, value, "must be a finite distance away")
+                raise self.refuse(key, value, "must have a finite size")
             self.coordinates[key] = x, y
             return convert_to_polar(x, y)
         if not isinstance(value, list) or len(value) != 2:
-            form = self.COORDINATES.format(unit) if unit == "m" else ""
+            form = self.COORDINATES.format(unit)
             raise self.refuse(
                 key,
                 value,
@@ -252,7 +265,9 @@ def write_pair(
 
 
 def _suggest(word: object, names: list[str]) -> str:
-    """Suggest the valid word that is nearest to one that is not."""
+    """Suggest the valid word that is nearest to one that is not, or means the same."""
+    if isinstance(word, str) and MEANT.get(word) in names:
+        return f'did you mean "{MEANT[word]}"? '
     close = (
         difflib.get_close_matches(word[:LONGEST_SHOWN], names, 1)
         if isinstance(word, str)

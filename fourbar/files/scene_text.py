@@ -121,10 +121,11 @@ def _restore_coordinates(
         with suppress(LookupError, TypeError):
             for step in into:
                 holder = holder[step]
-            if holder[last] == write_pair(*convert_to_polar(x, y), "m"):
+            unit = holder[last][0].partition(" ")[2]
+            if holder[last] == write_pair(*convert_to_polar(x, y), unit):
                 holder[last] = {
-                    "x": write_quantity(x, "m"),
-                    "y": write_quantity(y, "m"),
+                    "x": write_quantity(x, unit),
+                    "y": write_quantity(y, unit),
                 }
 
 

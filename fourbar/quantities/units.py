@@ -30,6 +30,7 @@ SWAPS = (
         "kg": "kgf",
         "Hz": "rev/s",
         "hz": "rev/s",
+        "Grad": "deg",
     },
     {"lbf": "lb", "ozf": "oz", "kgf": "kg"},
 )
@@ -50,9 +51,11 @@ SIGNS = str.maketrans(
     }
 )
 """Other signs of a product, marks of inches and feet, and signs that look like that of a degree."""
+PREFIXED_ANGLE = re.compile(r"(?<![A-Za-z])(?!m|µ|u|grad)[A-Za-zµ]{1,2}rad(?![A-Za-z])")
+"""Grad, krad: a prefix before an angle, which nobody means but for milli- and micro-."""
 TURNING = re.compile(r"\s*\b(c?cw|(?:anti|counter)?-?clockwise)$", re.IGNORECASE)
 """A sense of turning after a unit: the sign states it."""
-GLUED = re.compile(r"(kg|g|N|lb|oz)(m|mm|cm)(?=$|[\^²*])")
+GLUED = re.compile(r"(kg|g|N)(m|mm|cm)(?=$|[\^²*])")
 """kgm^2: a product without a sign between its factors."""
 RAISED = re.compile("[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+")
 DIGITS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
@@ -71,6 +74,8 @@ UNIT = re.compile(
 """Names, each with at most one small exponent, and operators: nothing else reaches the parser, no tower of powers.
 Names are taken whole (`++`), so that a text which does not fit is refused in one pass."""
 LONGEST_UNIT = 60
+UNIT_MISSING = "the unit is missing"
+"""Reason of the error for a number alone."""
 
 
 class UnitError(ValueError):
@@ -101,7 +106,7 @@ def to_si(text: str, unit: str) -> float:
         )
         raise UnitError(f"a comma is no part of a number{hint}")
     if not name:
-        raise UnitError("the unit is missing")
+        raise UnitError(UNIT_MISSING)
     if turning := TURNING.search(name):
         sign = "" if turning[1].casefold() not in ("cw", "clockwise") else "-"
         plain = f"{sign}{number_text[0].lstrip('+-')} {name[: turning.start()]}"
@@ -242,6 +247,8 @@ def _find_factor(name: str) -> tuple[Fraction, dict[str, Fraction]]:
     if len(name) > LONGEST_UNIT or not UNIT.fullmatch(name):
         raise UnitError("the unit cannot be read")
     registry = _load_registry()
+    if angle := PREFIXED_ANGLE.search(name):
+        raise UnitError(f'the unit "{angle[0]}" is not known')
     try:
         one = registry.Quantity(Fraction(1), registry.parse_units(name)).to_root_units()
     except (

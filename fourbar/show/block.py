@@ -46,6 +46,8 @@ FEW_DIGITS = 1e-8
 """Error bar as a part of the value from which on the block says where digits are lost: half of those of a double."""
 ALIKE = 1e-3
 """Ratio of the smallest to the largest of several quantities from which on they share a prefix."""
+LOCATED = 1e-6
+"""Part of the motion within which the place of a flat maximum is located: nearer to zero it is zero."""
 NO_ANGLE = 1e-14
 """rad; rounding of an angle of a turn."""
 LOST = {2: "3 and 4", 3: "2 and 4", 4: "2 and 3"}
@@ -90,18 +92,36 @@ class _Block:
         if self.facts.kind == "position":
             paragraphs = [*self._write_position(head, pressure)]
         else:
-            loads = [
-                *self._write_drive(pressure),
-                *self._write_pins(),
-                *self._write_bending(),
-                *self._write_remarks(),
-            ]
-            paragraphs = [[*head, *self._write_motion()], loads]
+            paragraphs = [[*head, *self._write_motion()], self._write_loads(pressure)]
         lines: list[str] = []
         for paragraph in filter(None, paragraphs):
             for line in [*([""] if lines else []), *paragraph]:
                 lines += [line] if len(line) <= WIDTH else _wrap(line)
         return [line.replace(TIED, " ") for line in lines]
+
+    def _write_loads(self, pressure: float | None) -> list[str]:
+        """Write the drive, the loads of pins and bars, and remarks; the rates where nothing acts."""
+        if not self._is_acted_on() and self.facts.rates:
+            return self._write_rates()
+        return [
+            *self._write_drive(pressure),
+            *self._write_pins(),
+            *self._write_bending(),
+            *self._write_remarks(),
+        ]
+
+    def _write_rates(self) -> list[str]:
+        """Write the largest speed and acceleration of the bars that follow, side by side."""
+        rates = self.facts.rates
+        rows = [("rates", [f"bar {bar} ({BAR_NAMES[bar]})" for bar in rates])]
+        for label, unit, index in (("omega", "rad/s", 0), ("alpha", "rad/s^2", 1)):
+            peaks = [pair[index] for pair in rates.values()]
+            cells = self._cells([peak.value for peak in peaks], unit)
+            rows += [
+                (f"  {label}", cells),
+                ("  at", [self._place(peak.place, named=False) for peak in peaks]),
+            ]
+        return [*_align(rows), "no mass, load or effect: nothing loads pins and drive"]
 
     def _write_position(
         self, head: list[str], pressure: float | None
@@ -137,6 +157,9 @@ class _Block:
 
     def _place(self, place: float, *, named: bool = True) -> str:
         """Write a place as "theta_2 = 22.8 deg", or without its name."""
+        first, last = self.facts.commanded
+        if abs(place) <= LOCATED * abs(last - first):
+            place = 0.0
         text = self._value(
             place, self.unit, {"m": self.longest, "s": 1.0}.get(self.unit)
         )
@@ -476,12 +499,12 @@ class _Block:
         facts, bending = self.facts, self.facts.bending.values()
         if not any(bar.peak.value for bar in bending):
             return []
-        places = [self._value(bar.x, "m", self.longest) for bar in bending]
-        if facts.kind != "position":
-            positions = [self._place(bar.peak.place, named=False) for bar in bending]
-            places = [
-                f"{x}, {place}" for x, place in zip(places, positions, strict=True)
-            ]
+        places = []
+        for bar in bending:
+            place = self._value(bar.x, "m", self.longest)
+            if facts.kind != "position":
+                place += f", {self._place(bar.peak.place, named=False)}"
+            places.append(place if bar.peak.value else "-")
         moments = self._cells([bar.peak.value for bar in bending], "N m")
         rows = [
             ("bending", [f"bar {bar}" for bar in facts.bending]),

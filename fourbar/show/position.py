@@ -34,6 +34,8 @@ class PositionSheet:
     def write_bars(self) -> list[str]:
         """Write angle, speed and acceleration of the moving bars."""
         kinds = {"theta": "rad", "omega": "rad/s", "alpha": "rad/s^2"}
+        if self._rests():
+            del kinds["omega"], kinds["alpha"]
         columns: dict[str, list[str]] = {}
         for letter, unit in kinds.items():
             values = [getattr(self.solution, f"{letter}_{bar}") for bar in MOVING_BARS]
@@ -51,6 +53,13 @@ class PositionSheet:
             rows.append(_write_row(f"bar {bar}", cells))
         return rows
 
+    def _rests(self) -> bool:
+        """Return True if nothing moves or begins to: a static position has no rates to show."""
+        of_input = self.solution.omega_2, self.solution.alpha_2
+        of_output = self.solution.omega_4, self.solution.alpha_4
+        rates = [rate for rate in (*of_input, *of_output) if rate is not None]
+        return all(rate[0] == 0.0 for rate in rates)
+
     def write_points(self) -> list[str]:
         """Write place, velocity and acceleration of the pins, mass centres and points."""
         centres = [
@@ -59,6 +68,8 @@ class PositionSheet:
         names = ["A", "B", *centres, *self.solution.points]
         rows = [_write_row("", ("x", "y", "size"))]
         scales = {"": "m", "v_": "m/s", "a_": "m/s^2"}
+        if self._rests():
+            del scales["v_"], scales["a_"]
         largest = {start: self._find_largest(start, names) for start in scales}
         for name in names:
             for start, unit in scales.items():
@@ -171,6 +182,8 @@ class PositionSheet:
         if unit != "1":
             factor, name = choose_unit(abs(float(values[0])), unit, self.units)
             name = f" {name}"
+        elif abs(float(values[0])) <= ROUND_OFF:  # of ratios of lengths, which are 1
+            factor = 0.0
         (text,) = _write_numbers(factor * values)
         return f"{label:<{NUMBER_LABEL}}{text}{name}{after}"
 

@@ -380,6 +380,8 @@ class Facts:
     held: tuple[float, float] | None
     """Least and greatest torque or force while dry friction holds a pin that is at rest."""
     pins: dict[str, PinLoad]
+    rates: dict[int, tuple[Peak, Peak]]
+    """Largest speed and acceleration, signed, of the bars that follow; empty where no speed is stated."""
     bending: dict[int, BarBending]
     stresses: dict[int, float | None]
     """Largest bending stress of each bar, Pa; None where its cross-section is not stated."""
@@ -442,6 +444,7 @@ def summarize(scene: Scene, solution: Solution) -> Facts:
         duty=find_duty(between) if peak is not None and kind != "position" else None,
         held=None if drive is None else _find_held(solution, drive),
         pins=_list_pin_loads(solution, between),
+        rates=_find_rates(solution, smooth=smooth),
         bending=bending,
         stresses=_list_stresses(scene, bending),
         stroke_range=None if fine.stroke is None else find_range(fine.stroke),
@@ -451,6 +454,26 @@ def summarize(scene: Scene, solution: Solution) -> Facts:
         between=between,
         error=_find_error(solution, drive),
     )
+
+
+def _find_rates(solution: Solution, *, smooth: bool) -> dict[int, tuple[Peak, Peak]]:
+    """Find the largest speed and acceleration of the bars that follow what is commanded."""
+    places, rates = _list_places(solution), dict[int, tuple[Peak, Peak]]()
+    if solution.omega_4 is None or len(solution) == 1:
+        return rates
+    moved = () if solution.time is not None else (solution.at.bar,)
+    for bar in MOVING_BARS:
+        if bar in moved:
+            continue
+        peaks = []
+        for letter in ("omega", "alpha"):
+            values = getattr(solution, f"{letter}_{bar}")
+            if not np.isfinite(values).any():
+                return {}
+            sign = 1 if np.nanmax(values) >= -np.nanmin(values) else -1
+            peaks.append(_find_extreme(sign * values, places, sign, smooth))
+        rates[bar] = (peaks[0], peaks[1])
+    return rates
 
 
 def _find_kind(scene: Scene, solution: Solution) -> str:

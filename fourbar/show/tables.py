@@ -203,8 +203,11 @@ def _list_parts(solution: Solution, name: str) -> dict[str, Array]:
         return {}
     if values.ndim == 1:
         return {name: values}
-    size = {f"|{name}|": np.hypot(values[:, 0], values[:, 1])} if has_size(name) else {}
-    return {**size, f"{name}_x": values[:, 0], f"{name}_y": values[:, 1]}
+    sizes = np.hypot(values[:, 0], values[:, 1])
+    small = np.abs(values) <= ROUND_OFF * sizes[:, None]
+    x, y = np.where(small, 0.0, values).T
+    size = {f"|{name}|": sizes} if has_size(name) else {}
+    return {**size, f"{name}_x": x, f"{name}_y": y}
 
 
 def _choose_form(unit: str) -> str:

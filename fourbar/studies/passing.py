@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from fourbar.errors import InputError, NotAssembledError
 from fourbar.formulas.mobility import TURN, find_intervals
 from fourbar.quantities import Array
-from fourbar.scene import Command, Scene, command_at
+from fourbar.scene import Command, Scene, command, command_at
 from fourbar.scene.motion import COMMANDS, SIDES, STROKE_COMMAND, Motion
 from fourbar.scene.scene import Independent
 from fourbar.solve import solve
@@ -71,7 +71,7 @@ def _find_places(scene: Scene, name: str, value: float) -> list[float]:
         raise NotAssembledError(
             f"{_say(name, value)}: no position of this assembly has it"
         )
-    return places
+    return sorted(places)
 
 
 def _require_assembled(scene: Scene, name: str, value: float) -> None:
@@ -102,9 +102,13 @@ def _list_candidates(scene: Scene, name: str, value: float) -> list[float]:
             place = getattr(found, commanded)
             if place is not None and math.isfinite(place[0]):
                 candidates.append(float(place[0]))
-    if commanded in ANGLES:  # with one change point an assembly repeats after two turns
-        candidates += [place + TURN for place in candidates]
-    return candidates
+    if commanded not in ANGLES:
+        return candidates
+    # with one change point an assembly repeats after two turns; the sweep's own turn first
+    turned = [place + turns * TURN for place in candidates for turns in (0, 1, -1)]
+    sweep = command(scene).angle
+    low, high = float(sweep.min()) - SAME, float(sweep.max()) + SAME
+    return sorted(turned, key=lambda place: not low <= place <= high)
 
 
 def _is_same(name: str, first: float, second: float) -> bool:
@@ -211,6 +215,8 @@ def _find_released(scene: Scene, name: str, value: float) -> Command:
         return _require_values(getattr(solve(scene, "position", at=at), name), name)
 
     if name == "time":
+        if value == 0.0:
+            return run(free.duration, 1).part(slice(0, 1))
         if not 0.0 < value <= free.duration:
             raise NotAssembledError(
                 f"{_say(name, value)}: the release lasts {free.duration:.6g} s"

@@ -8,8 +8,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import IO, Any
 
+import numpy as np
 import pytest
 
+import fourbar
 from fourbar.cli import status
 from fourbar.errors import BAD_INPUT, FourBarError, InputError
 from fourbar.files import load, loads, read_text
@@ -109,7 +111,11 @@ MISTAKES = [
     ("load that does nothing", 'force = ["3 N", "40 deg"]\nfrom_pin = ["5 cm", "0 deg"]\n', "", ["loads[0]", "force"]),
     ("arm without a force", 'force = ["3 N", "40 deg"]', 'moment = "1 N m"', ["loads[0].from_pin", "needs a force"]),
     ("force without an angle", '["3 N", "40 deg"]', '"3 N"', ["loads[0].force", "pair"]),
-    ("force by coordinates", '["3 N", "40 deg"]', '{ x = "1 N", y = "2 N" }', ["loads[0].force", "a pair like"]),
+    ("force by one component", '["3 N", "40 deg"]', '{ x = "1 N" }', ["loads[0].force.y", "is missing"]),
+    ("force downwards", '["3 N", "40 deg"]', '["3 N", "down"]', ["loads[0].force[1]", 'did you mean "-90 deg"?']),
+    ("torque for moment", 'force = ["3 N", "40 deg"]', 'torque = "1 N m"', ["loads[0].torque", '"moment"?']),
+    ("unit left out in quotes", '"60 deg"', '"60"', ["motion.theta_2", 'did you mean "60 deg"?']),
+    ("degrees in German", '"60 deg"', '"60 Grad"', ["motion.theta_2", '"Grad" is not known; did you mean "60 deg"?']),
     ("force with three parts", '["3 N", "40 deg"]', '["3 N", "40 deg", "1 m"]', ["loads[0].force", "pair"]),
     ("loads as a table", "[[loads]]", "[loads]", ["loads", "[[loads]]"]),
     ("frame misspelt", "bar = 4", 'bar = 4\nframe = "body"', ["loads[0].frame", '"world" or "bar"']),
@@ -401,6 +407,29 @@ def test_mutated_files_end_in_a_scene_or_in_one_line() -> None:
         except FourBarError as error:
             assert "\n" not in str(error) and len(str(error)) < LONGEST_LINE, str(error)
     assert 50 < answered < 1950  # the mutations reach both ends
+
+
+def test_forces_and_gravity_by_components_are_written_so_again() -> None:
+    text = """\
+[lengths]
+ground = "300 mm"
+input = "100 mm"
+coupler = "250 mm"
+output = "220 mm"
+[[loads]]
+bar = 4
+force = { x = "3 N", y = "-4 N" }
+[effects]
+gravity = { x = "1.5 m/s^2", y = "-9.81 m/s^2" }
+"""
+    scene = loads(text)
+    assert scene.loads[0].force == pytest.approx((5.0, np.arctan2(-4.0, 3.0)))
+    (gravity,) = scene.effects
+    assert isinstance(gravity, fourbar.Gravity)
+    assert gravity.magnitude == pytest.approx(np.hypot(1.5, 9.81))
+    written = fourbar.dump(scene)
+    assert 'force = { x = "3.0 N", y = "-4.0 N" }' in written
+    assert loads(written).loads == scene.loads
 
 
 @pytest.mark.parametrize("key", ["crank", "slider"])

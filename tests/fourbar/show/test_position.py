@@ -54,6 +54,17 @@ def test_what_a_scene_has_not_is_left_out() -> None:
     assert not any(line.startswith("F_") for line in sheet.write_ratios())
 
 
+def test_a_static_position_shows_no_rates() -> None:
+    still = replace(ONE, motion=fourbar.Motion(1.0, 0.0))
+    sheet = PositionSheet(still, fourbar.solve(still), COMMON)
+    assert "theta" in sheet.write_bars()[0]
+    assert "omega" not in sheet.write_bars()[0]
+    assert not any(line.startswith(("  v", "  a")) for line in sheet.write_points())
+    starting = replace(ONE, motion=fourbar.Motion(1.0, 0.0, 3.0))
+    sheet = PositionSheet(starting, fourbar.solve(starting), COMMON)
+    assert "alpha" in sheet.write_bars()[0]
+
+
 def test_rounding_is_shown_as_zero_and_a_far_centre_by_a_word() -> None:
     lift = fourbar.Scene(
         fourbar.uniform(0.3, 0.1, 0.3, 0.1), fourbar.Motion(np.pi / 2.0, 1.0)

@@ -37,6 +37,21 @@ def test_every_position_of_the_assembly_with_that_output_angle_is_found() -> Non
     assert np.abs(found.angle - sweep.theta_2[100]).min() < LOCATED
 
 
+def test_places_lie_in_the_turn_of_the_sweep_in_rising_order() -> None:
+    scene = replace(crank_rocker(), motion=fourbar.Motion())
+    value = float(fourbar.solve(scene).theta_4[100])
+    found = find_positions(scene, [("theta_4", value)]).angle
+    assert 0.0 <= found[0] < found[1] <= 2.0 * math.pi
+
+
+def test_a_release_has_a_state_at_its_start() -> None:
+    found = find_positions(DROPPED, [("time", 0.0)])
+    assert found.time is not None and found.time.tolist() == [0.0]
+    start = fourbar.solve(DROPPED, at=found)
+    assert start.theta_2[0] == pytest.approx(1.0, abs=LOCATED)
+    assert start.omega_2 is not None and start.omega_2[0] == 0.0
+
+
 def test_a_place_out_of_range_is_refused_with_the_range() -> None:
     with pytest.raises(NotAssembledError, match=r"theta_2 goes from 84\.6\d* to 365"):
         find_positions(thesis(), [("theta_2", math.radians(30.0))])
