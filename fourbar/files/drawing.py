@@ -16,6 +16,7 @@ from fourbar.solve import solve
 
 DRAWN = "drawn"
 """Word that stands for the drawn angle, stroke or side; key of a place of the drawing."""
+STANDS_ALONE = "must be left out: `drawn` states the place"
 ANGLES = {names[0]: bar for bar, names in COMMANDS.items()}
 """Bars by the names of their angles."""
 NUMBERS_OF_BARS = {name: bar for bar, name in BAR_NAMES.items()}
@@ -98,18 +99,16 @@ def _state_places(
         ]
     if not isinstance(value, dict):
         return value
-    if DRAWN in value:
-        entry = read.table(key, value, (DRAWN,))
-        if bar is None:
-            raise read.refuse(
-                key, value, "a place of the drawing needs the bar it is of"
-            )
-        if key.endswith((".from_centre", ".arm")):
-            raise read.refuse(key, value, "a place of the drawing is written from_pin")
-        z = drawing.into_bar(bar, read_point(read, f"{key}.{DRAWN}", entry[DRAWN]))
-        return {"x": f"{z.real!r} m", "y": f"{z.imag!r} m"}
     number = value.get("bar")
     own = number if isinstance(number, int) and number in BAR_NAMES else bar
+    if DRAWN in value:
+        place = _state_place(read, key, value, drawing, own)
+        if len(value) == 1:
+            return place
+        if "from_pin" in value:
+            raise read.refuse(f"{key}.from_pin", value["from_pin"], STANDS_ALONE)
+        value = {name: entry for name, entry in value.items() if name != DRAWN}
+        value["from_pin"] = place
     stated = {}
     for name, entry in value.items():
         of_bar = (
@@ -117,6 +116,21 @@ def _state_places(
         )
         stated[name] = _state_places(read, f"{key}.{name}", entry, drawing, of_bar)
     return stated
+
+
+def _state_place(
+    read: Reader, key: str, value: dict[str, Any], drawing: DrawnPins, bar: int | None
+) -> dict[str, str]:
+    """State a place of the drawing by its coordinates in the frame of its bar."""
+    if bar is None:
+        allowed = (
+            f'must name the bar it is of: {key} = {{ bar = 3, drawn = ["x", "y"] }}'
+        )
+        raise read.refuse(f"{key}.{DRAWN}", value[DRAWN], allowed)
+    if key.endswith((".from_centre", ".arm")):
+        raise read.refuse(key, value, "a place of the drawing is written from_pin")
+    z = drawing.into_bar(bar, read_point(read, f"{key}.{DRAWN}", value[DRAWN]))
+    return {"x": f"{z.real!r} m", "y": f"{z.imag!r} m"}
 
 
 def state_motion(

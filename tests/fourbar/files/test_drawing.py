@@ -102,6 +102,29 @@ def test_places_of_the_drawing_are_where_they_are_drawn() -> None:
     assert loads(dump(scene)) == scene and "[pins]" in dump(scene)
 
 
+def test_a_place_of_the_drawing_stands_beside_its_bar_wherever_a_place_stands() -> None:
+    acts = """
+[motion]
+theta_2 = "drawn"
+omega_2 = "0 rad/s"
+[points]
+P = { bar = 3, PLACE ["120 mm", "80 mm"] CLOSED }
+[[loads]]
+bar = 4
+force = ["10 N", "0 deg"]
+PLACE ["240 mm", "70 mm"] CLOSED
+"""
+    short = acts.replace("PLACE", "drawn =").replace("CLOSED", "")
+    nested = acts.replace("PLACE", "from_pin = { drawn =").replace("CLOSED", "}")
+    assert loads(DRAWN + short) == loads(DRAWN + nested)
+    for text, said in (
+        (short.replace("bar = 3, ", ""), "must name the bar it is of"),
+        (short.replace("bar = 3, ", 'bar = 3, from_pin = ["1 m", "0"], '), "left out"),
+    ):
+        with pytest.raises(fourbar.InputError, match=said):
+            loads(DRAWN + text)
+
+
 CYLINDER = """\
 [drive]
 from = { bar = 1, from_pin = { drawn = ["100 mm", "-50 mm"] } }
