@@ -82,7 +82,9 @@ def test_the_page_s_engine_answers_what_the_formulas_do(
     )
     if motion.speed is None:
         motion = motion.replace(speed=1.0)
-    scene = replace(scene, motion=motion, loads=(), effects=gravity, drive_bar=2)
+    scene = replace(
+        scene, motion=motion, loads=(), effects=gravity, drive=None, drive_bar=2
+    )
     commanded = list_positions(scene)
     # an engine is told the sign of the command's own sine at each position
     told = with_signs(scene.linkage, commanded)

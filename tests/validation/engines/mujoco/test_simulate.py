@@ -109,6 +109,7 @@ def test_slow_linkages_hold_as_well(loaded: bool, index: int) -> None:
     slow = replace(
         drawn,
         motion=drawn.motion.replace(speed=0.001 if loaded else 0.01, acceleration=0.0),
+        drive=None,
         drive_bar=2,
     )
     posed = slow if loaded else replace(slow, loads=(), effects=())
