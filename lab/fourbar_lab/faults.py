@@ -12,10 +12,14 @@ import click
 from fourbar.errors import FAILED, HOLDS
 from fourbar_lab import injection
 from fourbar_lab.injection import read_faults
-from fourbar_validation.engines.processes import run_to_end
+from fourbar_validation.engines.processes import Ended, run_to_end
 from fourbar_validation.engines.workers import apply_each
-from fourbar_validation.places import FORMULAS, PACKAGE
+from fourbar_validation.places import CHECKOUT, FORMULAS, PACKAGE
 
+TESTS_FAIL = 1
+"""Exit status of pytest where a test fails."""
+TEST_SECONDS = 10.0
+"""Processor time within which the tests of what judges must fail, s."""
 CHUNK = 8
 """Faults of one process, which loads the engines once."""
 SECONDS = 300
@@ -26,17 +30,34 @@ Failing = dict[str, list[str]]
 
 def try_faults(numbers: Sequence[int]) -> list[Failing] | str:
     """Try the fault of each number in turn, or none: the rows that fail, or why there is no result."""
+    done = _inject(*map(str, numbers))
+    return done.why or [
+        json.loads(each) for each in done.out.splitlines()[-max(1, len(numbers)) :]
+    ]
+
+
+def _inject(*arguments: str) -> Ended:
+    """Run the module that injects, in a process of its own."""
     packages = dict.fromkeys(
         str(folder)
         for folder in (FORMULAS.parent, PACKAGE.parent, Path(__file__).parents[1])
     )
-    line = [sys.executable, "-P", injection.__file__, *numbers]
-    done = run_to_end(
-        line, seconds=SECONDS, variables={"PYTHONPATH": os.pathsep.join(packages)}
-    )
-    return done.why or [
-        json.loads(each) for each in done.out.splitlines()[-max(1, len(numbers)) :]
-    ]
+    line = [sys.executable, "-P", injection.__file__, *arguments]
+    variables = {"PYTHONPATH": os.pathsep.join(packages)}
+    return run_to_end(line, seconds=SECONDS, folder=CHECKOUT, variables=variables)
+
+
+def try_judging_fault(number: int) -> str | None:
+    """Try a fault of what judges on the tests of its folder: why it survives them, or None."""
+    done = _inject("--tests", str(number))
+    if done.why:
+        return f"it raises: {done.why}"
+    outcome = json.loads(done.out.splitlines()[-1])
+    if outcome["status"] != TESTS_FAIL:
+        return f"the tests end with status {outcome['status']}"
+    if outcome["seconds"] > TEST_SECONDS:
+        return f"the tests take {outcome['seconds']:.1f} s until one fails"
+    return None
 
 
 def explain_survival(entry: dict[str, Any], failing: Failing | str) -> str | None:
@@ -83,12 +104,21 @@ def try_every_fault(workers: int) -> Iterator[tuple[str, str | None]]:
                 entries[number]["fault"],
                 None if why and "harmless" in entries[number] else why,
             )
+    judging = read_faults("judging") if CHECKOUT is not None else []
+    outcomes_of_tests = apply_each(try_judging_fault, range(len(judging)), workers)
+    for entry, reason in zip(judging, outcomes_of_tests, strict=True):
+        yield entry["fault"], reason
 
 
 @click.command()
 @click.option("--workers", default=2, show_default=True, type=click.IntRange(1))
 def command(workers: int) -> int:
-    """Make each fault of faults.toml in formulas, effects, MJCF and engines, one at a time; each must be caught."""
+    """Make each fault of faults.toml, one at a time; each must be caught.
+
+    Those in formulas, effects, MJCF and engines must fail a comparison, those in what
+    judges (comparison, tolerance, rows, report, regression, store, cost, advice) the quick
+    tests of their folder.
+    """
     from rich.console import Console
     from rich.progress import track
 
@@ -96,7 +126,7 @@ def command(workers: int) -> int:
         track(
             try_every_fault(workers),
             "injecting",
-            total=len(read_faults()) + 1,
+            total=len(read_faults()) + len(read_faults("judging")) + 1,
             console=Console(stderr=True),
         )
     )

@@ -1,14 +1,16 @@
 """Inject faults, one after another: a module is loaded with another text, then the harness checks the test scenes.
 
 Run by its path, with the packages on PYTHONPATH: `python -P injection.py NUMBER...` prints what failed as JSON, a line
-for each fault; without a number nothing is injected and every test scene must hold. As a module it would import the
-project before the fault stands.
+for each fault; without a number nothing is injected and every test scene must hold. `injection.py --tests NUMBER` runs
+the tests that an entry of what judges names, and prints how they ended. As a module it would import the project before
+the fault stands.
 """
 
 import importlib.abc
 import importlib.machinery
 import json
 import sys
+import time
 import tomllib
 from pathlib import Path
 from types import CodeType
@@ -19,10 +21,14 @@ PACKAGES = ("fourbar", "fourbar_validation")
 """Packages that an entry may change, in the checkout or as they are installed."""
 
 
-def read_faults() -> list[dict[str, Any]]:
-    """Read the list: the keys of an entry are fault, file, old, new, scenes, caught_by and perhaps harmless."""
+def read_faults(table: str = "injected") -> list[dict[str, Any]]:
+    """Read a table of the list.
+
+    The keys of an entry are fault, file, old and new; of what is "injected" into formulas
+    and engines also scenes, caught_by and perhaps harmless, of what is "judging" tests.
+    """
     entries: list[dict[str, Any]] = tomllib.loads(FAULTS.read_text(encoding="utf-8"))[
-        "injected"
+        table
     ]
     return entries
 
@@ -109,8 +115,24 @@ def list_failing(names: list[str]) -> dict[str, list[str]]:
     return failing
 
 
+def run_tests(entry: dict[str, Any]) -> dict[str, float]:
+    """Run the quick tests that an entry names, with its fault: pytest's exit status and the processor time, s."""
+    import pytest
+
+    finder = FaultFinder(entry)
+    sys.meta_path.insert(0, finder)
+    quick = ["-x", "-n", "0", "-p", "no:cacheprovider", "-m", "not slow"]
+    status = pytest.main([*quick, entry["tests"]])
+    if finder.left:
+        raise RuntimeError(f"the tests use no {', '.join(finder.left)}")
+    return {"status": int(status), "seconds": time.process_time()}
+
+
 def main() -> None:
     """Inject the fault of each number, check its test scenes, print what fails."""
+    if sys.argv[1:2] == ["--tests"]:
+        print(json.dumps(run_tests(read_faults("judging")[int(sys.argv[2])])))
+        return
     if len(sys.argv) == 1:
         print(json.dumps(list_failing([])))
     for number in map(int, sys.argv[1:]):

@@ -9,6 +9,7 @@ from fourbar_lab import faults
 from fourbar_lab.fault_scenes import FAULT_SCENES
 from fourbar_lab.faults import explain_survival, try_faults
 from fourbar_lab.injection import inject_fault, read_faults
+from fourbar_validation.engines.processes import Ended
 from fourbar_validation.engines.registry import ENGINES
 from fourbar_validation.run.judge import judge
 from tests.support.scenes import thesis
@@ -55,6 +56,48 @@ def test_every_entry_fits_its_module_and_is_tried_on_a_scene() -> None:
             "fault"
         ]
         assert entry["caught_by"] or entry["harmless"], entry["fault"]
+
+
+JUDGING = read_faults("judging")
+
+
+def test_every_entry_of_what_judges_fits_its_module_and_names_tests_of_its_folder() -> (
+    None
+):
+    folders = set()
+    for entry in JUDGING:
+        for name, text in inject_fault(entry).items():
+            compile(text, name, "exec")
+        folder = entry["file"].split("/")[1]
+        folders.add(folder)
+        assert entry["tests"].startswith(f"tests/validation/{folder}/test_")
+    assert len({entry["fault"] for entry in JUDGING}) == len(JUDGING) >= 30
+    assert folders == {"compare", "regression", "run", "report", "cost", "advise"}
+
+
+@pytest.mark.parametrize(
+    "number",
+    [
+        pytest.param(number, marks=pytest.mark.slow, id=entry["fault"])
+        for number, entry in enumerate(JUDGING)
+    ],
+)
+def test_a_fault_of_what_judges_falls_in_the_tests_of_its_folder(number: int) -> None:
+    assert faults.try_judging_fault(number) is None
+
+
+def test_tests_that_do_not_fail_or_take_long_let_a_fault_survive(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    for status, seconds, says in ((0, 1.0, "status 0"), (1, 11.0, "take 11.0 s")):
+        ended = Ended(
+            f'...\n{{"status": {status}, "seconds": {seconds}}}\n', "", False, ""
+        )
+        monkeypatch.setattr(faults, "run_to_end", lambda *_, e=ended, **__: e)
+        assert says in (faults.try_judging_fault(0) or "")
+    held = Ended('{"status": 1, "seconds": 2.0}\n', "", False, "")
+    monkeypatch.setattr(faults, "run_to_end", lambda *_, **__: held)
+    assert faults.try_judging_fault(0) is None
 
 
 @pytest.mark.parametrize(
