@@ -9,8 +9,6 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, TextIO
 
-import numpy as np
-
 if TYPE_CHECKING:
     import click
 
@@ -37,8 +35,11 @@ class InputError(FourBarError):
         self, key: str, value: object, allowed: str, file: str | None = None
     ) -> None:
         self.key, self.value, self.allowed, self.file = key, value, allowed, file
-        if isinstance(value, np.generic):
-            value = value.item()  # np.float64(0.21) is 0.21 to a reader
+        # a reader wants 0.21, not np.float64(0.21); an interruption while numpy is
+        # imported is one line too, so that this module does not import it
+        numpy = sys.modules.get("numpy")
+        if numpy is not None and isinstance(value, numpy.generic):
+            value = value.item()
         shown = " ".join(repr(value).split())  # arrays take several lines
         if len(shown) > LONGEST_SHOWN:  # of a long path the end says which
             shown = (
