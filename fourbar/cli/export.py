@@ -54,7 +54,7 @@ without_loads_option = click.option(
     show_default=True,
     metavar="NAME",
     help="Figure: overview, linkage, coupler, kinematics, points, torque, forces, hodograph, energy, "
-    "transmission, freebody, bars, sensitivity or stroke.",
+    "transmission, shaking, ratios, centres, freebody, bars, sensitivity or stroke.",
 )
 @click.option(
     "--at",

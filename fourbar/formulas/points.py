@@ -159,21 +159,7 @@ def coupler_curve(
         range(4, MOST_STEPS + 1, 4),
         f"must be a multiple of 4 up to {MOST_STEPS}",
     )
-    (start, stop), branches = every[circuit]
-    branch = branch if branch in branches else branches[0]
-    half = np.arange(0.5, steps, dtype=np.float64)
-    turns = 0
-    if turns_fully(linkage):
-        turns = 2 if len(change_points(linkage)) == 1 else 1
-        # odd halves of a multiple of 4 never meet theta_1 or theta_1 + pi
-        theta_2: Array = start + half * (turns * TURN / steps)
-        assembly: NDArray[np.int64] = np.full(theta_2.shape, branch)
-    else:
-        out = 0.5 * (start + stop) - 0.5 * (stop - start) * np.cos(
-            half[: steps // 2] * (TURN / steps)
-        )
-        theta_2 = np.concatenate((out, out[::-1]))
-        assembly = np.repeat((branch, -branch), len(out))
+    theta_2, assembly, turns = list_circuit(linkage, circuit, branch, steps)
     curve = compute_state(linkage, theta_2, assembly).point(3, point)
     x, y = curve.real, curve.imag
     path = prepare_path(Loop(*linkage.lengths, 0.0, 0.0), linkage.ground_angle)
@@ -182,6 +168,28 @@ def coupler_curve(
     return CouplerCurve(
         theta_2, np.append(signs, signs[0]), np.append(x, x[0]), np.append(y, y[0])
     )
+
+
+def list_circuit(
+    linkage: FourBar, circuit: int, branch: int, steps: int
+) -> tuple[Array, NDArray[np.int64], int]:
+    """List the positions of a circuit, (steps,): theta_2, its assembly, and the turns that theta_2 gains.
+
+    For the parameters see `coupler_curve`.
+    """
+    (start, stop), branches = circuits(linkage)[circuit]
+    branch = branch if branch in branches else branches[0]
+    half = np.arange(0.5, steps, dtype=np.float64)
+    if turns_fully(linkage):
+        turns = 2 if len(change_points(linkage)) == 1 else 1
+        # odd halves of a multiple of 4 never meet theta_1 or theta_1 + pi
+        theta_2: Array = start + half * (turns * TURN / steps)
+        return theta_2, np.full(theta_2.shape, branch), turns
+    out = 0.5 * (start + stop) - 0.5 * (stop - start) * np.cos(
+        half[: steps // 2] * (TURN / steps)
+    )
+    theta_2 = np.concatenate((out, out[::-1]))
+    return theta_2, np.repeat((branch, -branch), len(out)), 0
 
 
 def _compute_state(linkage: FourBar, theta_2: object, branch: object) -> State:

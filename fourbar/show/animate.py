@@ -23,9 +23,10 @@ from fourbar.files import dump
 from fourbar.files.scene_text import BARS
 from fourbar.formulas.mobility import classify
 from fourbar.linkage import MOVING_BARS
-from fourbar.quantities import ANGLES, OK, PIN_FORCES
+from fourbar.quantities import ANGLES, DERIVED_NAMES, OK, PIN_FORCES
 from fourbar.scene import Command, Scene, command, command_at
 from fourbar.scene.pictures import encode_picture
+from fourbar.show.derived import derive
 from fourbar.show.duty import compute_energies
 from fourbar.show.plot.film import write_film
 from fourbar.show.plot.style import format_of, shorten_text
@@ -48,6 +49,8 @@ MAX_ROWS = 1441
 WATCHED = (1.5, 60.0)
 """A motion through time that lasts between these, s, is shown in real time."""
 RATES = tuple(f"{letter}_{bar}" for letter in ("omega", "alpha") for bar in MOVING_BARS)
+CENTRES = ("I13", "I24")
+"""Places that lie at infinity now and then: a figure has them, no curve."""
 SCALARS = (
     *ANGLES,
     "condition",
@@ -295,7 +298,9 @@ def _collect_columns(solution: Solution) -> dict[str, Any]:
         values = getattr(solution, name)
         if values is not None:
             columns[name] = values
-    columns["transmission"] = np.arcsin(np.abs(solution.sin_mu))
+    for name in DERIVED_NAMES:
+        if name not in CENTRES and (values := derive(solution, name)) is not None:
+            columns[name] = values
     return columns
 
 

@@ -9,6 +9,8 @@ const quantitiesOf = () => [
   ...POINTS.flatMap(([name]) => [other(`v_${name}`, `speed of ${typeset(name)}`, "m/s"), other(`a_${name}`, `acceleration of ${typeset(name)}`, "m/s^2")]),
   other("energy", "kinetic energy", "J"), other("torque", `torque on bar ${data.drive_bar}`, "N m"), other("power", "power of the drive", "W"),
   angle("transmission", "transmission angle"),
+  ...[3, 4].map(k => [`omega_${k}/omega_2`, `\u03c9${"\u2083\u2084"[k - 3]}/\u03c9\u2082, 1`, 1]), ["mechanical_advantage", "mechanical advantage, 1", 1],
+  other("shaking_force", "|shaking force|", "N"), other("shaking_moment", "shaking moment about O\u2082", "N m"),
   other("drive_force", "force of the drive", "N"), other("stroke", "stroke", "m"),
   ...FORCES.map(name => other(name, `|${typeset(name)}|`, "N")),
 ];

@@ -155,10 +155,13 @@ def clip(
         if view.time is None
         else f"t = {view.time[index]:.4g} s"
     )
+    edge = f"{write_number(limit * factor)} {name_of_unit}"
+    largest = write_quantity(worst[index], unit, view.units)
+    if unit == "1":
+        edge, largest = (text.removesuffix(" 1") for text in (edge, largest))
     note(
         view,
-        f"{what} clipped at {write_number(limit * factor)} {name_of_unit}; the largest evaluated, {name} = "
-        f"{write_quantity(worst[index], unit, view.units)}, is at {words}.",
+        f"{what} clipped at {edge}; the largest evaluated, {name} = {largest}, is at {words}.",
     )
 
 

@@ -12,7 +12,7 @@ from fourbar.linkage import require
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Scene
 from fourbar.show.block import explain_static
-from fourbar.show.plot import curves, freebody, linkage, studies
+from fourbar.show.plot import curves, derived, freebody, linkage, studies
 from fourbar.show.plot.curves import draw_transmission
 from fourbar.show.plot.labels import Labels
 from fourbar.show.plot.style import (
@@ -96,6 +96,18 @@ def _draw_single(paint: Callable[[Any, View], None]) -> Painter:
     return lambda figure, shown, labels: paint(figure.subplots(), shown)
 
 
+def _draw_rows(*painters: Callable[[Any, View], None]) -> Painter:
+    """Draw panels below each other."""
+
+    def paint(figure: "SubFigure", shown: View, labels: Labels) -> None:
+        for axes, painter in zip(
+            figure.subplots(len(painters), 1), painters, strict=True
+        ):
+            painter(axes, shown)
+
+    return paint
+
+
 def _draw_hodographs(figure: "SubFigure", shown: View, labels: Labels) -> None:
     panels = figure.subplots(2, 2, subplot_kw={"projection": "polar"}).ravel()
     for axes, name in zip(panels, PIN_FORCES, strict=True):
@@ -122,6 +134,21 @@ FIGURES: dict[str, tuple[Painter, tuple[float, float], bool]] = {
     "hodograph": (_draw_hodographs, (6.4, 6.6), True),
     "energy": (_draw_single(curves.draw_energy), (5.6, 3.2), True),
     "transmission": (_draw_single(draw_transmission), (5.6, 3.2), False),
+    "shaking": (
+        _draw_rows(derived.draw_shaking_force, derived.draw_shaking_moment),
+        (5.6, 5.4),
+        True,
+    ),
+    "ratios": (
+        _draw_rows(derived.draw_speed_ratios, derived.draw_advantage),
+        (5.6, 5.4),
+        False,
+    ),
+    "centres": (
+        lambda figure, *of: derived.draw_centres(figure.subplots(), *of),
+        (5.6, 5.4),
+        False,
+    ),
     "freebody": (freebody.draw_free_bodies, (9.6, 4.6), True),
     "bars": (freebody.draw_internal_forces, (9.6, 6.2), True),
     "sensitivity": (studies.draw_influences, (9.6, 3.6), True),

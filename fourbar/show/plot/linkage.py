@@ -10,6 +10,7 @@ import numpy as np
 from fourbar.linkage import ENDS, MOVING_BARS
 from fourbar.show.plot import symbols
 from fourbar.show.plot.labels import Label, Labels
+from fourbar.show.plot.paths import trace
 from fourbar.show.plot.style import (
     BAR_COLOURS,
     INK,
@@ -350,7 +351,8 @@ def write_path_legend(axes: "Axes") -> float:
 
 def list_paths(view: View) -> list[tuple[Array, str, Any, str]]:
     """List paths of A, B, mass centres (or the coupler's mid-point) and own points: (n, 2) in m, colour, dash, name."""
-    sweep = view.sweep
+    traced = trace(view)
+    sweep = traced.solution
     massive = view.scene.linkage.coupler.mass > 0.0
     middle = sweep.G3 if massive else 0.5 * (sweep.A + sweep.B)
     paths: list[tuple[Array, str, Any, str]] = [
@@ -372,10 +374,9 @@ def list_paths(view: View) -> list[tuple[Array, str, Any, str]]:
         (path, POINT, (0, (3, 1, 1, 1)), f"path of {name}")
         for name, path in sweep.points.items()
     ]
-    closes = sweep.assembled[:, None]
     return [
-        (np.where(closes, path, np.nan), colour, dashes, name)
-        for path, colour, dashes, name in paths
+        (traced.path(points), colour, dashes, name)
+        for points, colour, dashes, name in paths
     ]
 
 
@@ -386,12 +387,20 @@ def draw_coupler_curves(axes: "Axes", view: View, labels: Labels) -> None:
         locate_pins(view, factor),
         [point.name for point in view.scene.points if point.bar == 3],
     )
-    for (name, path), (colour, dashes) in zip(
-        _list_coupler_points(view, names), cycle(COUPLER_CURVES), strict=False
+    traced = trace(view)
+    for (name, points), (colour, dashes) in zip(
+        _list_coupler_points(traced.solution, names),
+        cycle(COUPLER_CURVES),
+        strict=False,
     ):
         lw = 1.8 if name in (*names, "0.5") else 1.1
         axes.plot(
-            *(factor * path).T, color=colour, lw=lw, ls=dashes, label=name, zorder=3
+            *(factor * traced.path(points)).T,
+            color=colour,
+            lw=lw,
+            ls=dashes,
+            label=name,
+            zorder=3,
         )
     faint: dict[str, Any] = {
         "color": MUTED,
@@ -416,6 +425,8 @@ def draw_coupler_curves(axes: "Axes", view: View, labels: Labels) -> None:
     labels.keep_off(axes, *pins.values())
     axes.set_aspect("equal", adjustable="datalim")
     title = f"Coupler curves, {view.branch_name} branch"
+    if traced.circuit:
+        title = "Coupler curves of the circuit"
     axes.set(xlabel=f"$x$ ({unit})", ylabel=f"$y$ ({unit})", title=title)
     _show_drawing_coordinates(axes, view, factor)
     heading = (
@@ -433,9 +444,10 @@ def draw_coupler_curves(axes: "Axes", view: View, labels: Labels) -> None:
     view.notes.append(f"The linkage is drawn at {view.at}.")
 
 
-def _list_coupler_points(view: View, names: list[str]) -> Iterator[tuple[str, Array]]:
-    """List the paths that are drawn of the coupler, each with its name."""
-    sweep = view.sweep
+def _list_coupler_points(
+    sweep: Solution, names: list[str]
+) -> Iterator[tuple[str, Array]]:
+    """List the points of the coupler whose paths are drawn, each with its name."""
     along = sweep.B - sweep.A
     across = np.stack([-along[:, 1], along[:, 0]], axis=1)
     if names:

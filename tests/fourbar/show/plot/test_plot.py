@@ -218,7 +218,11 @@ def test_the_coupler_figure_shows_the_points_of_the_scene() -> None:
         if line.get_label()[0] != "_"
     }
     assert list(curves) == ["$A$", "$B$", "P"]  # Q belongs to the output
-    np.testing.assert_allclose(curves["P"], solved(scene).points["P"], atol=1e-15)
+    # each solved position lies between two of the finer path
+    path = np.asarray(curves["P"])
+    near = np.hypot(*np.diff(path, axis=0).T).max()
+    for place in solved(scene).points["P"]:
+        assert np.hypot(*(path - place).T).min() < near
 
 
 @pytest.mark.slow

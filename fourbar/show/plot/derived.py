@@ -1,0 +1,156 @@
+"""Curves of what follows from a solution: shaking force and moment, ratios, paths of instant centres."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fourbar.show.derived import derive
+from fourbar.show.plot.curves import (
+    break_at_poles,
+    choose_limit,
+    clip,
+    draw_axes,
+    find_poles,
+    note,
+)
+from fourbar.show.plot.labels import Labels
+from fourbar.show.plot.linkage import draw_mechanism, locate_pins, scale_of
+from fourbar.show.plot.style import (
+    BAR_COLOURS,
+    BAR_DASHES,
+    INK,
+    MUTED,
+    POINT,
+    find_greatest,
+    place_legend,
+)
+from fourbar.show.plot.view import View
+from fourbar.show.units import choose_unit
+from fourbar.solution import Array
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+SYMBOLS = {
+    "omega_3/omega_2": "ω₃/ω₂",
+    "omega_4/omega_2": "ω₄/ω₂",
+    "mechanical_advantage": "T₄/T₂",
+}
+WINDOW = 1.5
+"""Instant centres are drawn up to this multiple of the linkage's size from it."""
+
+
+def _list_values(view: View, name: str) -> list[Array]:
+    """List a quantity of every branch that shares the scales; the view's own first."""
+    views = [view, *(other for other in view.alike if other is not view)]
+    values = [derive(branch.sweep, name) for branch in views]
+    return [column for column in values if column is not None]
+
+
+def draw_shaking_force(axes: "Axes", view: View) -> None:
+    """Draw the force on the frame: its size and its components."""
+    over, poles = draw_axes(axes, view), find_poles(view)
+    vectors = _list_values(view, "shaking_force")
+    x, y = vectors[0].T
+    curves = {"|F|": np.hypot(x, y), "F_x": x, "F_y": y}
+    sizes = [np.hypot(*vector.T) for vector in vectors]
+    limit = choose_limit(sizes)
+    factor, unit = choose_unit(limit or find_greatest(*sizes), "N", view.units)
+    looks = ((INK, "-"), (BAR_COLOURS[2], (0, (4, 1.5))), (BAR_COLOURS[4], (0, (1, 1))))
+    for (name, values), (colour, dashes) in zip(curves.items(), looks, strict=True):
+        axes.plot(
+            break_at_poles(over, poles),
+            factor * break_at_poles(values, poles),
+            color=colour,
+            ls=dashes,
+            label=f"${name}$",
+        )
+    axes.axhline(0.0, color=INK, lw=0.6, zorder=1)
+    axes.set(ylabel=f"$F$ ({unit})", title="Shaking force on the frame")
+    clip(axes, view, curves, limit, "Shaking force", "N")
+    place_legend(axes)
+
+
+def draw_shaking_moment(axes: "Axes", view: View) -> None:
+    """Draw the moment on the frame about O2."""
+    over, poles = draw_axes(axes, view), find_poles(view)
+    moments = _list_values(view, "shaking_moment")
+    limit = choose_limit(moments)
+    factor, unit = choose_unit(limit or find_greatest(*moments), "N m", view.units)
+    axes.plot(
+        break_at_poles(over, poles),
+        factor * break_at_poles(moments[0], poles),
+        color=INK,
+    )
+    axes.axhline(0.0, color=INK, lw=0.6, zorder=1)
+    axes.set(ylabel=f"$M$ ({unit})", title="Shaking moment about $O_2$")
+    clip(axes, view, {"M": moments[0]}, limit, "Shaking moment", "N m")
+
+
+def draw_speed_ratios(axes: "Axes", view: View) -> None:
+    """Draw the ratios of the speeds of coupler and output to that of the input."""
+    _draw_ratios(axes, view, {3: "omega_3/omega_2", 4: "omega_4/omega_2"})
+    axes.set(ylabel="ratio", title="Speed ratios")
+    place_legend(axes)
+
+
+def draw_advantage(axes: "Axes", view: View) -> None:
+    """Draw the mechanical advantage, the torque of the output to that of the input."""
+    _draw_ratios(axes, view, {2: "mechanical_advantage"})
+    axes.set(ylabel="T₄/T₂", title="Mechanical advantage")
+
+
+def _draw_ratios(axes: "Axes", view: View, names: dict[int, str]) -> None:
+    """Draw ratios by the bars whose colours they have; beyond a pole no line goes on."""
+    over = draw_axes(axes, view)
+    everywhere = [
+        values for name in names.values() for values in _list_values(view, name)
+    ]
+    limit = choose_limit(everywhere)
+    curves = dict[str, Array]()
+    for bar, name in names.items():
+        values = _list_values(view, name)[0]
+        jumps = np.flatnonzero(values[:-1] * values[1:] < 0.0)
+        far = np.minimum(np.abs(values[:-1]), np.abs(values[1:]))[jumps] > 1.0
+        poles = jumps[far]
+        curves[SYMBOLS[name]] = values
+        axes.plot(
+            break_at_poles(over, poles),
+            break_at_poles(values, poles),
+            color=BAR_COLOURS[bar],
+            ls=BAR_DASHES[bar],
+            label=SYMBOLS[name],
+        )
+    axes.axhline(0.0, color=INK, lw=0.6, zorder=1)
+    clip(axes, view, curves, limit, "Ratio", "1")
+
+
+def draw_centres(axes: "Axes", view: View, labels: Labels) -> None:
+    """Draw the paths of the instant centres I13 and I24 near the linkage."""
+    factor, unit, _ = scale_of(view)
+    pins = np.array([*locate_pins(view, 1.0).values()])
+    middle = pins.mean(axis=0)
+    reach = WINDOW * max(view.scene.linkage.lengths)
+    for name, colour, dashes in (("I13", POINT, "-"), ("I24", INK, (0, (4, 1.5)))):
+        (path,) = _list_values(view, name)[:1]
+        away = np.hypot(*(path - middle).T)
+        shown = np.where((away <= reach)[:, None], path, np.nan)
+        subscript = name[1:]
+        axes.plot(
+            *(factor * shown).T,
+            color=colour,
+            ls=dashes,
+            lw=1.2,
+            label=f"$I_{{{subscript}}}$",
+        )
+        (here,) = [derive(view.here, name)]
+        assert here is not None
+        if np.hypot(*(here[0] - middle)) <= reach:
+            axes.plot(*(factor * here).T, "o", ms=4.5, color=colour, zorder=6)
+    draw_mechanism(axes, view, view.here, 0, labels)
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.grid(color=MUTED, alpha=0.2)
+    title = f"Instant centres at {view.at}"
+    axes.set(xlabel=f"$x$ ({unit})", ylabel=f"$y$ ({unit})", title=title)
+    place_legend(axes)
+    note(view, f"Centres further than {WINDOW:g} longest bars away are left out.")

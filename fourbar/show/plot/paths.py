@@ -1,0 +1,91 @@
+"""Paths of points, traced by steps along the curve: near a small transmission angle a degree may be a long chord."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from fourbar.formulas.mobility import find_circuit
+from fourbar.formulas.points import list_circuit
+from fourbar.scene import Command, command_at
+from fourbar.scene.motion import Sweep
+from fourbar.show.plot.view import View
+from fourbar.solution import Array, Solution
+from fourbar.solve import solve
+
+STEPS = (1440, 7200, 36_000, 180_000)
+"""Steps that are tried until no chord is long, each a multiple of 4."""
+CHORD = 1.0 / 150.0
+"""Longest chord of a path, as a part of its extent: no corner is seen in a printed figure."""
+
+
+class Trace(NamedTuple):
+    """Positions from which paths are drawn."""
+
+    solution: Solution
+    circuit: bool
+    """True for the whole circuit, through both branches where the input has limits."""
+
+    def path(self, points: Array) -> Array:
+        """Return the path of a point, (k, 2), m; its positions that stand closer than need be are left out."""
+        shown = np.where(self.solution.assembled[:, None], points, np.nan)
+        if self.circuit:
+            shown = np.concatenate([shown, shown[:1]])
+        return _thin(shown)
+
+
+def trace(view: View) -> Trace:
+    """Solve the positions that the paths of a view run through.
+
+    A motion of the input that names no sweep has the circuit of the position drawn; a sweep and
+    the command of another bar have their own range; a motion through time and a list of angles
+    have their own positions.
+    """
+    motion = view.scene.motion
+    listed = isinstance(motion.angle, np.ndarray)
+    if view.time is not None or listed:
+        return Trace(view.sweep, circuit=False)
+    circuit = motion.commanded == "theta_2" and not isinstance(motion.angle, Sweep)
+    solution = view.sweep
+    for steps in STEPS:
+        at = _list_circuit(view, steps) if circuit else _list_range(view, steps)
+        solution = solve(view.scene, "position", at=at)
+        followed = [solution.A, solution.B, *solution.points.values()]
+        if all(_longest_chord(points) <= CHORD for points in followed):
+            break
+    return Trace(solution, circuit)
+
+
+def _list_circuit(view: View, steps: int) -> Command:
+    linkage, here = view.scene.linkage, view.here
+    number = int(find_circuit(linkage, here.theta_2, here.branch)[0])
+    theta_2, assembly, _ = list_circuit(
+        linkage, number, view.scene.motion.branch, steps
+    )
+    return Command(theta_2, assembly.astype(np.int8), None, 0.0)
+
+
+def _list_range(view: View, steps: int) -> Command:
+    places = view.sweep.at.places
+    return command_at(view.scene, np.linspace(places[0], places[-1], steps + 1))
+
+
+def _longest_chord(points: Array) -> float:
+    """Return the longest chord between positions that assemble, as a part of the path's extent."""
+    chords = np.hypot(*np.diff(points, axis=0).T)
+    extent = float(np.nanmax(np.nanmax(points, axis=0) - np.nanmin(points, axis=0)))
+    return float(np.nanmax(chords, initial=0.0)) / extent if extent else 0.0
+
+
+def _thin(path: Array) -> Array:
+    """Leave out positions that lie within half a chord of the one before; gaps and ends stay."""
+    extent = float(np.nanmax(np.nanmax(path, axis=0) - np.nanmin(path, axis=0)))
+    step = 0.5 * CHORD * extent
+    gap = np.isnan(path).any(axis=1)
+    if step == 0.0:
+        return path[[0, -1]]
+    chords = np.nan_to_num(np.hypot(*np.diff(path, axis=0).T))
+    passed = np.floor(np.concatenate([[0.0], np.cumsum(chords)]) / step)
+    beside = np.flatnonzero(np.diff(gap.astype(int)))
+    on = np.flatnonzero(np.diff(passed, prepend=-1.0) > 0.0)
+    kept = np.unique([0, len(path) - 1, *beside, *(beside + 1), *on])
+    return np.asarray(path[kept])

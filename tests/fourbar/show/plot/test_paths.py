@@ -1,0 +1,78 @@
+"""Paths run along the curve: no false corner, through both branches, and where the drawing has the point."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import fourbar
+from fourbar.files.scene_file import loads
+from fourbar.show.plot.figures import draw_figure
+from fourbar.show.plot.paths import CHORD, trace
+from fourbar.show.plot.view import make_view
+from tests.support.scenes import crank_rocker
+
+NEAR_IN_LINE = """\
+title = "Four-bar from joint coordinates"
+[pins]
+O2 = ["4.1 cm", "3.75 cm"]
+A = ["1.244 cm", "0.196 cm"]
+B = ["-2.32 cm", "-2.293 cm"]
+O4 = ["0.165 cm", "1.322 cm"]
+[motion]
+omega_2 = "10 rpm"
+[points]
+E = { bar = 3, from_pin = { drawn = ["-2.591 cm", "1.657 cm"] } }
+"""
+
+
+def measure_chords(path: np.ndarray) -> tuple[float, float]:
+    """Return the longest chord as a part of the extent, and the sharpest turn between two, deg."""
+    steps = np.diff(path, axis=0) @ np.array([1.0, 1.0j])
+    extent = float(np.ptp(path, axis=0).max())
+    turns = np.abs(np.angle(steps[1:] / steps[:-1]))
+    return float(np.abs(steps).max()) / extent, float(np.degrees(turns.max()))
+
+
+def test_the_whole_circuit_is_traced_without_a_corner() -> None:
+    """By degrees of the input this path has chords of 40 mm; its extent is 120 mm."""
+    view = make_view(loads(NEAR_IN_LINE))
+    traced = trace(view)
+    assert traced.circuit
+    path = traced.path(traced.solution.points["E"])
+    assert path[0] == pytest.approx(path[-1])
+    longest, sharpest = measure_chords(path)
+    assert longest < 2.0 * CHORD
+    assert sharpest < 30.0
+    assert len(path) < 2000
+    away = path - view.here.points["E"][0]
+    assert np.hypot(*away.T).min() < CHORD * np.ptp(path, axis=0).max()
+    # the curve of the formulas, by many more positions
+    scene = view.scene
+    curve = fourbar.coupler_curve(scene, "E", steps=200_000)
+    dense = np.stack([curve.x, curve.y], axis=1)
+    apart = np.hypot(*np.diff(dense, axis=0).T).max()
+    for point in path[:: len(path) // 40]:
+        assert np.hypot(*(dense - point).T).min() < apart
+
+
+def test_a_stated_sweep_keeps_its_ends() -> None:
+    scene = replace(
+        crank_rocker(points=(fourbar.Point("P", 3, (0.1, 0.7)),)),
+        motion=fourbar.Motion(fourbar.Sweep(0.2, 1.4, 3), 10.0),
+    )
+    view = make_view(scene)
+    traced = trace(view)
+    path = traced.path(traced.solution.points["P"])
+    assert not traced.circuit
+    assert path[[0, -1]] == pytest.approx(view.sweep.points["P"][[0, -1]])
+    assert measure_chords(path)[0] < 2.0 * CHORD
+
+
+def test_the_coupler_figure_draws_that_path() -> None:
+    scene = loads(NEAR_IN_LINE)
+    figure = draw_figure(scene, "coupler").figure
+    (axes,) = (axes for axes in figure.axes if axes.get_title(loc="left"))
+    lines = {line.get_label(): line.get_xydata() for line in axes.lines}
+    assert measure_chords(np.asarray(lines["E"]))[0] < 2.0 * CHORD
+    assert "circuit" in axes.get_title(loc="left")
