@@ -122,7 +122,7 @@ def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     ("name", "count"),
     [
         *(("README.md", 2), ("docs/commands.md", 7), ("docs/gallery.md", 1)),
-        *(("docs/guide-designer.md", 4), ("docs/guide-roboticist.md", 6)),
+        *(("docs/guide-designer.md", 4), ("docs/guide-roboticist.md", 8)),
     ],
 )
 def test_every_command_prints_what_is_shown(

@@ -30,6 +30,8 @@ from fourbar_validation.robots.measure import (
 
 ERRORS = ("method", "quantity", "error", "of its largest", "at")
 SETTINGS = ("changed alone", "single states", "through time", "cost")
+ROUND_OFF = 1e-8
+"""Part of the largest torque and pin forces below which two exact answers differ by the digits of the scene."""
 STATES_FILE = (
     *("loop", "method", "joint [deg]", "omega_2 [rad/s]", "alpha_2 [rad/s^2]"),
     *("torque [N m]", "torque of rigid pins [N m]"),
@@ -78,16 +80,18 @@ def _describe_loop(loop: LoopMeasurement) -> Iterator[Block]:
     )
     yield (
         f"{loop.held} other degrees of freedom are held: at single states by "
-        "generalized forces, through time by armature (a tenth of it changes "
-        f"{loop.influence:.1e}); contacts, joint limits and motors are off"
+        "generalized forces, through time (once the loop has settled) by armature, a "
+        f"tenth of which changes {loop.influence:.1e}; contacts, joint limits and "
+        "motors are off"
     )
     if loop.switched_off:
         names = ", ".join(loop.switched_off)
         yield f"switched off, because it ties its bars to joints that are held: {names}"
     left_out = find_left_out(loop)
+    size = f"{left_out:.1e}" if left_out > ROUND_OFF else f"less than {ROUND_OFF:g}"
     yield (
-        f"with rigid pins the robot differs from the formulas by {left_out:.1e} of the "
-        "largest: what the scene leaves out; the rest is MuJoCo's soft constraint"
+        f"with rigid pins the robot differs from the formulas by {size} of the largest: "
+        "what the scene leaves out; the rest is MuJoCo's soft constraint"
     )
     yield TextTable(ERRORS, [error.cells() for error in list_errors(loop)])
     if loop.through_time is None:
@@ -132,27 +136,26 @@ def _describe_torn(loop: LoopMeasurement) -> Iterator[Block]:
 
 
 def describe_advice(advice: SettingsAdvice) -> Iterator[Block]:
-    """Describe what each setting does alone, and what to type."""
-    rows = [_write_tried(one) for one in (advice.before, *advice.alone)]
-    yield TextTable(SETTINGS, rows)
+    """Describe what to type, what it reaches, and what each setting does alone."""
     before, best = advice.before, advice.best
     if not best.changes:
         yield f"The file is within {advice.wanted:g} as it is."
-        return
-    change = (
-        f"error {before.error:.2g} -> {best.error:.2g}, gap {1e3 * before.gap:.2g} -> "
-        f"{1e3 * best.gap:.2g} mm, {1e6 * before.seconds_per_step:.3g} -> "
-        f"{1e6 * best.seconds_per_step:.3g} us a step"
-    )
-    if advice.reached:
-        yield f"Type this for an error within {advice.wanted:g} ({change}):"
+    elif advice.reached:
+        yield f"Type this for an error within {advice.wanted:g}:"
     else:
         yield (
-            f"None of {advice.tried} combinations was within {advice.wanted:g}; "
-            f"the best ({change}):"
+            f"None of {advice.tried} combinations was within {advice.wanted:g}; the best:"
         )
     for element in advice.typed:
         yield Typed(element)
+    if best.changes:
+        yield (
+            f"error {before.error:.2g} -> {best.error:.2g}, gap {1e3 * before.gap:.2g} "
+            f"-> {1e3 * best.gap:.2g} mm, {1e6 * before.seconds_per_step:.3g} -> "
+            f"{1e6 * best.seconds_per_step:.3g} us a step"
+        )
+    rows = [_write_tried(one) for one in (before, *advice.alone)]
+    yield TextTable(SETTINGS, rows)
 
 
 def _write_tried(tried: TriedSettings) -> tuple[str, ...]:
