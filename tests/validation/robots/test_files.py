@@ -125,7 +125,7 @@ def test_no_file_outside_is_opened(tmp_path: Path) -> None:
         ("<!DOCTYPE a [<!ENTITY b 'c'>]><mujoco/>", "no document type"),
         ("<mujoco model='a\0b'/>", "no XML"),
         ("\xff\xfe", "no XML"),
-        ("<robot/>", "outermost element is <mujoco>"),
+        ("<robot/>", "a URDF holds no closed loop"),
         ("<mujoco>", "no XML"),
         ("<mujoco>" + 200 * "<body>" + 200 * "</body>" + "</mujoco>", "deeper"),
     ],

@@ -84,7 +84,9 @@ class _RobotReading:
         root = self._parse(self.path)
         if root.tag != "mujoco":
             raise self._refuse(
-                root.tag, "must be an MJCF, whose outermost element is <mujoco>"
+                root.tag,
+                "must be an MJCF, whose outermost element is <mujoco>; a URDF holds no "
+                "closed loop",
             )
         self._expand(root, self.path, 0)
         self._take_meshes(root)

@@ -81,7 +81,7 @@ def _describe_loop(loop: LoopMeasurement) -> Iterator[Block]:
     yield (
         f"{loop.held} other degrees of freedom are held: at single states by "
         "generalized forces, through time (once the loop has settled) by armature, a "
-        f"tenth of which changes {loop.influence:.1e}; contacts, joint limits and "
+        f"tenth of which changes the errors by {loop.influence:.1g}; contacts, joint limits and "
         "motors are off"
     )
     if loop.switched_off:

@@ -21,7 +21,7 @@ from fourbar_validation.engines.mujoco.robots.loop import (
     RobotLoop,
     RobotReport,
 )
-from tests.support.robots import EXCAVATOR, TILT, Planar, rotation
+from tests.support.robots import ADAPTIVE, EXCAVATOR, TILT, Planar, rotation
 from tests.whole.test_imports import ROOT
 
 MODELS = ROOT / "models" / "robots"
@@ -149,6 +149,15 @@ def test_five_hinges_are_a_four_bar_once_one_is_held() -> None:
     )
     assert model.joint(loop.joint).name == "a"
     assert model.joint("d").id in loop.held
+
+
+def test_the_joint_that_a_spring_holds_is_the_first_to_hold() -> None:
+    """The finger of an adaptive gripper."""
+    assert "--hold spring_link (or " in closure_of(ADAPTIVE).reason
+    stiff = FIVE_BAR.format(more="").replace(
+        'joint name="c"', 'joint name="c" stiffness="2"'
+    )
+    assert "--hold c (or b, d)" in closure_of(stiff).reason
 
 
 def test_two_motors_are_named() -> None:

@@ -208,7 +208,7 @@ class LoopMeasurement:
     refusal: str
     """Why it was not simulated; empty where it was."""
     influence: float
-    """What holding the joints a tenth as firmly changes in torque and pin forces, of the largest of each."""
+    """What holding the joints a tenth as firmly changes in the errors, of the largest torque and pin forces."""
     torn: tuple[TornState, ...]
     advice: SettingsAdvice | None
 

@@ -368,6 +368,13 @@ class _Finder:
             for joint, name in zip(chain.joints, names, strict=True)
             if (joint in driven) == several
         ] or names
+        # a spring holds its joint best
+        springs = {
+            name_joint(self.model, joint)
+            for joint in chain.joints
+            if self.model.jnt_stiffness[joint]
+        }
+        candidates.sort(key=lambda name: name not in springs)
         shared = self._list_shared(chain, number)
         also = f"; {shared}" if shared else ""
         by = (

@@ -18,6 +18,7 @@ from fourbar_validation.engines.mujoco.robots.answers import (
     MeasureOptions,
     RobotMeasurement,
     TornState,
+    measure_sizes,
 )
 from fourbar_validation.engines.mujoco.robots.closures import (
     choose_loop,
@@ -190,15 +191,23 @@ def _choose_motion(scene: Scene, turned: float) -> LoopMotion:
 
 
 def _compare(one: InsideAnswer, other: InsideAnswer) -> float:
-    """Return the largest difference of two answers at the same angles, of the largest of each quantity."""
+    """Return by how much the errors of two runs differ at the same angles, of the largest of each quantity.
+
+    Each is the error at its own state: the motions differ too, and near a limit position the forces with them.
+    """
     scales, worst = one.scales(), 0.0
     if one.lost or other.lost:
         return math.inf
     for name, scale in scales.items():
         first, second = (
-            np.array([row.soft.values()[name] for row in answer.rows])
+            np.array(
+                [
+                    row.soft.values()[name] - row.rigid.values()[name]
+                    for row in answer.rows
+                ]
+            )
             for answer in (one, other)
         )
         if scale:
-            worst = max(worst, float(np.abs(first - second).max()) / scale)
+            worst = max(worst, float(measure_sizes(first - second).max()) / scale)
     return worst
