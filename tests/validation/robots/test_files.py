@@ -9,7 +9,7 @@ from fourbar_validation.engines.mujoco.robots.compiled import (
     compile_robot,
     list_unknown_parts,
 )
-from fourbar_validation.robots.files import read_robot
+from fourbar_validation.robots.files import is_four_bar_alone, read_robot
 
 TETRAHEDRON = (
     "v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nv 0 0 0.1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
@@ -146,6 +146,18 @@ def test_a_complaint_of_the_compiler_is_one_line(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="does not compile it") as caught:
         compile_robot(read_robot(path))
     assert "\n" not in str(caught.value)
+
+
+def test_a_file_with_more_than_three_joints_is_a_robot(tmp_path: Path) -> None:
+    path = tmp_path / "robot.xml"
+    joint = '<default><joint damping="1"/></default><worldbody>{}</worldbody>'
+    for bodies, alone in (
+        (3 * "<body><joint/></body>", True),
+        (4 * "<body><joint/></body>", False),
+        ("<body><freejoint/>" + 3 * "<body><joint/></body>" + "</body>", False),
+    ):
+        path.write_text(f"<mujoco>{joint.format(bodies)}</mujoco>")
+        assert is_four_bar_alone(read_robot(path)) == alone
 
 
 def test_height_fields_are_left_out_and_said(tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ from click.testing import CliRunner, Result
 
 from fourbar_validation.advise.advise import command as advise
 from fourbar_validation.check.mjcf import command as check_mjcf
+from fourbar_validation.robots.command import command as loops
 
 FOOT = str(Path(__file__).parents[3] / "models" / "robots" / "biped_foot.xml")
 
@@ -29,6 +30,17 @@ def test_a_loop_is_measured_in_its_robot_and_settings_are_advised(
     assert "Type this for an error within 0.01" in advised.output
     assert '<connect name="rod" site1="rod_end" site2="heel"' in advised.output
     assert "pad" not in advised.output and "flywheel" not in advised.output
+
+
+@pytest.mark.slow
+def test_a_scene_and_a_robot_need_no_name_of_a_loop(tmp_path: Path) -> None:
+    scene = str(tmp_path / "foot.toml")
+    made = call(loops, FOOT, "-o", scene)
+    assert made.exception is None, made.output
+    checked = call(check_mjcf, scene, FOOT, "-o", str(tmp_path))
+    assert checked.return_value == 0, checked.output
+    assert "MuJoCo in the whole robot against the formulas" in checked.output
+    assert "differs from the formulas by less than 1e-08" in checked.output
 
 
 def test_options_that_do_not_go_together_are_refused() -> None:

@@ -46,7 +46,7 @@ from fourbar_validation.compare.tolerance import (
 from fourbar_validation.engines.mujoco.robots.loop import RobotFile
 from fourbar_validation.report.templating import render, write_number
 from fourbar_validation.report.terminal import make_table
-from fourbar_validation.robots.files import read_robot
+from fourbar_validation.robots.files import is_four_bar_alone, read_robot
 from fourbar_validation.robots.guard import examine_guarded
 from fourbar_validation.robots.measure import (
     find_worst,
@@ -388,8 +388,8 @@ def command(
 ) -> int:
     """Compare your own MJCF with a scene: how wrong its torque and pin forces are, and why.
 
-    A four-bar alone is compared with the generated MJCF of SCENE, entry by entry. With --loop, or without SCENE, loops
-    are measured inside the whole robot of FILE.xml; the scene is then taken from the file.
+    A four-bar alone is compared with the generated MJCF of SCENE, entry by entry. With --loop, without SCENE, or where
+    FILE.xml has more joints, loops are measured inside the whole robot; without SCENE it is taken from the file.
     """
     if len(files) > 2:
         raise click.UsageError("give one FILE.xml, and SCENE before it or not")
@@ -400,22 +400,27 @@ def command(
             raise click.UsageError("--mimic needs the SCENE of the loop")
         show_mimic(measure_mimic(theirs, mimic, scene))
         return 0
-    if loop is not None or scene is None:
+    assets = robot.pop("assets")
+    if loop is not None or scene is None or _is_robot(theirs, names, assets, robot):
         if names:
             raise click.UsageError("--name is for the MJCF of a four-bar alone")
         options = read_measure_options(loop, wanted, robot)
-        measurement = measure_robot(theirs, options, scene, robot["assets"])
+        measurement = measure_robot(theirs, options, scene, assets)
         report(measurement, theirs, out)
         worst = max(map(find_worst, measurement.loops))
         return int(wanted is not None and not worst <= wanted)
-    assets = robot.pop("assets")
-    if any(robot.values()):
-        raise click.UsageError(
-            "the options of a robot need --loop, or FILE.xml without SCENE"
-        )
     suite = read_scene_files(files[:1])
     examined = examine_model(
         suite.name(0), suite.scene(0), theirs, read_names(names), wanted, assets
     )
     show(examined, theirs, out)
     return examined.counts.status
+
+
+def _is_robot(
+    mjcf: Path, names: tuple[str, ...], assets: Path | None, robot: Mapping[str, Any]
+) -> bool:
+    """Tell whether a file is to be measured as a robot: by its options, or because it has more joints."""
+    if names:
+        return False
+    return any(robot.values()) or not is_four_bar_alone(read_robot(mjcf, assets))

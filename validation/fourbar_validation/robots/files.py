@@ -22,6 +22,8 @@ LARGEST_ASSETS = 512 * 2**20
 DEEPEST = 100
 """Nested elements; the readers of XML recurse."""
 MOST_INCLUDES = 200
+HINGES = 3
+"""Joints of a four-bar."""
 REACHING_OUT = (
     "extension",
     "plugin",
@@ -63,6 +65,17 @@ def read_robot(path: Path, assets: Path | None = None) -> RobotFile:
     InputError : what the file may not hold, or names and is not there, in one line.
     """
     return _RobotReading(path, assets).read()
+
+
+def is_four_bar_alone(file: RobotFile) -> bool:
+    """Tell whether a file has no more joints than a four-bar whose fourth pin is an equality."""
+    joints = [
+        element
+        for world in ET.fromstring(file.text).iter("worldbody")
+        for element in world.iter()
+        if element.tag in ("joint", "freejoint")
+    ]
+    return len(joints) <= HINGES
 
 
 @dataclass

@@ -13,8 +13,10 @@ from fourbar.scene import Scene
 from fourbar_validation.engines.mujoco.robots.answers import MeasureOptions
 from fourbar_validation.engines.mujoco.robots.loop import PoseOptions, RobotFile
 from fourbar_validation.engines.mujoco.robots.measure import measure_loops
+from fourbar_validation.engines.mujoco.robots.scene import read_loop_scene
 from fourbar_validation.robots.files import read_robot
 from fourbar_validation.robots.measure import find_left_out, find_worst
+from tests.support.robots import FINGER
 
 ROBOTS = Path(__file__).parents[5] / "models" / "robots"
 
@@ -111,6 +113,16 @@ def test_the_input_of_the_scene_is_driven_whatever_the_file_drives() -> None:
     assert find_left_out(loop) < 1e-9
     (loop,) = measure_loops(file, MeasureOptions(PoseOptions()), None).loops
     assert loop.joint == "O4"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["dip_loop", "pip_link-middle"])
+def test_the_loop_of_a_scene_is_found_by_its_lengths(name: str) -> None:
+    file = RobotFile(Path("finger.xml"), FINGER)
+    scene = read_loop_scene(file, PoseOptions(), name, None).scene
+    (loop,) = measure_loops(file, MeasureOptions(PoseOptions()), scene).loops
+    assert loop.name == name
+    assert find_left_out(loop) < 1e-7
 
 
 def made_angles(made: object) -> list[float]:

@@ -55,7 +55,7 @@ def measure_loops(
 
     Parameters
     ----------
-    scene : of the loop; None: it is made from the file.
+    scene : of the loop, of several the one whose lengths fit; None: it is made from the file.
 
     Raises
     ------
@@ -73,6 +73,8 @@ def measure_loops(
             reasons = "; ".join(f"{one.name}: {one.reason}" for one in closures)
             why = reasons or "the file has no equality that closes a loop"
             raise InputError("MJCF", None, f"has no planar four-bar: {why}")
+        if scene is not None and options.loop is None:
+            loops = [min(loops, key=lambda one: min(_miss_lengths(scene, one)))]
         measured = []
         for one in loops:
             loop = one if scene is None else _turn_to(scene, posed, one, options)
@@ -91,11 +93,7 @@ def _turn_to(
     scene: Scene, posed: PosedRobot, loop: RobotLoop, options: MeasureOptions
 ) -> RobotLoop:
     """Return the loop as the scene has it: its input driven, and its plane seen from the same side."""
-    ground, *moving = np.log(loop.lengths)
-    apart, turned = (
-        float(np.abs(np.log(scene.linkage.lengths) - lengths).sum())
-        for lengths in ([ground, *moving], [ground, *reversed(moving)])
-    )
+    apart, turned = _miss_lengths(scene, loop)
     output = loop.hinges.get("O4")
     if options.pose.drive is None and output is not None and turned < apart - ALIKE:
         pose = replace(options.pose, drive=name_joint(posed.model, output))
@@ -103,6 +101,17 @@ def _turn_to(
     behind = loop.seen_from_behind()
     nearer = _miss_output(scene, behind) < _miss_output(scene, loop) - ALIKE
     return behind if nearer else loop
+
+
+def _miss_lengths(scene: Scene, loop: RobotLoop) -> tuple[float, float]:
+    """Return by how much a loop's lengths miss those of a scene, as it is driven and driven at its output."""
+    ground, *moving = np.log(loop.lengths)
+    wanted = np.log(scene.linkage.lengths)
+    apart, turned = (
+        float(np.abs(wanted - lengths).sum())
+        for lengths in ([ground, *moving], [ground, *reversed(moving)])
+    )
+    return apart, turned
 
 
 def _miss_output(scene: Scene, loop: RobotLoop) -> float:
