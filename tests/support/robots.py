@@ -85,6 +85,25 @@ EXCAVATOR = """
 """A linkage that the cylinder of another loop moves."""
 
 
+LIFTED = """
+<mujoco model="arm with a tool"><compiler angle="degree" autolimits="true" inertiafromgeom="true"/>
+<default><geom type="capsule" size=".01" contype="0" conaffinity="0"/>
+<default class="pin"><joint axis="0 0 1" stiffness="0.2" springref="20" frictionloss="0.01"/></default></default>
+<worldbody><body name="base" pos="0 0 1" axisangle="1 1 0 40">
+<joint name="lift" axis="0 1 0" type="slide"/><geom type="sphere" size="0.1"/>
+<body name="arm" childclass="pin"><joint name="arm" range="-30 60"/><geom fromto="0 0 0 .08 0 0"/>
+ <body name="tool" pos="0.05 0 0.02" gravcomp="1"><joint name="tool" axis="1 0 0" range="-90 90"/>
+  <geom type="box" size=".02 .01 .03"/></body></body>
+<body name="lever" pos=".2 0.01 0" childclass="pin">
+ <joint name="lever" axis="0 0 -1" range="-80 80" armature="0.001"/><geom fromto="0 0 0 .03 .12 0"/>
+ <body name="rod" pos=".03 .12 0" gravcomp="0.5"><joint name="rod"/><geom fromto="0 0 0 -.08 -.06 0"/></body></body>
+</body></worldbody>
+<equality><weld body1="rod" body2="arm" torquescale="0" anchor=".08 0 0" solref="0.01 1"/></equality>
+<actuator><position joint="arm" kp="5" kv=".1"/><motor joint="tool"/></actuator></mujoco>
+"""
+"""A weld that is a pin, springs, friction, and bodies that are held against gravity."""
+
+
 def examine_text(scene: Scene, text: str | None, names: Mapping[str, str]) -> Examined:
     """Examine a text as a file that names no other; None: the file generated from the scene."""
     file = None if text is None else RobotFile(Path("theirs.xml"), text)

@@ -23,15 +23,21 @@ from fourbar_validation.engines.mujoco.robots.loop import (
 from fourbar_validation.engines.mujoco.robots.pose import pose_robot
 from fourbar_validation.engines.mujoco.robots.scene import make_scene
 from fourbar_validation.robots.files import read_robot
-from tests.support.robots import ADAPTIVE, EXCAVATOR, FINGER
+from tests.support.robots import ADAPTIVE, EXCAVATOR, FINGER, LIFTED
 
 ROBOTS = Path(__file__).parents[5] / "models" / "robots"
 FILES = ["biped_foot", "gripper"]
-TEXTS = {"finger": FINGER, "adaptive": ADAPTIVE, "excavator": EXCAVATOR}
+TEXTS = {
+    "finger": FINGER,
+    "adaptive": ADAPTIVE,
+    "excavator": EXCAVATOR,
+    "lifted": LIFTED,
+}
 LOOPS = {
     "finger": ("pip_link-middle", PoseOptions()),
     "adaptive": ("follower-coupler", PoseOptions(held=("spring_link",))),
     "excavator": ("bucket_linkage", PoseOptions()),
+    "lifted": ("rod-arm", PoseOptions()),
 }
 """A loop of each text, and what is asked of it."""
 ASKED_TWICE = 1e-6

@@ -66,3 +66,12 @@ def name_joint(model: mujoco.MjModel, joint: int) -> str:
 def takes_control(model: mujoco.MjModel, actuator: int) -> bool:
     """Tell a motor from a load, a spring or a damper that is written as an actuator."""
     return bool(model.actuator_gainprm[actuator].any())
+
+
+def is_enabled(model: mujoco.MjModel, *flags: str) -> bool:
+    """Tell whether no flag switches a feature off; a flag that this MuJoCo does not have switches nothing."""
+    bits = (
+        int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{flag.upper()}", 0))
+        for flag in flags
+    )
+    return not any(model.opt.disableflags & bit for bit in bits)

@@ -32,6 +32,7 @@ from fourbar_validation.engines.mujoco.couple import find_couple
 from fourbar_validation.engines.mujoco.robots.ancestry import (
     climb,
     find_tied_bodies,
+    is_enabled,
     name_joint,
     takes_control,
 )
@@ -339,7 +340,16 @@ class LoopInside:
             site = self.model.actuator_trnid[load, 0]
             if body in climb(self.model, int(self.model.site_bodyid[site])):
                 force -= load_force(self.model, data, load)
-        return np.asarray(force)
+        return np.asarray(force - self._find_lift(body))
+
+    def _find_lift(self, body: int) -> Array:
+        """Return what lifts a body, and all that it bears, against gravity (gravcomp), (3,), N."""
+        model = self.model
+        if not hasattr(model, "body_gravcomp") or not is_enabled(model, "gravity"):
+            return np.zeros(3)
+        lifted = model.body_mass * model.body_gravcomp
+        borne = [b for b in np.flatnonzero(lifted) if body in climb(model, int(b))]
+        return np.asarray(-lifted[borne].sum() * model.opt.gravity)
 
     def _read_closure(self, data: mujoco.MjData, pin: str) -> tuple[Array, int]:
         """Sum the forces of the equalities at the cut pin; return the sum and the bar that it acts on."""
@@ -410,7 +420,7 @@ class LoopInside:
         if not 1.0 <= instants[-1] / timestep <= MOST_STEPS:
             raise LimitError(
                 f"its timestep of {timestep:g} s makes {instants[-1] / timestep:.3g} steps of the motion; "
-                f"must be 1 to {MOST_STEPS}"
+                f"must be 1 to {MOST_STEPS}: --speed states another speed"
             )
         spent = 0.0
         # the loop starts exactly closed, and takes some time constants to yield as far as it does

@@ -25,7 +25,11 @@ from fourbar.scene import Scene
 from fourbar.scene.motion import CROSSED, OPEN, Motion, Sweep
 from fourbar.solve import solve
 from fourbar_validation.compare.answer import Array
-from fourbar_validation.engines.mujoco.robots.ancestry import climb, name_joint
+from fourbar_validation.engines.mujoco.robots.ancestry import (
+    climb,
+    is_enabled,
+    name_joint,
+)
 from fourbar_validation.engines.mujoco.robots.closures import (
     PINS_OF_BAR,
     choose_loop,
@@ -148,15 +152,6 @@ def _sum_over_motors(
         if on_joint and int(model.actuator_trnid[number, 0]) == joint:
             total += float(of_motors[number] * model.actuator_gear[number, 0] ** 2)
     return total
-
-
-def is_enabled(model: mujoco.MjModel, *flags: str) -> bool:
-    """Tell whether no flag switches a feature off; a flag that this MuJoCo does not have switches nothing."""
-    bits = (
-        int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{flag.upper()}", 0))
-        for flag in flags
-    )
-    return not any(model.opt.disableflags & bit for bit in bits)
 
 
 def round_off(number: float) -> float:
