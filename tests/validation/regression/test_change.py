@@ -52,6 +52,7 @@ def test_a_quarter_more_is_noticed(factor: float, kind: Kind) -> None:
         ([ROW], [ROW], HOLDS),
         ([ROW], [], FAILED),
         ([ROW], [changed(quantity="F12")], FAILED),
+        ([ROW, changed(quantity="F12")], [ROW], FAILED),
         ([ROW], [changed(verdict=DEGRADED)], FAILED),
         ([ROW], [changed(verdict=REFUSES, error=math.nan)], FAILED),
         ([ROW], [changed(verdict=FAILS)], FAILED),

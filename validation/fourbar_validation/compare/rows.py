@@ -39,6 +39,7 @@ IDENTITIES = (
         "sweep",
     ),
     *("torque", "torque_error", "force_error", "friction_residual"),
+    *("mirrored", "turned", "scaled", "exchanged", "superposed", "split masses"),
 )
 """Rows of the formulas that no engine answers: they do not count as compared."""
 

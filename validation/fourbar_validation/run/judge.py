@@ -36,6 +36,7 @@ from fourbar_validation.run.shipped.cuts import internal_forces
 from fourbar_validation.run.shipped.equilibria import equilibria
 from fourbar_validation.run.shipped.files import sdf, usd
 from fourbar_validation.run.shipped.sensitivities import sensitivity, study, tolerances
+from fourbar_validation.run.transformed import check_transformed
 
 
 class Check(NamedTuple):
@@ -61,6 +62,7 @@ CHECKS = (
         needs_theta_2="error bars: balls are asked at theta_2, and `stability --bar` at the other bars",
     ),
     Check(check_residual),
+    Check(check_transformed),
     Check(
         Question.find_reversals,
         needs_theta_2="reversals of dry friction: they are drawn over theta_2",

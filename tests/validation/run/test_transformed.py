@@ -1,0 +1,133 @@
+"""Scenes stated otherwise have the same numbers, and one that has not fails its row."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fourbar
+from fourbar.effects import Effect, Place
+from fourbar.linkage import FourBar
+from fourbar_validation.run import transformed
+from fourbar_validation.run.judge import ask
+from fourbar_validation.run.transformed import (
+    MEASURES,
+    SCALE,
+    _Conversion,
+    check_transformed,
+)
+from fourbar_validation.scenes.random import DrawnType, draw_random_scene
+from tests.support.scenes import crank_rocker
+
+EVERYTHING: tuple[Effect, ...] = (
+    fourbar.Gravity(9.81, -1.2),
+    fourbar.Viscous.at(A=0.02, O4=0.03),
+    fourbar.Springs(
+        (fourbar.Spring(Place(1, (0.1, -1.0)), Place(3, (0.2, 0.4)), 90.0, 0.1, 2.0),)
+    ),
+    fourbar.Torsion.at(A=(0.4, 0.3, 0.2), O4=(0.3, 1.0, -0.1), B=(0.2, 0.8, 0.0)),
+    fourbar.Flywheel(0.02, 4),
+)
+LOADS = (
+    fourbar.Load(4, (3.0, 0.7), from_centre=(0.05, 1.0)),
+    fourbar.Load(3, (2.0, -1.4), from_pin=(0.1, 0.3), frame="bar", moment=-0.2),
+    fourbar.Load(2, (1.0, 2.0), from_pin=(0.04, -0.6)),
+)
+CYLINDER = fourbar.LinearDrive(Place(1, (0.25, -2.8)), Place(3, (0.09, 0.17)))
+AT_A_POINT = fourbar.PointDrive(Place(3, (0.1, 0.2)), 1.1, "bar")
+SCENES = {
+    "everything": crank_rocker(loads=LOADS, effects=EVERYTHING),
+    "arm": crank_rocker(),
+    "friction": crank_rocker(
+        loads=LOADS,
+        effects=(fourbar.Friction.at(A=0.1), fourbar.PinFriction.at(B=(0.1, 0.01))),
+    ),
+    "drive on the coupler": crank_rocker(loads=LOADS, drive_bar=3),
+    "drive on the output": crank_rocker(loads=LOADS, drive_bar=4),
+    "cylinder": crank_rocker(loads=LOADS, drive=CYLINDER),
+    "point": crank_rocker(loads=LOADS, drive=AT_A_POINT),
+    "bar 4 commanded": crank_rocker(
+        motion=fourbar.Motion(theta_4=fourbar.Sweep(2.3, 2.8, 12), omega_4=2.0),
+        loads=LOADS,
+    ),
+    "bar 3 commanded": crank_rocker(
+        motion=fourbar.Motion(
+            theta_3=fourbar.Sweep(0.4, 0.7, 12), omega_3=-2.0, branch=-1
+        ),
+        loads=LOADS,
+    ),
+}
+
+
+def list_rows(scene: fourbar.Scene) -> dict[str, Any]:
+    question = ask("scene", scene, ())
+    return {row.quantity: row for row in check_transformed(question)}
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_a_scene_has_the_same_numbers_however_it_is_stated(name: str) -> None:
+    rows = list_rows(SCENES[name])
+    assert not [row for row in rows.values() if row.failed]
+    left_out = {
+        "friction": {"superposed", "split masses"},
+        "arm": {"split masses"},
+    }
+    assert rows.keys() == MEASURES.keys() - left_out.get(name, set())
+    assert rows["scaled"].error == rows["scaled"].allowed == 0.0
+
+
+@pytest.mark.parametrize("index", range(6))
+def test_random_scenes_have_the_same_numbers(index: int) -> None:
+    rows = list_rows(draw_random_scene(3, index, tuple(DrawnType)))
+    assert rows and not [row for row in rows.values() if row.failed]
+
+
+@pytest.mark.parametrize("name", MEASURES)
+def test_one_number_that_differs_fails_its_row(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    solve = transformed.solve
+    calls = []
+
+    def differ(scene: fourbar.Scene, *stage: Any, **at: Any) -> Any:
+        """Change a torque in the last digits from the second call on."""
+        solution = solve(scene, *stage, **at)
+        calls.append(scene)
+        if len(calls) > 1:
+            solution.torque[1] *= 1.0 + 1e-11
+        return solution
+
+    scene = crank_rocker(loads=LOADS, effects=EVERYTHING)
+    few = transformed._take_few(ask("scene", scene, ()))
+    assert few is not None
+    monkeypatch.setattr(transformed, "MEASURES", {name: MEASURES[name]})
+    monkeypatch.setattr(transformed, "solve", differ)
+    (row,) = check_transformed(ask("scene", scene, ()))
+    assert row.failed and row.reason.endswith("worst in torque")
+
+
+def test_a_field_that_forgets_the_ground_fails_where_it_is_turned(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """As a fault would: gravity from the ground's line in place of the world's."""
+    field = fourbar.Gravity.field.fget  # type: ignore[attr-defined]
+    held = crank_rocker().linkage.ground_angle
+
+    def turn(load: fourbar.Gravity) -> complex:
+        return field(load) * np.exp(1j * (load.angle + 0.5 * np.pi - held))  # type: ignore[no-any-return]
+
+    monkeypatch.setattr(fourbar.Gravity, "field", property(turn))
+    rows = list_rows(crank_rocker())
+    assert rows["turned"].failed and rows["mirrored"].failed
+
+
+def test_a_place_of_the_coupler_is_read_from_its_other_pin() -> None:
+    linkage = FourBar(
+        0.3, fourbar.Bar(0.1), fourbar.Bar(0.25), fourbar.Bar(0.22), ground_angle=0.2
+    )
+    to = _Conversion(exchanged=True)
+    twice = to.place(to.place(Place(3, (0.07, 0.4)), linkage), linkage)
+    assert twice.from_pin == pytest.approx((0.07, 0.4))
+    assert to.place(Place(2, (0.07, 0.4)), linkage) == Place(4, (0.07, 0.4))
+    assert to.place(Place(1, (0.3, 0.0)), linkage).from_pin == pytest.approx((0.0, 0.0))
+    assert SCALE == 128.0

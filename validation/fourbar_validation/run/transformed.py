@@ -1,0 +1,562 @@
+"""The same linkage stated otherwise: mirrored, turned, scaled, read from its other end, in parts.
+
+A symmetry of mechanics takes the formulas' numbers of one scene into those of another, which other branches of the
+code compute; it needs no reference. Scaling by powers of two changes no digit at all.
+"""
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from fourbar.effects import (
+    Effect,
+    Flywheel,
+    Friction,
+    Gravity,
+    LinearDrive,
+    Load,
+    PinFriction,
+    Place,
+    PointDrive,
+    Springs,
+    Torsion,
+    Viscous,
+)
+from fourbar.linkage import MOVING_BARS, Bar, FourBar
+from fourbar.quantities import OK, PIN_FORCES, UNITS
+from fourbar.scene import Command, Scene
+from fourbar.scene.motion import Motion
+from fourbar.solution import Solution
+from fourbar.solve import solve
+from fourbar_validation.compare.rows import Row
+from fourbar_validation.compare.scales import scale_of, sum_terms
+from fourbar_validation.compare.tolerance import (
+    EQUIVALENCE,
+    WELL_CONDITIONED,
+    Array,
+    Mask,
+    count_half_turns,
+    find_condition,
+    find_error,
+    magnitude,
+)
+from fourbar_validation.run.question import Question
+
+SAMPLE = 5
+"""Positions of a scene that are stated otherwise."""
+TURNED = 0.7
+"""Angle by which a scene is turned, rad."""
+SCALE = 2.0**7
+"""Factor of every length."""
+PART, APART = 0.3, 0.4
+"""Part of a bar's mass that is split off, and how far apart both parts are, in radii of gyration of the bar."""
+AT_A_REVERSAL = 1e-3
+"""Part of its speeds below which a pin with dry friction may reverse."""
+FORCES = (*PIN_FORCES, "torque", "drive_force")
+COMPARED = (
+    *(f"{name}_{bar}" for name in ("theta", "omega", "alpha") for bar in MOVING_BARS),
+    *FORCES,
+    "power",
+)
+"""Quantities that are compared, as far as the scene has them."""
+OTHER_BAR = {1: 1, 2: 4, 3: 3, 4: 2}
+OTHER_PIN = {"O2": "O4", "A": "B", "B": "A", "O4": "O2"}
+"""Bars and pins by their numbers and names where the linkage is read from its other end."""
+OTHER_FORCE = {
+    "F12": ("F14", 1.0),
+    "F14": ("F12", 1.0),
+    "F32": ("F43", -1.0),
+    "F43": ("F32", -1.0),
+}
+"""Pin forces there: F34 = -F43, F23 = -F32."""
+REASONS = {
+    "mirrored": "y, angles and couples change their signs",
+    "turned": "everything turns with the ground; nothing else changes",
+    "scaled": "lengths and accelerations times 2^7, forces times 2^7, couples times 4^7, to the last digit",
+    "exchanged": "bars 2 and 4 change places, the coupler is read from B",
+    "superposed": "the forces of all loads and effects are the sum of what each adds",
+    "split masses": "a bar of two bodies has the forces of both",
+}
+
+
+class _NoCounterpartError(Exception):
+    """The scene holds what a transformation has no counterpart of."""
+
+
+@dataclass(frozen=True)
+class _Few:
+    """A scene at a few positions that are well-conditioned, with what the formulas say of them."""
+
+    scene: Scene
+    command: Command
+    solution: Solution
+    question: Question
+    fit: Mask
+    """Positions that are compared; the first, from which springs count their turns, need not be."""
+    sizes: dict[str, tuple[Array, Array, Array]] = field(default_factory=dict)
+    """Scale, condition and sum of the terms of each quantity that was compared."""
+
+    def solve(self, scene: Scene, **changed: Any) -> Solution:
+        """Solve another scene at the same positions, some entries of the command changed."""
+        return _solve(scene, self.command._replace(**changed))
+
+    def size(self, name: str) -> tuple[Array, Array, Array]:
+        """Return scale, condition and sum of the terms of a quantity, (n,) each."""
+        if name not in self.sizes:
+            numbers = name, self.scene, self.solution
+            condition = find_condition(name, self.scene.linkage, self.solution)
+            self.sizes[name] = (
+                scale_of(*numbers, getattr(self.solution, name)),
+                np.minimum(condition, 1.0),
+                sum_terms(*numbers),
+            )
+        return self.sizes[name]
+
+    def measure(self, name: str, theirs: Array, summed: Array | float = 0.0) -> Array:
+        """Return an error times its condition, (n,). `summed`: magnitudes that were summed."""
+        scale, condition, _ = self.size(name)
+        ours = getattr(self.solution, name)
+        return find_error(name, ours, theirs, np.maximum(scale, summed)) * condition
+
+    def compare(
+        self, convert: Callable[[str], Array], names: Sequence[str] = COMPARED
+    ) -> dict[str, Array]:
+        """Compare the quantities that the scene has with those of another one, converted."""
+        return {
+            name: self.measure(name, convert(name))
+            for name in names
+            if getattr(self.solution, name, None) is not None
+        }
+
+    def row(self, name: str, errors: dict[str, Array]) -> Row:
+        """Make the row of a transformation, of the quantity that is worst."""
+        theta_1 = self.scene.linkage.ground_angle
+        condition = 1.0 / count_half_turns(theta_1, self.command.angle)
+        allowed = 0.0 if name == "scaled" else EQUIVALENCE.factor / condition
+
+        def find_largest(name: str) -> float:
+            return float(np.nan_to_num(errors[name], nan=np.inf)[self.fit].max())
+
+        worst = max(errors, key=find_largest)
+        return self.question.row(
+            name,
+            errors[worst],
+            allowed,
+            f"identity: {REASONS[name]}; times the condition; worst in {worst}",
+            self.fit,
+            condition,
+            self.solution.theta_2,
+        )
+
+
+def check_transformed(question: Question) -> Iterator[Row]:
+    """Hold a scene to what it is when it is stated otherwise."""
+    few = _take_few(question)
+    if few is None:
+        return
+    for name, measure in MEASURES.items():
+        try:
+            errors = measure(few)
+        except _NoCounterpartError:
+            continue
+        yield few.row(name, errors)
+
+
+def _take_few(question: Question) -> _Few | None:
+    """Take a scene at a few positions, with plain numbers of its bars and places; None where none fits."""
+    solution, at, scene = question.solution, question.at, question.scene
+    if at.speed is None or at.stroke is not None or at.time is not None:
+        return None
+    known = all(type(term) in CONVERTED for term in (*scene.loads, *scene.effects))
+    if not known or any(load.table is not None for load in scene.loads):
+        return None
+    assert solution.drive_condition is not None
+    fit = (
+        (solution.status_code == OK)
+        & (solution.condition >= WELL_CONDITIONED)
+        & (solution.drive_condition >= WELL_CONDITIONED)
+        & ~question.reversing(AT_A_REVERSAL)
+    )
+    indices = np.flatnonzero(fit)
+    if not len(indices):
+        return None
+    begin = int(np.argmax(solution.assembled))
+    chosen = indices[np.unique(np.linspace(0, len(indices) - 1, SAMPLE).astype(int))]
+    positions = np.concatenate([[begin], chosen[chosen != begin]])
+    command = at.part(positions)._replace(remainder=None)
+    placed, link = scene.in_pairs_from_pins(), scene.linkage
+    two, three, four = (_make_plain(link.bar(bar)) for bar in MOVING_BARS)
+    few = Scene(
+        FourBar(link.ground, two, three, four, link.ground_angle),
+        Motion(),
+        scene.drive_bar,
+        placed.loads,
+        placed.effects,
+        drive=placed.drive,
+    )
+    return _Few(few, command, _solve(few, command), question, fit[positions])
+
+
+def _solve(scene: Scene, command: Command) -> Solution:
+    """Solve a scene whose motion begins at the first position, from which springs count their turns."""
+    bar, branch = command.bar, int(command.branch[0])
+    begin: Any = {f"theta_{bar}": float(command.angle[0]), "branch": branch}
+    return solve(replace(scene, motion=Motion(**begin)), "force", at=command)
+
+
+def _make_plain(bar: Bar) -> Bar:
+    """Return a bar whose mass, inertia and centre are numbers."""
+    return Bar(bar.length, bar.mass, bar.moment_of_inertia, bar.mass_centre)
+
+
+@dataclass(frozen=True)
+class _Conversion:
+    """What happens to each number of a scene."""
+
+    length: float = 1.0
+    """Factor of lengths, accelerations and forces; of couples and inertias it is its square."""
+    sense: float = 1.0
+    """-1: angles and couples change their signs."""
+    turn: float = 0.0
+    """What is added to directions in the world, rad."""
+    exchanged: bool = False
+    """Read from the other end."""
+
+    def pair(self, pair: tuple[float, float]) -> tuple[float, float]:
+        """Convert a place or an arm of fixed direction from its bar's line."""
+        return self.length * pair[0], self.sense * pair[1]
+
+    def direction(self, angle: float, frame: str = "world") -> float:
+        """Convert the direction of a force."""
+        return self.sense * angle + (self.turn if frame == "world" else 0.0)
+
+    def place(self, place: Place, linkage: FourBar) -> Place:
+        """Convert a place, which is a pair from the first pin of its bar."""
+        assert place.from_pin is not None
+        if not self.exchanged:
+            return Place(place.bar, self.pair(place.from_pin))
+        if place.bar in (2, 4):
+            return Place(OTHER_BAR[place.bar], place.from_pin)
+        length = linkage.lengths[place.bar - 1]
+        return Place(place.bar, _from_other_end(length, place.from_pin))
+
+    def bar(self, bar: Bar, *, reversed_: bool = False) -> Bar:
+        """Convert a bar; the coupler is read from its second pin."""
+        assert bar.inertia is not None and bar.centre is not None
+        centre = bar.centre
+        if reversed_:
+            centre = _from_other_end(bar.length, centre)
+        square = self.length * self.length
+        length = self.length * bar.length
+        return Bar(length, bar.mass, square * bar.inertia, self.pair(centre))
+
+
+def _from_other_end(length: float, pair: tuple[float, float]) -> tuple[float, float]:
+    """Return a place of a bar as it is read from its second pin."""
+    place = length - pair[0] * complex(math.cos(pair[1]), math.sin(pair[1]))
+    return abs(place), math.atan2(place.imag, place.real)
+
+
+def _convert_load(load: Load, to: _Conversion, linkage: FourBar) -> Load:
+    force = None
+    bar = OTHER_BAR[load.bar] if to.exchanged else load.bar
+    places: dict[str, Any] = {}
+    if load.force is not None:
+        # a direction from the bar's line turns with the coupler's line
+        turned = (
+            math.pi if to.exchanged and load.bar == 3 and load.frame == "bar" else 0.0
+        )
+        force = (
+            to.length * load.force[0],
+            to.direction(load.force[1], load.frame) + turned,
+        )
+        if load.arm is not None:
+            places["arm"] = (to.length * load.arm[0], to.direction(load.arm[1]))
+        else:
+            assert load.place is not None
+            places["from_pin"] = to.place(load.place, linkage).from_pin
+    moment = to.length * to.length * to.sense * load.moment
+    return Load(bar, force, **places, moment=moment, frame=load.frame)
+
+
+def _convert_gravity(effect: Gravity, to: _Conversion, linkage: FourBar) -> Gravity:
+    return Gravity(to.length * effect.magnitude, to.direction(effect.angle))
+
+
+def _convert_couples(effect: Any, to: _Conversion, linkage: FourBar) -> Any:
+    """Convert damping and dry friction, whose couples have no sense of their own."""
+    square = to.length * to.length
+    return type(effect).at(
+        **{_name(pin, to): square * number for pin, number in effect.rows}
+    )
+
+
+def _convert_pin_friction(
+    effect: PinFriction, to: _Conversion, linkage: FourBar
+) -> PinFriction:
+    return PinFriction(
+        tuple((_name(pin, to), mu, to.length * r) for pin, mu, r in effect.pins)
+    )
+
+
+def _convert_springs(effect: Springs, to: _Conversion, linkage: FourBar) -> Springs:
+    return Springs(
+        tuple(
+            replace(
+                spring,
+                start=to.place(spring.start, linkage),
+                end=to.place(spring.end, linkage),
+                length=to.length * spring.length,
+                preload=to.length * spring.preload,
+            )
+            for spring in effect.springs
+        )
+    )
+
+
+def _convert_torsion(effect: Torsion, to: _Conversion, linkage: FourBar) -> Torsion:
+    """Convert springs at pins; read from the other end two bars at A or B change their order."""
+    rows = []
+    square = to.length * to.length
+    for pin, stiffness, rest, preload in effect.springs:
+        sense, line = to.sense, 0.0
+        if to.exchanged:
+            sense = -1.0 if pin in ("A", "B") else 1.0
+            line = -math.pi
+        rows.append(
+            (
+                _name(pin, to),
+                square * stiffness,
+                sense * rest + line,
+                square * sense * preload,
+            )
+        )
+    return Torsion(tuple(rows))
+
+
+def _convert_flywheel(effect: Flywheel, to: _Conversion, linkage: FourBar) -> Flywheel:
+    bar = OTHER_BAR[effect.bar] if to.exchanged else effect.bar
+    return Flywheel(to.length * to.length * effect.inertia, bar)
+
+
+def _name(pin: str, to: _Conversion) -> str:
+    return OTHER_PIN[pin] if to.exchanged else pin
+
+
+CONVERTED: dict[type[Effect], Callable[[Any, _Conversion, FourBar], Any]] = {
+    Load: _convert_load,
+    Gravity: _convert_gravity,
+    Viscous: _convert_couples,
+    Friction: _convert_couples,
+    PinFriction: _convert_pin_friction,
+    Springs: _convert_springs,
+    Torsion: _convert_torsion,
+    Flywheel: _convert_flywheel,
+}
+"""Loads and effects that can be stated otherwise."""
+NOT_IN_PARTS = (Friction, PinFriction)
+"""Effects that are not the sum of what each adds."""
+
+
+def _convert_drive(drive: Any, to: _Conversion, linkage: FourBar) -> Any:
+    if isinstance(drive, LinearDrive):
+        ends = (to.place(end, linkage) for end in (drive.start, drive.end))
+        return LinearDrive(*ends)
+    if not isinstance(drive, PointDrive):
+        return None
+    direction = to.direction(drive.direction, drive.frame)
+    if to.exchanged and drive.place.bar == 3 and drive.frame == "bar":
+        direction += math.pi
+    return PointDrive(to.place(drive.place, linkage), direction, drive.frame)
+
+
+def _convert(scene: Scene, to: _Conversion) -> Scene:
+    """State a scene otherwise."""
+    link = scene.linkage
+    bars = [
+        to.bar(link.bar(bar), reversed_=to.exchanged and bar == 3)
+        for bar in MOVING_BARS
+    ]
+    theta_1 = to.sense * link.ground_angle + to.turn
+    drive_bar = scene.drive_bar
+    if to.exchanged:
+        bars, theta_1 = bars[::-1], theta_1 + math.pi
+        drive_bar = OTHER_BAR.get(drive_bar, drive_bar)
+    two, three, four = bars
+    terms = [
+        [CONVERTED[type(term)](term, to, link) for term in terms]
+        for terms in (scene.loads, scene.effects)
+    ]
+    return Scene(
+        FourBar(to.length * link.ground, two, three, four, theta_1),
+        Motion(),
+        drive_bar,
+        tuple(terms[0]),
+        tuple(terms[1]),
+        drive=_convert_drive(scene.drive, to, link),
+    )
+
+
+def _measure_mirrored(few: _Few) -> dict[str, Array]:
+    """Mirror at the x-axis."""
+    command = few.command
+    other = few.solve(
+        _convert(few.scene, _Conversion(sense=-1.0)),
+        angle=-command.angle,
+        branch=-command.branch,
+        speed=-np.asarray(command.speed),
+        acceleration=-np.asarray(command.acceleration),
+    )
+
+    def convert(name: str) -> Array:
+        values = np.array(getattr(other, name))
+        if name in PIN_FORCES:
+            return values * [1.0, -1.0]
+        return values if name in ("drive_force", "power") else -values
+
+    return few.compare(convert)
+
+
+def _measure_turned(few: _Few) -> dict[str, Array]:
+    """Turn about O2."""
+    other = few.solve(
+        _convert(few.scene, _Conversion(turn=TURNED)),
+        angle=few.command.angle + TURNED,
+    )
+
+    def convert(name: str) -> Array:
+        values = np.array(getattr(other, name))
+        if name in PIN_FORCES:
+            turned = (values @ [1.0, 1j]) * np.exp(-1j * TURNED)
+            return np.stack((turned.real, turned.imag), axis=1)
+        return values - TURNED if name.startswith("theta") else values
+
+    return few.compare(convert)
+
+
+def _measure_scaled(few: _Few) -> dict[str, Array]:
+    """Multiply lengths, and what grows with them, by a power of two; return what differs at all."""
+    other = few.solve(_convert(few.scene, _Conversion(length=SCALE)))
+    power = {"N": SCALE, "N m": SCALE**2, "W": SCALE**2}
+    return {
+        name: magnitude(
+            np.array(getattr(other, name)) / power.get(UNITS[name], 1.0) - ours
+        )
+        for name in COMPARED
+        if (ours := getattr(few.solution, name, None)) is not None
+    }
+
+
+def _measure_exchanged(few: _Few) -> dict[str, Array]:
+    """Read the linkage from O4."""
+    command = few.command
+    bar = OTHER_BAR[command.bar]
+    line = math.pi if bar == 3 else 0.0
+    branch = -command.branch if bar == 3 else command.branch
+    other = few.solve(
+        _convert(few.scene, _Conversion(exchanged=True)),
+        angle=command.angle + line,
+        branch=branch,
+        bar=bar,
+    )
+
+    def convert(name: str) -> Array:
+        if name in PIN_FORCES:
+            same, sign = OTHER_FORCE[name]
+            return sign * np.array(getattr(other, same))
+        if name[:6] in ("theta_", "omega_", "alpha_"):
+            values = getattr(other, f"{name[:6]}{OTHER_BAR[int(name[6])]}")
+            return values - math.pi if name == "theta_3" else np.array(values)
+        return np.array(getattr(other, name))
+
+    return few.compare(convert)
+
+
+def _measure_superposed(few: _Few) -> dict[str, Array]:
+    """Sum what each load and effect adds to the forces of inertia alone."""
+    scene = few.scene
+    terms = [*scene.loads, *scene.effects]
+    _require_linear(scene)
+    if len(terms) < 2:
+        raise _NoCounterpartError
+    bare = replace(scene, loads=(), effects=())
+    alone = [
+        replace(bare, loads=(term,))
+        if isinstance(term, Load)
+        else replace(bare, effects=(term,))
+        for term in terms
+    ]
+    return _measure_sum(few, bare, alone)
+
+
+def _measure_split_masses(few: _Few) -> dict[str, Array]:
+    """Sum the forces of two bodies that make up each bar."""
+    scene = few.scene
+    _require_linear(scene)
+    if any(load.arm is not None for load in scene.loads):
+        raise _NoCounterpartError  # its place follows the mass centre
+    if not any(bar.mass for bar in scene.linkage.moving):
+        raise _NoCounterpartError
+    parts = [
+        replace(scene, linkage=_take_part(scene.linkage, part))
+        for part in (PART, 1.0 - PART)
+    ]
+    return _measure_sum(
+        few, replace(scene, linkage=_take_part(scene.linkage, 0.0)), parts
+    )
+
+
+def _take_part(linkage: FourBar, part: float) -> FourBar:
+    """Take a part of each bar's mass: 0.3 on one side of the centre, 0.7 on the other, or nothing."""
+    bars = []
+    for bar in linkage.moving:
+        assert bar.inertia is not None and bar.centre is not None
+        mass = part * bar.mass
+        apart = APART * math.sqrt(bar.inertia / bar.mass) if bar.mass else 0.0
+        # the inertia of both parts about the common centre, less what their distance makes
+        rest = bar.inertia - PART * (1.0 - PART) * bar.mass * apart * apart
+        away = apart * ((1.0 - PART) if part == PART else -PART)
+        r, phi = bar.centre
+        centre = r * complex(math.cos(phi), math.sin(phi)) + away
+        pair = (abs(centre), math.atan2(centre.imag, centre.real))
+        bars.append(Bar(bar.length, mass, part * rest, pair))
+    two, three, four = bars
+    return FourBar(linkage.ground, two, three, four, linkage.ground_angle)
+
+
+def _require_linear(scene: Scene) -> None:
+    """Raise where forces are not the sum of what each load and effect adds."""
+    if any(isinstance(effect, NOT_IN_PARTS) for effect in scene.effects):
+        raise _NoCounterpartError
+
+
+def _measure_sum(few: _Few, bare: Scene, parts: Sequence[Scene]) -> dict[str, Array]:
+    """Compare with the sum of what scenes have beyond a bare one."""
+    none = few.solve(bare)
+    solved = [few.solve(part) for part in parts]
+    errors = {}
+    for name in FORCES:
+        if getattr(few.solution, name, None) is None:
+            continue
+        values = [np.array(getattr(each, name)) for each in (none, *solved)]
+        total = values[0] + sum(value - values[0] for value in values[1:])
+        summed = len(parts) * magnitude(values[0])
+        summed = summed + sum(magnitude(value) for value in values[1:])
+        # what cancels within a part is among the terms of the whole
+        summed = np.maximum(summed, few.size(name)[2])
+        errors[name] = few.measure(name, total, summed)
+    return errors
+
+
+MEASURES: dict[str, Callable[[_Few], dict[str, Array]]] = {
+    "mirrored": _measure_mirrored,
+    "turned": _measure_turned,
+    "scaled": _measure_scaled,
+    "exchanged": _measure_exchanged,
+    "superposed": _measure_superposed,
+    "split masses": _measure_split_masses,
+}
+"""Errors of each way of stating a scene otherwise, by the name of its row."""
