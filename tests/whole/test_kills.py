@@ -43,7 +43,13 @@ from fourbar_validation.scenes.suites import (
 )
 from tests.support.guests import list_processes, write_program
 from tests.support.here import Heard, judge_here
-from tests.support.unlucky import Few, Moody, Unlucky, dies_at_first
+from tests.support.unlucky import (
+    Few,
+    Moody,
+    Unlucky,
+    die_with_the_pipe,
+    dies_at_first,
+)
 
 SEED = 7
 KILLS = int(os.environ.get("KILLS", "1"))
@@ -138,6 +144,21 @@ def test_workers_that_die_with_nothing_to_do_end_the_run_which_can_be_resumed(
             judge_all(Few(), tmp_path / "run", workers=1)
     assert not (tmp_path / "run" / "results.csv").exists()
     assert judge_all(Few(), tmp_path / "run", workers=1).counts[FAILS] == 0
+
+
+@pytest.mark.slow
+@pytest.mark.posix
+def test_a_worker_killed_with_the_lock_of_the_pipe_ends_the_run_within_seconds() -> (
+    None
+):
+    """Nobody gives the lock back: the others must not wait for it as long as Pebble does, two minutes."""
+    begin = time.monotonic()
+    results = workers.apply_over_processes(
+        die_with_the_pipe, [(0, [None])], 1, seconds=None, instead=workers.fail
+    )
+    with pytest.raises(workers.NoWorkersError, match="what is finished is kept"):
+        list(results)
+    assert time.monotonic() - begin < 60.0
 
 
 @pytest.mark.slow

@@ -30,10 +30,15 @@ MODELS = Path(__file__).parents[3] / "models"
 SCENES = {
     "thesis": fourbar.load(MODELS / "thesis.toml"),
     "crank_rocker": fourbar.load(MODELS / "crank_rocker.toml"),
+    "drag_link": fourbar.load(MODELS / "drag_link.toml"),
 }
 SCENES["accelerating"] = replace(
     SCENES["crank_rocker"],
     motion=fourbar.Motion(SCENES["crank_rocker"].motion.angle, 10.0, 30.0),
+)
+MOMENT, FORCE = SCENES["crank_rocker"].loads
+SCENES["load_in_the_world"] = replace(
+    SCENES["crank_rocker"], loads=(MOMENT, replace(FORCE, frame="world"))
 )
 FORCES = ("torque", "F12", "F32", "F43", "F14")
 ALL = ("theta_3", "theta_4", "omega_3", "omega_4", "alpha_3", "alpha_4", *FORCES)
@@ -195,23 +200,69 @@ def inertial_times(scene: Scene, by_mass: float, by_inertia: float) -> Numbers:
     return {name: np.array(values) for name, values in numbers.items()}
 
 
-def other_pin(scene: Scene) -> Scene:
-    bar = scene.linkage.coupler
+def other_pin(bar: fourbar.Bar) -> fourbar.Bar:
     r, phi = bar.mass_centre
     x, y = bar.length - r * math.cos(phi), r * math.sin(phi)
-    return bars(
-        scene, coupler=replace(bar, centre=(math.hypot(x, y), math.atan2(y, x)))
+    return replace(bar, centre=(math.hypot(x, y), math.atan2(y, x)))
+
+
+def about_pin(bar: fourbar.Bar) -> fourbar.Bar:
+    r = bar.mass_centre[0]
+    return replace(bar, inertia=bar.moment_of_inertia + bar.mass * r**2)
+
+
+def at_mid_bar(bar: fourbar.Bar) -> fourbar.Bar:
+    return replace(bar, centre=(bar.length / 2.0, 0.0))
+
+
+def turned_over(bar: fourbar.Bar) -> fourbar.Bar:
+    return replace(bar, centre=half_a_turn(bar))
+
+
+def mirrored(bar: fourbar.Bar) -> fourbar.Bar:
+    r, phi = bar.mass_centre
+    return replace(bar, centre=(r, -phi))
+
+
+def without_inertia(bar: fourbar.Bar) -> fourbar.Bar:
+    return replace(bar, inertia=0.0)
+
+
+def solved_with(
+    change: Callable[[fourbar.Bar], fourbar.Bar],
+    *names: str,
+) -> Callable[[Scene], Numbers]:
+    """Solve with some bars changed; without names every moving bar."""
+    names = names or ("input", "coupler", "output")
+    return solved(
+        lambda scene: bars(
+            scene, **{name: change(getattr(scene.linkage, name)) for name in names}
+        )
     )
 
 
-def about_pin(scene: Scene) -> Scene:
-    bar = scene.linkage.output
-    return bars(
-        scene,
-        output=replace(
-            bar, inertia=bar.moment_of_inertia + bar.mass * bar.mass_centre[0] ** 2
-        ),
-    )
+def in_degrees(first: float) -> Callable[[Scene], Numbers]:
+    """Angles in degrees within a turn from `first`."""
+
+    def planted(scene: Scene) -> Numbers:
+        numbers = right(scene)
+        for name in ("theta_3", "theta_4"):
+            numbers[name] = first + (np.degrees(numbers[name]) - first) % 360.0
+        return numbers
+
+    return planted
+
+
+def with_gravity(angle: float) -> Callable[[Scene], Numbers]:
+    gravity = fourbar.Gravity(9.81, math.radians(angle))
+    return solved(lambda scene: replace(scene, effects=(gravity,)))
+
+
+def in_other_frame(scene: Scene) -> Scene:
+    """A scene of a load whose direction is kept where it turned with its bar, or turns."""
+    moment, force = scene.loads
+    frame = {"bar": "world", "world": "bar"}[force.frame]
+    return replace(scene, loads=(moment, replace(force, frame=frame)))
 
 
 def half_a_turn(bar: fourbar.Bar) -> tuple[float, float]:
@@ -259,12 +310,14 @@ MISTAKES: list[tuple[str, str, tuple[str, ...], Callable[[Scene], Numbers], str]
      solved(lambda s: replace(s, loads=(*s.loads[:2], s.loads[3]))), "load 3 (bar 3) is missing"),
     ("statics", "crank_rocker", FORCES, solved(same, omega_2=0.0, alpha_2=0.0), "statics"),
     ("omega_2 in rev/min", "crank_rocker", ALL, solved(same, omega_2=10.0 * 30 / math.pi), "rev/min"),
-    ("wrong pin", "crank_rocker", FORCES, solved(other_pin), "coupler: mass centre measured from the wrong pin"),
+    ("wrong pin", "crank_rocker", FORCES,
+     solved_with(other_pin, "coupler"), "coupler: mass centre measured from the wrong pin"),
     ("mid-bar", "crank_rocker", FORCES,
-     solved(lambda s: bars(s, coupler=replace(s.linkage.coupler, centre=(0.125, 0.0)))), "centre taken at"),
-    ("inertia about the pin", "crank_rocker", FORCES, solved(about_pin), "output: inertia about the pin"),
+     solved_with(at_mid_bar, "coupler"), "coupler: mass centre taken at mid-bar"),
+    ("inertia about the pin", "crank_rocker", FORCES,
+     solved_with(about_pin, "output"), "output: inertia about the pin"),
     ("no inertia", "thesis", FORCES,
-     solved(lambda s: bars(s, coupler=replace(s.linkage.coupler, inertia=0.0))), "coupler: moment of inertia left out"),
+     solved_with(without_inertia, "coupler"), "coupler: moment of inertia left out"),
     ("kg cm^2 for kg m^2", "thesis", FORCES,
      solved(lambda s: bars(s, output=replace(s.linkage.output, inertia=s.linkage.output.moment_of_inertia * 1e4))),
      "output: moment of inertia in kg cm^2 taken for kg m^2"),
@@ -286,7 +339,7 @@ MISTAKES: list[tuple[str, str, tuple[str, ...], Callable[[Scene], Numbers], str]
      solved(lambda s: bars(s, coupler=replace(s.linkage.coupler, mass=s.linkage.coupler.mass * 1.2))),
      "coupler: mass 1.2 times ours"),
     ("mass centre turned", "crank_rocker", FORCES,
-     solved(lambda s: bars(s, output=replace(s.linkage.output, centre=half_a_turn(s.linkage.output)))),
+     solved_with(turned_over, "output"),
      "output: mass centre turned by 180 deg"),
     ("load reversed", "thesis", FORCES,
      solved(lambda s: replace(s, loads=(reversed_load(s.loads[0]), *s.loads[1:]))), "load 1 (bar 2) is reversed"),
@@ -324,9 +377,22 @@ MISTAKES: list[tuple[str, str, tuple[str, ...], Callable[[Scene], Numbers], str]
     ("alpha_2 left out", "accelerating", FORCES, solved(same, alpha_2=0.0), "alpha_2 is left out"),
     ("theta_4 from bar 2", "crank_rocker", ALL,
      lambda s: right(s) | {"theta_4": right(s)["theta_4"] - right(s)["theta_2"]}, "relative to bar 2"),
-    ("mirrored", "crank_rocker", FORCES, solved(lambda s: bars(s, coupler=replace(
-        s.linkage.coupler, centre=(s.linkage.coupler.mass_centre[0], -s.linkage.coupler.mass_centre[1])))),
+    ("mirrored", "crank_rocker", FORCES, solved_with(mirrored, "coupler"),
      "coupler: mass centre on the other side of the bar's line"),
+    ("every other pin", "crank_rocker", FORCES, solved_with(other_pin), "every bar: mass centre measured from the"),
+    ("every mid-bar", "crank_rocker", FORCES, solved_with(at_mid_bar), "every bar: mass centre taken at mid-bar"),
+    ("every centre turned", "crank_rocker", FORCES, solved_with(turned_over), "every bar: mass centre turned by"),
+    ("every centre mirrored", "crank_rocker", FORCES, solved_with(mirrored), "every bar: mass centre on the other"),
+    ("every inertia about the pin", "crank_rocker", FORCES, solved_with(about_pin), "every bar: inertia about the pin"),
+    ("no inertia at all", "thesis", FORCES, solved_with(without_inertia), "every bar: moment of inertia left out"),
+    ("inertia of a bar about its end", "crank_rocker", FORCES, solved_with(
+        lambda bar: replace(bar, inertia=bar.mass * bar.length**2 / 3.0)), "m L^2/3, of a slender bar about its end"),
+    ("gravity along x", "crank_rocker", FORCES, with_gravity(0.0), "gravity is turned by 90 deg"),
+    ("gravity along -x", "crank_rocker", FORCES, with_gravity(180.0), "gravity is turned by -90 deg"),
+    ("load kept", "crank_rocker", FORCES, solved(in_other_frame), "load 2 (bar 3): its direction is kept"),
+    ("load turning", "load_in_the_world", FORCES, solved(in_other_frame), "load 2 (bar 3): its direction turns with"),
+    ("degrees to 180", "drag_link", ALL, in_degrees(-180.0), "degrees from -180 to 180 where radians"),
+    ("degrees to 360", "drag_link", ALL, in_degrees(0.0), "degrees from 0 to 360 where radians"),
     ("drive on bar 3", "thesis", FORCES, solved(lambda s: replace(s, drive_bar=3)), "on bar 3 instead of bar 4"),
 ]  # fmt: skip
 

@@ -182,6 +182,35 @@ BUGS: dict[str, tuple[type, str]] = {
         make_guest((FORCES, "(force.imag, force.real)")),
         "x and y exchanged: F12, F32, F43, F14",
     ),
+    "no weight of the coupler": (
+        make_guest((" - field)", " - (field if name != 'coupler' else 0j))")),
+        "the weight of bar 3 is missing",
+    ),
+    "no centripetal part": (
+        make_guest(("(1j * turning - w * w) * arm", "1j * turning * arm")),
+        "-omega^2 r is missing in a_G of every bar, r from its first pin to G",
+    ),
+    "centripetal part outwards": (
+        make_guest(("turning - w * w)", "turning + w * w)")),
+        "-omega^2 r has the wrong sign in a_G of every bar, r from its first pin to G",
+    ),
+    "no tangential part": (
+        make_guest(("(1j * turning - w * w) * arm", "-w * w * arm")),
+        "alpha x r is missing in a_G of every bar, r from its first pin to G",
+    ),
+    "tangential part reversed": (
+        make_guest(("(1j * turning - w * w)", "(-1j * turning - w * w)")),
+        "alpha x r has the wrong sign in a_G of every bar, r from its first pin to G",
+    ),
+    "acceleration of the pin": (
+        make_guest(
+            (
+                "(1j * turning - w * w) * arm",
+                "(1j * turning - w * w) * arm * (name != 'coupler')",
+            )
+        ),
+        "the acceleration of bar 3's first pin is used as its a_G",
+    ),
     "statics": (
         make_guest(
             ("    d, a, b, c = (", "    omega = alpha = 0.0\n    d, a, b, c = (")
@@ -189,6 +218,65 @@ BUGS: dict[str, tuple[type, str]] = {
         "no inertial forces (statics)",
     ),
 }
+
+
+DRIVEN: dict[int, tuple[tuple[str, str], ...]] = {
+    3: (
+        (
+            "F43 = (moments[2] * r3 + moments[1] * r4) / det",
+            "moments[0] += cross(r2, forces[1])\n"
+            "    F43 = (moments[0] * r4 + moments[2] * r2) / cross(r2, r4)",
+        ),
+        (TORQUE, '"torque": moments[1] - cross(r3, F43)'),
+    ),
+    4: (
+        (
+            "F43 = (moments[2] * r3 + moments[1] * r4) / det",
+            "moments[0] += cross(r2, forces[1])\n"
+            "    F43 = (moments[1] * r2 - moments[0] * r3) / cross(r3, r2)",
+        ),
+        (TORQUE, '"torque": moments[2] + cross(r4, F43)'),
+    ),
+}
+"""The engine's text where the drive is on bar 3 or 4."""
+NO_VELOCITY_TERMS = (
+    "k = (alpha + 1j * omega**2) * r2 + 1j * omega_3**2 * r3 - 1j * omega_4**2 * r4",
+    "k = alpha * r2",
+)
+CUT_AT_B = "    F32 = F43 - forces[1]", "    F43 = 0j\n    F32 = F43 - forces[1]"
+TREE = (
+    "forces and torque of the open tree, cut at B: the loop force is 0, as from "
+    "mj_inverse or rnea of a loop"
+)
+
+
+@pytest.mark.parametrize("bar", DRIVEN)
+def test_a_mistake_is_named_wherever_the_drive_acts(bar: int) -> None:
+    scene = replace(SCENE, drive_bar=bar)
+    assert find_causes(make_guest(*DRIVEN[bar]), scene) == []
+    causes = find_causes(make_guest(*DRIVEN[bar], NO_VELOCITY_TERMS), scene)
+    assert causes[0] == "(dJ/dt) v is missing in the accelerations of the loop"
+    assert find_causes(make_guest(*DRIVEN[bar], CUT_AT_B), scene)[0] == TREE
+
+
+@pytest.mark.parametrize(("pin", "bar"), [("A", 3), ("O4", 4), ("O4", 3)])
+def test_the_joint_of_a_driven_bar_carries_the_bars_behind_it(
+    pin: str, bar: int
+) -> None:
+    """The work of the weights in a tree whose driven joint alone turns is that of its torque."""
+    scene = crank_rocker(loads=(), drive_bar=bar)
+    standing = scene.motion.replace(speed=0.0, acceleration=0.0)
+    scene = replace(scene, motion=standing, effects=(fourbar.Gravity(),))
+    right = fourbar.solve(scene, "force")
+    A, B = right.A, right.B
+    joints = {("A", 3): B, ("O4", 4): B, ("O4", 3): A}
+    behind = {("A", 3): (3,), ("O4", 4): (4,), ("O4", 3): (3, 4)}
+    torque = np.zeros(len(right))
+    for one in behind[pin, bar]:
+        weight = scene.linkage.bar(one).mass * 9.81
+        torque += weight * (getattr(right, f"G{one}") - joints[pin, bar])[:, 0]
+    cut = find_wrenches(scene, right).cut(pin)
+    np.testing.assert_allclose(cut["torque"], torque, atol=1e-12)
 
 
 def find_causes(guest: type, scene: Scene = SCENE) -> list[str]:
@@ -225,8 +313,8 @@ def test_what_nobody_knows_is_no_known_mistake() -> None:
     assert find_causes(strange) == []
 
 
-class FromThePin:
-    """Free bodies whose loads have their arms measured from the bar's first pin."""
+class Misplaced:
+    """Free bodies whose loads are others, position by position."""
 
     name = "plain"
 
@@ -234,20 +322,9 @@ class FromThePin:
         right = fourbar.solve(scene, "position", at=at)
         parts = []
         for i in range(len(at.angle)):
-            loads = []
-            for load in scene.loads:
-                first = {2: 0j, 3: complex(*right.A[i])}.get(load.bar)
-                if first is None:
-                    d, theta_1 = scene.linkage.ground, scene.linkage.ground_angle
-                    first = d * np.exp(1j * theta_1)
-                G = complex(*getattr(right, f"G{load.bar}")[i])
-                r, phi = load.arm
-                place = first + r * np.exp(1j * phi) - G
-                loads.append(
-                    replace(load, arm=(float(abs(place)), float(np.angle(place))))
-                )
+            loads = tuple(self.change(scene, right, i, load) for load in scene.loads)
             here = at.part(np.array([i]))
-            parts.append(FreeBody().answer(replace(scene, loads=tuple(loads)), here))
+            parts.append(FreeBody().answer(replace(scene, loads=loads), here))
         numbers = {
             name: np.concatenate([part.quantities[name] for part in parts])
             for name in ("theta_3", "theta_4", "F12", "F32", "F43", "F14", "torque")
@@ -255,13 +332,65 @@ class FromThePin:
         assembled = np.ones(len(parts), dtype=bool)
         return Answer(self.name, "exact", at, assembled, numbers)
 
+    def change(
+        self, scene: Scene, right: fourbar.Solution, i: int, load: fourbar.Load
+    ) -> fourbar.Load:
+        raise NotImplementedError
 
-def test_an_arm_from_the_pin_is_named_with_its_load() -> None:
+
+class FromThePin(Misplaced):
+    """Arms are measured from the bar's first pin."""
+
+    def change(
+        self, scene: Scene, right: fourbar.Solution, i: int, load: fourbar.Load
+    ) -> fourbar.Load:
+        first = {2: 0j, 3: complex(*right.A[i])}.get(load.bar)
+        if first is None:
+            d, theta_1 = scene.linkage.ground, scene.linkage.ground_angle
+            first = d * np.exp(1j * theta_1)
+        G = complex(*getattr(right, f"G{load.bar}")[i])
+        r, phi = load.arm
+        place = first + r * np.exp(1j * phi) - G
+        return replace(load, arm=(float(abs(place)), float(np.angle(place))))
+
+
+class FromG(Misplaced):
+    """Places that are told from the bar's first pin are taken from G."""
+
+    def change(
+        self, scene: Scene, right: fourbar.Solution, i: int, load: fourbar.Load
+    ) -> fourbar.Load:
+        return replace(load, from_pin=None, from_centre=load.from_pin)
+
+
+class Turning(Misplaced):
+    """Forces of fixed direction turn with their bars."""
+
+    def change(
+        self, scene: Scene, right: fourbar.Solution, i: int, load: fourbar.Load
+    ) -> fourbar.Load:
+        size, direction = load.force
+        theta = float(getattr(right, f"theta_{load.bar}")[i])
+        return replace(load, force=(size, direction + theta))
+
+
+@pytest.mark.parametrize(
+    ("guest", "place", "words"),
+    [
+        (FromThePin, "arm", "its arm is measured from the bar's first pin, not from G"),
+        (
+            FromG,
+            "from_pin",
+            "its place is measured from G, not from the bar's first pin",
+        ),
+        (Turning, "arm", "its direction turns with the bar"),
+        (Turning, "from_pin", "its direction turns with the bar"),
+    ],
+)
+def test_a_load_that_acts_elsewhere_is_named(
+    guest: type, place: str, words: str
+) -> None:
     motion = fourbar.Motion(fourbar.Sweep(0.1, 6.0, 8), 10.0)
-    scene = crank_rocker(
-        motion=motion, loads=(fourbar.Load(4, (3.0, 0.7), arm=(0.05, 1.0)),)
-    )
-    causes = find_causes(FromThePin, scene)
-    assert causes[0] == (
-        "load 1 (bar 4): its arm is measured from the bar's first pin, not from G"
-    )
+    load = fourbar.Load(4, (3.0, 0.7), **{place: (0.05, 1.0)})
+    scene = crank_rocker(motion=motion, loads=(load,))
+    assert find_causes(guest, scene)[0] == f"load 1 (bar 4): {words}"

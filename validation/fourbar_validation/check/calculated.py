@@ -18,6 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fourbar.effects import Gravity
 from fourbar.errors import FourBarError
 from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import FORCES, PIN_FORCES, VECTORS
@@ -31,8 +32,9 @@ Values = dict[str, Array]
 """Numbers that a mistake leads to, by quantity; others stay right."""
 PAIRS = {"F12": (1, 2), "F32": (3, 2), "F43": (4, 3), "F14": (1, 4)}
 """Bar that exerts each pin force, and bar on which it acts."""
-CUTS = ("B", "A", "O4")
-"""Pins at which a loop is cut into a tree, the commonest first."""
+CHAINS = {"B": ((2, 3), (4,)), "A": ((2,), (4, 3)), "O4": ((2, 3, 4),)}
+"""Pins at which a loop is cut into a tree, the commonest first: the chains of bars that are
+left, each from the ground on."""
 ENOUGH = 3
 """Columns or positions that a hypothesis with a number in it needs."""
 SOFT = 1e-6
@@ -47,7 +49,7 @@ LATE = {
 
 
 class BarWrenches(NamedTuple):
-    """Bars at n positions, with what their pins must give each of them."""
+    """Bars at n positions, with what their pins and the drive must give each of them."""
 
     arms: dict[int, Array]
     """From the bar's first pin (O2, A, O4) to G, (n, 2)."""
@@ -55,6 +57,8 @@ class BarWrenches(NamedTuple):
     """From the bar's first pin to its second one, (n, 2)."""
     p: dict[int, Array]
     q: dict[int, Array]
+    drive_bar: int
+    """Bar on which the ground's couple acts."""
 
     def changed(
         self, bar: int, p: Array | float = 0.0, q: Array | float = 0.0
@@ -69,25 +73,39 @@ class BarWrenches(NamedTuple):
         return self.q[bar] + cross(self.arms[bar], self.p[bar])
 
     def solve(self) -> Values:
-        """Solve the three free bodies with the drive on bar 2."""
-        of_3, of_4 = self.about_pin(3), self.about_pin(4)
-        b, c = self.bars[3], self.bars[4]
-        # b x F43 = of_3, c x F43 = -of_4
-        det = cross(b, c)
-        F43 = (of_3[:, None] * c + of_4[:, None] * b) / det[:, None]
+        """Solve the three free bodies.
+
+        Moments about the first pins of bars 2, 3 and 4, where T_k is the drive's couple on
+        bar k:
+
+            a x F43 + T_2 = moment of bar 2 + a x p3
+            b x F43 + T_3 = moment of bar 3
+           -c x F43 + T_4 = moment of bar 4
+        """
+        a, b, c = (self.bars[bar] for bar in MOVING_BARS)
+        lever = {2: a, 3: b, 4: -c}
+        moment = {bar: self.about_pin(bar) for bar in MOVING_BARS}
+        moment[2] = moment[2] + cross(a, self.p[3])
+        one, other = (bar for bar in MOVING_BARS if bar != self.drive_bar)
+        det = cross(lever[one], lever[other])[:, None]
+        F43 = (
+            moment[one][:, None] * lever[other] - moment[other][:, None] * lever[one]
+        ) / det
         F32 = F43 - self.p[3]
+        driven = self.drive_bar
         return {
             "F43": F43,
             "F32": F32,
             "F12": self.p[2] - F32,
             "F14": self.p[4] + F43,
-            "torque": self.about_pin(2) - cross(self.bars[2], F32),
+            "torque": moment[driven] - cross(lever[driven], F43),
         }
 
     def cut(self, pin: str) -> Values:
         """Solve the tree that a cut at a pin leaves: no force is passed there.
 
-        Its torque is that of the joint at O2, which carries all bars of its branch.
+        Its torque is that of the joint by which the driven bar hangs on the ground or on
+        the bar before it in its chain; the joint carries the bar and all behind it.
         """
         none = np.zeros_like(self.p[2])
         if pin == "A":
@@ -96,25 +114,39 @@ class BarWrenches(NamedTuple):
             F32, F43 = -self.p[3], none
         else:
             F32, F43 = -self.p[3] - self.p[4], -self.p[4]
-        carried = {"A": (2,), "B": (2, 3), "O4": (2, 3, 4)}[pin]
-        torque = np.zeros(len(none))
-        place = np.zeros_like(none)
-        for bar in carried:
-            first_pin = place if bar != 4 else place - self.bars[4]
-            torque = torque + self.about_pin(bar) + cross(first_pin, self.p[bar])
-            place = place + self.bars[bar]
         return {
             "F12": self.p[2] - F32,
             "F32": F32,
             "F43": F43,
             "F14": self.p[4] + F43,
-            "torque": torque,
+            "torque": self._torque_of_tree(pin),
         }
+
+    def _torque_of_tree(self, pin: str) -> Array:
+        """Compute the moment that the driven bar's joint gives in the tree cut at a pin."""
+        A = self.bars[2]
+        B = A + self.bars[3]
+        first_pins = {2: np.zeros_like(A), 3: A, 4: B - self.bars[4]}
+        chain = next(chain for chain in CHAINS[pin] if self.drive_bar in chain)
+        place = chain.index(self.drive_bar)
+        joint = first_pins[self.drive_bar]
+        if (pin, self.drive_bar) in (("A", 3), ("O4", 4)):
+            joint = B
+        torque = np.zeros(len(A))
+        for bar in chain[place:]:
+            arm = first_pins[bar] - joint
+            torque = torque + self.about_pin(bar) + cross(arm, self.p[bar])
+        return torque
 
 
 def cross(u: Array, v: Array) -> Array:
     """Compute the z component of the cross product of vectors, (n, 2)."""
     return np.asarray(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
+
+
+def turn_by_quarter(v: Array) -> Array:
+    """Turn vectors, (n, 2), by 90 deg."""
+    return np.stack((-v[:, 1], v[:, 0]), axis=1)
 
 
 def turn(v: Array, angle: Array) -> Array:
@@ -140,8 +172,8 @@ def find_wrenches(scene: Scene, right: Solution) -> BarWrenches:
         at_first, at_second = acting[bar]
         p[bar] = at_first + at_second
         q[bar] = cross(first[bar] - G, at_first) + cross(second[bar] - G, at_second)
-    q[2] = q[2] + np.asarray(right.torque)
-    return BarWrenches(arms, bars, p, q)
+    q[scene.drive_bar] = q[scene.drive_bar] + np.asarray(right.torque)
+    return BarWrenches(arms, bars, p, q, scene.drive_bar)
 
 
 @dataclass(frozen=True)
@@ -162,11 +194,12 @@ class Calculation:
         yield from self._frames()
         yield from self._equal_forces()
         yield from self._velocity_terms()
+        yield from self._accelerations_of_centres()
+        yield from self._weights()
         yield from self._arms_of_loads()
-        yield from self._inertia_about_pins()
 
     def _open_tree(self) -> Iterator[Mistake]:
-        trees = {pin: self.wrenches.cut(pin) for pin in CUTS}
+        trees = {pin: self.wrenches.cut(pin) for pin in CHAINS}
         how = "the loop force is 0, as from mj_inverse or rnea of a loop"
         for pin, values in trees.items():
             text = f"forces and torque of the open tree, cut at {pin}: {how}"
@@ -209,28 +242,72 @@ class Calculation:
 
     def _velocity_terms(self) -> Iterator[Mistake]:
         """Leave out (dJ/dt) v, without which alpha_3 and alpha_4 follow alpha_2 alone."""
-        right, scene = self.right, self.judge.scene
+        right = self.right
         with np.errstate(divide="ignore", invalid="ignore"):
             gain = np.asarray(right.alpha_2) / np.asarray(right.omega_2)
-        wrong = {bar: gain * getattr(right, f"omega_{bar}") for bar in (3, 4)}
         wrenches, moved = self.wrenches, Values()
-        for bar, alpha in wrong.items():
-            apart = alpha - getattr(right, f"alpha_{bar}")
-            arm = self.wrenches.arms[bar]
-            a = apart[:, None] * np.stack((-arm[:, 1], arm[:, 0]), axis=1)
-            body = scene.linkage.bar(bar)
+        for bar in (3, 4):
+            alpha = gain * getattr(right, f"omega_{bar}")
+            more = alpha - getattr(right, f"alpha_{bar}")
+            a = more[:, None] * turn_by_quarter(wrenches.arms[bar])
+            body = self.judge.scene.linkage.bar(bar)
             wrenches = wrenches.changed(
-                bar, body.mass * a, body.moment_of_inertia * apart
+                bar, body.mass * a, body.moment_of_inertia * more
             )
             moved[f"alpha_{bar}"] = alpha
             moved[f"a_G{bar}"] = getattr(right, f"a_G{bar}") + a
-        forces = wrenches.solve()
         text = "(dJ/dt) v is missing in the accelerations of the loop"
-        yield _state(text, {**moved, **forces})
-        yield _state(f"{text}, from which the forces follow", forces)
+        yield from _state_with_forces(text, moved, wrenches)
+
+    def _accelerations_of_centres(self) -> Iterator[Mistake]:
+        """Leave out a part of the acceleration of each G about its bar's first pin."""
+        right = self.right
+        centripetal, tangential = {}, {}
+        for bar in MOVING_BARS:
+            omega, alpha = (
+                np.broadcast_to(getattr(right, f"{rate}_{bar}"), len(right))
+                for rate in ("omega", "alpha")
+            )
+            arm = self.wrenches.arms[bar]
+            centripetal[bar] = -(omega**2)[:, None] * arm
+            tangential[bar] = alpha[:, None] * turn_by_quarter(arm)
+        parts = {
+            "-omega^2 r is missing in a_G": (centripetal, -1.0),
+            "-omega^2 r has the wrong sign in a_G": (centripetal, -2.0),
+            "alpha x r is missing in a_G": (tangential, -1.0),
+            "alpha x r has the wrong sign in a_G": (tangential, -2.0),
+        }
+        for text, (part, times) in parts.items():
+            wrenches, moved = self.wrenches, Values()
+            for bar in MOVING_BARS:
+                a = times * part[bar]
+                wrenches = wrenches.changed(bar, self._mass(bar) * a)
+                moved[f"a_G{bar}"] = getattr(right, f"a_G{bar}") + a
+            whose = "of every bar, r from its first pin to G"
+            yield from _state_with_forces(f"{text} {whose}", moved, wrenches)
+        for bar in MOVING_BARS:
+            a = -centripetal[bar] - tangential[bar]
+            wrenches = self.wrenches.changed(bar, self._mass(bar) * a)
+            moved = {f"a_G{bar}": getattr(right, f"a_G{bar}") + a}
+            text = f"the acceleration of bar {bar}'s first pin is used as its a_G"
+            yield from _state_with_forces(text, moved, wrenches)
+
+    def _mass(self, bar: int) -> float:
+        return self.judge.scene.linkage.bar(bar).mass
+
+    def _weights(self) -> Iterator[Mistake]:
+        """Leave out the weight of one bar."""
+        for effect in self.judge.scene.effects:
+            if not isinstance(effect, Gravity):
+                continue
+            direction = np.array([np.cos(effect.angle), np.sin(effect.angle)])
+            for bar in MOVING_BARS:
+                weight = self._mass(bar) * effect.magnitude * direction
+                without = self.wrenches.changed(bar, weight)
+                yield _state(f"the weight of bar {bar} is missing", without.solve())
 
     def _arms_of_loads(self) -> Iterator[Mistake]:
-        """Measure the arm of a load from the bar's first pin instead of from G."""
+        """Measure where a force acts from the wrong point, or let it turn with its bar."""
         scene = self.judge.scene
         for number, load in enumerate(scene.loads):
             if not load.force:
@@ -240,30 +317,37 @@ class Calculation:
             bar = load.bar
             force = find_wrenches(scene, without).p[bar] - self.wrenches.p[bar]
             moment = cross(self.wrenches.arms[bar], force)
-            yield _state(
-                f"load {number + 1} (bar {bar}): its arm is measured from the bar's "
-                "first pin, not from G",
-                self.wrenches.changed(bar, q=moment).solve(),
-            )
-
-    def _inertia_about_pins(self) -> Iterator[Mistake]:
-        wrenches = self.wrenches
-        for bar in MOVING_BARS:
-            body = self.judge.scene.linkage.bar(bar)
-            more = body.mass * body.mass_centre[0] ** 2 if body.mass else 0.0
-            wrenches = wrenches.changed(
-                bar, q=more * getattr(self.right, f"alpha_{bar}")
-            )
-        text = "every bar: inertia about the pin used as the inertia about G"
-        yield _state(text, wrenches.solve())
+            name = f"load {number + 1} (bar {bar})"
+            what = "its place"
+            if load.arm is not None:
+                what = "its arm"
+            if load.from_pin is None:
+                yield _state(
+                    f"{name}: {what} is measured from the bar's first pin, not from G",
+                    self.wrenches.changed(bar, q=moment).solve(),
+                )
+            if load.arm is not None:
+                theta = getattr(self.right, f"theta_{bar}")
+                more = turn(force, theta) - force
+                r, phi = load.arm
+                arm = np.array([[r * np.cos(phi), r * np.sin(phi)]])
+                turned = self.wrenches.changed(bar, -more, -cross(arm, more))
+                yield _state(
+                    f"{name}: its direction turns with the bar", turned.solve()
+                )
+            else:  # an engine is told every place from the first pin
+                yield _state(
+                    f"{name}: {what} is measured from G, not from the bar's first pin",
+                    self.wrenches.changed(bar, q=-moment).solve(),
+                )
 
 
 def find_miscalculated(judge: Judge) -> Iterator[Mistake]:
     """List the mistakes of a calculation, or of a simulation, that a table can show."""
     scene = judge.scene
     loaded = any(effect.loaded_pins for effect in scene.effects)
-    by_input = scene.drive is None and scene.drive_bar == 2 and not loaded
-    if judge.stage == "force" and by_input:
+    by_couple = scene.drive is None and not loaded
+    if judge.stage == "force" and by_couple:
         mistakes: list[Mistake] = []
         with np.errstate(all="ignore"), suppress(FourBarError):
             # a scene without one of its loads may be none
@@ -283,6 +367,15 @@ def _state(
         return values.get(quantity)
 
     return Mistake(text, predict, whole=whole, left=left)
+
+
+def _state_with_forces(
+    text: str, moved: Values, wrenches: BarWrenches
+) -> Iterator[Mistake]:
+    """State a mistake in accelerations: these and the forces are wrong, or the forces alone."""
+    forces = wrenches.solve()
+    yield _state(text, {**moved, **forces})
+    yield _state(f"{text}, from which the forces follow", forces)
 
 
 def _find_impulses(judge: Judge) -> Iterator[Mistake]:

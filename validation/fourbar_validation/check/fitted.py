@@ -53,8 +53,11 @@ FACTORS = {
     2.0: "doubled",
     1e4: "in kg cm^2 taken for kg m^2",
     1e-4: "10^4 too small",
+    4.0: "m L^2/3, of a slender bar about its end, where m L^2/12 is right",
 }
 """Factors of a moment of inertia, and the mistake behind each."""
+VANISHING = 1e-9
+"""A factor below it is none: what it stands before was left out, which is a mistake of its own."""
 PLAIN = 1e-2
 """Relative; a fitted number this near a plain one is tried as that."""
 GRID = 72
@@ -215,7 +218,7 @@ def _try_factors(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
             )
             slope = float(moves @ moves)
             factor = 1.0 + float(moves @ theirs) / slope if slope else math.nan
-            if not 0.0 < factor < math.inf or factor == 1.0:
+            if not VANISHING < factor < math.inf or factor == 1.0:
                 continue
             plain = (
                 next((f for f in FACTORS if abs(factor / f - 1.0) < PLAIN), None)

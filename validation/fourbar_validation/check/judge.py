@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.errors import InputError
+from fourbar.formulas.mobility import TURN
 from fourbar.quantities import OK
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.scene import require_input
@@ -166,10 +167,10 @@ class Judge:
         # the number a mistake would have printed is rounded at its own size, however much larger
         unchanged = self.ours(key)
         larger: Array | float = 1.0
-        if ours is not unchanged and not quantity.startswith("theta"):
-            larger = np.maximum(
-                np.nanmax(magnitude(ours)[self.ok], initial=0.0) / scale, 1.0
-            )
+        if ours is not unchanged:
+            usual = TURN if quantity.startswith("theta") else scale
+            largest = np.nanmax(magnitude(ours)[self.ok], initial=0.0)
+            larger = np.maximum(largest / usual, 1.0)
         moves = [
             compute_difference(quantity, unchanged, self.ours(key, other))
             for other in self.near

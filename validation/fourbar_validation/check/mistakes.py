@@ -23,6 +23,12 @@ from fourbar_validation.scenes.hard_families import list_moving, replace_bars
 
 RPM = np.pi / 30.0
 """rad/s of one rev/min."""
+GRAVITY_TURNED = {
+    "reversed": np.pi,
+    "turned by 90 deg": np.pi / 2.0,
+    "turned by -90 deg": -np.pi / 2.0,
+}
+"""Directions that gravity may be given, by their angle from the right one."""
 SHOWN = 5
 """Explanations that are printed."""
 NEARER = 10.0
@@ -181,8 +187,9 @@ def _change_gravity(scene: Scene) -> Iterator[tuple[str, Scene]]:
         )
         return
     yield "gravity is missing", replace(scene, effects=others)
-    flipped = (replace(effect, magnitude=-effect.magnitude) for effect in gravity)
-    yield "gravity is reversed", replace(scene, effects=(*others, *flipped))
+    for text, angle in GRAVITY_TURNED.items():
+        turned = (replace(effect, angle=effect.angle + angle) for effect in gravity)
+        yield f"gravity is {text}", replace(scene, effects=(*others, *turned))
 
 
 def _change_loads(scene: Scene) -> Iterator[tuple[str, Scene]]:
@@ -207,6 +214,14 @@ def _change_loads(scene: Scene) -> Iterator[tuple[str, Scene]]:
             replace(scene, loads=tuple(map(_reverse, scene.loads))),
         )
     yield from ((f"{name} is reversed", reversing(i)) for i, name in enumerate(names))
+    for i, (name, load) in enumerate(zip(names, scene.loads, strict=True)):
+        if load.force is None or load.arm is not None:
+            continue
+        other, how = "bar", "turns with the bar"
+        if load.frame == "bar":
+            other, how = "world", "is kept"
+        moved = (*scene.loads[:i], replace(load, frame=other), *scene.loads[i + 1 :])
+        yield f"{name}: its direction {how}", replace(scene, loads=moved)
 
 
 def _change_bars(scene: Scene) -> Iterator[tuple[str, Scene]]:
@@ -214,6 +229,13 @@ def _change_bars(scene: Scene) -> Iterator[tuple[str, Scene]]:
         for text, change in BAR_MISTAKES:
             if (changed := change(bar)) is not None:
                 yield f"{name}: {text}", replace_bars(scene, **{name: changed})
+    for text, change in BAR_MISTAKES:
+        changed_bars = {}
+        for name, bar in list_moving(scene):
+            if (changed := change(bar)) is not None:
+                changed_bars[name] = changed
+        if len(changed_bars) > 1:
+            yield f"every bar: {text}", replace_bars(scene, **changed_bars)
 
 
 def _reverse(load: Load) -> Load:
@@ -270,11 +292,25 @@ def _is_angular(quantity: str) -> bool:
     return quantity.startswith(("theta", "omega", "alpha"))
 
 
+def _is_angle(quantity: str) -> bool:
+    return quantity.startswith("theta")
+
+
 COLUMN_MISTAKES: tuple[
     tuple[str, Callable[[Array], Array], Callable[[str], bool]], ...
 ] = (
     ("sign reversed, or F_ij given for F_ji", np.negative, lambda quantity: True),
     ("degrees where radians were announced", np.degrees, _is_angular),
+    (
+        "degrees from -180 to 180 where radians were announced",
+        lambda values: np.degrees(np.remainder(values + np.pi, TURN) - np.pi),
+        _is_angle,
+    ),
+    (
+        "degrees from 0 to 360 where radians were announced",
+        lambda values: np.degrees(np.remainder(values, TURN)),
+        _is_angle,
+    ),
     ("x and y exchanged", lambda values: values[:, ::-1], VECTORS.__contains__),
     (
         "measured from the other end of the bar (half a turn off): theta_4 or theta_3 from B, theta_2 from A",

@@ -21,6 +21,12 @@ SECONDS = 60.0
 """A scene takes 0.05 to 3 s; what takes longer than this hangs."""
 IN_FLIGHT = 4
 """Chunks submitted per worker, so that it is always busy and the memory stays bounded."""
+LOCKED = 10.0
+"""Seconds for which a worker waits for the pipe that all workers share.
+
+A worker that is killed while it reads or writes there leaves the pipe locked for good: the
+others then wait twice as long, and the run ends and can be resumed. A message takes
+milliseconds."""
 Chunk = tuple[int, Sequence[Any]]
 """Number and items."""
 Attempt = Callable[[Any], Any]
@@ -34,11 +40,14 @@ class NoWorkersError(DependencyError):
 
 
 def prepare_worker(_: object = None) -> None:
-    """Bound the memory and keep what is printed.
+    """Bound the memory and the waiting for other workers, and keep what is printed.
 
     The function comes along, so that a worker imports what it needs before its first
     item, whose time is limited.
     """
+    from pebble import CONSTS
+
+    CONSTS.channel_lock_timeout = LOCKED
     bound_memory()
     keep_output()
 

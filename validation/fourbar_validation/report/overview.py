@@ -42,6 +42,8 @@ NAMES = {
 MOST_KINDS = 500
 """Causes that are told apart; further ones are one."""
 OTHERS = "other causes"
+SMALL = 1e-5
+"""Largest error, relative to a quantity's scale, of an engine that lacks digits rather than an equation."""
 LIMIT, NO_VALUE, NO_DIGITS, DOES_NOT_APPLY = (
     "at declared limits of an engine",
     "where the formulas state no value",
@@ -148,9 +150,8 @@ class Overview:
         self.scenes = self.with_forces = self.checked_twice = 0
         self.released = False
         self.not_compared: Counter[str] = Counter()
-        self.first_failure: Row | None = None
         self.since = ""
-        """How the first failure stood in the run that this one is held against."""
+        """How the named failure stood in the run that this one is held against."""
         self._lines: dict[str, OverviewLine] = {}
         self._kinds: dict[tuple[str, tuple[str, ...]], _Kind] = {}
 
@@ -209,7 +210,6 @@ class Overview:
         for engine, rows in failing.items():
             used = [float(find_used(row.error, row.allowed)) for row in rows]
             worst = rows[used.index(max(used))]
-            self.first_failure = self.first_failure or worst
             key = (engine, tuple(name_causes(scene, engine, rows)))
             if key not in self._kinds and len(self._kinds) >= MOST_KINDS:
                 key = (engine, (OTHERS,))
@@ -239,6 +239,12 @@ class Overview:
                 left = {t: kind for t, kind in left.items() if t not in explained}
             causes += sorted(of_engine, key=lambda cause: -cause.scenes)
         return causes
+
+    @property
+    def named_failure(self) -> Row | None:
+        """Return the failing row that the verdict names; None if nothing fails."""
+        causes = self.causes
+        return causes[0].worst if causes else None
 
     def name_lines(self, versions: Mapping[str, str]) -> list[OverviewLine]:
         """Return the engines that were compared, with their names and versions."""
@@ -332,7 +338,20 @@ def name_causes(scene: Record, engine: str, rows: Sequence[Row]) -> list[str]:
     differ = [group for group in GROUPS if group in groups]
     differ += sorted(groups - set(GROUPS))
     agree = [group for group in GROUPS if group not in groups]
-    words = f"{' and '.join(differ[:3])} {'differs' if len(differ) == 1 else 'differ'}"
+    words = _join(differ[:3], "differ")
     if agree:
-        words += f", {' and '.join(agree)} {'agrees' if len(agree) == 1 else 'agree'}"
+        words += f", {_join(agree, 'agree')}"
+    worst = max(row.error for row in rows)
+    if worst < SMALL:
+        digits = math.floor(-math.log10(worst))
+        return [
+            f"{words}: from digit {digits} on, as where numbers are single "
+            "precision or an iteration ends early"
+        ]
     return [f"{words}; no known mistake explains it"]
+
+
+def _join(groups: Sequence[str], verb: str) -> str:
+    """Write groups of quantities with their verb."""
+    plural = len(groups) > 1 or groups[0].endswith("s")
+    return f"{' and '.join(groups)} {verb if plural else verb + 's'}"

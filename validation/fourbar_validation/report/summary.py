@@ -218,11 +218,10 @@ class Summary:
     @property
     def headline(self) -> str:
         """Say the verdict in plain words: where it is not green, whose fault it is."""
-        worst = self.overview.first_failure
-        if worst is None:
+        causes = self.overview.causes
+        if not causes:
             missing = ", ".join(engine for engine, _ in self.missing)
             return self.counts.headline + (f"; not run: {missing}" if missing else "")
-        causes = self.overview.causes
         others = f", and {len(causes) - 1} more causes" if len(causes) > 1 else ""
         first = causes[0]
         named = first.engine if first.engine not in OWN_ENGINES else "fourbar itself"

@@ -199,6 +199,8 @@ def _check_inertia(question: Question, bare: Question, engine: Engine) -> Iterat
         row for row in rows if row.quantity == drive or row.verdict in (REFUSES, FAILS)
     ]
     rows = [row for row in rows if row.quantity != "undecided"]
+    if any(row.failed for row in rows) and engine.name not in question.causes:
+        question.causes[engine.name] = find_causes(bare, answer, engine.tolerance)
     if rows:  # a failure besides the torque, or in place of it, is not left out
         worst = max(rows, key=lambda row: VERDICTS.index(row.verdict))
         reason = (

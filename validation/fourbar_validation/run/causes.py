@@ -9,6 +9,7 @@ from fourbar_validation.check.mistakes import explain
 from fourbar_validation.check.theirs import NOT_JUDGED, Array, TheirTable, Unit
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.tolerance import ErrorBound, magnitude
+from fourbar_validation.engines.description import state_from_pins
 from fourbar_validation.run.question import Question
 
 MOST_POSITIONS = 400
@@ -19,14 +20,17 @@ numbers: it was made in another order of summation than the hypothesis."""
 
 
 def find_causes(question: Question, answer: Answer, tolerance: ErrorBound) -> list[str]:
-    """List the mistakes that explain all that differs in an answer, the simplest first."""
+    """List the mistakes that explain all that differs in an answer, the simplest first.
+
+    The scene is stated as an engine is told it, with every place from the bar's first pin.
+    """
     at = answer.at
     if at is None or at.commanded != "theta_2" or answer.assembled is None:
         return []
     try:
         table = make_table(answer, tolerance)
         commanded = at.part(slice(0, len(table.theta_2)))
-        judge = Judge(question.scene, table, at=commanded)
+        judge = Judge(state_from_pins(question.scene), table, at=commanded)
     except FourBarError:
         return []
     differing = [key for key in judge.table.values if differs(judge, key)]

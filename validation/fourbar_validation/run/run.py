@@ -64,7 +64,7 @@ class RunOptions:
     drawn: bool = True
     """True for pictures; a long suite has them at the end, of the scenes that fail or come nearest to failing."""
     against: Path | None = None
-    """Earlier run in which the first failure is looked up."""
+    """Earlier run in which the failure that the verdict names is looked up."""
     sample: int = SAMPLE
     """Scenes, evenly chosen, in which functions other than `solve` are checked."""
 
@@ -162,7 +162,7 @@ def run(
         summary.asked = make_plain(suite.name(0)) if len(suite) == 1 else ""
         if options.against is not None:
             summary.overview.since = find_since(
-                summary.overview.first_failure, open_run(options.against, "--against")
+                summary.overview.named_failure, open_run(options.against, "--against")
             )
         write_text(out / "report.md", write_markdown(summary))
         generated = any(engine.generated for engine in engines)
@@ -184,14 +184,22 @@ def run(
 
 
 def find_since(failure: Row | None, before: Recorded) -> str:
-    """Say how the first failure stood in an earlier run; nothing if there is none."""
+    """Say how a failure stood in an earlier run; nothing if there is no failure.
+
+    An engine without an answer has no such row in a run in which it answered.
+    """
     if failure is None:
         return ""
-    key = (failure.scene, failure.engine, failure.quantity)
+    answered = False
     for row in before.rows():
-        if (row.scene, row.engine, row.quantity) == key:
+        if (row.scene, row.engine) != (failure.scene, failure.engine):
+            continue
+        if row.quantity == failure.quantity:
             held = "It failed too in" if row.failed else "It held in"
             return f"{held} {before.describe()}."
+        answered = True
+    if answered and failure.quantity == "all":
+        return f"It answered in {before.describe()}."
     return f"It is not in {before.describe()}."
 
 

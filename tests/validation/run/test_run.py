@@ -1,0 +1,84 @@
+"""A run held against an earlier one says of the failure that it names how it stood there."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from fourbar_validation.compare.rows import AGREES, FAILS, Row, write_results
+from fourbar_validation.compare.tolerance import EQUIVALENCE
+from fourbar_validation.engines.free_body import FreeBody
+from fourbar_validation.engines.registry import Engine
+from fourbar_validation.regression.record import (
+    Recorded,
+    describe_run,
+    open_run,
+    write_about,
+)
+from fourbar_validation.report.record import Record
+from fourbar_validation.run.run import RunOptions, find_since, run
+from tests.support.here import judge_here
+from tests.support.unlucky import Few
+
+ROW = Row("a", "mine", "exact", "F32", 1e-15, 1e-14, AGREES, "", 2.0, 1.0)
+FAILED = replace(ROW, error=1e-3, verdict=FAILS)
+
+
+def save(folder: Path, rows: list[Row]) -> Recorded:
+    folder.mkdir()
+    write_results(rows, folder / "results.csv")
+    write_about(describe_run([Engine("mine", FreeBody, EQUIVALENCE)], "suite"), folder)
+    return open_run(folder)
+
+
+@pytest.mark.parametrize(
+    ("before", "failure", "words"),
+    [
+        ([ROW], FAILED, "It held in "),
+        ([FAILED], FAILED, "It failed too in "),
+        ([replace(ROW, scene="b"), FAILED], FAILED, "It failed too in "),
+        ([replace(ROW, quantity="F43")], FAILED, "It is not in "),
+        ([replace(ROW, engine="theirs")], FAILED, "It is not in "),
+        ([ROW], replace(FAILED, quantity="all"), "It answered in "),
+        ([replace(ROW, scene="b")], replace(FAILED, quantity="all"), "It is not in "),
+    ],
+)
+def test_a_failure_is_looked_up_in_an_earlier_run(
+    tmp_path: Path, before: list[Row], failure: Row, words: str
+) -> None:
+    earlier = save(tmp_path / "before", before)
+    since = find_since(failure, earlier)
+    assert since == f"{words}{earlier.describe()}."
+    assert str(tmp_path / "before") in since
+    assert find_since(None, earlier) == ""
+
+
+def test_the_verdict_says_since_when_of_the_failure_that_it_names(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The cause of most scenes is named, of which the first scene that fails has none."""
+    judge_here(monkeypatch)
+    rows = {
+        "a": [replace(FAILED, quantity="torque")],
+        "b": [replace(FAILED, scene="b")],
+        "c": [replace(FAILED, scene="c", error=1e-2)],
+    }
+    monkeypatch.setattr(
+        "fourbar_validation.run.pool.judge_job",
+        lambda job: Record(
+            job.name,
+            rows=rows[job.name],
+            causes={} if job.name == "a" else {"mine": ["F32 and F43 are exchanged"]},
+        ),
+    )
+    before = save(
+        tmp_path / "before",
+        [rows["a"][0], replace(ROW, scene="b"), replace(ROW, scene="c")],
+    )
+    options = RunOptions(drawn=False, sample=0, against=before.table.parent)
+    engine = Engine("mine", FreeBody, EQUIVALENCE)
+    summary = run(Few(("a", "b", "c")), tmp_path / "now", (engine,), options)
+    assert "mine is wrong: F32 and F43 are exchanged" in summary.headline
+    assert "worst F32 of c" in summary.headline
+    assert summary.headline.endswith(f" It held in {before.describe()}.")
+    assert "It held in" in (tmp_path / "now" / "report.md").read_text("utf-8")
