@@ -20,7 +20,7 @@ JUDGED_BY = {
     # what a command reads, does and prints is tested through the command
     "fourbar/cli/test_cli.py": "fourbar/cli: evaluate export given; fourbar/show: tables",
     "whole/test_exits.py": "validation: cli; validation/report: terminal; lab: cli fuzz_files",
-    "whole/test_kills.py": "validation/run: pool run",
+    "whole/test_kills.py": "validation/run: pool",
     "whole/test_results_format.py": "validation/compare: columns",
     "whole/test_package.py": "validation: places",
     # one table or one evaluation, whose rows are no use alone
@@ -40,7 +40,7 @@ JUDGED_BY = {
     "fourbar/show/plot/test_plot.py": "fourbar/show/plot: curves figures freebody labels linkage studies style view",
     # a comparison is tested by engines with given answers
     "validation/run/test_judge.py": "validation/compare: answer effects; "
-    "validation/run: answers command identities question run",
+    "validation/run: answers command identities question",
     "validation/compare/statements/test_statements.py": "validation/compare/statements: limit_positions transmission",
     # adapters: judged against printed figures, each other, and faults put in front of them
     "validation/engines/test_engines.py": "validation/engines: balls description "

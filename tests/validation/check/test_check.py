@@ -1024,6 +1024,12 @@ ORDINARY: dict[str, Callable[[list[tuple[float, float]]], str]] = {
     ),
     "upper case": lines("THETA_2 [deg],TORQUE\n", "{theta:.0f},{torque:.9e}\n"),
     "T2": lines("theta2 (deg),T2 (N m)\n", "{theta:.0f},{torque:.9e}\n"),
+    "units in upper case": lines(
+        "Theta_2 [DEG],Torque [N M]\n", "{theta:.0f},{torque:.9e}\n"
+    ),
+    "words": lines(
+        "Crank angle (deg)\tMotor torque (N-m)\n", "{theta:.0f}\t{torque:.9e}\n"
+    ),
     "repeated": lines(
         "theta_2 [deg],torque,torque\n", "{theta:.0f},{torque:.9e},{torque:.9e}\n"
     ),
@@ -1066,6 +1072,31 @@ def test_a_bare_omega_suggests_the_commanded_one(tmp_path: Path) -> None:
     form = lines("theta_2 [deg],torque,omega\n", "{theta:.0f},{torque:.9e},1\n")
     table = read_table(write_torques(tmp_path / "theirs.csv", form))
     assert table.left_out == {"omega": "not a known column: rename it if it is omega_2"}
+
+
+@pytest.mark.parametrize(
+    ("heading", "words"),
+    [
+        ("omega", "rename it if it is omega_2"),
+        ("R12x [N]", "rename it if it is F12_x or F12_y"),
+        ("Lagerkraft A x [N]", "rename it if it is F12_x, F32_x, F43_x, F14_x,"),
+        ("Fx at A (N)", "rename it if it is F12_x, F32_x, F43_x, F14_x,"),
+        ("Tin", "rename it if it is torque"),
+        ("rocker angle", "rename it if it is theta_2, theta_3 or theta_4"),
+        ("angular speed", "rename it if it is omega_2, omega_3 or omega_4"),
+    ],
+)
+def test_a_column_of_an_unknown_name_says_what_it_may_be(
+    heading: str, words: str, tmp_path: Path
+) -> None:
+    form = lines(f"theta_2 [deg],torque,{heading}\n", "{theta:.0f},{torque:.9e},1\n")
+    path = write_torques(tmp_path / "theirs.csv", form)
+    (why,) = read_table(path).left_out.values()
+    assert why.startswith("not a known column: ") and words in why
+    alone = lines(f"theta_2 [deg],{heading}\n", "{theta:.0f},1\n")
+    path = write_torques(tmp_path / "alone.csv", alone)
+    with pytest.raises(InputError, match=r"needs a result.*rename it if it is"):
+        read_table(path)
 
 
 def test_a_repeated_column_of_other_numbers_says_which_to_rename(

@@ -744,7 +744,7 @@ def test_of_an_older_record_only_the_hash_can_say_that_scenes_changed() -> None:
     )
     assert render.write_text(changes).startswith(
         "1 of 4 rows are compared"
-    ) and "No regression in 1 of 4 rows" in render.write_text(changes)
+    ) and "suites: no regression in 1 of 4 rows" in render.write_text(changes)
 
 
 def widen(error: float, reason: str = "fewer digits") -> Engine:
@@ -782,6 +782,21 @@ def test_a_wider_tolerance_is_a_regression_over_two_nights(
     both = ["accept", str(tmp_path / "first"), "--to", str(accepted)]
     assert status([*both, "--allow-weaker"]) == 0
     assert status(["compare", str(accepted), str(tmp_path / "first")]) == 0
+
+
+def test_a_run_of_another_suite_is_never_called_no_regression(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Two of eight rows stand in both: the verdict says so before anything else."""
+    both = [ROW, replace(ROW, quantity="F12")]
+    others = [replace(ROW, scene=f"scene {k}") for k in range(6)]
+    old, new = save(tmp_path / "old", both), save(tmp_path / "new", [*both, *others])
+    for runs in ([str(old), str(new)], [str(new), str(old)]):
+        assert status(["compare", *runs]) == 2
+        printed = capsys.readouterr()
+        verdict = printed.out.splitlines()[-1]
+        assert verdict.startswith("Runs of two suites: no regression against")
+        assert "shares 2 of 8 rows with the new run" in printed.err
 
 
 @pytest.mark.parametrize(

@@ -380,7 +380,8 @@ def test_a_run_prints_one_row_an_engine_and_the_rest_on_demand(
     assert "not compared: equilibria in 1 scene: too near" in " ".join(
         capsys.readouterr().out.split()
     )
-    table = write_markdown(summary).splitlines()[4:7]
+    text = write_markdown(summary)
+    table = text[text.index("| largest") :].splitlines()
     assert table[0] == (
         "| largest error of allowed | torque | pin forces | motion | compared |"
     )
@@ -427,9 +428,10 @@ def test_failures_are_one_line_an_engine_and_cause(
     lines = [str(cause) for cause in summary.overview.causes]
     assert lines == [
         f"mine: {swapped}, all else agrees: 23 scenes; worst scene 00 120 deg",
-        "theirs: no answer: exit status #: Cannot find module 'x': 1 scene; "
+        "theirs: no answer: exit status 3: Cannot find module 'x': 1 scene; "
         "worst scene 00",
     ]
+    assert [line.engine for line in summary.lines] == ["mine"]
     assert summary.headline.startswith(f"FAILS: mine is wrong: {swapped}")
     assert "F32 of scene 00 120 deg" in summary.headline
     print_table(summary, tmp_path)
@@ -452,6 +454,34 @@ def test_what_no_known_mistake_explains_is_told_by_what_differs_and_what_agrees(
     nothing = replace(OF_MINE, error=math.nan, verdict=FAILS)
     (cause,) = summary_of([record_of("a", [nothing])]).overview.causes
     assert cause.text == "no number for torque"
+
+
+def test_digits_that_are_missing_are_no_missing_term() -> None:
+    rows = [fail(replace(OF_MINE, quantity=name), 3e-8) for name in ("torque", "F12")]
+    (cause,) = summary_of([record_of("a", rows)]).overview.causes
+    assert cause.text == (
+        "torque and pin forces differ, motion agrees: from digit 7 on, as where "
+        "numbers are single precision or an iteration ends early"
+    )
+
+
+def test_an_engine_that_broke_down_alone_is_named_without_a_quantity() -> None:
+    dead = Row.unmeasured("a", "theirs", "", "all", FAILS, "exit status 3: no licence")
+    headline = summary_of([record_of("a", [dead])]).headline
+    assert headline == (
+        "FAILS: theirs is wrong: no answer: exit status 3: no licence, in 1 scene; a."
+    )
+
+
+def test_a_weaker_rule_stands_before_a_verdict_that_holds() -> None:
+    summary = summary_of([record_of("a", [OF_MINE])])
+    assert summary.good
+    summary.overview.weaker = ["mine: factor 1e-14 -> 0.01", "mine: class a -> b"]
+    summary.overview.baseline = "last night"
+    assert not summary.good
+    assert summary.headline.startswith(
+        "WEAKER RULE: mine: factor 1e-14 -> 0.01, and 1 more, against last night. All 1"
+    )
 
 
 def test_two_engines_must_compare_torque_and_all_pin_forces_of_a_scene() -> None:

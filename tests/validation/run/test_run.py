@@ -6,8 +6,9 @@ from pathlib import Path
 import pytest
 
 from fourbar_validation.compare.rows import AGREES, FAILS, Row, write_results
-from fourbar_validation.compare.tolerance import EQUIVALENCE
+from fourbar_validation.compare.tolerance import EQUIVALENCE, ErrorBound
 from fourbar_validation.engines.free_body import FreeBody
+from fourbar_validation.engines.guests import STATED
 from fourbar_validation.engines.registry import Engine
 from fourbar_validation.regression.record import (
     Recorded,
@@ -51,6 +52,27 @@ def test_a_failure_is_looked_up_in_an_earlier_run(
     assert since == f"{words}{earlier.describe()}."
     assert str(tmp_path / "before") in since
     assert find_since(None, earlier) == ""
+
+
+def test_a_rule_that_is_weaker_than_before_stands_first(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Everything holds by the wider tolerance: the run is not green."""
+    judge_here(monkeypatch)
+    before = save(tmp_path / "before", [ROW])
+    stated = ErrorBound(STATED, "0.01 of the scale: fewer digits", 1e-2, False)
+    monkeypatch.setattr(
+        "fourbar_validation.run.pool.judge_job",
+        lambda job: Record(job.name, rows=[replace(ROW, allowed=1e-2)]),
+    )
+    options = RunOptions(drawn=False, sample=0, against=before.table.parent)
+    engine = Engine("mine", FreeBody, stated)
+    summary = run(Few(("a",)), tmp_path / "now", (engine,), options)
+    assert summary.headline.startswith("WEAKER RULE: mine: factor 1.11")
+    assert f"against {before.describe()}. All 1 comparison" in summary.headline
+    assert not summary.good
+    page = (tmp_path / "now" / "report.html").read_text("utf-8")
+    assert '<h1 class="bad">WEAKER RULE: mine' in page
 
 
 def test_the_verdict_says_since_when_of_the_failure_that_it_names(

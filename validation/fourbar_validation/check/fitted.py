@@ -19,31 +19,10 @@ from fourbar.scene import Scene
 from fourbar.solution import Solution
 from fourbar.solve import solve
 from fourbar_validation.check.judge import Judge, Mistake
-from fourbar_validation.check.theirs import Array, name_quantity
+from fourbar_validation.check.theirs import OTHER_UNITS, Array, name_quantity
 from fourbar_validation.compare.tolerance import compute_difference, replace_zero_size
 from fourbar_validation.scenes.hard_families import replace_bars
 
-OTHER_UNITS = {
-    "rad": ("rad", "deg"),
-    "rad/s": ("rad/s", "deg/s", "rpm", "rev/s"),
-    "rad/s^2": ("rad/s^2", "deg/s^2", "rpm/s"),
-    "m": ("m", "mm", "cm", "in", "ft"),
-    "m/s^2": ("m/s^2", "mm/s^2", "cm/s^2", "in/s^2", "ft/s^2", "g0"),
-    "N": ("N", "kN", "mN", "lbf", "kgf"),
-    "N m": (
-        "N m",
-        "N mm",
-        "N cm",
-        "kN m",
-        "mN m",
-        "lbf ft",
-        "lbf in",
-        "kgf m",
-        "kgf cm",
-        "kgf mm",
-    ),
-}
-"""Units that may be taken for each SI unit; the SI unit itself if the file announced another unit."""
 ENOUGH = 3
 """Numbers that a fitted one must explain: fewer are explained by chance."""
 CARRIED = 2.0

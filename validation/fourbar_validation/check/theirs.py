@@ -43,17 +43,54 @@ BLANK = "blank"
 COMMENT = ("#", "%", "//")
 """Beginnings of a line that is a comment."""
 OTHER_NAMES = {
+    **dict.fromkeys(("t2", "t3", "t4", "moment", "drehmoment"), "torque"),
     **dict.fromkeys(
-        ("t2", "t3", "t4", "moment", "drehmoment", "antriebsmoment"), "torque"
+        ("antriebsmoment", "motortorque", "inputtorque", "cranktorque"), "torque"
     ),
+    **dict.fromkeys(("drivetorque", "drivingtorque"), "torque"),
     **dict.fromkeys(
         ("winkel", "kurbelwinkel", "antriebswinkel", "crankangle", "angle"), "theta_2"
     ),
+    "inputangle": "theta_2",
     "zeit": "time",
 }
-"""Names in small letters, without underscores, that other programs and languages use."""
-COMMANDED = {"theta": "theta_2", "omega": "omega_2", "alpha": "alpha_2"}
-"""Names without a bar, and what they may mean."""
+"""Names in small letters, without spaces and underscores, of other programs and languages."""
+MAY_MEAN = (
+    ("theta", "theta_2"),
+    ("omega", "omega_2"),
+    ("alpha", "alpha_2"),
+    (r"(?:r|fr|force|kraft|reaction)([1-4])([1-4])[xy]?", r"F\1\2_x or F\1\2_y"),
+    (r"t_?in|m_?in|.*(?:torque|moment).*", "torque"),
+    (
+        r"f[xy]?(?:at)?(?:a|b|o2|o4)?|.*(?:force|kraft|reaction).*",
+        "F12_x, F32_x, F43_x, F14_x, or their y",
+    ),
+    (r".*(?:speed|velocity|geschwindigkeit).*", "omega_2, omega_3 or omega_4"),
+    (r".*(?:acceleration|beschleunigung).*", "alpha_2, alpha_3 or alpha_4"),
+    (r".*(?:angle|winkel|theta|phi).*", "theta_2, theta_3 or theta_4"),
+)
+"""Patterns of names, spelled as in OTHER_NAMES, and what they may mean."""
+OTHER_UNITS = {
+    "rad": ("rad", "deg"),
+    "rad/s": ("rad/s", "deg/s", "rpm", "rev/s"),
+    "rad/s^2": ("rad/s^2", "deg/s^2", "rpm/s"),
+    "m": ("m", "mm", "cm", "in", "ft"),
+    "m/s^2": ("m/s^2", "mm/s^2", "cm/s^2", "in/s^2", "ft/s^2", "g0"),
+    "N": ("N", "kN", "mN", "lbf", "kgf"),
+    "N m": (
+        "N m",
+        "N mm",
+        "N cm",
+        "kN m",
+        "mN m",
+        "lbf ft",
+        "lbf in",
+        "kgf m",
+        "kgf cm",
+        "kgf mm",
+    ),
+}
+"""Units that may be taken for each SI unit; the SI unit itself if the file announced another unit."""
 THOUSANDS = re.compile(r"[-+]?\d{1,3}(?:[ ,'\u2019\u00a0\u202f]\d{3})+(?:\.\d+)?")
 GERMAN_THOUSANDS = re.compile(r"[-+]?\d{1,3}(?:\.\d{3})+,\d+")
 TWO_TURNS = 4.0 * math.pi
@@ -63,7 +100,7 @@ MOST_DEGREES = 1e6
 LARGEST_FILE = 64 * 2**20
 """Bytes; a table larger than this is not a hand-made comparison."""
 HEADING = re.compile(
-    r"\|?(?P<name>\w+)\|?\s*(?:\[(?P<square>[^\]]*)\]|\((?P<round>.*)\))?(?P<letter>_[xy])?"
+    r"\|?(?P<name>\w[\w ]*?)\|?\s*(?:\[(?P<square>[^\]]*)\]|\((?P<round>.*)\))?(?P<letter>_[xy])?"
 )
 
 
@@ -135,7 +172,8 @@ def read_table(path: Path) -> TheirTable:
         raise InputError(
             "header",
             headings,
-            "needs a column theta_2 (say theta_2 [deg] for degrees)",
+            "needs a column theta_2 (say theta_2 [deg] for degrees)"
+            + _list_suggestions(left_out),
             str(path),
         )
     numbers = {name: np.empty(len(rows)) for name in names}
@@ -182,10 +220,21 @@ def read_table(path: Path) -> TheirTable:
         raise InputError(
             "header",
             headings,
-            f"needs a result, such as {examples}; known are {_find_known()}",
+            f"needs a result, such as {examples}{_list_suggestions(left_out)}; "
+            f"known are {_find_known()}",
             str(path),
         )
     return table
+
+
+def _list_suggestions(left_out: dict[str, str]) -> str:
+    """List the columns that are not known and what they may be renamed to."""
+    suggestions = [
+        f"; {heading}: {why.partition(': ')[2]}"
+        for heading, why in left_out.items()
+        if ": " in why
+    ]
+    return "".join(suggestions)
 
 
 def _drop_repeated(
@@ -329,13 +378,27 @@ def _find_name(name: str) -> str:
     """Find the quantity that a column's name means, in whatever letters it is written."""
     if name in UNITS or name in NOT_JUDGED:
         return name
-    plain = name.replace("θ", "theta").replace("ω", "omega").replace("α", "alpha")
-    plain = plain.lower().replace("_", "")
+    plain = _spell(name)
     known = {**dict.fromkeys(NOT_JUDGED), **UNITS}
     spelled = {one.lower().replace("_", ""): one for one in known}
     for letter in "xy":
         spelled |= {f"{one.lower()}{letter}": f"{one}_{letter}" for one in VECTORS}
     return spelled.get(plain, OTHER_NAMES.get(plain, name))
+
+
+def _spell(name: str) -> str:
+    """Spell a name in small letters, without spaces, hyphens and underscores."""
+    plain = name.replace("θ", "theta").replace("ω", "omega").replace("α", "alpha")
+    return re.sub(r"[\s_-]", "", plain.lower())
+
+
+def _suggest(name: str) -> str:
+    """Say what a column may be renamed to; an empty string where nothing is like it."""
+    plain = _spell(name)
+    for pattern, meaning in MAY_MEAN:
+        if match := re.fullmatch(pattern, plain):
+            return f"rename it if it is {match.expand(meaning)}"
+    return ""
 
 
 def _is_unit_line(cells: list[str]) -> bool:
@@ -362,8 +425,8 @@ def _read_columns(
             continue  # an empty cell that a spreadsheet leaves at the end of a line
         if match is None or quantity in NOT_JUDGED or quantity not in UNITS:
             unknown = "not a known column"
-            if name.lower() in COMMANDED:
-                unknown += f": rename it if it is {COMMANDED[name.lower()]}"
+            if suggestion := _suggest(name):
+                unknown += f": {suggestion}"
             left_out[heading.strip() or f"column {index + 1}"] = NOT_JUDGED.get(
                 quantity, unknown
             )
@@ -382,9 +445,13 @@ def _read_unit(path: Path, heading: str, quantity: str, text: str) -> Unit:
         return Unit(UNITS[quantity], 1.0)
     from fourbar.quantities.units import find_factor
 
+    unit = UNITS[quantity]
+    plain = {_spell(name): name for name in OTHER_UNITS.get(unit, ())}
     try:
-        return Unit(text, find_factor(UNITS[quantity], text))
+        return Unit(text, find_factor(unit, text))
     except InputError as error:
+        if (usual := plain.get(_spell(text))) is not None:
+            return Unit(text, find_factor(unit, usual))
         raise InputError(
             "header", heading, f"{text}: {error.allowed}", str(path)
         ) from None

@@ -35,6 +35,8 @@ def write_verdict(diff: Differences) -> str:
     head = f"{many} regression{'s' if many > 1 else ''}" if many else "No regression"
     if diff.nothing and not many:
         head = "Nothing was compared"
+    elif diff.strange:
+        head = f"Runs of two suites: {head[:1].lower()}{head[1:]}"
     rows = (
         f"{diff.compared} of {diff.rows}"
         if diff.compared < diff.rows

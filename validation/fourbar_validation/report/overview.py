@@ -42,6 +42,8 @@ NAMES = {
 MOST_KINDS = 500
 """Causes that are told apart; further ones are one."""
 OTHERS = "other causes"
+NO_ANSWER = "no answer: "
+"""Beginning of the cause of an engine that broke down."""
 SMALL = 1e-5
 """Largest error, relative to a quantity's scale, of an engine that lacks digits rather than an equation."""
 LIMIT, NO_VALUE, NO_DIGITS, DOES_NOT_APPLY = (
@@ -90,7 +92,8 @@ class OverviewLine:
     )
     compared: int = 0
     failed: int = 0
-    scenes: int = 0
+    answered: bool = False
+    """True if any number of it was compared; the reason why none was is not in the table."""
     reasons: Counter[str] = field(default_factory=Counter)
     """Why it was not compared, by scene."""
 
@@ -152,6 +155,10 @@ class Overview:
         self.not_compared: Counter[str] = Counter()
         self.since = ""
         """How the named failure stood in the run that this one is held against."""
+        self.weaker: list[str] = []
+        """Rules that are weaker than in that run."""
+        self.baseline = ""
+        """That run in words."""
         self._lines: dict[str, OverviewLine] = {}
         self._kinds: dict[tuple[str, tuple[str, ...]], _Kind] = {}
 
@@ -184,6 +191,7 @@ class Overview:
         line = self._line(row.engine)
         line.compared += row.compared
         line.failed += row.failed
+        line.answered |= row.compared and row.quantity != "all"
         group = find_group(row)
         if row.compared and group is not None:
             line.columns[group].add(row, float(find_used(row.error, row.allowed)))
@@ -234,8 +242,11 @@ class Overview:
                         counts[text] += kind.scenes
                 text = counts.most_common(1)[0][0]
                 explained = [texts for texts in left if text in texts]
-                worst = max((left[texts] for texts in explained), key=lambda k: k.used)
-                of_engine.append(Cause(engine, text, counts[text], worst.worst))
+                kind = max((left[texts] for texts in explained), key=lambda k: k.used)
+                words = text
+                if kind.worst.quantity == "all":
+                    words = f"{NO_ANSWER}{_take_reason(kind.worst)}"
+                of_engine.append(Cause(engine, words, counts[text], kind.worst))
                 left = {t: kind for t, kind in left.items() if t not in explained}
             causes += sorted(of_engine, key=lambda cause: -cause.scenes)
         return causes
@@ -256,7 +267,7 @@ class Overview:
             else:
                 line.name = pattern.format(version).replace(" ,", ",").strip()
         order = list(NAMES)
-        lines = [line for line in self._lines.values() if line.compared or line.failed]
+        lines = [line for line in self._lines.values() if line.answered]
         return sorted(
             lines,
             key=lambda line: (
@@ -318,12 +329,16 @@ def _list_reasons(scene: Record) -> Iterable[tuple[str, str]]:
             yield engine, reason
 
 
+def _take_reason(row: Row) -> str:
+    """Return why an engine has no answer, without what it printed."""
+    return write_one_line(row.reason.partition("; what it printed")[0])
+
+
 def name_causes(scene: Record, engine: str, rows: Sequence[Row]) -> list[str]:
     """Name the mistakes that explain the failing rows of an engine in a scene, or say what fails."""
     whole = [row for row in rows if row.quantity == "all"]
     if whole:
-        reason = NUMBER.sub("#", whole[0].reason.partition("; what it printed")[0])
-        return [f"no answer: {write_one_line(reason)}"]
+        return [f"{NO_ANSWER}{NUMBER.sub('#', _take_reason(whole[0]))}"]
     if known := scene.causes.get(engine):
         return [f"{text}, all else agrees" for text in known]
     if engine in OWN_ENGINES:

@@ -218,6 +218,14 @@ class Summary:
     @property
     def headline(self) -> str:
         """Say the verdict in plain words: where it is not green, whose fault it is."""
+        words = self._say_first_cause()
+        if weaker := self.overview.weaker:
+            more = f", and {len(weaker) - 1} more" if len(weaker) > 1 else ""
+            rules = f"{weaker[0]}{more}, against {self.overview.baseline}"
+            return f"WEAKER RULE: {rules}. {words}"
+        return words
+
+    def _say_first_cause(self) -> str:
         causes = self.overview.causes
         if not causes:
             missing = ", ".join(engine for engine, _ in self.missing)
@@ -226,7 +234,9 @@ class Summary:
         first = causes[0]
         named = first.engine if first.engine not in OWN_ENGINES else "fourbar itself"
         what = f"{named} is wrong: {first.text}, in {first.scenes} scene"
-        what += f"{'s' if first.scenes > 1 else ''}; worst {first.worst.quantity} of "
+        what += f"{'s' if first.scenes > 1 else ''}; "
+        if first.worst.quantity != "all":
+            what += f"worst {first.worst.quantity} of "
         since = f" {self.overview.since}" if self.overview.since else ""
         return f"FAILS: {what}{first.place}{others}.{since}"
 
@@ -256,8 +266,9 @@ class Summary:
 
     @property
     def good(self) -> bool:
-        """Return whether everything that was to be compared was compared, and holds."""
-        return self.counts.status == HOLDS and not self.missing
+        """Return whether everything that was to be compared was compared, and holds by no weaker rule."""
+        held = self.counts.status == HOLDS and not self.missing
+        return held and not self.overview.weaker
 
     @property
     def engines(self) -> list[EngineLine]:

@@ -26,6 +26,7 @@ from fourbar_validation.regression.record import (
     open_run,
     write_about,
 )
+from fourbar_validation.regression.rules import list_weakened
 from fourbar_validation.regression.scenes import describe_scenes
 from fourbar_validation.report.html import write_html, write_markdown
 from fourbar_validation.report.machine import name_code
@@ -64,7 +65,7 @@ class RunOptions:
     drawn: bool = True
     """True for pictures; a long suite has them at the end, of the scenes that fail or come nearest to failing."""
     against: Path | None = None
-    """Earlier run in which the failure that the verdict names is looked up."""
+    """Earlier run in which the failure that the verdict names is looked up, and whose rules must not be stricter."""
     sample: int = SAMPLE
     """Scenes, evenly chosen, in which functions other than `solve` are checked."""
 
@@ -161,9 +162,12 @@ def run(
         summary.date, summary.commit = about.date, about.commit
         summary.asked = make_plain(suite.name(0)) if len(suite) == 1 else ""
         if options.against is not None:
-            summary.overview.since = find_since(
-                summary.overview.named_failure, open_run(options.against, "--against")
-            )
+            before = open_run(options.against, "--against")
+            overview = summary.overview
+            overview.since = find_since(overview.named_failure, before)
+            weakened = list_weakened(before.about.rules, about.rules)
+            overview.weaker = [f"{rule}" for rule in weakened]
+            overview.baseline = before.describe()
         write_text(out / "report.md", write_markdown(summary))
         generated = any(engine.generated for engine in engines)
         models, why_not = picture_models(suite, shown) if generated else ({}, "")
