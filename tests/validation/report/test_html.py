@@ -46,6 +46,34 @@ return found.sort((a, b) => a[0] - b[0]).slice(0, 5);
 """
 
 
+SMALLEST = 9.0
+"""px, of text at the size at which it is shown. Its box is two px more: room above its letters."""
+TEXTS = """
+const clipped = [];
+let smallest = Infinity;
+for (const text of document.querySelectorAll("svg text")) {
+  const box = text.getBoundingClientRect();
+  if (!box.width) continue;
+  const frame = text.ownerSVGElement.getBoundingClientRect();
+  const inside = box.left >= frame.left - 2 && box.right <= frame.right + 2
+    && box.top >= frame.top - 2 && box.bottom <= frame.bottom + 2;
+  if (!inside) clipped.push(text.textContent);
+  const m = text.getScreenCTM();
+  const size = parseFloat(getComputedStyle(text).fontSize) * Math.hypot(m.a, m.b);
+  smallest = Math.min(smallest, size);
+}
+return [clipped, smallest];
+"""
+PAPERS = """
+return [...document.querySelectorAll("svg path, svg rect")].filter(shape => {
+  const frame = shape.ownerSVGElement.getBoundingClientRect();
+  const box = shape.getBoundingClientRect();
+  const whole = box.width > 0.95 * frame.width && box.height > 0.95 * frame.height;
+  return frame.width && whole && getComputedStyle(shape).fill !== "none";
+}).map(shape => getComputedStyle(shape).fill);
+"""
+
+
 def wait(driver, condition):
     """What the condition gives once it holds: a body is unpacked in its own time."""
     from selenium.webdriver.support.wait import WebDriverWait
@@ -66,6 +94,25 @@ def test_all_text_is_readable(browse, dark: bool) -> None:
 def test_nothing_is_wider_than_a_phone(browse) -> None:
     driver = browse(report(copies(2, failing=1))[1], 360)
     assert driver.execute_script("return document.documentElement.scrollWidth") <= 360
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("width", [1440, 400])
+def test_every_text_of_a_picture_is_whole_and_large_enough(browse, width: int) -> None:
+    """The pictures of the first screen, and those of a scene that is open."""
+    driver = browse(report(copies(2, failing=1))[1], width)
+    assert len(driver.find_elements("css selector", "details[open] svg")) == 3
+    clipped, smallest = driver.execute_script(TEXTS)
+    assert clipped == []
+    assert smallest >= SMALLEST
+
+
+@pytest.mark.slow
+def test_a_picture_has_no_paper_of_its_own(browse) -> None:
+    """Its light paper would hide the light text of a dark page."""
+    driver = browse(report(copies(2, failing=1))[1], dark=True)
+    assert driver.find_elements("css selector", "svg")
+    assert driver.execute_script(PAPERS) == []
 
 
 @pytest.mark.slow

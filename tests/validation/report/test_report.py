@@ -4,8 +4,10 @@ import base64
 import csv
 import gzip
 import io
+import json
 import math
 import re
+import shlex
 from dataclasses import replace
 from functools import cache
 from html import unescape
@@ -19,6 +21,7 @@ import fourbar
 from fourbar_validation.compare.rows import AGREES, FAILS, REFUSES, Row, write_rows
 from fourbar_validation.engines import guests
 from fourbar_validation.engines.registry import ENGINES, WORK, load_further
+from fourbar_validation.engines.table import choose_engines, fill_table
 from fourbar_validation.report import svg
 from fourbar_validation.report.figures import STRETCHES, find_worst_of_segments
 from fourbar_validation.report.html import ALL_OPEN, Section, write_html, write_markdown
@@ -27,6 +30,7 @@ from fourbar_validation.report.summary import OWN, Summary
 from fourbar_validation.report.svg import FLOOR
 from fourbar_validation.report.terminal import print_table
 from fourbar_validation.run.judge import judge_for_report
+from tests.support.guests import write_program
 from tests.support.here import judge_solve_alone, summary_of
 from tests.support.scenes import crank_rocker
 
@@ -301,15 +305,23 @@ def test_many_scenes_give_a_short_report_of_the_worst(
 
 @pytest.mark.slow
 def test_every_engine_of_a_report_has_a_mark_of_its_own(
-    monkeypatch: pytest.MonkeyPatch,
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     """Whoever is drawn first, and in whatever process: the engine says its number."""
     monkeypatch.setattr(svg, "NUMBERS", {})
     classes = "tests.support.hostile_class:"
-    engines = guests.read_guests(
-        [f"{classes}Right", f"{classes}Leaves"],
-        [engine.name for engine in (*ENGINES, *load_further())],
+    program = shlex.split(write_program(tmp_path, "plain"))
+    (tmp_path / "engines.toml").write_text(
+        f'[[engine]]\nname = "one"\ncommand = {json.dumps(program)}\n'
+        f'[[engine]]\nname = "another"\ncommand = {json.dumps(program)}\n'
     )
+    table = fill_table([tmp_path], [f"{classes}Right", f"{classes}Leaves"])
+    engines = [
+        engine
+        for engine in choose_engines("free-body,one,another", table)
+        if isinstance(engine, guests.Guest)
+    ]
+    assert len(engines) == 4
     names = [engine.name for engine in (*ENGINES, *load_further(), *engines)]
     svg.NUMBERS.update(guests.list_numbers(engines))
     marks = {

@@ -129,7 +129,6 @@ def name_guests(
             stated=False,
             code=hash_files(filter(os.path.isfile, program.command)),
             version=" on ".join(filter(None, (hello.version, hello.device))),
-            number=len(names),
             seconds=program.seconds,
             releases="release" in hello.effects,
         )

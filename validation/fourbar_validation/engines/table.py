@@ -5,7 +5,7 @@ points), the files engines.toml, and the guests that the command line names.
 """
 
 from collections.abc import Callable, Collection, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -15,7 +15,7 @@ from fourbar_validation.engines.environments import (
     read_engines,
     start_engine,
 )
-from fourbar_validation.engines.guests import read_guests
+from fourbar_validation.engines.guests import Guest, read_guests
 from fourbar_validation.engines.registry import BALLS, ENGINES, Engine, load_further
 
 HARNESS, LAB, FILE, GUEST = "harness", "lab", "engines.toml", "--guest"
@@ -88,8 +88,11 @@ def choose_engines(
         taken = {*table, *(engine.name for engine in chosen)} - {name}
         engine = table[name].open(taken)
         optional = names is None and table[name].source == LAB
-        if not (optional and engine.missing()):
-            chosen.append(engine)
+        if optional and engine.missing():
+            continue
+        if isinstance(engine, Guest):
+            engine = replace(engine, number=len(chosen))
+        chosen.append(engine)
     return tuple(chosen)
 
 

@@ -84,7 +84,13 @@ def _draw_linkage(name: str, scene: Scene, solution: Solution) -> str:
     with apply_style():
         figure, labels = Figure(figsize=(3.1, 2.9), layout="constrained"), Labels()
         here = solve(scene, "position", at=solution.at.part(slice(best, best + 1)))
-        draw_linkage(figure.subplots(), View(scene, solution, here), labels)
+        axes = figure.subplots()
+        draw_linkage(axes, View(scene, solution, here), labels)
+        legend = axes.get_legend()
+        if legend is not None:  # it is wider than this drawing
+            legend.remove()
+        # the arrow of gravity stands above the axes
+        axes.set_title(axes.get_title(loc="left"), pad=22.0)
         labels.settle(figure)
         svg = write_svg(figure, f"{name} linkage")
     for light, variable in PLOT_COLOURS.items():

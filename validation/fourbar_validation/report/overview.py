@@ -69,6 +69,11 @@ class OverviewCell:
             self.row, self.used = row, used
 
     @property
+    def failed(self) -> bool:
+        """Return whether that row fails."""
+        return self.row is not None and self.row.failed
+
+    @property
     def parts(self) -> tuple[str, ...]:
         """Return the error, and of what it is allowed, as the parts of a cell."""
         if self.row is None:

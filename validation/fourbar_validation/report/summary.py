@@ -230,7 +230,8 @@ class Summary:
         if not causes:
             missing = ", ".join(engine for engine, _ in self.missing)
             return self.counts.headline + (f"; not run: {missing}" if missing else "")
-        others = f", and {len(causes) - 1} more causes" if len(causes) > 1 else ""
+        more = len(causes) - 1
+        others = f", and {more} more cause{'s' if more > 1 else ''}" if more else ""
         first = causes[0]
         named = first.engine if first.engine not in OWN_ENGINES else "fourbar itself"
         what = f"{named} is wrong: {first.text}, in {first.scenes} scene"

@@ -130,7 +130,7 @@ def draw_svg(figure: Any, salt: str, *, transparent: bool = True) -> str:
             text,
             format="svg",
             transparent=transparent,
-            facecolor=figure.get_facecolor(),
+            facecolor="none" if transparent else figure.get_facecolor(),
             metadata={"Date": None, "Creator": None},
         )
     svg = text.getvalue()

@@ -88,10 +88,14 @@ def _make_overview(summary: Summary) -> "Table":
     for heading in (*GROUPS, "compared"):
         shown.add_column(heading, justify="right", no_wrap=True)
     for line in summary.lines:
-        cells = [str(line.columns[group]) for group in GROUPS]
-        style = "bold red" if line.failed else ""
         name = escape(clean_line(line.name))
-        shown.add_row(name, *cells, str(line.compared), style=style)
+        cells = []
+        for group in GROUPS:
+            cell = line.columns[group]
+            cells.append(f"[bold red]{cell}[/]" if cell.failed else str(cell))
+        if line.failed:
+            name = f"[bold red]{name}[/]"
+        shown.add_row(name, *cells, str(line.compared))
     return shown
 
 
