@@ -268,8 +268,9 @@ class Summary:
     @property
     def good(self) -> bool:
         """Return whether everything that was to be compared was compared, and holds by no weaker rule."""
-        held = self.counts.status == HOLDS and not self.missing
-        return held and not self.overview.weaker
+        if self.overview.weaker:
+            return False
+        return self.counts.status == HOLDS and not self.missing
 
     @property
     def engines(self) -> list[EngineLine]:
