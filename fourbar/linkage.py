@@ -4,6 +4,7 @@ Pins: O2 (origin; bars 1, 2), A (2, 3), B (3, 4), O4 (4, 1).
 Bars: 1 ground (length d), 2 input (a), 3 coupler (b), 4 output (c).
 """
 
+import cmath
 import math
 from collections.abc import Container
 from contextlib import suppress
@@ -287,10 +288,7 @@ class Bar:
     @property
     def to_centre(self) -> complex:
         """Vector from the first pin to G in the bar's frame: along + i across, m."""
-        r, phi = self.mass_centre
-        if not isinstance(r, float):  # a longer number
-            return r * np.cos(phi) + 1j * (r * np.sin(phi))
-        return complex(r * math.cos(phi), r * math.sin(phi)) if phi else complex(r, 0.0)
+        return cmath.rect(*self.mass_centre)
 
 
 @dataclass(frozen=True, slots=True)

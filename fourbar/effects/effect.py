@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.errors import InputError, LimitError, expect
-from fourbar.formulas.arithmetic import Number, cross, is_any, select
+from fourbar.formulas.arithmetic import Number, cross, is_any, polar, select
 from fourbar.formulas.motion import State
 from fourbar.formulas.pin_forces import Bodies, Body, PinForces, Wrenches
 from fourbar.linkage import PINS, Declared, FourBar, require
@@ -24,7 +24,8 @@ AT_REST = 50.0 * 2.0**-52
 def list_bodies(linkage: FourBar, effects: Iterable[Any] = ()) -> Bodies:
     """List the inertial properties of bars 2, 3, 4, with the inertia that effects (a flywheel) add."""
     bodies = [
-        Body(bar.mass, bar.moment_of_inertia, bar.to_centre) for bar in linkage.moving
+        Body(bar.mass, bar.moment_of_inertia, polar(*bar.mass_centre))
+        for bar in linkage.moving
     ]
     for effect in effects:
         for bar, inertia in effect.carried.items():

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from fourbar.effects.effect import Actions, PinRows, SolvedFriction
 from fourbar.errors import InputError
 from fourbar.formulas.arithmetic import is_any, make_like
-from fourbar.formulas.longer import shorten
+from fourbar.formulas.longer import take_doubles
 from fourbar.formulas.pin_forces import PinForces
 from fourbar.linkage import AT_LEAST_ZERO, PIN_FORCE, Declared
 from fourbar.quantities import JAMMED, OK, SEVERAL, Array
@@ -98,11 +98,11 @@ class PinFriction(PinRows):
 
         def column(force: Any) -> Any:
             """Return the components of a force over all positions, (n, 2)."""
-            flat = np.broadcast_to(_make_plain(force), shape).ravel()
+            flat = np.broadcast_to(take_doubles(force), shape).ravel()
             return np.stack([flat.real, flat.imag], axis=-1)
 
         k = np.stack(
-            [np.broadcast_to(_make_plain(arms[pin]), shape).ravel() for pin in names],
+            [np.broadcast_to(take_doubles(arms[pin]), shape).ravel() for pin in names],
             axis=1,
         )
         F = np.stack([column(getattr(pins, PIN_FORCE[pin])) for pin in names], axis=1)
@@ -121,14 +121,13 @@ class PinFriction(PinRows):
             pin: make_like(sliding.x[:, p].reshape(shape), pins.F12.real)
             for p, pin in enumerate(names)
         }
-        if _make_plain(pins.F12) is not pins.F12:
-            couples = self._refine(couples, pins, per_unit)
+        couples = self._refine(couples, pins, per_unit)
         for pin, couple in couples.items():
             actions.couple(pin, -senses[pin] * couple)
         loaded = eliminate(actions)
         residuals = [
             np.abs(
-                _make_plain(
+                take_doubles(
                     couple - arms[pin] * np.abs(getattr(loaded, PIN_FORCE[pin]))
                 )
             )
@@ -147,7 +146,7 @@ class PinFriction(PinRows):
     def _refine(
         self, couples: dict[str, Any], pins: PinForces, per_unit: dict[str, PinForces]
     ) -> dict[str, Any]:
-        """Take Newton's steps from couples in doubles, in the numbers of the forces: longer ones or with derivatives.
+        """Take Newton's steps from couples in doubles, in whatever numbers the forces are.
 
         (1 - J) dx = mu r |F + C x| - x, J the slope of the right-hand side by x: of numbers that carry their
         derivatives the same steps are the theorem of the implicit function.
@@ -163,9 +162,9 @@ class PinFriction(PinRows):
                 for c, couple in zip(by, couples.values(), strict=True):
                     force = force + c * couple
                 gaps.append(arms[pin] * np.abs(force) - couples[pin])
-                along = _make_plain(force) / np.abs(_make_plain(force))
+                along = take_doubles(force) / np.abs(take_doubles(force))
                 pulls = [
-                    _make_plain(arms[pin]) * (along.conjugate() * _make_plain(c)).real
+                    take_doubles(arms[pin]) * (along.conjugate() * take_doubles(c)).real
                     for c in by
                 ]
                 slopes.append(np.broadcast_arrays(*pulls, along.real)[:-1])
@@ -186,11 +185,6 @@ class PinFriction(PinRows):
         for pin, mu, r in self.pins:
             load = np.hypot(*np.asarray(forces[PIN_FORCE[pin]]).T)
             actions.couple(pin, -actions.sense(pin) * (mu * r * load))
-
-
-def _make_plain(number: Any) -> Any:
-    """Return the double, or the array of them, of a longer number or of one that carries its derivatives."""
-    return shorten(getattr(number, "values", number))
 
 
 class Sliding(NamedTuple):

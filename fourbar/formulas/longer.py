@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.lib.mixins import NDArrayOperatorsMixin
 
-from fourbar.formulas.arithmetic import PI_LOW, Number, split_sum
+from fourbar.formulas.arithmetic import PI_LOW, Number, split_sum, without_slopes
 
 HAS_LONG_DOUBLES = np.finfo(np.longdouble).nmant > np.finfo(np.float64).nmant
 HALF_PI_LOWEST = -1.4973849048591833e-33
@@ -46,6 +46,11 @@ def shorten(number: Number) -> Number:
     ):
         return number.astype(complex if number.dtype.kind == "c" else float)
     return number
+
+
+def take_doubles(number: Number) -> Number:
+    """Return a number as doubles, without further digits and without slopes."""
+    return shorten(without_slopes(number))
 
 
 def change_numbers(value: Any, change: Callable[[Any], Any]) -> Any:

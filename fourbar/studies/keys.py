@@ -1,19 +1,16 @@
 """The numbers of a scene by their keys in its file, and scenes in which they are arrays."""
 
-import math
 from collections.abc import Mapping
 from dataclasses import fields
 from difflib import get_close_matches
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.lib.mixins import NDArrayOperatorsMixin
 
 from fourbar.effects import Gravity, Springs
 from fourbar.effects.effect import PinRows
 from fourbar.effects.place import STATED_PLACES
 from fourbar.errors import InputError, expect
-from fourbar.formulas.arithmetic import polar
 from fourbar.linkage import (
     ANY,
     AT_LEAST_ZERO,
@@ -208,28 +205,6 @@ def refuse_key(key: str, value: object, keys: list[str]) -> InputError:
     return InputError(key, value, f'unknown key; did you mean "{close[0]}"?')
 
 
-class ManyBars(Bar):
-    """The same bar of many linkages: its numbers may be arrays."""
-
-    __slots__ = ()
-
-    @property
-    def to_centre(self) -> Any:
-        """Vector to G as a single bar has it: cosine and sine are those of the C library, not of NumPy."""
-        r, phi = self.mass_centre
-        if isinstance(phi, NDArrayOperatorsMixin):  # with slopes
-            return polar(r, phi)
-        if np.ndim(phi) and np.asarray(phi).dtype == np.longdouble:
-            return super().to_centre
-        if np.ndim(phi):
-            angles = np.asarray(phi).tolist()
-            cosine: Any = np.array([math.cos(angle) for angle in angles])
-            return r * cosine + 1j * (
-                r * np.array([math.sin(angle) for angle in angles])
-            )
-        return r * math.cos(phi) + 1j * (r * math.sin(phi)) if phi else r + 0j
-
-
 LEFT_OUT = (
     "is left out of the scene and follows the length; state it to give it a tolerance"
 )
@@ -309,7 +284,7 @@ def replace_place(holder: Any, place: Place, values: Any) -> Any:
     old = getattr(holder, name)
     if isinstance(holder, Bar) and name == "centre" and old is None:
         old = holder.mass_centre
-    new = object.__new__(ManyBars if isinstance(holder, Bar) else type(holder))
+    new = object.__new__(type(holder))
     for field in fields(holder):
         value = (
             replace_place(old, tuple(rest), values)
