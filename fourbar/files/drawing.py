@@ -7,8 +7,11 @@ from typing import Any
 import numpy as np
 
 from fourbar.effects import ForceDrive, LinearDrive, Place
+from fourbar.errors import InputError
 from fourbar.files.fields import Reader
-from fourbar.linkage import BAR_NAMES, MOVING_BARS, PINS, Bar, FourBar
+from fourbar.formulas.mobility import count_equalities, meet_change_points
+from fourbar.linkage import BAR_NAMES, ENDS, MOVING_BARS, PINS, Bar, FourBar
+from fourbar.quantities.units import find_rounding
 from fourbar.scene import Scene, command_at
 from fourbar.scene.drawing import DrawnPins
 from fourbar.scene.motion import BRANCH_NAMES, COMMANDS, STROKE_COMMAND, Motion
@@ -17,6 +20,8 @@ from fourbar.solve import solve
 DRAWN = "drawn"
 """Word that stands for the drawn angle, stroke or side; key of a place of the drawing."""
 STANDS_ALONE = "must be left out: `drawn` states the place"
+APART = 0.05
+"""Part of the longest bar by which pins lie off the drawing if no motion of the commanded bar has that assembly."""
 ANGLES = {names[0]: bar for bar, names in COMMANDS.items()}
 """Bars by the names of their angles."""
 NUMBERS_OF_BARS = {name: bar for bar, name in BAR_NAMES.items()}
@@ -76,9 +81,8 @@ def state_lengths(
     read: Reader, top: dict[str, Any], drawing: DrawnPins
 ) -> dict[str, Any]:
     """State the tables of a drawing by lengths, and each place of it in its bar's frame."""
-    lengths = {
-        name: f"{drawing.length(bar)!r} m" for name, bar in NUMBERS_OF_BARS.items()
-    }
+    met = meet_lengths(drawing, top["pins"])
+    lengths = {name: f"{met[bar - 1]!r} m" for name, bar in NUMBERS_OF_BARS.items()}
     lengths["ground_angle"] = f"{drawing.angle(1)!r} rad"
     stated = {
         key: _state_places(read, key, value, drawing)
@@ -86,6 +90,24 @@ def state_lengths(
         if key != "pins"
     }
     return {**stated, "lengths": lengths}
+
+
+def meet_lengths(drawing: DrawnPins, pins: dict[str, Any]) -> tuple[float, ...]:
+    """Return the lengths of a drawing, of a parallelogram or a kite without the rounding of its coordinates.
+
+    `pins`: x and y of each pin as they are written.
+    """
+    ends = {1: ("O2", "O4"), **ENDS}
+    last = {pin: [find_rounding(text, "m") for text in pins[pin]] for pin in PINS}
+    moved = {pin: math.hypot(*roundings) for pin, roundings in last.items()}
+    lengths = tuple(drawing.length(bar) for bar in ends)
+    roundings = tuple(moved[first] + moved[second] for first, second in ends.values())
+    decimals = tuple(
+        max(*last[first], *last[second]) for first, second in ends.values()
+    )
+    met = meet_change_points(lengths, roundings, decimals)  # type: ignore[arg-type]
+    # one equality alone is met by chance: nobody draws it
+    return met if count_equalities(met) > 1 else lengths
 
 
 def _state_places(
@@ -201,4 +223,12 @@ def choose_assembly(scene: Scene, drawing: DrawnPins) -> Scene:
         pins = np.array([complex(*here.A[0]), complex(*here.B[0])])
         gap = float(np.abs(pins - wanted).sum())
         gaps.setdefault(gap if math.isfinite(gap) else math.inf, on_branch)
-    return gaps[min(gaps)]
+    nearest = min(gaps)
+    if APART * max(scene.linkage.lengths) < nearest < math.inf:
+        raise InputError(
+            f"motion.theta_{bar}",
+            DRAWN,
+            f"in the assembly that is drawn the {BAR_NAMES[bar]} stands still: "
+            "command another bar",
+        )
+    return gaps[nearest]

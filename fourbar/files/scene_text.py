@@ -23,7 +23,7 @@ from fourbar.effects import (
 from fourbar.effects.effect import PinRows
 from fourbar.effects.place import STATED_PLACES
 from fourbar.errors import InputError, expect
-from fourbar.files.drawing import choose_assembly, read_point
+from fourbar.files.drawing import choose_assembly, meet_lengths, read_point
 from fourbar.files.fields import (
     Reader,
     convert_to_polar,
@@ -97,14 +97,14 @@ def _write_lengths(
     drawing = scene.drawing
     if drawing is None:
         return [("lengths", lengths)]
-    drawn = (*(drawing.length(bar) for bar in BAR_NAMES), drawing.angle(1))
+    pins = {pin: [write_quantity(x, "m") for x in drawing.place(pin)] for pin in PINS}
+    drawn = (*meet_lengths(drawing, pins), drawing.angle(1))
     linkage = scene.linkage
     assembly = choose_assembly(scene, drawing).motion.branch
     same = drawn == (*linkage.lengths, linkage.ground_angle)
     if not same or assembly != scene.motion.branch:
         return [("lengths", lengths)]
     del motion["branch"]
-    pins = {pin: [write_quantity(x, "m") for x in drawing.place(pin)] for pin in PINS}
     return [("pins", pins)]
 
 

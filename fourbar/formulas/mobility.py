@@ -449,9 +449,17 @@ def find_miss(linkage: FourBar) -> tuple[float, str] | None:
     return max(gap for gap in sums if gap <= NEARLY * perimeter), meant.name
 
 
+def count_equalities(lengths: tuple[float, float, float, float]) -> int:
+    """Count the equalities of change points that hold: two of a parallelogram or a kite, three of a rhombus."""
+    touching = TOUCHING * math.fsum(lengths)
+    gaps = (abs(math.fsum(map(mul, signs, lengths))) for signs in EQUALITIES)
+    return sum(gap <= touching for gap in gaps)
+
+
 def meet_change_points(
     lengths: tuple[float, float, float, float],
     roundings: tuple[float, float, float, float],
+    decimals: tuple[float, float, float, float] | None = None,
 ) -> tuple[float, float, float, float]:
     """Return the lengths of ground, input, coupler and output with the equalities that they miss by rounding.
 
@@ -462,9 +470,12 @@ def meet_change_points(
     ----------
     lengths : as stated, m.
     roundings : largest error of each length by the rounding of what was stated, m.
+    decimals : half of the last decimals of what was stated, if not the roundings; too coarse
+        ones round nothing.
     """
     largest = DIGITS_STATED * math.fsum(lengths)
-    fine = [rounding if rounding <= largest else 0.0 for rounding in roundings]
+    pairs = zip(roundings, decimals or roundings, strict=True)
+    fine = [rounding if last <= largest else 0.0 for rounding, last in pairs]
     allowed = math.fsum(fine)
     missed = [
         signs

@@ -16,7 +16,7 @@ from fourbar.formulas.mobility import (
     name_assembly,
     turns_fully,
 )
-from fourbar.linkage import BAR_NAMES, PIN_FORCE
+from fourbar.linkage import BAR_NAMES, MOVING_BARS, PIN_FORCE
 from fourbar.quantities import LINE, PIN_FORCES
 from fourbar.scene import Scene
 from fourbar.scene.motion import BRANCH_NAMES
@@ -27,6 +27,7 @@ from fourbar.show.units import (
     COMMON,
     DIGITS,
     POSITION_DIGITS,
+    ROUND_OFF,
     choose_unit,
     write_digits,
     write_short,
@@ -357,17 +358,32 @@ class _Block:
         return lines
 
     def _without_rounding(self, value: float) -> float:
-        """Return zero for a torque or force of the drive that is no larger than its error bars."""
+        """Return zero for a torque or force of the drive that is no larger than its rounding."""
         drive = self.facts.drive
-        if drive is None or drive.error is None:
+        if drive is None:
             return value
-        return 0.0 if abs(value) <= np.nanmax(drive.error, initial=0.0) else value
+        error = self._find_round_off()
+        if drive.error is not None:
+            error = max(error, np.nanmax(drive.error, initial=0.0))
+        return 0.0 if abs(value) <= error else value
+
+    def _find_round_off(self) -> float:
+        """Return the rounding of inertial torques (forces); at a change point an error bar is less."""
+        solution, bars = self.facts.solution, self.facts.scene.linkage.moving
+        inertial = 0.0
+        for number, bar in zip(MOVING_BARS, bars, strict=True):
+            a_G = getattr(solution, f"a_G{number}")
+            inertial += bar.mass * float(np.nanmax(np.hypot(*a_G.T), initial=0.0))
+        lever = 1.0 if self.facts.linear else self.longest
+        return ROUND_OFF * inertial * lever
 
     def _write_power(self) -> list[str]:
         """Write power and energy of the drive, and what a motor must have."""
         facts, duty, power = self.facts, self.facts.duty, self.facts.solution.power
         if duty is None:
             one = float(power[0]) if power is not None else 0.0
+            if facts.peak is not None and not self._without_rounding(facts.peak.value):
+                one = 0.0
             return [self._row("power", self._value(one, "W"))] if one else []
         if not duty.peak_power > 0.0:
             return []

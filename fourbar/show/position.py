@@ -43,6 +43,9 @@ class PositionSheet:
                 continue
             numbers = np.array([value[0] for value in values])
             largest = np.nanmax(np.abs(numbers), initial=0.0)
+            if letter == "alpha":
+                speeds = [getattr(self.solution, f"omega_{bar}") for bar in MOVING_BARS]
+                largest = max(largest, np.nanmax(np.square(speeds), initial=0.0))
             numbers = np.where(np.abs(numbers) <= ROUND_OFF * largest, 0.0, numbers)
             factor, name = choose_unit(0.0, unit, self.units)
             form = ".4f" if letter == "theta" else f".{POSITION_DIGITS}g"
@@ -179,6 +182,8 @@ class PositionSheet:
         self, label: str, values: Array, unit: str, after: str = ""
     ) -> str:
         factor, name = 1.0, ""
+        if unit == "rad" and abs(float(values[0])) <= ROUND_OFF:
+            values = 0.0 * values
         if unit != "1":
             factor, name = choose_unit(abs(float(values[0])), unit, self.units)
             name = f" {name}"
@@ -190,10 +195,13 @@ class PositionSheet:
 
 def _write_numbers(numbers: Array, form: str = f".{POSITION_DIGITS}g") -> list[str]:
     """Write numbers; a dash where there is no value, and 0 without a sign."""
-    return [
-        format(number + 0.0, form) if np.isfinite(number) else "-"
-        for number in numbers.tolist()
-    ]
+    texts = []
+    for number in numbers.tolist():
+        text = format(number, form) if np.isfinite(number) else "-"
+        if text != "-" and float(text) == 0.0:
+            text = text.removeprefix("-")
+        texts.append(text)
+    return texts
 
 
 def _write_row(label: str, cells: Iterable[str]) -> str:

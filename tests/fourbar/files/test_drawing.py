@@ -233,3 +233,68 @@ def test_mjcf_stands_where_the_drawing_has_it(tmp_path: Path) -> None:
         "O4": (0.25, 0.05),
     }.items():
         assert data.site(name).xpos[:2] == pytest.approx(place, abs=1e-9)
+
+
+def test_a_parallelogram_drawn_on_a_grid_is_one() -> None:
+    """To a tenth of a millimetre the lengths of opposite bars differ; the sum of all is above 500 mm."""
+    random = np.random.default_rng(1)
+    recognised, tried = 0, 0
+    for _ in range(200):
+        O2 = complex(*random.uniform(-200.0, 200.0, 2))
+        arm, base = (
+            random.uniform(150.0, 300.0) * np.exp(1j * random.uniform(0.0, 7.0))
+            for _ in range(2)
+        )
+        if abs(np.sin(np.angle(arm / base))) < 0.1:
+            continue
+        pins = (O2, O2 + arm, O2 + arm + base, O2 + base)
+        rows = (f'["{pin.real:.1f} mm", "{pin.imag:.1f} mm"]' for pin in pins)
+        text = "\n".join(
+            f"{name} = {row}"
+            for name, row in zip(("O2", "A", "B", "O4"), rows, strict=True)
+        )
+        scene = loads(f"[pins]\n{text}\n")
+        tried += 1
+        recognised += scene.linkage.ground == pytest.approx(
+            scene.linkage.coupler.length, rel=1e-14
+        )
+        assert loads(dump(scene)).linkage == scene.linkage
+    assert tried > 150
+    assert recognised == tried
+
+
+def test_a_drawing_that_nearly_has_one_change_point_stays_as_it_is() -> None:
+    """d + a = b + c but for 0.03 mm, within the decimals: by chance, and nobody draws that."""
+    text = """\
+[pins]
+O2 = ["0.0 mm", "0.0 mm"]
+A = ["0.0 mm", "100.0 mm"]
+B = ["273.0 mm", "150.8 mm"]
+O4 = ["300.0 mm", "30.0 mm"]
+"""
+    scene = loads(text)
+    pins = scene.drawing
+    assert pins is not None
+    d, a, b, c = drawn = tuple(pins.length(bar) for bar in (1, 2, 3, 4))
+    assert 1e-5 < abs(d + a - b - c) < 5e-5
+    assert scene.linkage.lengths == drawn
+
+
+@pytest.mark.parametrize("bar", [2, 4])
+def test_a_commanded_bar_that_stands_still_as_drawn_is_refused(bar: int) -> None:
+    """A kite folded onto one pin: two bars turn together about it, and the others rest."""
+    folded = {
+        2: ((0, 0), (300, 0), (300, 200), (300, 0)),
+        4: ((0, 0), (150, 80), (0, 0), (300, 0)),
+    }[bar]
+    rows = "\n".join(
+        f'{name} = ["{x} mm", "{y} mm"]'
+        for name, (x, y) in zip(("O2", "A", "B", "O4"), folded, strict=True)
+    )
+    text = f'[pins]\n{rows}\n[motion]\ntheta_{bar} = "drawn"\nomega_{bar} = "1 rad/s"\n'
+    with pytest.raises(InputError, match="stands still: command another bar"):
+        loads(text)
+    other = 6 - bar
+    scene = loads(text.replace(f"_{bar} =", f"_{other} ="))
+    here = fourbar.solve(scene)
+    assert getattr(here, f"omega_{bar}")[0] == 0.0

@@ -285,3 +285,15 @@ def test_the_peak_of_a_release_over_change_points_is_said_to_grow() -> None:
     for time in solution.change_points:
         angle = np.interp(time, solution.time, solution.theta_2)
         assert abs(math.sin(angle)) < 1e-3
+
+
+def test_a_kite_on_its_change_point_shows_zeros_and_not_their_rounding() -> None:
+    kite = fourbar.FourBar(
+        0.3, fourbar.Bar(0.3), fourbar.Bar(0.2, 1.0), fourbar.Bar(0.2)
+    )
+    scene = fourbar.Scene(kite, fourbar.Motion(0.0, 1.0))
+    text = "\n".join(write_block(scene, fourbar.solve(scene)))
+    assert "e-" not in text.replace("1e-", "")
+    assert "-0.0000" not in text
+    assert re.search(r"transmission angle +0 deg", text)
+    assert re.search(r"torque +0 N m", text)
