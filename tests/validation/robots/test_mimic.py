@@ -123,6 +123,22 @@ def test_least_squares_are_the_normal_equations() -> None:
 
 
 @pytest.mark.slow
+def test_an_include_may_lie_in_the_folder_of_assets(tmp_path: Path) -> None:
+    home, elsewhere = tmp_path / "a" / "b", tmp_path / "assets"
+    for folder in (home, elsewhere):
+        folder.mkdir(parents=True)
+    text = write(elsewhere).read_text()
+    inside = text.replace("mujoco>", "mujocoinclude>")
+    (elsewhere / "mimic.xml").write_text(inside)
+    path = home / "robot.xml"
+    path.write_text('<mujoco><include file="mimic.xml"/></mujoco>')
+    report = measure_mimic(path, "s", KNEE, elsewhere)
+    assert report.equality.leader == "c"
+    with pytest.raises(InputError, match="is not there"):
+        measure_mimic(path, "s", KNEE)
+
+
+@pytest.mark.slow
 def test_fewer_positions_than_a_fit_needs_are_refused(tmp_path: Path) -> None:
     few = replace(KNEE, motion=KNEE.motion.replace(angle=np.linspace(-0.5, 0.5, 5)))
     with pytest.raises(InputError, match="range of at least 6 positions"):

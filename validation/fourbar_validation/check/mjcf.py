@@ -398,7 +398,7 @@ def command(
     if mimic is not None:
         if scene is None:
             raise click.UsageError("--mimic needs the SCENE of the loop")
-        show_mimic(measure_mimic(theirs, mimic, scene))
+        show_mimic(measure_mimic(theirs, mimic, scene, robot["assets"]))
         return 0
     assets = robot.pop("assets")
     if loop is not None or scene is None or _is_robot(theirs, names, assets, robot):

@@ -58,16 +58,22 @@ class MimicReport:
     """Polynomials of DEGREES with the smallest largest error of the angle."""
 
 
-def measure_mimic(path: Path, joint: str, scene: Scene) -> MimicReport:
+def measure_mimic(
+    path: Path, joint: str, scene: Scene, assets: Path | None = None
+) -> MimicReport:
     """Hold the polynomial of a joint against the loop of a scene over its motion.
 
     The leader's position is taken as theta_2, and the follower's zero is theta_4 where the leader is at its own.
+
+    Parameters
+    ----------
+    assets : a further folder in which includes and meshes are looked for.
 
     Raises
     ------
     InputError : no such equality, or the loop does not close at the zero of the file or over the motion.
     """
-    file = read_robot(path)
+    file = read_robot(path, assets)
     with examine_guarded(path) as examined:
         equality: JointEquality = examined(READ, file, joint)
     positions = np.unique(command(scene).theta_2)

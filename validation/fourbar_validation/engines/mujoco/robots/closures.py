@@ -288,7 +288,8 @@ class _Finder:
             return f"{follower} is kept at {coefficients.split()[0]} of its rest"
         leader = name_joint(model, second)
         return (
-            f"{follower} follows {leader}, polycoef {coefficients}: no loop is closed"
+            f"{follower} follows {leader}, polycoef {coefficients}: no loop is closed "
+            f"(check-mjcf SCENE FILE --mimic {follower} holds it against one)"
         )
 
     def _recognise(
