@@ -45,6 +45,7 @@ from fourbar_validation.engines.mujoco.closed_loop import (
 from fourbar_validation.engines.mujoco.couple import find_couple
 from fourbar_validation.engines.mujoco.describe import (
     FREE,
+    STIFFEST,
     Described,
     describe_model,
     mend_entry,
@@ -71,8 +72,6 @@ MOST_STEPS = 400_000
 """A revolution at 628 steps per turn is a thousandth of this; more would be minutes."""
 PRICING = 60.0
 """Seconds in which differences are tried one by one; each takes two evaluations."""
-STIFFEST = 0.9999
-"""Largest impedance of a constraint: MuJoCo clamps `solimp` there."""
 DRIVING = 1e3
 """Armature over the inertia of all else from which it is a flywheel that drives: the speed then ripples by 1e-3."""
 GENERATED = Path("generated.xml")
