@@ -19,7 +19,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from fourbar.effects import Flywheel
+from fourbar.effects import Flywheel, Gravity
 from fourbar.errors import FourBarError, InputError, LimitError
 from fourbar.linkage import PINS
 from fourbar.mjcf import choose_run, size_flywheel, write_mjcf
@@ -51,11 +51,13 @@ from fourbar_validation.engines.mujoco.describe import (
     mend_entry,
     set_entry,
 )
+from fourbar_validation.engines.mujoco.robots.ancestry import is_enabled
 from fourbar_validation.engines.mujoco.robots.compiled import (
     compile_robot,
     list_unknown_parts,
 )
 from fourbar_validation.engines.mujoco.robots.loop import RobotFile
+from fourbar_validation.engines.mujoco.robots.scene import miss_output
 from fourbar_validation.engines.mujoco.runner import (
     Stepper,
     find_assembled,
@@ -74,6 +76,10 @@ PRICING = 60.0
 """Seconds in which differences are tried one by one; each takes two evaluations."""
 DRIVING = 1e3
 """Armature over the inertia of all else from which it is a flywheel that drives: the speed then ripples by 1e-3."""
+SAME_GRAVITY = 1e-9
+"""Part of gravity by which its direction may differ in the axes of a scene."""
+SAME_OUTPUT = 1e-6
+"""rad; two ways to see a linkage whose outputs miss that of the scene alike."""
 GENERATED = Path("generated.xml")
 """Name of the file that is generated from a scene."""
 NO_BIAS = mujoco.mjtBias.mjBIAS_NONE
@@ -109,9 +115,36 @@ def collect_warnings() -> Iterator[list[str]]:
         mujoco.set_mju_user_warning(before)
 
 
-def compile_topology(file: RobotFile, names: Mapping[str, str]) -> Topology:
-    """Compile a file whose bars have these names."""
-    return Topology(compile_robot(file).model, names)
+def compile_topology(
+    file: RobotFile, names: Mapping[str, str], scene: Scene
+) -> Topology:
+    """Compile a file whose bars have these names, and see it as a scene does."""
+    return orient(Topology(compile_robot(file).model, names), scene)
+
+
+def orient(topology: Topology, scene: Scene) -> Topology:
+    """Return a four-bar in the axes of a scene, as far as gravity has the same direction there; else as it is.
+
+    A linkage that is turned in its plane together with gravity, or seen from the other side, is the same one.
+    """
+    model = topology.model
+    gravity = model.opt.gravity * is_enabled(model, "gravity")
+    wanted = sum(
+        (effect.vector for effect in scene.effects if isinstance(effect, Gravity)),
+        start=np.zeros(2),
+    )
+    allowed = SAME_GRAVITY * float(np.linalg.norm(gravity))
+    seen = [
+        topology.turned(scene.linkage.ground_angle, behind=behind)
+        for behind in (False, True)
+    ]
+    fitting = [
+        one for one in seen if np.linalg.norm(one.in_plane(gravity) - wanted) <= allowed
+    ]
+    missed = [miss_output(scene, *one.rest_angles) for one in fitting]
+    if len(fitting) > 1 and missed[1] < missed[0] - SAME_OUTPUT:
+        return fitting[1]
+    return fitting[0] if fitting else topology
 
 
 def examine(scene: Scene, file: RobotFile | None, names: Mapping[str, str]) -> Examined:
@@ -128,6 +161,7 @@ def _examine(scene: Scene, file: RobotFile, names: Mapping[str, str]) -> Examine
     robot = compile_robot(file)
     list_unknown_parts(robot, set(range(robot.model.nbody)))
     topology, guessed = find_topology(robot.model, names, scene.linkage.lengths)
+    topology = orient(topology, scene)
     loop = UserLoop(topology, scene)
     described = describe_model(topology, loop.flywheel)
     for key, (value, *_) in described.items():
@@ -165,14 +199,14 @@ def examine_changed(
     """
     start, answered = time.perf_counter(), list[list[Answer] | None]()
     file = RobotFile(GENERATED, write_mjcf(scene, drive="none"))
-    generated = describe_model(compile_topology(file, {}))
+    generated = describe_model(compile_topology(file, {}, scene))
     texts = (set_entry(file.text, generated, key, value) for key, value in changes)
     for changed in chain([file.text], texts):
         answers = None
         if time.perf_counter() - start < PRICING and changed is not None:
             try:
                 with collect_warnings():
-                    topology = compile_topology(replace(file, text=changed), {})
+                    topology = compile_topology(replace(file, text=changed), {}, scene)
                     answers = _list_answers(UserLoop(topology, scene), scene)
             except (
                 FourBarError
@@ -191,7 +225,7 @@ def examine_mended(
     """Answer with a file one entry of which is that of the generated one; None where it cannot be."""
     start, answered = time.perf_counter(), list[list[Answer] | None]()
     for key, value in changes:
-        topology = compile_topology(file, names)
+        topology = compile_topology(file, names, scene)
         answers = None
         if time.perf_counter() - start < PRICING and mend_entry(topology, key, value):
             with collect_warnings():
@@ -211,7 +245,7 @@ def predict_softness(
     """
     answers = []
     for times in (1.0, 2.0):
-        topology = compile_topology(file, names)
+        topology = compile_topology(file, names, scene)
         if topology.closure is None:
             return {}
         impedance = 1.0 / (1.0 + times * (1.0 / STIFFEST - 1.0))

@@ -61,7 +61,13 @@ def find_stated_body(model: mujoco.MjModel, names: Mapping[str, str], role: str)
 class Topology:
     """Bars, pins, hinges and closure of a compiled model; everything is measured in its rest state."""
 
-    def __init__(self, model: mujoco.MjModel, names: Mapping[str, str]) -> None:
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        names: Mapping[str, str],
+        axes: Array | None = None,
+    ) -> None:
+        """Read a model; `axes`: x and y of its plane, (2, 3), None: those of the world that are in it."""
         self.model, self.data, self.names = model, mujoco.MjData(model), dict(names)
         mujoco.mj_kinematics(model, self.data)
         mujoco.mj_comPos(model, self.data)
@@ -80,6 +86,8 @@ class Topology:
         self.hinge: dict[str, int] = {}
         self.sense: dict[str, float] = {}
         self._find_plane()
+        if axes is not None:
+            self.axes, self.normal = axes, np.cross(*axes)
         for joint in range(model.njnt):
             self._add_hinge(joint)
         if len(self.hinge) != 3:
@@ -290,6 +298,20 @@ class Topology:
     def ground_angle(self) -> float:
         """Return theta_1, rad."""
         return self._line[1]
+
+    @property
+    def rest_angles(self) -> tuple[float, float, float]:
+        """Return theta_1, theta_2 and theta_4 of the rest state, rad."""
+        return self._line[1], self._line[2], self._line[4]
+
+    def turned(self, ground_angle: float, *, behind: bool = False) -> "Topology":
+        """Return the same four-bar in axes in which theta_1 is this angle, rad; `behind`: seen from the other side."""
+        x, y = self.axes
+        y = -y if behind else y
+        angle = (-self.ground_angle if behind else self.ground_angle) - ground_angle
+        cos, sin = math.cos(angle), math.sin(angle)
+        axes = np.array([cos * x + sin * y, cos * y - sin * x])
+        return Topology(self.model, self.names, axes)
 
     def rest_angle(self, pin: str) -> float:
         """Measure a hinge in the rest state: from the line of its bearer to that of the bar that hangs on it."""

@@ -8,8 +8,6 @@ import numpy as np
 
 from fourbar.errors import InputError, LimitError
 from fourbar.scene import Scene, command
-from fourbar.scene.motion import Motion
-from fourbar.solve import solve
 from fourbar_validation.engines.mujoco.robots.ancestry import name_joint
 from fourbar_validation.engines.mujoco.robots.answers import (
     InsideAnswer,
@@ -29,7 +27,7 @@ from fourbar_validation.engines.mujoco.robots.compiled import compile_robot
 from fourbar_validation.engines.mujoco.robots.inside import HEAVY, LoopInside
 from fourbar_validation.engines.mujoco.robots.loop import RobotFile, RobotLoop
 from fourbar_validation.engines.mujoco.robots.pose import PosedRobot, pose_robot
-from fourbar_validation.engines.mujoco.robots.scene import make_scene
+from fourbar_validation.engines.mujoco.robots.scene import make_scene, miss_output
 from fourbar_validation.engines.mujoco.robots.settings import (
     SettingsSearch,
     read_settings,
@@ -99,8 +97,11 @@ def _turn_to(
         pose = replace(options.pose, drive=name_joint(posed.model, output))
         loop = choose_loop(find_closures(posed, pose), loop.name)
     behind = loop.seen_from_behind()
-    nearer = _miss_output(scene, behind) < _miss_output(scene, loop) - ALIKE
-    return behind if nearer else loop
+    missed, missed_behind = (
+        miss_output(scene, one.angles[0], one.angles[1], one.angles[3])
+        for one in (loop, behind)
+    )
+    return behind if missed_behind < missed - ALIKE else loop
 
 
 def _miss_lengths(scene: Scene, loop: RobotLoop) -> tuple[float, float]:
@@ -112,17 +113,6 @@ def _miss_lengths(scene: Scene, loop: RobotLoop) -> tuple[float, float]:
         for lengths in ([ground, *moving], [ground, *reversed(moving)])
     )
     return apart, turned
-
-
-def _miss_output(scene: Scene, loop: RobotLoop) -> float:
-    """Return by how much the output of a scene misses that of a loop in its pose, rad; infinite where it is open."""
-    theta_1, theta_2, _, theta_4 = loop.angles
-    linkage = scene.linkage
-    angle = np.array([theta_2 - theta_1 + linkage.ground_angle])
-    motion = Motion(angle, branch=scene.motion.branch)
-    output = float(solve(Scene(linkage, motion), "position").theta_4[0])
-    away = output - linkage.ground_angle - (theta_4 - theta_1)
-    return abs(math.remainder(away, math.tau)) if math.isfinite(away) else math.inf
 
 
 def _measure_loop(

@@ -164,6 +164,16 @@ def round_angle(angle: float) -> float:
     return round(angle, DIGITS) + 0.0
 
 
+def miss_output(scene: Scene, theta_1: float, theta_2: float, theta_4: float) -> float:
+    """Return by how much the output of a scene misses that of a loop in its pose, rad; infinite where it is open."""
+    linkage = scene.linkage
+    angle = np.array([theta_2 - theta_1 + linkage.ground_angle])
+    motion = Motion(angle, branch=scene.motion.branch)
+    output = float(solve(Scene(linkage, motion), "position").theta_4[0])
+    away = output - linkage.ground_angle - (theta_4 - theta_1)
+    return abs(math.remainder(away, math.tau)) if math.isfinite(away) else math.inf
+
+
 @dataclass(frozen=True, slots=True)
 class _Lump:
     """What a bar carries, as one rigid body in the plane."""
