@@ -17,8 +17,8 @@ class PinocchioLoop(PlainLoop):
     """Over Pinocchio's joint Jacobians, frame accelerations and rnea."""
 
     def __init__(self, scene: Scene) -> None:
-        tree = PinocchioTree(scene)
-        super().__init__(tree, scene)
+        super().__init__(PinocchioTree, scene)
+        tree = self.tree
         self.ends = tree.frame["end3"], tree.frame["end4"]
         self.at = [self.data.oMf[frame].translation for frame in self.ends]
         # what only weighs needs no forces from outside, and its field stays

@@ -7,6 +7,7 @@ J a + (dJ/dt) v = 0, one inverse dynamics tau(q, v, a), and the multipliers of
     [J^T e_drive] [lambda; T] = tau.
 """
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from fourbar.errors import LimitError
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Array
-from fourbar_validation.engines.description import list_speeds
+from fourbar_validation.engines.description import list_speeds, state_from_pins
 from fourbar_validation.engines.loop import Assembler
 from fourbar_validation.engines.tree import solve_closed, solve_multipliers
 
@@ -31,9 +32,10 @@ class PlainLoop:
     Raises LimitError for a cylinder, and for friction that depends on the pin forces.
     """
 
-    def __init__(self, tree: Any, scene: Scene) -> None:
+    def __init__(self, build: Callable[[Scene], Any], scene: Scene) -> None:
         if scene.drive is not None:
             raise LimitError("the plain loop has a couple on a bar, no cylinder")
+        tree = build(state_from_pins(scene))
         if tree.loaded:
             raise LimitError("the plain loop does not iterate over loads of pins")
         self.tree, self.model, self.data = tree, tree.model, tree.data

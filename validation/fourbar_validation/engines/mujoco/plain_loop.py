@@ -13,8 +13,8 @@ class MujocoInverseLoop(PlainLoop):
     """Over MuJoCo's kinematics, mj_jacDot and mj_inverse, with constraints off."""
 
     def __init__(self, scene: Scene) -> None:
-        tree = MujocoTree(scene)
-        super().__init__(tree, scene)
+        super().__init__(MujocoTree, scene)
+        tree = self.tree
         self.ends = tree.site["end3"], tree.site["end4"]
         self.bodies = tree.body[3], tree.body[4]
         self.at = [self.data.site_xpos[site] for site in self.ends]
