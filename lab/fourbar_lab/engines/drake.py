@@ -1,6 +1,6 @@
 """Drake: inverse dynamics on the open tree, the loop closed by multipliers, pin forces from its reaction port."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import partial
 from typing import Any
 
@@ -26,8 +26,10 @@ from fourbar_validation.engines.description import (
     about_first_pin,
     find_unknown,
     list_parts,
+    rotate_by,
 )
 from fourbar_validation.engines.effects import has_term, list_acting
+from fourbar_validation.engines.loaded import Pair
 from fourbar_validation.engines.loop import Exact
 from fourbar_validation.engines.tree import Tree
 
@@ -121,8 +123,11 @@ class DrakeTree(Tree):
         """Set the speeds; accelerations come with each request."""
         self.plant.SetVelocities(self.context, v)
 
-    def acceleration(self, name: str) -> Array:
-        """Return J a + (dJ/dt) v of a point."""
+    def accelerations(self, names: Iterable[str]) -> list[list[float]]:
+        """Return J a + (dJ/dt) v of points."""
+        return [self._accelerate(name).tolist() for name in names]
+
+    def _accelerate(self, name: str) -> Array:
         arguments = (*self.local[name], self.world, self.world)
         bias = self.plant.CalcBiasTranslationalAcceleration(
             self.context, BY_SPEEDS, *arguments
@@ -142,7 +147,7 @@ class DrakeTree(Tree):
             )
         return np.array(self.plant.CalcInverseDynamics(self.context, self.a, forces))
 
-    def carried(self) -> dict[int, Array]:
+    def carried(self) -> dict[int, Pair]:
         """Read the reaction port, which finds the accelerations once more."""
         applied = []
         for bar, wrench in self.wrenches.items():
@@ -156,7 +161,10 @@ class DrakeTree(Tree):
         port.FixValue(self.context, Value[list[ExternallyAppliedSpatialForce]](applied))
         borne = self.plant.get_reaction_forces_output_port().Eval(self.context)
         return {
-            b: self.rotation(b) @ borne[int(joint.index())].translational()[:2]
+            b: rotate_by(
+                self.rotation(b).tolist(),
+                *borne[int(joint.index())].translational()[:2].tolist(),
+            )
             for b, joint in self.joint.items()
         }
 

@@ -232,7 +232,7 @@ class FaultyTree:
         return getattr(self.tree, name)
 
     def push(self, bar: int, force: Any, point: Any) -> None:
-        self.tree.push(bar, self.factor * force, point)
+        self.tree.push(bar, [self.factor * axis for axis in force], point)
 
     def twist(self, bar: int, couple: float) -> None:
         self.tree.twist(bar, self.factor * couple)

@@ -90,15 +90,16 @@ def _apply_springs(effect: "Springs", bars: Loaded) -> None:
     """Pull at the engine's own places of the two points."""
     for spring in effect.springs:
         one, second = bars.end(spring.start), bars.end(spring.end)
-        vector = np.asarray(second - one)
-        distance = math.hypot(*vector)
+        x, y = second[0] - one[0], second[1] - one[1]
+        distance = math.hypot(x, y)
         if spring.preload == spring.stiffness * spring.length:
-            vector = spring.stiffness * vector
+            per_metre = spring.stiffness
         else:
             tension = spring.preload + spring.stiffness * (distance - spring.length)
-            vector = vector * (tension / distance) if distance else np.full(2, np.nan)
-        bars.push(spring.start.bar, vector, one)
-        bars.push(spring.end.bar, -vector, second)
+            per_metre = tension / distance if distance else math.nan
+        x, y = per_metre * x, per_metre * y
+        bars.push(spring.start.bar, (x, y), one)
+        bars.push(spring.end.bar, (-x, -y), second)
 
 
 def _apply_flywheel(effect: "Flywheel", bars: Loaded) -> None:
@@ -110,16 +111,17 @@ def _load(load: "Load", bars: Loaded) -> None:
     """Apply a force at its place, which the engine's bar carries along, and a couple."""
     factor = 1.0 if load.table is None else look_up(load.table, bars.angle(2))
     if load.force is not None:
-        along, across = resolve(*load.force)
-        force = np.array((along, across))
+        force = resolve(*load.force)
         if load.frame == "bar":
-            force = bars.rotate(load.bar, along, across)
+            force = bars.rotate(load.bar, *force)
         if load.arm is not None:
-            point = bars.point(f"G{load.bar}") + np.array(resolve(*load.arm))
+            x, y = bars.locate(f"G{load.bar}")
+            to_x, to_y = resolve(*load.arm)
+            point = x + to_x, y + to_y
         else:
             assert load.place is not None
             point = bars.end(load.place)
-        bars.push(load.bar, factor * force, point)
+        bars.push(load.bar, (factor * force[0], factor * force[1]), point)
     bars.twist(load.bar, factor * load.moment)
 
 

@@ -1,7 +1,7 @@
 """The bars of a four-bar as an engine holds them; loads and effects act on them as wrenches, from its own numbers."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -34,9 +34,11 @@ ROUNDED = 1e-11
 """Change, relative, at or below which one that no longer falls is rounding, near a pole of the torque too."""
 DIVERGED = 1e100
 """Load, N, that only passes running away from each other reach."""
+Pair = tuple[float, float]
+"""A vector of the plane: plain numbers, since an array of two costs more than its arithmetic."""
 Act = Callable[[], None]
 """Function that applies what acts on the bars at their present motion."""
-Values = dict[str, Array | float]
+Values = dict[str, Array | Sequence[float] | float]
 
 
 class Assembled(Protocol):
@@ -51,7 +53,7 @@ class Assembled(Protocol):
     def jacobian(self) -> Array:
         """Return the derivative of the gap, (2, 3), m."""
 
-    def positions(self) -> dict[str, Array]:
+    def positions(self) -> Mapping[str, Array | Pair]:
         """Locate O4, A, B, "B4", the end of bar 4, and where pin A is open "A2", that of bar 2; (2,), m."""
 
 
@@ -127,27 +129,29 @@ class Loaded(EngineBars, Protocol):
         """Compute the direction from the bar's axes; the ground's line as described."""
         if bar == 1:
             return self.ground_angle
-        along = self.rotation(bar)[:, 0]
-        return math.atan2(along[1], along[0])
+        (cosine, _), (sine, _) = self.rotation(bar).tolist()
+        return math.atan2(sine, cosine)
 
-    def rotate(self, bar: int, x: float, y: float) -> Array:
-        """Rotate (x, y) along and across a bar's line into world axes, (2,)."""
-        rotated = (
-            rotate(self.ground_angle, x, y)
-            if bar == 1
-            else rotate_by(self.rotation(bar).tolist(), x, y)
-        )
-        return np.array(rotated)
+    def rotate(self, bar: int, x: float, y: float) -> Pair:
+        """Rotate (x, y) along and across a bar's line into world axes."""
+        if bar == 1:
+            return rotate(self.ground_angle, x, y)
+        return rotate_by(self.rotation(bar).tolist(), x, y)
 
-    def first_pin(self, bar: int) -> Array:
-        """Locate the first pin of a bar (O2, O2, A, O4 of bars 1, 2, 3, 4), m, (2,)."""
-        return np.zeros(2) if bar == 1 else self.point(f"first_pin{bar}")
+    def locate(self, name: str) -> Pair:
+        """Locate a point that `description.parts` names, m."""
+        x, y = self.point(name).tolist()
+        return x, y
 
-    def end(self, point: "Place") -> Array:
-        """Locate an end of a spring or of a linear drive, m, (2,)."""
-        return self.first_pin(point.bar) + self.rotate(
-            point.bar, *resolve(point.distance, point.angle)
-        )
+    def first_pin(self, bar: int) -> Pair:
+        """Locate the first pin of a bar (O2, O2, A, O4 of bars 1, 2, 3, 4), m."""
+        return (0.0, 0.0) if bar == 1 else self.locate(f"first_pin{bar}")
+
+    def end(self, point: "Place") -> Pair:
+        """Locate an end of a spring or of a linear drive, m."""
+        x, y = self.first_pin(point.bar)
+        along, across = self.rotate(point.bar, *resolve(point.distance, point.angle))
+        return x + along, y + across
 
     def cylinder(self, bar: int) -> tuple[complex, complex]:
         """Measure it with the bars laid down along +x."""
@@ -155,13 +159,13 @@ class Loaded(EngineBars, Protocol):
         self.place((0.0, 0.0, 0.0))
         ends = [end for _, end in self.linear.ends]
         on_bar, on_ground = sorted(ends, key=lambda end: -end.bar)
-        x, y = (
-            (self.end(point) - self.first_pin(bar)).tolist()
+        on, ground = (
+            np.subtract(self.end(point), self.first_pin(bar)).tolist()
             for point in (on_bar, on_ground)
         )
-        return complex(*x), complex(*y)
+        return complex(*on), complex(*ground)
 
-    def line(self) -> tuple[list[tuple[float, int, Array]], float | None, Array]:
+    def line(self) -> tuple[list[tuple[float, int, Pair]], float | None, Array]:
         """Place the drive: sense, bar and point of each end, m; its stroke, m; and its direction.
 
         A force at a point has no stroke.
@@ -171,13 +175,14 @@ class Loaded(EngineBars, Protocol):
             (sense, place.bar, self.end(place)) for sense, place in self.linear.ends
         ]
         if isinstance(self.linear, PointDrive):
-            along = np.array(resolve(1.0, self.linear.direction))
+            along = resolve(1.0, self.linear.direction)
             if self.linear.frame == "bar":
-                along = self.rotate(self.linear.place.bar, *along.tolist())
-            return ends, None, along
+                along = self.rotate(self.linear.place.bar, *along)
+            return ends, None, np.array(along)
         (*_, one), (*_, second) = ends
-        stroke = math.hypot(*(second - one))
-        return ends, stroke, (second - one) / stroke
+        line = np.subtract(second, one)
+        stroke = math.hypot(*line)
+        return ends, stroke, line / stroke
 
     def work(self, size: float) -> None:
         """Let the drive act with a torque, N m, or a force, N."""
@@ -192,17 +197,14 @@ class Loaded(EngineBars, Protocol):
         """Set a field (g_x, g_y) for the engine's own gravity, m/s^2."""
         self.field = field
 
-    def push(self, bar: int, force: Array, point: Array) -> None:
+    def push(self, bar: int, force: Iterable[float], point: Iterable[float]) -> None:
         """Add a force (N, world axes) at a point (m, world axes); on the ground it does nothing."""
         if bar != 1:
-            (x, y), (f_x, f_y), wrench = (
-                (point - self.first_pin(bar)).tolist(),
-                force.tolist(),
-                self.wrenches[bar],
-            )
+            (x, y), (x_0, y_0), (f_x, f_y) = point, self.first_pin(bar), force
+            wrench = self.wrenches[bar]
             wrench[0] += f_x
             wrench[1] += f_y
-            wrench[2] += x * f_y - y * f_x
+            wrench[2] += (x - x_0) * f_y - (y - y_0) * f_x
 
     def twist(self, bar: int, couple: float) -> None:
         """Add a couple, N m; on the ground it does nothing."""

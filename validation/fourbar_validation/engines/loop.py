@@ -1,8 +1,9 @@
 """A four-bar assembled position by position, by whatever engine moves its bars: what an exact engine answers."""
 
+import cmath
 import math
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -69,33 +70,29 @@ class Assembler:
 
     def __init__(self, tree: Assembled, bar: int = 2) -> None:
         self.tree, self.bar = tree, bar
-
-    def find(self, theta: float, branch: int) -> Angles | None:
-        """Assemble on the branch and place the tree there; None where the loop does not close."""
-        tree, bar = self.tree, self.bar
-        theta = theta if bar == 2 else reduce_angle(theta)
-        tree.place([theta if each == bar else 0.0 for each in (2, 3, 4)])
-        points = tree.positions()
+        # measured once, with the bars laid down along +x
+        tree.place((0.0, 0.0, 0.0))
+        points = {name: complex(*place) for name, place in tree.positions().items()}
         along = {
             2: points.get("A2", points["A"]),
             3: points["B"] - points["A"],
             4: points["B4"] - points["O4"],
         }
-        diagonal = points["O4"] + along[4] if bar == 4 else points["O4"] - along[bar]
-        e, d, near, far, held = (
-            math.hypot(*vector.tolist())
-            for vector in (
-                diagonal,
-                points["O4"],
-                *(along[other] for other in CLOSING[bar]),
-                along[bar],
-            )
-        )
-        closed = ROUNDING * (held + d + near + far)
+        self.ground, self.along = points["O4"], along[bar]
+        self.near, self.far = (abs(along[other]) for other in CLOSING[bar])
+        lengths = abs(self.ground), abs(self.along), self.near, self.far
+        self.closed = ROUNDING * sum(lengths)
+
+    def find(self, theta: float, branch: int) -> Angles | None:
+        """Assemble on the branch and place the tree there; None where the loop does not close."""
+        bar, near, far, closed = self.bar, self.near, self.far, self.closed
+        theta = theta if bar == 2 else reduce_angle(theta)
+        held = self.along * complex(math.cos(theta), math.sin(theta))
+        diagonal = self.ground + held if bar == 4 else self.ground - held
+        e, phi = cmath.polar(diagonal)
         # the gap with a bar held is stationary only where the others lie along the diagonal: this is its least value
         if max(e - (near + far), abs(near - far) - e) > closed:
             return None
-        phi = math.atan2(diagonal[1], diagonal[0])
         # the triangle as measured is the nearest start, also where a bar is a millionth of the others
         triangle = (
             _compute_triangle_angle(e, near, far),
@@ -114,7 +111,7 @@ class Assembler:
                 math.remainder(theta_3 - theta_2, math.tau),
                 math.remainder(theta_4, math.tau),
             )
-            assembled = close_gap(tree, q, branch, closed, bar)
+            assembled = close_gap(self.tree, q, branch, closed, bar)
             if assembled is not None:
                 return assembled
         if max(e - (near + far), abs(near - far) - e) < -closed:
@@ -252,7 +249,7 @@ class Exact:
         return answer
 
 
-Read = Callable[[Angles, float, float], Values]
+Read = Callable[[Angles, float, float], Mapping[str, Any]]
 """Function from the bars' angles, and speed and acceleration of the commanded bar, to values by name."""
 
 
@@ -275,7 +272,7 @@ def read_each(
     ):
         if (q := position.find(theta, branch)) is not None:
             assembled[i], gap = True, max(gap, math.hypot(*bars.gap()))
-            rows[i] = missing | read(q, float(omega[i]), float(alpha[i]))
+            rows[i] = {**missing, **read(q, float(omega[i]), float(alpha[i]))}
     return (
         {name: np.array([row[name] for row in rows], float) for name in missing},
         assembled,

@@ -1,7 +1,7 @@
 """Pinocchio: recursive Newton-Euler on the open tree, the loop closed by multipliers; and a released motion."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from typing import Any
 
@@ -10,6 +10,7 @@ import pinocchio as pin
 
 from fourbar.effects import Gravity
 from fourbar.errors import LimitError
+from fourbar.linkage import MOVING_BARS
 from fourbar.scene import Scene, command, with_signs
 from fourbar_validation.compare.answer import Array, ReleasedAnswer
 from fourbar_validation.engines.description import (
@@ -19,6 +20,7 @@ from fourbar_validation.engines.description import (
     rotate_by,
 )
 from fourbar_validation.engines.effects import has_term, list_acting
+from fourbar_validation.engines.loaded import Pair
 from fourbar_validation.engines.loop import Assembler, Exact
 from fourbar_validation.engines.tree import Tree, solve_closed
 
@@ -57,24 +59,27 @@ class PinocchioTree(Tree):
         self.q = np.zeros(3)
         self.external = pin.StdVec_Force([pin.Force.Zero()] * model.njoints)
         # the engine's own memory, read and written in place: to look it up again costs more than a pass of the engine
-        self.at = {
+        self.at: dict[str, Array] = {
             name: data.oMf[frame].translation[:2] for name, frame in self.frame.items()
         }
-        self.turned_to = {
+        self.turned_to: dict[int, Array] = {
             bar: data.oMi[joint].rotation[:2, :2] for bar, joint in self.joint.items()
         }
         self.joint_force = {
-            bar: data.f[joint].linear[:2] for bar, joint in self.joint.items()
+            bar: data.f[self.joint[bar]].linear[:2] for bar in MOVING_BARS
         }
         self.external_force = {
             bar: (self.external[joint].linear, self.external[joint].angular)
             for bar, joint in self.joint.items()
         }
+        self._fields: dict[tuple[float, float], Any] = {}
         self.ready(scene, list_acting(scene, self))
         self._weigh(self.field)
 
     def _weigh(self, field: tuple[float, float]) -> None:
-        self.model.gravity = pin.Motion(np.array([*field, 0.0]), np.zeros(3))
+        if field not in self._fields:
+            self._fields[field] = pin.Motion(np.array([*field, 0.0]), np.zeros(3))
+        self.model.gravity = self._fields[field]
 
     def place(self, q: Sequence[float]) -> None:
         """Place joint frames, Jacobian columns and points at q."""
@@ -84,17 +89,23 @@ class PinocchioTree(Tree):
 
     def point(self, name: str) -> Array:
         """Place of a frame."""
-        return np.asarray(self.at[name])
+        return self.at[name]
+
+    def locate(self, name: str) -> Pair:
+        """Read the place of a frame."""
+        x, y = self.at[name].tolist()
+        return x, y
 
     def rotation(self, bar: int) -> Array:
         """Return that of the joint."""
-        return np.asarray(self.turned_to[bar])
+        return self.turned_to[bar]
 
     def point_jacobian(self, name: str) -> Array:
         """Return that of a frame."""
-        return np.array(
-            pin.getFrameJacobian(self.model, self.data, self.frame[name], WORLD)[:2]
+        jacobian: Array = pin.getFrameJacobian(
+            self.model, self.data, self.frame[name], WORLD
         )
+        return jacobian[:2]
 
     def turn(self, bar: int) -> Array:
         """Return the last row of the bar's frame Jacobian."""
@@ -106,18 +117,23 @@ class PinocchioTree(Tree):
         """Compute the forward kinematics."""
         pin.forwardKinematics(self.model, self.data, self.q, v, a)
 
-    def acceleration(self, name: str) -> Array:
-        """Return that of a frame."""
-        motion = pin.getFrameClassicalAcceleration(
-            self.model, self.data, self.frame[name], WORLD
-        )
-        return np.array(motion.linear[:2])
+    def accelerations(self, names: Iterable[str]) -> list[list[float]]:
+        """Return those of frames."""
+        model, data, frame = self.model, self.data, self.frame
+        return [
+            pin.getFrameClassicalAcceleration(
+                model, data, frame[name], WORLD
+            ).linear.tolist()[:2]
+            for name in names
+        ]
 
     def needed(
         self, field: tuple[float, float], wrenches: dict[int, list[float]]
     ) -> Array:
         """Compute recursive Newton-Euler with what acts on the bars as external forces."""
         self._weigh(field)
+        if not any(map(any, wrenches.values())):
+            return np.array(pin.rnea(self.model, self.data, self.q, self.v, self.a))
         for bar, (x, y, moment) in wrenches.items():
             force, couple = self.external_force[bar]
             force[:2] = rotate_by(self.rotation(bar).T.tolist(), x, y)
@@ -126,11 +142,11 @@ class PinocchioTree(Tree):
             pin.rnea(self.model, self.data, self.q, self.v, self.a, self.external)
         )
 
-    def carried(self) -> dict[int, Array]:
-        """Compute what each joint transmits in one more pass."""
-        self.needed(self.field, self.wrenches)
+    def carried(self) -> dict[int, Pair]:
+        """Read what each joint transmits, which the last pass left in its own axes."""
         return {
-            bar: self.rotation(bar) @ self.joint_force[bar] for bar in self.wrenches
+            bar: rotate_by(self.turned_to[bar].tolist(), *force.tolist())
+            for bar, force in self.joint_force.items()
         }
 
 

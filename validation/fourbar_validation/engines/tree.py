@@ -9,6 +9,7 @@ lambda = F43 and e_drive = the derivative of the driven bar's rotation, or of th
 comes from the engine.
 """
 
+from collections.abc import Iterable
 from functools import partial
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -18,10 +19,22 @@ from fourbar.linkage import MOVING_BARS
 from fourbar.scene import Scene
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.engines.description import ON_BARS, POINTS
-from fourbar_validation.engines.loaded import Act, Loaded, Values, make_no_wrenches
+from fourbar_validation.engines.loaded import (
+    Act,
+    Loaded,
+    Pair,
+    Values,
+    make_no_wrenches,
+)
 
 if TYPE_CHECKING:
     from fourbar.effects.place import Place
+OPEN_AT_B = [(name, point) for name, point in POINTS.items() if name != "A2"]
+"""Names of points where bars 2 and 3 share pin A, and of the points of the bars."""
+ACCELERATIONS = [f"a_{name}" for name in ON_BARS]
+AT_REST = np.zeros(3)
+BORNE = {2: (2,), 3: (3, 2), 4: (4,)}
+"""Bars whose first pins carry what acts on a bar of the open tree."""
 OMEGAS, ALPHAS = (
     tuple(f"{name}_{bar}" for bar in MOVING_BARS) for name in ("omega", "alpha")
 )
@@ -59,34 +72,30 @@ class Tree(Loaded, Protocol):
     def set_motion(self, v: Array, a: Array) -> None:
         """Set speeds and accelerations of the coordinates."""
 
-    def acceleration(self, name: str) -> Array:
-        """Return that of a point at the motion last set, (2,), m/s^2."""
+    def accelerations(self, names: Iterable[str]) -> list[list[float]]:
+        """Return those of points at the motion last set, [x, y] of each, m/s^2."""
 
     def needed(
         self, field: tuple[float, float], wrenches: dict[int, list[float]]
     ) -> Array:
         """Return the generalized forces that the motion last set needs beyond gravity and what acts, (3,), N m."""
 
-    def carried(self) -> dict[int, Array]:
-        """Return the force on each moving bar at its first pin, at the motion and wrenches last set, (2,), N."""
+    def carried(self) -> dict[int, Pair]:
+        """Return the force on each moving bar at its first pin, at the motion and wrenches last asked for, N."""
 
     # methods that follow from these
     def gap(self) -> tuple[float, float]:
         """Return B on bar 3 minus B on bar 4."""
-        x, y = (self.point("end3") - self.point("end4")).tolist()
-        return x, y
+        (x, y), (x_4, y_4) = self.locate("end3"), self.locate("end4")
+        return x - x_4, y - y_4
 
     def jacobian(self) -> Array:
         """Return the difference of the two points' Jacobians."""
         return self.point_jacobian("end3") - self.point_jacobian("end4")
 
-    def positions(self) -> dict[str, Array]:
+    def positions(self) -> dict[str, Pair]:
         """Locate the points of the bars."""
-        return {
-            name: np.array(self.point(point))
-            for name, point in POINTS.items()
-            if name != "A2"
-        }
+        return {name: self.locate(point) for name, point in OPEN_AT_B}
 
     def velocity(self, bar: int) -> float:
         """Return the angular velocity of a bar, rad/s."""
@@ -101,10 +110,11 @@ class Tree(Loaded, Protocol):
         self.v, self.a = v, a
         self.set_motion(v, a)
 
-    def drift(self, v: Array) -> Array:
-        """Return the acceleration of the gap at speeds v where a = 0, (2,), m/s^2."""
-        self.moving(v, np.zeros(3))
-        return self.acceleration("end3") - self.acceleration("end4")
+    def drift(self, v: Array) -> Pair:
+        """Return the acceleration of the gap at speeds v where a = 0, m/s^2."""
+        self.moving(v, AT_REST)
+        (x, y), (x_4, y_4) = self.accelerations(("end3", "end4"))
+        return x - x_4, y - y_4
 
     def torques(self) -> Array:
         """Compute what the motion asks for beyond loads and effects, (3,), N m."""
@@ -125,40 +135,52 @@ class Tree(Loaded, Protocol):
         """Return the derivative of an end of the drive, (2, 3), m: its bar's first pin, and the arm turned across."""
         if point.bar == 1:
             return np.zeros((2, 3))
-        x, y = self.end(point) - self.first_pin(point.bar)
+        x, y = np.subtract(self.end(point), self.first_pin(point.bar)).tolist()
         return self.point_jacobian(f"first_pin{point.bar}") + np.outer(
             (-y, x), self.turns[point.bar]
         )
 
-    def forces(self, loop_force: Array, drive: float) -> dict[str, Array]:
-        """Return F12, F32, F14 with the loop force on bar 3 at B, its opposite on bar 4, and the drive put back."""
-        self.push(3, loop_force, self.point("end3"))
-        self.push(4, -loop_force, self.point("end4"))
-        self.work(drive)
+    def forces(self, loop_force: Array, drive: float) -> dict[str, Pair]:
+        """Return F12, F32, F14 at the motion and wrenches last set.
+
+        The open tree carries what acts. The force of the loop on bar 3, its opposite on
+        bar 4 and a drive along a line are carried on to the ground; a couple asks
+        nothing of the pins.
+        """
+        x, y = loop_force.tolist()
         on = self.carried()
-        return {"F12": on[2], "F32": -on[3], "F14": on[4]}
+        carry(on, 3, x, y)
+        carry(on, 4, -x, -y)
+        if self.linear is not None:
+            ends, _, along = self.line()
+            for sense, bar, _ in ends:
+                carry(on, bar, *(sense * drive * along).tolist())
+        x, y = on[3]
+        return {"F12": on[2], "F32": (-x, -y), "F14": on[4]}
 
     def move(self, bar: int, speed: float, acceleration: float) -> Values:
         """Return velocities, accelerations and forces where the tree is placed; nothing where they are 0/0."""
         jacobian, commanded = self.jacobian(), self.turns[bar]
         try:
             v = solve_closed(jacobian, speed, commanded)
-            a = solve_closed(jacobian, acceleration, commanded, *self.drift(v).tolist())
+            a = solve_closed(jacobian, acceleration, commanded, *self.drift(v))
         except np.linalg.LinAlgError:
             return {}
         self.moving(v, a)
-        values: Values = {
-            f"a_{name}": self.acceleration(point) for name, point in ON_BARS.items()
-        }
+        values: Values = dict(
+            zip(ACCELERATIONS, self.accelerations(ON_BARS.values()), strict=True)
+        )
         values |= zip(OMEGAS, (self.rows @ v).tolist(), strict=True)
         values |= zip(ALPHAS, (self.rows @ a).tolist(), strict=True)
         solve = partial(solve_multipliers, jacobian, self.drive_column())
 
         def balanced() -> dict[str, Any]:
             unknowns = solve(self.torques())
-            return self.forces(unknowns[:2], float(unknowns[2])) | {
-                "F43": unknowns[:2],
-                self.driving: unknowns[2],
+            loop_force, drive = unknowns[:2], float(unknowns[2])
+            return {
+                **self.forces(loop_force, drive),
+                "F43": loop_force,
+                self.driving: drive,
             }
 
         try:
@@ -172,6 +194,13 @@ class Tree(Loaded, Protocol):
                 solve(self.needed((0.0, 0.0), make_no_wrenches()))[2]
             )
         return values
+
+
+def carry(on: dict[int, Pair], bar: int, x: float, y: float) -> None:
+    """Let the pins of an open tree carry one more force on a bar, N; the ground takes none."""
+    for bearer in BORNE.get(bar, ()):
+        f_x, f_y = on[bearer]
+        on[bearer] = f_x - x, f_y - y
 
 
 BAR_2 = np.array([1.0, 0.0, 0.0])

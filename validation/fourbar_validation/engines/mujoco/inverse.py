@@ -1,18 +1,21 @@
 """MuJoCo's inverse dynamics on the open tree, constraints off; the loop is closed by multipliers."""
 
-import warnings
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from copy import copy
+from functools import cache
 from typing import Any
 
 import mujoco
 import numpy as np
 
 from fourbar.errors import LimitError
+from fourbar.linkage import uniform
 from fourbar.scene import Scene
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.engines.description import FIRST_PIN, find_unknown, list_parts
 from fourbar_validation.engines.effects import has_term, list_acting
 from fourbar_validation.engines.limits import LIGHTEST
+from fourbar_validation.engines.loaded import Pair
 from fourbar_validation.engines.loop import Exact
 from fourbar_validation.engines.tree import Tree
 
@@ -30,73 +33,108 @@ def find_refusal(scene: Scene) -> str:
     return ""
 
 
-class MujocoTree(Tree):
-    """The open tree, built from the description with MjSpec."""
+@cache
+def compile_bars() -> mujoco.MjModel:
+    """Compile the open tree of three bars of unit length and mass, constraints off; what is fixed lies at 0.
 
-    def __init__(self, scene: Scene, data: mujoco.MjData | None = None) -> None:
-        spec = mujoco.MjSpec()
-        spec.option.disableflags |= (
-            mujoco.mjtDisableBit.mjDSBL_CONSTRAINT | mujoco.mjtDisableBit.mjDSBL_CONTACT
+    Only numbers differ from tree to tree, and to compile takes a hundred times as long as to
+    write them. What the compiler takes from nobody, `find_refusal` refuses.
+    """
+    spec = mujoco.MjSpec()
+    spec.option.disableflags |= (
+        mujoco.mjtDisableBit.mjDSBL_CONSTRAINT | mujoco.mjtDisableBit.mjDSBL_CONTACT
+    )
+    bodies: dict[int, Any] = {1: spec.worldbody}
+    for part in list_parts(uniform(1.0, 1.0, 1.0, 1.0)):
+        body = bodies[part.bar] = bodies[part.bearer].add_body(name=f"bar{part.bar}")
+        body.explicitinertial = True
+        body.mass, body.inertia = part.mass, [part.inertia] * 3
+        body.add_joint(
+            name=FIRST_PIN[part.bar],
+            type=mujoco.mjtJoint.mjJNT_HINGE,
+            axis=[0.0, 0.0, 1.0],
         )
-        bodies: dict[int, Any] = {1: spec.worldbody}
-        for part in list_parts(scene.linkage):
-            body = bodies[part.bar] = bodies[part.bearer].add_body(
-                name=f"bar{part.bar}", pos=[*part.first_pin, 0.0]
-            )
-            body.explicitinertial = True
-            body.mass, body.ipos, body.inertia = (
-                part.mass,
-                [*part.centre, 0.0],
-                [part.inertia] * 3,
-            )
-            body.add_joint(
-                name=FIRST_PIN[part.bar],
-                type=mujoco.mjtJoint.mjJNT_HINGE,
-                axis=[0.0, 0.0, 1.0],
-            )
-            for name, place in part.points.items():
-                body.add_site(name=name, pos=[*place, 0.0])
-        with warnings.catch_warnings():
-            # the warning is about the mass matrix at q = 0, which inverse dynamics never divides by
-            warnings.filterwarnings("ignore", "Inertia matrix is too close to singular")
-            self.model = model = spec.compile()
-        # a centre or site nearer than 1e-6 m is taken for the body's origin, silently; these marks are why
-        model.body_sameframe[:] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
-        model.site_sameframe[:] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
-        model.body_simple[:] = model.dof_simplenum[:] = 0
-        self.data = mujoco.MjData(model) if data is None else data
-        mujoco.mj_resetData(model, self.data)
+        for name in part.points:
+            body.add_site(name=name)
+    model = spec.compile()
+    # a centre or site nearer than 1e-6 m is taken for the body's origin, silently; these marks are why
+    model.body_sameframe[:] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
+    model.site_sameframe[:] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
+    model.body_simple[:] = model.dof_simplenum[:] = 0
+    assert [int(model.joint(pin).dofadr[0]) for pin in FIRST_PIN.values()] == [0, 1, 2]
+    return model
+
+
+class MujocoTree(Tree):
+    """The open tree, its numbers written from the description; `memory`: of a tree that is no longer asked."""
+
+    def __init__(
+        self, scene: Scene, memory: tuple[mujoco.MjModel, mujoco.MjData] | None = None
+    ) -> None:
+        if memory is None:
+            model = copy(compile_bars())
+            memory = model, mujoco.MjData(model)
+        self.model, self.data = model, data = memory
+        mujoco.mj_resetData(model, data)
         self.body = {bar: model.body(f"bar{bar}").id for bar in FIRST_PIN}
         self.site = {model.site(number).name: number for number in range(model.nsite)}
-        assert [int(model.joint(pin).dofadr[0]) for pin in FIRST_PIN.values()] == [
-            0,
-            1,
-            2,
-        ]  # depth first
-        # the engine's own memory, read in place
-        self.at = {
-            name: self.data.site_xpos[site, :2] for name, site in self.site.items()
+        self._describe(scene)
+        # the engine's own memory, read and written in place: to look it up again takes longer than its work
+        self.in_space = {name: data.site_xpos[site] for name, site in self.site.items()}
+        self.at: dict[str, Array] = {
+            name: place[:2] for name, place in self.in_space.items()
         }
-        self.turned_to = {
-            bar: self.data.xmat[body].reshape(3, 3)[:2, :2]
+        self.turned_to: dict[int, Array] = {
+            bar: data.xmat[body].reshape(3, 3)[:2, :2]
             for bar, body in self.body.items()
         }
-        self._jac, self._dot = np.zeros((3, 3)), np.zeros((3, 3))
+        self.first_pins = {bar: data.xpos[body] for bar, body in self.body.items()}
+        self.joint_force = {
+            bar: data.cfrc_int[body, 3:5] for bar, body in self.body.items()
+        }
+        self.qpos, self.qvel, self.qacc = data.qpos, data.qvel, data.qacc
+        self.xfrc_applied, self.qfrc_inverse = data.xfrc_applied, data.qfrc_inverse
+        self.model_gravity = model.opt.gravity
+        self._jac = np.zeros((3, 3))
+        self._jacobians, self._rates = np.zeros((2, model.nsite, 3, 3))
+        self._force, self._couple = np.zeros(3), np.zeros(3)
         self.ready(scene, list_acting(scene, self))
+
+    def _describe(self, scene: Scene) -> None:
+        """Write places, masses and inertias.
+
+        Of what the compiler derives from them inverse dynamics reads the borne masses alone.
+        """
+        model = self.model
+        for part in list_parts(scene.linkage):
+            body = self.body[part.bar]
+            model.body_pos[body, :2] = part.first_pin
+            model.body_ipos[body, :2] = part.centre
+            model.body_mass[body] = model.body_subtreemass[body] = part.mass
+            model.body_inertia[body] = part.inertia
+            if part.bearer != 1:
+                model.body_subtreemass[self.body[part.bearer]] += part.mass
+            for name, place in part.points.items():
+                model.site_pos[self.site[name], :2] = place
 
     def place(self, q: Sequence[float]) -> None:
         """Place bodies, sites and the axes of the Jacobians at q."""
-        self.data.qpos[:] = q
+        self.qpos[:] = q
         mujoco.mj_kinematics(self.model, self.data)
         mujoco.mj_comPos(self.model, self.data)
 
     def point(self, name: str) -> Array:
         """Place of a site."""
-        return np.asarray(self.at[name])
+        return self.at[name]
+
+    def locate(self, name: str) -> Pair:
+        """Read the place of a site."""
+        x, y = self.at[name].tolist()
+        return x, y
 
     def rotation(self, bar: int) -> Array:
         """Return that of the body."""
-        return np.asarray(self.turned_to[bar])
+        return self.turned_to[bar]
 
     def point_jacobian(self, name: str) -> Array:
         """Return that of a site."""
@@ -110,65 +148,54 @@ class MujocoTree(Tree):
 
     def set_motion(self, v: Array, a: Array) -> None:
         """Set the speeds of the bodies."""
-        self.data.qvel[:], self.data.qacc[:] = v, a
+        self.qvel[:], self.qacc[:] = v, a
         mujoco.mj_comVel(self.model, self.data)
 
-    def acceleration(self, name: str) -> Array:
-        """Return J a + (dJ/dt) v of a site."""
-        site, body = self.site[name], self.body[int(name[-1])]
-        mujoco.mj_jacSite(self.model, self.data, self._jac, None, site)
-        mujoco.mj_jacDot(
-            self.model, self.data, self._dot, None, self.data.site_xpos[site], body
-        )
-        return np.asarray((self._jac @ self.a + self._dot @ self.v)[:2])
+    def accelerations(self, names: Iterable[str]) -> list[list[float]]:
+        """Return J a + (dJ/dt) v of sites."""
+        model, data, count = self.model, self.data, 0
+        for name, J, rate in zip(names, self._jacobians, self._rates, strict=False):
+            site, body = self.site[name], self.body[int(name[-1])]
+            mujoco.mj_jacSite(model, data, J, None, site)
+            mujoco.mj_jacDot(model, data, rate, None, self.in_space[name], body)
+            count += 1
+        J, rate = self._jacobians[:count], self._rates[:count]
+        accelerations: list[list[float]] = (J @ self.a + rate @ self.v)[:, :2].tolist()
+        return accelerations
 
     def needed(
         self, field: tuple[float, float], wrenches: dict[int, list[float]]
     ) -> Array:
         """Return the result of mj_inverse less what loads and effects do on the coordinates."""
-        self.model.opt.gravity[:] = (*field, 0.0)
-        self.data.xfrc_applied[:] = 0.0
+        self.model_gravity[:2] = field
+        self.xfrc_applied[:] = 0.0
         mujoco.mj_inverse(self.model, self.data)
         applied = np.zeros(3)
-        for bar, (x, y, moment) in (
-            (bar, wrench) for bar, wrench in wrenches.items() if any(wrench)
-        ):
-            force, couple, body = (
-                np.array([x, y, 0.0]),
-                np.array([0.0, 0.0, moment]),
-                self.body[bar],
-            )
-            mujoco.mj_applyFT(
-                self.model,
-                self.data,
-                force,
-                couple,
-                self.data.xpos[body],
-                body,
-                applied,
-            )
-        return np.asarray(self.data.qfrc_inverse - applied)
+        for bar, wrench in wrenches.items():
+            if any(wrench):
+                self._force[:2], self._couple[2] = wrench[:2], wrench[2]
+                mujoco.mj_applyFT(
+                    self.model,
+                    self.data,
+                    self._force,
+                    self._couple,
+                    self.first_pins[bar],
+                    self.body[bar],
+                    applied,
+                )
+        return np.asarray(self.qfrc_inverse - applied)
 
-    def carried(self) -> dict[int, Array]:
+    def carried(self) -> dict[int, Pair]:
         """Return cfrc_int, the force of the parent on each body."""
-        for bar, (x, y, moment) in self.wrenches.items():
-            body = self.body[bar]
-            to_x, to_y = (self.data.xipos[body] - self.data.xpos[body])[
-                :2
-            ]  # xfrc_applied acts at the mass centre
-            self.data.xfrc_applied[body] = (
-                x,
-                y,
-                0.0,
-                0.0,
-                0.0,
-                moment - (to_x * y - to_y * x),
-            )
+        for bar, (x, y, _) in self.wrenches.items():
+            # the couples about the mass centres, at which these forces act, ask nothing of the pins of a tree
+            self.xfrc_applied[self.body[bar], :2] = x, y
         mujoco.mj_rnePostConstraint(self.model, self.data)
-        return {
-            bar: np.array(self.data.cfrc_int[body, 3:5])
-            for bar, body in self.body.items()
-        }
+        forces = {}
+        for bar, force in self.joint_force.items():
+            x, y = force.tolist()
+            forces[bar] = x, y
+        return forces
 
 
 class MujocoInverse(Exact):
@@ -176,11 +203,11 @@ class MujocoInverse(Exact):
 
     def __init__(self) -> None:
         super().__init__("mujoco-inverse", self._make_tree)
-        self.data: mujoco.MjData | None = None
+        self.memory: tuple[mujoco.MjModel, mujoco.MjData] | None = None
 
     def _make_tree(self, scene: Scene) -> MujocoTree:
         if reason := find_refusal(scene):
             raise LimitError(reason)
-        tree = MujocoTree(scene, self.data)
-        self.data = tree.data
+        tree = MujocoTree(scene, self.memory)
+        self.memory = tree.model, tree.data
         return tree

@@ -29,7 +29,7 @@ from fourbar.scene import command as command_of
 from fourbar_validation.compare.answer import Answer, Array
 from fourbar_validation.compare.tolerance import magnitude
 from fourbar_validation.engines.description import Value, list_unknowns, name_driving
-from fourbar_validation.engines.loaded import Assembled, Values
+from fourbar_validation.engines.loaded import Assembled
 from fourbar_validation.engines.loop import (
     MADE,
     Angles,
@@ -435,7 +435,7 @@ class UserLoop(Assembled):
         """Compute the joint speeds that keep the gap closed where the model is placed, (3,)."""
         return np.asarray(self.to_joints @ solve_closed(self.jacobian(), omega_2))
 
-    def ask(self, q: Array, v: Array, alpha_2: float) -> Values:
+    def ask(self, q: Array, v: Array, alpha_2: float) -> dict[str, Array | float]:
         """Evaluate a state at which the crank accelerates at alpha_2, and solve for the driven bar's couple."""
         data, drive = self.data, self.scene.drive_bar
         active = data.eq_active.copy()
@@ -459,7 +459,7 @@ class UserLoop(Assembled):
 
         couple = self._solve_drive(acceleration, alpha_2)
         mujoco.mj_rnePostConstraint(self.model, data)
-        values: Values = {name_driving(self.scene): couple}
+        values: dict[str, Array | float] = {name_driving(self.scene): couple}
         turned = (
             self.topology.angles(data),
             self.from_joints @ data.qvel,
@@ -541,7 +541,7 @@ def answer_one_state(loop: UserLoop, command: Command) -> Answer:
     """Answer every position by itself."""
     contacts = 0
 
-    def read(_: Angles, omega_2: float, alpha_2: float) -> Values:
+    def read(_: Angles, omega_2: float, alpha_2: float) -> dict[str, Array | float]:
         nonlocal contacts
         try:
             v = loop.speeds(omega_2)
