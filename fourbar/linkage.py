@@ -78,6 +78,8 @@ def require(key: str, value: object, unit: str = "1", bound: str = ANY) -> float
 
 def require_whole(key: str, value: object, among: Container[int], allowed: str) -> int:
     """Return the value as one of some integers, or raise an InputError that says what is allowed."""
+    if type(value) is int and value in among:
+        return value
     if isinstance(value, bool) or not isinstance(value, Integral) or value not in among:
         raise InputError(key, value, allowed)
     return int(value)

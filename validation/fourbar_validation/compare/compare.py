@@ -1,7 +1,7 @@
 """An engine's answer against the formulas: one row per quantity, at the position where it is worst."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
@@ -38,6 +38,7 @@ from fourbar_validation.compare.rows import (
     make_plain,
 )
 from fourbar_validation.compare.scales import (
+    Sizes,
     make_reference,
     take_smallest_scale,
     take_strictest_condition,
@@ -50,6 +51,7 @@ from fourbar_validation.compare.tolerance import (
     Array,
     ErrorBound,
     Mask,
+    compute_differences,
     count_half_turns,
     divide,
     find_error,
@@ -121,6 +123,21 @@ class _Judged(NamedTuple):
     decided: int = 0
 
 
+class _Due(NamedTuple):
+    """A quantity that both sides have, and the positions at which it is compared."""
+
+    quantity: str
+    ours: Array
+    theirs: Array
+    mask: Mask
+    note: str
+    """Positions that are not judged, as the end of a reason."""
+    closed: int
+    """Number of positions where both close the loop."""
+    reversals: int
+    """Number of those at which dry friction reverses."""
+
+
 @dataclass
 class Comparison:
     """One answer held to the formulas."""
@@ -169,11 +186,7 @@ class Comparison:
                 for line, quantity in OF_THE_LINE.items()
                 if quantity in names or line in answer.quantities
             }
-        judged = [
-            one
-            for name in STAGE_OF
-            if name in names and (one := self._compare(name)) is not None
-        ]
+        judged = self._compare([name for name in STAGE_OF if name in names])
         alarms = [self._row("watch", FAILS, alarm) for alarm in answer.alarms]
         numbers, decided = (
             sum(one.numbers for one in judged),
@@ -236,6 +249,32 @@ class Comparison:
         assert self.held.nearby is not None
         return self.held.nearby(self.formulas.assembled)
 
+    @cached_property
+    def _reversing(self) -> Mask:
+        """Positions at which dry friction reverses, so that a force may have either of two values."""
+        tolerance = self.held.tolerance
+        return mark_reversing(
+            self.scene, self.formulas, tolerance.factor, in_time=tolerance.in_time
+        )
+
+    def _may_reverse(self, quantity: str) -> bool:
+        """Return whether a quantity may have either of two values where dry friction reverses."""
+        return quantity in OF_FORCES or (
+            quantity == "drive_condition"
+            and any(effect.loaded_pins for effect in self.scene.effects)
+        )
+
+    @cached_property
+    def _closed(self) -> Mask:
+        """Positions where both close the loop."""
+        assert self.answer.assembled is not None
+        return self.formulas.assembled & self.answer.assembled
+
+    @cached_property
+    def _count(self) -> int:
+        """Number of positions where both close the loop."""
+        return int(np.count_nonzero(self._closed))
+
     def _row(self, quantity: str, verdict: str, reason: str, **numbers: float) -> Row:
         error, allowed, theta_2, condition = (
             float(numbers.get(key, math.nan)) for key in NUMBERS
@@ -268,8 +307,18 @@ class Comparison:
             self._who, "assembled", float(count) * differ, 0.0, reason, ours.theta_2
         )
 
-    def _compare(self, quantity: str) -> _Judged | None:
-        """Compare a quantity where both close the loop and the formulas state a value; None if neither side has it."""
+    def _compare(self, quantities: Sequence[str]) -> list[_Judged]:
+        """Compare all quantities of the answer at once, in their order; those that neither side has are left out."""
+        prepared = [self._prepare(quantity) for quantity in quantities]
+        judged = iter(self._judge([one for one in prepared if isinstance(one, _Due)]))
+        return [
+            next(judged) if isinstance(one, _Due) else one
+            for one in prepared
+            if one is not None
+        ]
+
+    def _prepare(self, quantity: str) -> _Judged | _Due | None:
+        """Find where both close the loop and the formulas state a value; None if neither side has the quantity."""
         formulas, scene, tolerance = self.formulas, self.scene, self.held.tolerance
         ours, theirs = (
             getattr(formulas, quantity, None),
@@ -286,77 +335,74 @@ class Comparison:
         if ours is None or theirs is None:
             missing = "no answer" if theirs is None else "the formulas have no answer"
             return _Judged(self._row(quantity, FAILS, missing))
-        assert self.answer.assembled is not None
-        both = formulas.assembled & self.answer.assembled
-        stated = both & _mark_stated(quantity, formulas, ours)
-        closed, unstated = (
-            int(np.count_nonzero(both)),
-            _count(formulas.status_code[both & ~stated]),
+        mask, closed = (
+            self._closed & _mark_stated(quantity, formulas, ours),
+            self._count,
         )
-        if unstated and not stated.any():
-            return _Judged(
-                self._row(
-                    quantity, REFUSES, f"the formulas state no value: {unstated}"
-                ),
-                closed,
-            )
-        answerable = stated & _mark_answerable(quantity, scene, formulas, tolerance)
-        reversing = answerable & _mark_reversing(quantity, scene, formulas, tolerance)
-        reversals = int(
-            np.count_nonzero(reversing)
-        )  # at a reversal the forces of either side are right
-        note = f"; not judged: {unstated}" if unstated else ""
-        note += (
-            f"; {reversals} positions at which dry friction reverses not judged"
-            if reversals
-            else ""
-        )
-        mask = answerable & ~reversing
+        stated, note = int(np.count_nonzero(mask)), ""
+        if stated < closed:
+            unstated = _count(formulas.status_code[self._closed & ~mask])
+            if not stated:
+                reason = f"the formulas state no value: {unstated}"
+                return _Judged(self._row(quantity, REFUSES, reason), closed)
+            note += f"; not judged: {unstated}"
+        if quantity in FORCES and scene.drive_bar != 2 and tolerance.in_time:
+            mask = mask & _mark_moving_drive(scene, formulas)
+        reversals = 0  # at a reversal the forces of either side are right
+        if self._may_reverse(quantity):
+            reversals = int(np.count_nonzero(mask & self._reversing))
+            mask = mask & ~self._reversing
+        if reversals:
+            note += f"; {reversals} positions at which dry friction reverses not judged"
         if not mask.any():
             nowhere = "no position at which this quantity can be compared" + note
             return _Judged(self._row(quantity, UNDECIDED, nowhere), closed, reversals)
-        row, decided = self._judge(quantity, ours, theirs, mask, note)
-        return _Judged(row, closed, reversals + decided)
+        return _Due(quantity, ours, theirs, mask, note, closed, reversals)
 
-    def _judge(
-        self, quantity: str, ours: Array, theirs: Array, mask: Mask, note: str
-    ) -> tuple[Row, int]:
-        """Judge the errors at the positions of `mask`.
+    def _judge(self, due: Sequence[_Due]) -> Iterator[_Judged]:
+        """Judge the errors of quantities at their positions."""
+        if not due:
+            return
+        errors = self._measure(due)
+        beyond = errors.mask & ~(errors.error <= errors.allowed)
+        agrees = np.asarray(~beyond.any(axis=1) & errors.decidable.any(axis=1))
+        worst_used = find_worst_used(errors)
+        for i, one in enumerate(due):
+            of_one = errors.select(i)
+            if agrees[i]:
+                worst = of_one.agreeing(int(worst_used[i]))
+            else:
+                of_one = self._take_again(one.quantity, one.ours, of_one)
+                predicted = self._predict(one.quantity, of_one)
+                worst = judge_errors(of_one, predicted, self.held.method)
+            position = worst.position
+            row = self._row(
+                one.quantity,
+                worst.verdict,
+                worst.reason + one.note,
+                error=of_one.error[position],
+                allowed=worst.allowed,
+                theta_2=self.formulas.theta_2[position],
+                condition=of_one.condition[position],
+            )
+            yield _Judged(row, one.closed, one.reversals + worst.decided)
 
-        Return the row, and the number of positions with a verdict.
-        """
-        errors = self._measure(quantity, ours, theirs, mask)
-        errors = self._take_again(quantity, ours, errors)
-        worst = judge_errors(errors, self._predict(quantity, errors), self.held.method)
-        i = worst.position
-        row = self._row(
-            quantity,
-            worst.verdict,
-            worst.reason + note,
-            error=errors.error[i],
-            allowed=worst.allowed,
-            theta_2=self.formulas.theta_2[i],
-            condition=errors.condition[i],
-        )
-        return row, worst.decided
-
-    def _measure(
-        self, quantity: str, ours: Array, theirs: Array, mask: Mask
-    ) -> "Errors":
-        """Measure the errors of a quantity, and what is allowed at each position.
+    def _measure(self, due: Sequence[_Due]) -> "Errors":
+        """Measure the errors of quantities, and what is allowed at each position.
 
         A quantity whose scale is 0 vanishes with all its terms. Nothing is relative to
         it: its error is in its own unit, and none is allowed.
         """
-        scale, condition = self._scale(quantity)
+        names, ours, theirs, masks, *_ = zip(*due, strict=True)
+        scale, condition = map(np.stack, zip(*map(self._scale, names), strict=True))
         vanishes = scale == 0.0
         unit = replace_zero_size(scale)
         tolerance = self.held.tolerance
-        decidable = mask
+        mask = decidable = np.stack(masks)
         if tolerance.conditioned:
             decidable = mask & (condition * NOTHING_TO_TELL > EPS)
         return Errors(
-            error=find_error(quantity, ours, theirs, unit),
+            error=divide(compute_differences(names, ours, theirs), unit),
             allowed=np.where(vanishes, 0.0, tolerance.allowed(condition)),
             unit=unit,
             relative=~vanishes,
@@ -400,18 +446,26 @@ class Comparison:
     def _scale(self, quantity: str) -> tuple[Array, Array]:
         """Return size and condition of a quantity at each position, each the stricter of formulas and reference."""
         if quantity not in self.scales:
-            reference = self._solution if self.reference is None else self.reference
+            ours, theirs = self._sizes
+            reference = None if theirs is None else theirs.formulas
             self.scales[quantity] = (
-                take_smallest_scale(quantity, self.scene, self.formulas, reference),
+                take_smallest_scale(quantity, ours, theirs),
                 take_strictest_condition(
                     quantity, self.scene.linkage, self.formulas, reference
                 ),
             )
         return self.scales[quantity]
 
+    @cached_property
+    def _sizes(self) -> tuple[Sizes, Sizes | None]:
+        """Sizes by the formulas and by the reference, if there is one."""
+        reference = self._solution if self.reference is None else self.reference
+        theirs = None if reference is None else Sizes(self.scene, reference)
+        return Sizes(self.scene, self.formulas), theirs
+
 
 class Errors(NamedTuple):
-    """Errors of one quantity, each (n,), all in one unit."""
+    """Errors of one quantity, each (n,), all in one unit; or of several, (q, n)."""
 
     error: Array
     allowed: Array
@@ -430,6 +484,25 @@ class Errors(NamedTuple):
     """Errors of a second answer within the rounding of theta_2; NaN where not asked."""
     settled: int = 0
     """Number of positions at which that answer agrees."""
+
+    def select(self, i: int) -> "Errors":
+        """Select the errors of one quantity of several."""
+        return Errors(
+            error=self.error[i],
+            allowed=self.allowed[i],
+            unit=self.unit[i],
+            relative=self.relative[i],
+            condition=self.condition[i],
+            mask=self.mask[i],
+            decidable=self.decidable[i],
+            tolerance=self.tolerance,
+        )
+
+    def agreeing(self, position: int) -> "WorstPosition":
+        """Give the verdict where no error of the quantity is beyond the allowed one."""
+        decided = int(np.count_nonzero(self.decidable))
+        why = self.tolerance.explain(self.condition[position]) + self.notes
+        return WorstPosition(position, AGREES, why, self.allowed[position], decided)
 
     @property
     def beyond(self) -> Mask:
@@ -460,6 +533,12 @@ class WorstPosition(NamedTuple):
     """Number of positions that have a verdict."""
 
 
+def find_worst_used(errors: Errors) -> NDArray[np.intp]:
+    """Find the position of each quantity where the error uses most of what is allowed."""
+    used = find_used(errors.error, errors.allowed)
+    return np.asarray(np.argmax(np.where(errors.decidable, used, -1.0), axis=-1))
+
+
 def judge_errors(
     errors: Errors, predicted: Array | None, method: str = ""
 ) -> WorstPosition:
@@ -474,11 +553,7 @@ def judge_errors(
         why = f"eps/condition = {EPS / errors.condition[index]:.1e}"
         return WorstPosition(index, UNDECIDED, why, errors.allowed[index], 0)
     if not beyond.any():
-        used = find_used(errors.error, errors.allowed)
-        index = int(np.argmax(np.where(errors.decidable, used, -1.0)))
-        decided = int(np.count_nonzero(errors.decidable))
-        why = errors.tolerance.explain(errors.condition[index]) + errors.notes
-        return WorstPosition(index, AGREES, why, errors.allowed[index], decided)
+        return errors.agreeing(int(find_worst_used(errors)))
     expected = np.zeros_like(errors.error) if predicted is None else predicted
     bound = np.maximum(errors.allowed, TIMES_PREDICTED * expected)
     used = find_used(errors.error, bound)
@@ -507,18 +582,22 @@ def judge_errors(
 
 def _mark_stated(quantity: str, formulas: Solution, ours: Array) -> Mask:
     """Mark where the formulas have a single value. After an overflow these are the quantities computed before it."""
+    code = formulas.status_code
     if quantity in OF_FORCES:
         # A jam at rest concerns the motion that would begin, so its forces are stated. Forces with several solutions
         # are not: an engine may find another one, or not converge.
-        stated = (formulas.status_code == JAMMED) & np.isfinite(magnitude(ours))
-        return np.asarray(stated | (formulas.status_code == OK))
-    beyond = (formulas.status_code == OVERFLOW) & np.isnan(magnitude(ours))
-    jammed = (formulas.status_code == JAMMED) & (
-        quantity == "drive_condition"
-    )  # drive_condition says how near that is
+        jammed = code == JAMMED
+        if jammed.any():
+            jammed &= np.isfinite(magnitude(ours))
+        return np.asarray(jammed | (code == OK))
+    beyond = code == OVERFLOW
+    if beyond.any():
+        beyond &= np.isnan(magnitude(ours))
     # on a change point no engine can tell the limits of an assembly
-    in_line = np.isin(formulas.status_code, (SINGULAR, CHANGE_POINT))
-    return np.asarray(~in_line & ~beyond & ~jammed)
+    unstated = beyond | (code == SINGULAR) | (code == CHANGE_POINT)
+    if quantity == "drive_condition":  # it says how near a jam is
+        unstated |= code == JAMMED
+    return np.asarray(~unstated)
 
 
 def _count(codes: NDArray[np.uint8]) -> str:
@@ -531,29 +610,13 @@ def _count(codes: NDArray[np.uint8]) -> str:
     )
 
 
-def _mark_reversing(
-    quantity: str, scene: Scene, formulas: Solution, tolerance: ErrorBound
-) -> Mask:
-    """Mark where dry friction reverses, so that a force may have either of two values."""
-    near_jamming = quantity == "drive_condition" and any(
-        effect.loaded_pins for effect in scene.effects
+def _mark_moving_drive(scene: Scene, formulas: Solution) -> Mask:
+    """Mark where an engine that runs through time is not near a pole of the drive."""
+    speed = {3: formulas.omega_3, 4: formulas.omega_4}.get(
+        scene.drive_bar, formulas.stroke_speed
     )
-    if quantity not in OF_FORCES and not near_jamming:
-        return np.zeros(len(formulas), dtype=bool)
-    return mark_reversing(scene, formulas, tolerance.factor, in_time=tolerance.in_time)
-
-
-def _mark_answerable(
-    quantity: str, scene: Scene, formulas: Solution, tolerance: ErrorBound
-) -> Mask:
-    """Mark where an engine of this class can be expected to have the quantity."""
-    if quantity in FORCES and scene.drive_bar != 2 and tolerance.in_time:
-        speed = {3: formulas.omega_3, 4: formulas.omega_4}.get(
-            scene.drive_bar, formulas.stroke_speed
-        )
-        assert speed is not None
-        return mark_turning(speed)
-    return np.ones(len(formulas), dtype=bool)
+    assert speed is not None
+    return mark_turning(speed)
 
 
 def mark_turning(speed: Array) -> Mask:

@@ -201,6 +201,8 @@ def make_plain(text: str) -> str:
 
     Characters that would steer a terminal or a reader are shown, not sent.
     """
+    if text.isprintable():
+        return text
     return "".join(
         c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode()
         for c in text

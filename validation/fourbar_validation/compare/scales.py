@@ -15,7 +15,7 @@ import numpy as np
 
 from fourbar.effects import ForceDrive
 from fourbar.linkage import MOVING_BARS, FourBar
-from fourbar.quantities import LINE, OK, UNITS
+from fourbar.quantities import COUPLE, LINE, OK, UNITS
 from fourbar.scene import Scene
 from fourbar.solution import Solution
 from fourbar_validation.compare.answer import Answer
@@ -34,51 +34,71 @@ VANISHING = 1.0 / K
 """A quantity below this part of the sum of its terms has lost more to cancellation than K covers."""
 
 
+class Sizes:
+    """Sizes of the quantities of one solution of a scene; each sum of terms is computed once."""
+
+    def __init__(self, scene: Scene, formulas: Solution) -> None:
+        self.scene, self.formulas = scene.in_pairs_from_pins(), formulas
+        self._sums: dict[str, Array] = {}
+
+    def scale(self, quantity: str, values: Array) -> Array:
+        """Compute what the error of a quantity is divided by at each position, (n,)."""
+        formulas, unit = self.formulas, UNITS[quantity]
+        if unit in ("rad", "1"):
+            return np.ones(len(formulas))
+        size = magnitude(values)
+        terms = self.sum_terms(quantity)
+        well = (formulas.condition >= WELL_CONDITIONED) & np.isfinite(size)
+        if (
+            unit in ("N m", "W") or quantity == LINE.value
+        ):  # its poles are not where sin_mu vanishes
+            assert formulas.drive_condition is not None
+            well &= formulas.drive_condition >= WELL_CONDITIONED
+        nonzero = np.where(size < VANISHING * terms, terms, size)
+        if not well.any():
+            return nonzero
+        scale = float(size[well].max())
+        most = float(terms[well].max())
+        return np.where(well, most if scale < VANISHING * most else scale, nonzero)
+
+    def sum_terms(self, quantity: str) -> Array:
+        """Sum the absolute terms of the equation that a quantity is computed from, (n,), in its unit.
+
+        Raises KeyError for a quantity of a unit that has no such sum here: nothing is judged by another's scale.
+        """
+        unit = UNITS[quantity]
+        key = quantity if unit in OF_EACH_BAR else unit
+        if key not in self._sums:
+            with np.errstate(divide="ignore", invalid="ignore"):
+                terms = TERMS[unit](quantity, self)
+            self._sums[key] = np.asarray(terms, dtype=float)
+        return self._sums[key]
+
+
 def scale_of(quantity: str, scene: Scene, formulas: Solution, values: Array) -> Array:
     """Compute what the error of a quantity is divided by at each position, (n,)."""
-    if UNITS[quantity] in ("rad", "1"):
-        return np.ones(len(formulas))
-    size = magnitude(values)
-    terms = sum_terms(quantity, scene, formulas)
-    well = (formulas.condition >= WELL_CONDITIONED) & np.isfinite(size)
-    if (
-        UNITS[quantity] in ("N m", "W") or quantity == LINE.value
-    ):  # its poles are not where sin_mu vanishes
-        assert formulas.drive_condition is not None
-        well &= formulas.drive_condition >= WELL_CONDITIONED
-    nonzero = np.where(size < VANISHING * terms, terms, size)
-    if not well.any():
-        return nonzero
-    scale = float(size[well].max())
-    most = float(terms[well].max())
-    return np.where(well, most if scale < VANISHING * most else scale, nonzero)
+    return Sizes(scene, formulas).scale(quantity, values)
 
 
-def sum_terms(quantity: str, scene: Scene, formulas: Solution) -> Array:
-    """Sum of the absolute terms of the equation that a quantity is computed from, (n,), in its unit.
-
-    Raises KeyError for a quantity of a unit that has no such sum here: nothing is judged by another's scale.
-    """
-    scene = scene.in_pairs_from_pins()
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(
-            TERMS[UNITS[quantity]](quantity, scene, formulas), dtype=float
-        )
+OF_EACH_BAR = ("rad/s", "rad/s^2")
+"""Units of quantities whose sums of terms differ from bar to bar."""
 
 
-def _return_one(quantity: str, scene: Scene, formulas: Solution) -> Array:
-    return np.ones(len(formulas))
+def _return_one(_: str, sizes: Sizes) -> Array:
+    return np.ones(len(sizes.formulas))
 
 
-def _sum_lengths(quantity: str, scene: Scene, formulas: Solution) -> Array:
+def _sum_lengths(_: str, sizes: Sizes) -> Array:
+    scene = sizes.scene
     arms = sum(_compute_arm(scene, number) for number in MOVING_BARS) + sum(
         _compute_drive_arms(scene).values()
     )
-    return np.full(len(formulas), sum_lengths(scene.linkage) + arms)
+    return np.full(len(sizes.formulas), sum_lengths(scene.linkage) + arms)
 
 
-def _sum_speeds(quantity: str, scene: Scene, formulas: Solution) -> Array:
-    _, a, b, c = scene.linkage.lengths
+def _sum_speeds(quantity: str, sizes: Sizes) -> Array:
+    formulas = sizes.formulas
+    _, a, b, c = sizes.scene.linkage.lengths
     assert formulas.omega_2 is not None
     omega_2 = np.abs(formulas.omega_2)
     return (
@@ -88,10 +108,9 @@ def _sum_speeds(quantity: str, scene: Scene, formulas: Solution) -> Array:
     )
 
 
-def _sum_angular_accelerations(
-    quantity: str, scene: Scene, formulas: Solution
-) -> Array:
-    _, a, b, c = scene.linkage.lengths
+def _sum_angular_accelerations(quantity: str, sizes: Sizes) -> Array:
+    formulas = sizes.formulas
+    _, a, b, c = sizes.scene.linkage.lengths
     w2, w3, w4, a2 = (
         formulas.omega_2,
         formulas.omega_3,
@@ -107,7 +126,8 @@ def _sum_angular_accelerations(
     )
 
 
-def _sum_velocities(quantity: str, scene: Scene, formulas: Solution) -> Array:
+def _sum_velocities(_: str, sizes: Sizes) -> Array:
+    scene, formulas = sizes.scene, sizes.formulas
     total, drive = np.zeros(len(formulas)), _compute_drive_arms(scene)
     for number in MOVING_BARS:
         arm = (
@@ -119,7 +139,8 @@ def _sum_velocities(quantity: str, scene: Scene, formulas: Solution) -> Array:
     return total
 
 
-def _sum_accelerations(quantity: str, scene: Scene, formulas: Solution) -> Array:
+def _sum_accelerations(_: str, sizes: Sizes) -> Array:
+    scene, formulas = sizes.scene, sizes.formulas
     total = np.zeros(len(formulas))
     for number in MOVING_BARS:
         omega, alpha = (
@@ -132,7 +153,8 @@ def _sum_accelerations(quantity: str, scene: Scene, formulas: Solution) -> Array
     return total
 
 
-def _sum_forces(quantity: str, scene: Scene, formulas: Solution) -> Array:
+def _sum_forces(_: str, sizes: Sizes) -> Array:
+    scene, formulas = sizes.scene, sizes.formulas
     assert formulas.drive_condition is not None
     gain = 1.0
     if scene.drive is not None:  # a short lever makes the force as many times larger
@@ -145,25 +167,21 @@ def _sum_forces(quantity: str, scene: Scene, formulas: Solution) -> Array:
     )
 
 
-def _sum_torques(quantity: str, scene: Scene, formulas: Solution) -> Array:
-    return np.asarray(
-        max(scene.linkage.lengths[1:]) * _sum_forces(quantity, scene, formulas)
-    )
+def _sum_torques(_: str, sizes: Sizes) -> Array:
+    longest = max(sizes.scene.linkage.lengths[1:])
+    return np.asarray(longest * sizes.sum_terms(A_FORCE))
 
 
-def _sum_powers(quantity: str, scene: Scene, formulas: Solution) -> Array:
-    if scene.drive is not None:
-        return np.asarray(
-            _sum_forces(quantity, scene, formulas)
-            * _sum_velocities(quantity, scene, formulas)
-        )
-    return np.asarray(
-        _sum_torques(quantity, scene, formulas)
-        * np.abs(getattr(formulas, f"omega_{scene.drive_bar}"))
-    )
+def _sum_powers(_: str, sizes: Sizes) -> Array:
+    if sizes.scene.drive is not None:
+        return np.asarray(sizes.sum_terms(A_FORCE) * sizes.sum_terms(A_VELOCITY))
+    speed = getattr(sizes.formulas, f"omega_{sizes.scene.drive_bar}")
+    return np.asarray(sizes.sum_terms(COUPLE.value) * np.abs(speed))
 
 
-TERMS: dict[str, Callable[[str, Scene, Solution], Array]] = {
+A_FORCE, A_VELOCITY = "F12", "v_A"
+"""Any quantities of their units."""
+TERMS: dict[str, Callable[[str, Sizes], Array]] = {
     "rad": _return_one,
     "1": _return_one,
     "m": _sum_lengths,
@@ -333,17 +351,14 @@ def take_strictest_condition(
     )
 
 
-def take_smallest_scale(
-    quantity: str, scene: Scene, formulas: Solution, reference: Solution | None
-) -> Array:
+def take_smallest_scale(quantity: str, ours: Sizes, theirs: Sizes | None) -> Array:
     """Take the smaller of two sizes of a quantity at each position, (n,)."""
-    ours = scale_of(quantity, scene, formulas, getattr(formulas, quantity))
-    of_motion = reference is not None and (
-        reference.omega_2 is None
-        or all(getattr(reference, q) is not None for q in SIZED_BY)
-    )
-    if reference is None or not of_motion or getattr(reference, quantity) is None:
-        return ours
-    return np.fmin(
-        ours, scale_of(quantity, scene, reference, getattr(reference, quantity))
-    )
+    scale = ours.scale(quantity, getattr(ours.formulas, quantity))
+    if theirs is None or getattr(theirs.formulas, quantity) is None:
+        return scale
+    reference = theirs.formulas
+    if reference.omega_2 is not None and any(
+        getattr(reference, name) is None for name in SIZED_BY
+    ):
+        return scale
+    return np.fmin(scale, theirs.scale(quantity, getattr(reference, quantity)))

@@ -6,6 +6,7 @@ are not driven, the lever the shorter of bars 3 and 4 over the longest bar.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
@@ -232,14 +233,31 @@ def magnitude(values: Array) -> Array:
     )
 
 
+def compute_differences(
+    quantities: Sequence[str], ours: Sequence[Array], theirs: Sequence[Array]
+) -> Array:
+    """Compute the differences of several quantities, (q, n).
+
+    Those of angles are modulo 2 pi, of vectors by Euclidean norm; NaN where the shapes differ.
+    """
+    apart = np.full((len(quantities), len(ours[0])), np.nan)
+    alike = [i for i in range(len(ours)) if theirs[i].shape == ours[i].shape]
+    for axes in (1, 2):
+        if rows := [i for i in alike if ours[i].ndim == axes]:
+            difference = np.stack([ours[i] for i in rows])
+            difference -= np.stack([theirs[i] for i in rows])
+            if axes == 2:
+                apart[rows] = np.hypot(difference[..., 0], difference[..., 1])
+                continue
+            turned = [quantities[i].startswith("theta") for i in rows]
+            difference[turned] = wrap_angle(difference[turned])
+            apart[rows] = np.abs(difference)
+    return apart
+
+
 def compute_difference(quantity: str, ours: Array, theirs: Array) -> Array:
-    """Compute differences, of angles modulo 2 pi, of vectors by Euclidean norm, (n,); NaN where the shapes differ."""
-    if theirs.shape != ours.shape:
-        return np.full(len(ours), np.nan)
-    apart = ours - theirs
-    if quantity.startswith("theta"):
-        apart = wrap_angle(apart)
-    return magnitude(apart)
+    """Compute the differences of one quantity, (n,)."""
+    return np.asarray(compute_differences([quantity], [ours], [theirs])[0])
 
 
 def divide(apart: Array | float, size: Array | float) -> Array:

@@ -16,9 +16,8 @@ from fourbar.solution import Solution
 from fourbar.solve import solve
 from fourbar_validation.compare.rows import FAILS, FORMULAS, UNDECIDED, Row
 from fourbar_validation.compare.scales import (
+    Sizes,
     make_reference,
-    scale_of,
-    sum_terms,
     take_smallest_scale,
     take_strictest_condition,
 )
@@ -101,7 +100,7 @@ def compare_points(
         3: swing(2, link.input.length, 0.0),
         4: [link.ground * np.exp(1j * theta[1]), 0.0 * zero, 0.0 * zero],
     }
-    error = np.zeros(n)
+    error, sizes = np.zeros(n), Sizes(scene, reference)
     usable = (solution.status_code == OK) & (reference.condition >= least)
     usable &= find_condition("F12", link, reference) * NOTHING_TO_TELL > EPS
     for point in state_from_pins(scene).points:
@@ -118,11 +117,7 @@ def compare_points(
                 theirs = np.stack(((arm + at_foot).real, (arm + at_foot).imag), axis=1)
                 size = np.abs(arm) + np.abs(at_foot) + sum_lengths(scene.linkage)
                 if kind != "B":
-                    size = (
-                        np.abs(arm)
-                        + np.abs(at_foot)
-                        + sum_terms(kind, scene, reference)
-                    )
+                    size = np.abs(arm) + np.abs(at_foot) + sizes.sum_terms(kind)
                 apart = find_error(
                     kind, ours[point.name], theirs, size
                 ) * find_condition(kind, link, reference)
@@ -159,24 +154,33 @@ def check_blocks(question: Question) -> Iterator[Row]:
         sum(len(effect.loaded_pins) for effect in scene.effects) > 1
     ):  # each may take a search
         repeated.angle[1 : BLOCK - 1] = np.nan
-    together = solve(scene, "force", at=repeated)
+    expected = {
+        name: values
+        for name in ("sin_mu", "B", "alpha_3", *FORCES)
+        if (values := getattr(solution, name)) is not None
+    }
+    # every other quantity of thousands of positions would cost as much again
+    found = {
+        name: np.empty((len(long), *values.shape[1:]))
+        for name, values in expected.items()
+    }
+    together = solve(scene, at=repeated, out=found)
     error = (together.status_code[ends] != solution.status_code[long[ends]]).astype(
         float
     )
-    for quantity in ("sin_mu", "B", "alpha_3", *FORCES):
-        if (ours := getattr(solution, quantity)) is None:
-            continue
-        one, expected = getattr(together, quantity)[ends], ours[long[ends]]
-        finite = np.isfinite(magnitude(expected))
+    sizes = Sizes(scene, solution)
+    for quantity, ours in expected.items():
+        one, due = found[quantity][ends], ours[long[ends]]
+        finite = np.isfinite(magnitude(due))
         error[finite != np.isfinite(magnitude(one))] = np.inf
         with np.errstate(all="ignore"):  # beyond the range of doubles there is no size
-            size = scale_of(quantity, scene, solution, ours)[long[ends]]
+            size = sizes.scale(quantity, ours)[long[ends]]
         condition = find_condition(quantity, scene.linkage, solution)[long[ends]]
         condition = np.where(
             np.isnan(condition), 1.0, condition
         )  # decided by the command where nothing closes
         # evaluated by the same code, but not in the same company of a processor's registers
-        apart = find_error(quantity, one, expected, size) * condition
+        apart = find_error(quantity, one, due, size) * condition
         error[finite] = np.maximum(error[finite], apart[finite])
     alone = {angle: np.empty(n) for angle in ("theta_3", "theta_4")}
     solve(scene, at=command, out=alone)  # they are found without vectors then
@@ -188,9 +192,8 @@ def check_blocks(question: Question) -> Iterator[Row]:
             error[-1], np.nan_to_num(apart[ok], nan=np.inf).max(initial=0.0)
         )
     reason = f"{len(long)} positions at once against {n}"
-    yield question.row(
-        "blocks", error, EQUIVALENCE.factor, reason, theta_2=together.theta_2[ends]
-    )
+    theta_2 = solution.theta_2[long[ends]]
+    yield question.row("blocks", error, EQUIVALENCE.factor, reason, theta_2=theta_2)
 
 
 def check_error_bars(question: Question) -> Iterator[Row]:
@@ -227,6 +230,8 @@ def check_error_bars(question: Question) -> Iterator[Row]:
         solve(scene, "error", at=sampled),
     )
     reference = make_reference(scene, exact)
+    sizes = Sizes(scene, ours)
+    of_balls = None if reference is None else Sizes(scene, reference)
     for bar, quantities in (("torque_error", ("torque",)), ("force_error", PIN_FORCES)):
         width = getattr(ours, bar)
         true = np.max(
@@ -234,7 +239,7 @@ def check_error_bars(question: Question) -> Iterator[Row]:
             axis=0,
         )
         size = np.max(
-            [take_smallest_scale(q, scene, ours, reference) for q in quantities], axis=0
+            [take_smallest_scale(q, sizes, of_balls) for q in quantities], axis=0
         )
         condition = take_strictest_condition(
             quantities[0], scene.linkage, ours, reference
