@@ -19,6 +19,7 @@ from fourbar.evaluation.case import BLOCK
 from fourbar.formulas.mobility import choose_range
 from fourbar.linkage import Bar, FourBar
 from fourbar.quantities import ANGLES, UNKNOWNS
+from fourbar.scene import Command
 from fourbar.show.plot.style import format_of
 from fourbar.solve import solve
 from fourbar_lab.contenders import (
@@ -36,7 +37,9 @@ from fourbar_lab.contenders import (
 )
 from fourbar_validation.cost.formulas import make_bodies
 from fourbar_validation.cost.study import time_call
-from fourbar_validation.engines.registry import ENGINES, Engine
+from fourbar_validation.engines.description import ON_BARS
+from fourbar_validation.engines.plain_loop import PlainLoop
+from fourbar_validation.engines.registry import ENGINES, Engine, Later
 from fourbar_validation.published.thirteen import solve_thirteen
 from fourbar_validation.report.machine import name_machine
 from fourbar_validation.report.terminal import make_table
@@ -69,6 +72,21 @@ FORCES, BARS, ONE = (
     "one position to forces",
 )
 JUDGED = "a scene judged by the exact engines"
+ASKED = 200
+"""Positions that an adapter and a plain loop answer."""
+
+
+PLAIN_LOOPS = {
+    "Pinocchio": (
+        "pinocchio-inverse",
+        Later("fourbar_validation.engines.pinocchio_plain_loop:PinocchioLoop"),
+    ),
+    "MuJoCo": (
+        "mujoco-inverse",
+        Later("fourbar_validation.engines.mujoco.plain_loop:MujocoInverseLoop"),
+    ),
+}
+"""Engine, and what makes its plain loop, by its library."""
 
 
 class SpeedLimit(NamedTuple):
@@ -147,11 +165,19 @@ LIMITS = {
     ),
     "a judged scene / one position": SpeedLimit(
         "<=",
-        650.0,
-        "65 ms where a position takes 0.1 ms: a million scenes a night on 20 cores",
+        350.0,
+        "35 ms where a position takes 0.1 ms: two million scenes a night on 20 cores",
         JUDGED,
         ONE,
     ),
+    **{
+        f"{library}'s adapter / a plain loop": SpeedLimit(
+            "<=",
+            2.0,
+            "sure assembly and rows by name cost no more than the engine's own calls",
+        )
+        for library in PLAIN_LOOPS
+    },
     "import fourbar / import numpy": SpeedLimit(
         "<=", 1.0, "it loads numpy alone, and less than that of its own"
     ),
@@ -348,6 +374,7 @@ def measure(positions: int, rounds: int, largest: int) -> Measured:
     exact = [engine for engine in ENGINES if not engine.through_time]
     if not any(engine.missing() for engine in exact):
         rows[JUDGED] = 1e9 * time_judging(exact, max(1, positions // PER_SCENE))
+        rows |= compare_adapters(rounds)
     rows |= {
         name: rows[row.of] / rows[row.over]
         for name, row in LIMITS.items()
@@ -361,6 +388,50 @@ def measure(positions: int, rounds: int, largest: int) -> Measured:
         "import fourbar / import numpy": import_cost(),
     }
     return Measured(rows, by_positions, by_linkages, peers.not_run)
+
+
+def compare_adapters(rounds: int) -> dict[str, float]:
+    """Divide the time of each adapter by that of a plain loop that reads the same quantities."""
+    scene, command = make_example(), make_command(ASKED)
+    adapters = {engine.name: engine for engine in ENGINES}
+    actions: dict[str, Callable[[], object]] = {}
+    for library, (name, make_loop) in PLAIN_LOOPS.items():
+        adapter = adapters[name].start()
+        actions[f"{library}'s adapter"] = partial(adapter.answer, scene, command)
+        actions[library] = partial(read_plainly, make_loop(scene), command)
+    times = time_interleaved(actions, rounds)
+    return {
+        f"{library}'s adapter / a plain loop": times[f"{library}'s adapter"]
+        / times[library]
+        for library in PLAIN_LOOPS
+    }
+
+
+def read_plainly(loop: PlainLoop, command: Command) -> list[object]:
+    """Answer by a plain loop, and read the places, angles, rates and accelerations of each position besides."""
+    tree, inverse = loop.tree, loop.inverse
+    answered: list[object] = []
+
+    def inverse_and_read(q: Array, v: Array, a: Array) -> Array:
+        torques = inverse(q, v, a)
+        tree.moving(v, a)
+        answered.append(
+            (
+                tree.positions(),
+                [tree.angle(bar) for bar in (3, 4)],
+                (tree.rows @ v).tolist(),
+                (tree.rows @ a).tolist(),
+                tree.accelerations(ON_BARS.values()),
+            )
+        )
+        return torques
+
+    loop.inverse = inverse_and_read  # type: ignore[method-assign]
+    try:
+        loop.answer(command)
+    finally:
+        loop.inverse = inverse  # type: ignore[method-assign]
+    return answered
 
 
 def time_judging(engines: list[Engine], scenes: int) -> float:

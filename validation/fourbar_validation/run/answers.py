@@ -4,12 +4,12 @@ import math
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
+from typing import NamedTuple
 
 from fourbar.errors import LimitError
-from fourbar.formulas import mobility
 from fourbar.mjcf.document import LIGHT
 from fourbar.quantities import COUPLE, FORCES
-from fourbar.scene import Scene
+from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Adapter, Answer
 from fourbar_validation.compare.compare import Comparison, Predicted
 from fourbar_validation.compare.rows import FAILS, REFUSES, VERDICTS, Row
@@ -84,10 +84,8 @@ def _observe_order(question: Question, engine: Engine) -> dict[str, float]:
 
 def compare_statements(question: Question) -> Iterator[Row]:
     """Compare what the formulas state of the linkage, whatever its motion, with every exact engine."""
-    stated, part = (
-        limit_positions.Stated.of(question.scene.linkage),
-        "statements of the linkage",
-    )
+    stated = Statements.of(question.scene, question.at)
+    part = "statements of the linkage"
 
     def rows(engine: Engine, answer: Answer) -> list[Row]:
         predicted = make_prediction(engine, question.scene, question.at, answer)
@@ -120,12 +118,32 @@ def compare_statements(question: Question) -> Iterator[Row]:
             )
 
 
+class Statements(NamedTuple):
+    """Statements of the formulas on a linkage and over a motion, evaluated once for all engines."""
+
+    limits: limit_positions.Stated
+    transmission: transmission.Stated
+    over: transmission.StatedOver | None
+    """None where the motion has no speed."""
+
+    @classmethod
+    def of(cls, scene: Scene, at: Command | None) -> "Statements":
+        """Evaluate the formulas."""
+        over = None
+        if at is not None and at.omega_2 is not None:
+            over = transmission.StatedOver.of(scene, at)
+        linkage = scene.linkage
+        return cls(
+            limit_positions.Stated.of(linkage), transmission.Stated.of(linkage), over
+        )
+
+
 def check_statements(
     name: str,
     scene: Scene,
     engine: Adapter,
     answer: Answer,
-    stated: limit_positions.Stated | None = None,
+    stated: Statements | None = None,
     predicted: Predicted | None = None,
 ) -> list[Row]:
     """Make a row for each of `range`, `limit_positions`, `transmission`, and where there are change points `through`.
@@ -133,25 +151,27 @@ def check_statements(
     Parameters
     ----------
     answer : what the engine found over the scene's own motion.
-    stated : what the formulas state of the linkage, where several engines are held to it.
+    stated : what the formulas state, where several engines are held to it at one motion.
     predicted : the errors to be expected of the answer.
     """
-    linkage = scene.linkage
-    stated = limit_positions.Stated.of(linkage) if stated is None else stated
-    seen = look(
-        engine,
-        linkage,
-        [*limit_positions.choose_places(stated), *transmission.choose_places(linkage)],
+    if stated is None or (
+        stated.over is not None and stated.over.command is not answer.at
+    ):
+        stated = Statements.of(scene, answer.at)
+    limits, of_angle, over = stated
+    places = limit_positions.choose_places(limits) + transmission.choose_places(
+        of_angle
     )
+    seen = look(engine, scene.linkage, places)
     findings = {
-        "range": limit_positions.compare_ranges(stated, engine),
-        "limit_positions": limit_positions.compare_limit_positions(stated, seen),
+        "range": limit_positions.compare_ranges(limits, engine, seen),
+        "limit_positions": limit_positions.compare_limit_positions(limits, seen),
         "transmission": transmission.compare_transmission(
-            scene, seen, answer, predicted
+            of_angle, over, seen, answer, predicted
         ),
     }
-    if mobility.change_points(linkage):
-        findings["through"] = limit_positions.check_through(linkage, engine)
+    if limits.passages:
+        findings["through"] = limit_positions.check_through(limits, seen)
     return [
         make_worst_row(name, answer, quantity, list(rows))
         for quantity, rows in findings.items()

@@ -69,11 +69,12 @@ def make_worst_row(
 
 
 def look(engine: Adapter, linkage: FourBar, places: Iterable[Place]) -> Seen:
-    """Ask an engine at some places where bar 2 turns at 1 rad/s; the bars are uniform: masses play no part."""
+    """Ask an engine at some places where bar 2 turns at 1 rad/s; the bars are uniform: masses play no part.
+
+    `assembled` is 1.0 where it finds that the loop closes, 0.0 elsewhere.
+    """
     # neighbours in turn: an engine starts from the position before
     ordered = sorted(set(places), key=lambda place: place[::-1])
-    if not ordered:
-        return {}
     bars = uniform(*linkage.lengths)
     scene = Scene(
         FourBar(
@@ -84,11 +85,14 @@ def look(engine: Adapter, linkage: FourBar, places: Iterable[Place]) -> Seen:
     theta_2, branch = (np.array(column) for column in zip(*ordered, strict=True))
     answer = require_answer(
         engine, scene, Command(theta_2, branch.astype(np.int8), 1.0, 0.0)
-    ).quantities
-    names = [name for name in OF_BARS if name in answer]
+    )
+    assert answer.assembled is not None
+    names = ["assembled"] + [name for name in OF_BARS if name in answer.quantities]
+    columns = [answer.assembled] + [answer.quantities[name] for name in names[1:]]
+    rows = zip(*(column.astype(float).tolist() for column in columns), strict=True)
     return {
-        place: {name: float(answer[name][i]) for name in names}
-        for i, place in enumerate(ordered)
+        place: dict(zip(names, row, strict=True))
+        for place, row in zip(ordered, rows, strict=True)
     }
 
 
@@ -176,6 +180,12 @@ class _Trial(NamedTuple):
     findings: tuple[Finding, ...]
     """Findings from comparing the statements with each other."""
 
+    @property
+    def places(self) -> list[Place]:
+        """Places of the command."""
+        theta_2, branch = self.command.theta_2.tolist(), self.command.branch.tolist()
+        return list(zip(theta_2, branch, strict=True))
+
 
 def _try_bar(linkage: FourBar, bar: int) -> _Trial:
     second, third = (linkage.bar(k) for k in MOVING_BARS if k != bar)
@@ -258,6 +268,38 @@ def _mark_collinear(linkage: FourBar, bar: int) -> list[bool]:
     ]
 
 
+class _Passage(NamedTuple):
+    """An assembly through a change point, and the sign of sin(theta_4 - theta_3) that is stated on either side."""
+
+    point: float
+    """theta_2, rad."""
+    assembly: int
+    before: int
+    after: int
+
+    @property
+    def places(self) -> list[Place]:
+        """Places before the change point and beyond it, there with the stated sign and with the other one."""
+        beyond = self.point + PAST
+        return [
+            (self.point - PAST, self.before),
+            (beyond, self.after),
+            (beyond, -self.after),
+        ]
+
+
+def _list_passages(linkage: FourBar) -> Iterator[_Passage]:
+    """List both assemblies through every change point, now and a turn later."""
+    for change_point in mobility.change_points(linkage):
+        for turn, assembly in itertools.product((0, 1), (1, -1)):
+            point = change_point + TURN * turn
+            assemblies = np.full(2, assembly, dtype=np.int8)
+            around = np.array([point - PAST, point + PAST])
+            command = Command(around, assemblies, None, 0.0)
+            before, after = with_signs(linkage, command).branch.tolist()
+            yield _Passage(point, assembly, before, after)
+
+
 class Stated(NamedTuple):
     """Statements of the formulas on the limits of a linkage, evaluated once for all engines."""
 
@@ -268,6 +310,7 @@ class Stated(NamedTuple):
     """Limits of bar 2, and the little that it turns from each: at the limit rounding decides if the loop closes."""
     collinear: dict[int, list[bool]]
     """True for each limit of bars 3 and 4 at which all bars are collinear, apart from rounding."""
+    passages: list[_Passage]
 
     @classmethod
     def of(cls, linkage: FourBar) -> "Stated":
@@ -282,6 +325,7 @@ class Stated(NamedTuple):
             trials,
             inside,
             {bar: _mark_collinear(linkage, bar) for bar in (3, 4)},
+            list(_list_passages(linkage)),
         )
 
     def dead_centres(self, bar: int) -> list[mobility.LimitPosition]:
@@ -296,11 +340,17 @@ class Stated(NamedTuple):
         ]
 
 
-def compare_ranges(stated: Stated, engine: Adapter) -> Iterator[Finding]:
+def compare_ranges(stated: Stated, engine: Adapter, seen: Seen) -> Iterator[Finding]:
     """Compare ranges, limits and full turns of every moving bar, the range of a sweep, and the change points."""
     for bar, tried in stated.trials.items():
-        closes = require_answer(engine, tried.scene, tried.command).assembled
-        assert closes is not None
+        if bar == 2:
+            closes = np.array(
+                [seen[place]["assembled"] > 0.0 for place in tried.places]
+            )
+        else:
+            answer = require_answer(engine, tried.scene, tried.command)
+            assert answer.assembled is not None
+            closes = answer.assembled
         wrong = tried.decidable & (closes != tried.inside)
         angle = float(tried.angles[int(np.argmax(wrong))])
         what = (
@@ -315,16 +365,20 @@ def compare_ranges(stated: Stated, engine: Adapter) -> Iterator[Finding]:
 
 def choose_places(stated: Stated) -> list[Place]:
     """Return the places where an engine is evaluated to check these statements."""
-    inside = [
+    places = stated.trials[2].places
+    places += [
         (limit.theta_2 + step, branch)
         for limit, step in stated.inside
         for branch in (1, -1)
     ]
-    return inside + [
+    places += [
         (limit.theta_2, limit.branch)
         for bar in (3, 4)
         for limit in stated.dead_centres(bar)
     ]
+    for passage in stated.passages:
+        places += passage.places
+    return places
 
 
 def compare_limit_positions(stated: Stated, seen: Seen) -> Iterator[Finding]:
@@ -437,31 +491,20 @@ def _check_dead_centres(stated: Stated, bar: int, seen: Seen) -> Iterator[Findin
         )
 
 
-def check_through(linkage: FourBar, engine: Adapter) -> Iterator[Finding]:
-    """Check the assemblies through a change point: the engine finds the speeds of each one continuous.
-
-    Every change point, now and a turn later, on both assemblies.
-    """
-    for change_point in mobility.change_points(linkage):
-        for turn, assembly in itertools.product((0, 1), (1, -1)):
-            point = change_point + TURN * turn
-            before, after = point - PAST, point + PAST
-            assemblies = np.full(2, assembly, dtype=np.int8)
-            command = Command(np.array([before, after]), assemblies, None, 0.0)
-            start, stated = with_signs(linkage, command).branch.tolist()
-            places = [(before, start), (after, 1), (after, -1)]
-            seen = look(engine, linkage, places)
-            rates = np.array(
-                [
-                    [seen[place][name] for place in places]
-                    for name in ("omega_3", "omega_4")
-                ]
-            )
-            jumps = np.abs(rates[:, 1:] - rates[:, :1]).max(axis=0)
-            goes_on = (1, -1)[int(np.argmin(jumps))]
-            yield Finding(
-                float(stated != goes_on),
-                0.0,
-                float(point),
-                f"assembly {assembly:+d} at {point!r} rad",
-            )
+def check_through(stated: Stated, seen: Seen) -> Iterator[Finding]:
+    """Check the assemblies through a change point: the engine finds the speeds of each one continuous."""
+    for passage in stated.passages:
+        rates = np.array(
+            [
+                [seen[place][name] for place in passage.places]
+                for name in ("omega_3", "omega_4")
+            ]
+        )
+        jumps = np.abs(rates[:, 1:] - rates[:, :1]).max(axis=0)
+        goes_on = (passage.after, -passage.after)[int(np.argmin(jumps))]
+        yield Finding(
+            float(passage.after != goes_on),
+            0.0,
+            passage.point,
+            f"assembly {passage.assembly:+d} at {passage.point!r} rad",
+        )

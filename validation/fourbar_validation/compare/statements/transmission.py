@@ -34,27 +34,93 @@ RADII = (0.2, 0.3)
 """m; where the forces of the mechanical advantage act. Any two that differ."""
 
 
-def choose_places(linkage: FourBar) -> list[Place]:
+class Stated(NamedTuple):
+    """Statements of the formulas on the angle at B and on the strokes, evaluated once for all engines."""
+
+    linkage: FourBar
+    extremes: transmission.TransmissionExtremes
+    collinear: list[float]
+    """theta_2 where bars 3 and 4 are collinear on either branch, rad."""
+    strokes: tuple[float, tuple[float, float]] | None
+    """What bar 2 turns while bar 4 goes between its limits, and theta_2 amid that and the rest, rad."""
+
+    @classmethod
+    def of(cls, linkage: FourBar) -> "Stated":
+        """Evaluate the formulas."""
+        extremes = transmission.transmission_extremes(linkage)
+        return cls(linkage, extremes, _find_collinear(linkage), _find_strokes(linkage))
+
+    @property
+    def ends(self) -> tuple[tuple[float, float, float], ...]:
+        """The least and the greatest angle at B, theta_2 there, and the angle where bars 3 and 4 are collinear."""
+        extremes = self.extremes
+        return (extremes.least, extremes.theta_2_least, 0.0), (
+            extremes.greatest,
+            extremes.theta_2_greatest,
+            math.pi,
+        )
+
+
+class StatedOver(NamedTuple):
+    """Statements of the formulas over a motion, evaluated once for all engines; each (n,)."""
+
+    scene: Scene
+    command: Command
+    closed: Mask
+    """True where the loop closes, and not in one line."""
+    sin_mu: Array
+    drive_condition: Array
+    angle: Array
+    """Transmission angle, rad."""
+    extremes: transmission.TransmissionExtremes
+    advantage: Array
+    """Mechanical advantage of forces at RADII."""
+    to_singular: Finding
+    """Distance to a singular position, against the limits and dead centres that are stated."""
+
+    @classmethod
+    def of(cls, scene: Scene, command: Command) -> "StatedOver":
+        """Evaluate the formulas."""
+        state = state_of(scene.linkage, command.theta_2, command.branch)
+        half = state.position.half
+        with np.errstate(divide="ignore", invalid="ignore"):
+            advantage = transmission.mechanical_advantage(state, *RADII)
+        return cls(
+            scene,
+            command,
+            (half.outer >= 0.0) & (half.inner >= 0.0) & ~find_singular(state.position),
+            state.position.sin_mu,
+            # the leverage of a line is a quantity
+            np.abs(drive_sine(state.position, scene.drive_bar or 2)),
+            transmission.transmission_angle(state),
+            transmission.transmission_extremes(scene.linkage),
+            advantage,
+            _compare_distance(scene, command),
+        )
+
+
+def choose_places(stated: Stated) -> list[Place]:
     """Return the places where an engine is evaluated: the extremes that are no limits, and both strokes of bar 4."""
-    strokes = _find_strokes(linkage)
-    inner = [
-        (theta_2, 1)
-        for value, theta_2, collinear in _find_ends(linkage)
-        if value != collinear
+    places = [
+        (theta_2, 1) for value, theta_2, collinear in stated.ends if value != collinear
     ]
-    return inner + (
-        [] if strokes is None else [(theta_2, -1) for theta_2 in strokes[1]]
-    )
+    if stated.strokes is not None:
+        places += [(theta_2, -1) for theta_2 in stated.strokes[1]]
+    return places
 
 
 def compare_transmission(
-    scene: Scene, seen: Seen, answer: Answer, predicted: Predicted | None
+    stated: Stated,
+    over: StatedOver | None,
+    seen: Seen,
+    answer: Answer,
+    predicted: Predicted | None,
 ) -> Iterator[Finding]:
-    """Compare over the scene's own motion, if it is one, at the stated extremes, and between bar 4's stated limits."""
-    if answer.at is not None and answer.at.omega_2 is not None:
-        yield from _compare_over(scene, answer, predicted)
-    yield from _compare_extremes(scene.linkage, seen)
-    yield from _compare_time_ratio(scene.linkage, seen)
+    """Compare over a motion, if there is one, at the stated extremes, and between bar 4's stated limits."""
+    if over is not None:
+        yield from _compare_over(over, answer, predicted)
+    yield from _compare_extremes(stated, seen)
+    yield from _compare_time_ratio(stated, seen)
 
 
 class _Claim(NamedTuple):
@@ -69,12 +135,11 @@ class _Claim(NamedTuple):
 
 
 def _compare_over(
-    scene: Scene, answer: Answer, predicted: Predicted | None
+    over: StatedOver, answer: Answer, predicted: Predicted | None
 ) -> Iterator[Finding]:
-    """Compare the worst position of each statement over the scene's own motion."""
-    command = answer.at
-    assert command is not None
-    for claim in _list_claims(scene, answer):
+    """Compare the worst position of each statement over a motion."""
+    command = over.command
+    for claim in _list_claims(over, answer):
         allowed, mask = claim.allowed, claim.where & ~(claim.allowed >= NOTHING_TO_TELL)
         beyond = mask & ~(claim.error <= allowed)
         if predicted is not None and beyond.any():
@@ -96,19 +161,17 @@ def _compare_over(
                 float(command.theta_2[most]),
                 claim.what,
             )
-    yield _compare_distance(scene, command)
+    yield over.to_singular
 
 
-def _list_claims(scene: Scene, answer: Answer) -> Iterator[_Claim]:
+def _list_claims(over: StatedOver, answer: Answer) -> Iterator[_Claim]:
     """List what the formulas state at each position, against the engine's angles and speeds."""
-    command, linkage = answer.at, scene.linkage
-    assert (
-        command is not None
-        and command.omega_2 is not None
-        and answer.assembled is not None
+    command, linkage, drive = (
+        over.command,
+        over.scene.linkage,
+        over.scene.drive_bar or 2,
     )
-    state = state_of(linkage, command.theta_2, command.branch)
-    drive = scene.drive_bar or 2  # the leverage of a line is a quantity
+    assert command.omega_2 is not None and answer.assembled is not None
     theta = {
         2: command.theta_2,
         **{bar: answer.quantities[f"theta_{bar}"] for bar in (3, 4)},
@@ -116,26 +179,13 @@ def _list_claims(scene: Scene, answer: Answer) -> Iterator[_Claim]:
     first, second = (theta[bar] for bar in MOVING_BARS if bar != drive)
     angle = np.abs(wrap_angle(theta[4] - theta[3]))
     sine = np.abs(np.sin(angle))
-    half = (
-        state.position.half
-    )  # a row of its own compares whether both say that the loop closes
-    closed = (
-        answer.assembled
-        & (half.outer >= 0.0)
-        & (half.inner >= 0.0)
-        & ~find_singular(state.position)
-    )
-    extremes = transmission.transmission_extremes(linkage)
+    # a row of its own compares whether both say that the loop closes
+    closed = answer.assembled & over.closed
     with np.errstate(divide="ignore", invalid="ignore"):
         half_turns = count_half_turns(linkage.ground_angle, command.theta_2)
         allowed = EQUIVALENCE.factor * half_turns / (find_lever(linkage) * sine)
         ratio = answer.quantities["omega_4"] / command.omega_2
-        gained = (
-            transmission.mechanical_advantage(state, *RADII)
-            * ratio
-            * (RADII[1] / RADII[0])
-            - 1.0
-        )
+        gained = over.advantage * ratio * (RADII[1] / RADII[0]) - 1.0
         largest = np.maximum(
             1.0,
             np.maximum(
@@ -146,23 +196,21 @@ def _list_claims(scene: Scene, answer: Answer) -> Iterator[_Claim]:
     # the divisor of every tolerance must not come from the formulas alone
     yield _Claim(
         "condition",
-        np.abs(state.position.sin_mu - np.sin(theta[4] - theta[3])),
+        np.abs(over.sin_mu - np.sin(theta[4] - theta[3])),
         allowed,
         closed,
     )
-    drive_condition = np.abs(
-        np.abs(drive_sine(state.position, drive)) - np.abs(np.sin(second - first))
-    )
+    drive_condition = np.abs(over.drive_condition - np.abs(np.sin(second - first)))
     yield _Claim("drive condition", drive_condition, allowed, closed)
     acute = np.minimum(angle, math.pi - angle)
     yield _Claim(
         "transmission angle",
-        np.abs(transmission.transmission_angle(state) - acute),
+        np.abs(over.angle - acute),
         allowed,
         closed,
     )
     outside = np.maximum(
-        np.maximum(extremes.least - angle, angle - extremes.greatest), 0.0
+        np.maximum(over.extremes.least - angle, angle - over.extremes.greatest), 0.0
     )
     yield _Claim("beyond the extremes", outside, allowed, closed)
     moving = (
@@ -223,24 +271,12 @@ def _compute_to_singular(scene: Scene, command: Command) -> Array:
     return nearest
 
 
-def _find_ends(linkage: FourBar) -> tuple[tuple[float, float, float], ...]:
-    """Find the least and greatest angle between bars 3 and 4, theta_2 there, and the angle where they are collinear."""
-    extremes = transmission.transmission_extremes(linkage)
-    return (extremes.least, extremes.theta_2_least, 0.0), (
-        extremes.greatest,
-        extremes.theta_2_greatest,
-        math.pi,
-    )
-
-
-def _compare_extremes(linkage: FourBar, seen: Seen) -> Iterator[Finding]:
-    for value, theta_2, collinear in _find_ends(linkage):
+def _compare_extremes(stated: Stated, seen: Seen) -> Iterator[Finding]:
+    linkage = stated.linkage
+    for value, theta_2, collinear in stated.ends:
         if value == collinear:
             error = min(
-                (
-                    abs(wrap_angle(theta_2 - point))
-                    for point in _find_collinear(linkage)
-                ),
+                (abs(wrap_angle(theta_2 - point)) for point in stated.collinear),
                 default=math.inf,
             )
             yield Finding(
@@ -261,7 +297,7 @@ def _compare_extremes(linkage: FourBar, seen: Seen) -> Iterator[Finding]:
                 theta_2,
                 "extreme of the angle at B",
             )
-    extremes = transmission.transmission_extremes(linkage)
+    extremes = stated.extremes
     smallest = min(extremes.least, math.pi - extremes.greatest)
     yield Finding(
         abs(extremes.worst - smallest),
@@ -291,12 +327,9 @@ def _find_strokes(linkage: FourBar) -> tuple[float, tuple[float, float]] | None:
     return stroke, (dead[0] + stroke / 2.0, dead[1] + (TURN - stroke) / 2.0)
 
 
-def _compare_time_ratio(linkage: FourBar, seen: Seen) -> Iterator[Finding]:
-    ratio, strokes, theta_1 = (
-        mobility.time_ratio(linkage),
-        _find_strokes(linkage),
-        linkage.ground_angle,
-    )
+def _compare_time_ratio(stated: Stated, seen: Seen) -> Iterator[Finding]:
+    linkage, strokes = stated.linkage, stated.strokes
+    ratio, theta_1 = mobility.time_ratio(linkage), linkage.ground_angle
     agree = (strokes is None) == (ratio is None)
     yield Finding(float(not agree), 0.0, theta_1, "whether there is a time ratio")
     if strokes is not None and ratio is not None:
