@@ -111,7 +111,6 @@ def test_slow_linkages_hold_as_well(loaded: bool, index: int) -> None:
         motion=drawn.motion.replace(speed=0.001 if loaded else 0.01, acceleration=0.0),
         drive=None,
         drive_bar=2,
-        drive=None,
     )
     posed = slow if loaded else replace(slow, loads=(), effects=())
     answer = MujocoSimulated().answer(posed, fourbar.command(posed))
