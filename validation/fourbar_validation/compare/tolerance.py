@@ -247,7 +247,9 @@ def compute_differences(
             difference = np.stack([ours[i] for i in rows])
             difference -= np.stack([theirs[i] for i in rows])
             if axes == 2:
-                apart[rows] = np.hypot(difference[..., 0], difference[..., 1])
+                apart[rows] = magnitude(difference.reshape(-1, 2)).reshape(
+                    len(rows), -1
+                )
                 continue
             turned = [quantities[i].startswith("theta") for i in rows]
             difference[turned] = wrap_angle(difference[turned])

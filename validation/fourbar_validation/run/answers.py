@@ -121,8 +121,8 @@ def compare_statements(question: Question) -> Iterator[Row]:
 class Statements(NamedTuple):
     """Statements of the formulas on a linkage and over a motion, evaluated once for all engines."""
 
-    limits: limit_positions.Stated
-    transmission: transmission.Stated
+    limits: limit_positions.StatedLimits
+    transmission: transmission.StatedTransmission
     over: transmission.StatedOver | None
     """None where the motion has no speed."""
 
@@ -134,7 +134,9 @@ class Statements(NamedTuple):
             over = transmission.StatedOver.of(scene, at)
         linkage = scene.linkage
         return cls(
-            limit_positions.Stated.of(linkage), transmission.Stated.of(linkage), over
+            limit_positions.StatedLimits.of(linkage),
+            transmission.StatedTransmission.of(linkage),
+            over,
         )
 
 

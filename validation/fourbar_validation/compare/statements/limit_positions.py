@@ -300,7 +300,7 @@ def _list_passages(linkage: FourBar) -> Iterator[_Passage]:
             yield _Passage(point, assembly, before, after)
 
 
-class Stated(NamedTuple):
+class StatedLimits(NamedTuple):
     """Statements of the formulas on the limits of a linkage, evaluated once for all engines."""
 
     linkage: FourBar
@@ -313,7 +313,7 @@ class Stated(NamedTuple):
     passages: list[_Passage]
 
     @classmethod
-    def of(cls, linkage: FourBar) -> "Stated":
+    def of(cls, linkage: FourBar) -> "StatedLimits":
         """Evaluate the formulas."""
         inside = [
             (limit, _compute_inwards(linkage, limit.theta_2))
@@ -340,7 +340,9 @@ class Stated(NamedTuple):
         ]
 
 
-def compare_ranges(stated: Stated, engine: Adapter, seen: Seen) -> Iterator[Finding]:
+def compare_ranges(
+    stated: StatedLimits, engine: Adapter, seen: Seen
+) -> Iterator[Finding]:
     """Compare ranges, limits and full turns of every moving bar, the range of a sweep, and the change points."""
     for bar, tried in stated.trials.items():
         if bar == 2:
@@ -363,7 +365,7 @@ def compare_ranges(stated: Stated, engine: Adapter, seen: Seen) -> Iterator[Find
     yield _compare_change_points(stated.linkage)
 
 
-def choose_places(stated: Stated) -> list[Place]:
+def choose_places(stated: StatedLimits) -> list[Place]:
     """Return the places where an engine is evaluated to check these statements."""
     places = stated.trials[2].places
     places += [
@@ -381,7 +383,7 @@ def choose_places(stated: Stated) -> list[Place]:
     return places
 
 
-def compare_limit_positions(stated: Stated, seen: Seen) -> Iterator[Finding]:
+def compare_limit_positions(stated: StatedLimits, seen: Seen) -> Iterator[Finding]:
     """Compare the limits of every moving bar; where all bars are collinear no side can be stated."""
     yield Finding(0.0, 0.0, stated.linkage.ground_angle, "the same positions")
     yield from _check_input(stated, seen)
@@ -389,7 +391,7 @@ def compare_limit_positions(stated: Stated, seen: Seen) -> Iterator[Finding]:
         yield from _check_dead_centres(stated, bar, seen)
 
 
-def _check_input(stated: Stated, seen: Seen) -> Iterator[Finding]:
+def _check_input(stated: StatedLimits, seen: Seen) -> Iterator[Finding]:
     """Check just inside each limit that bars 3 and 4 are off their common line by the same angles on both branches."""
     linkage = stated.linkage
     d, a, *_ = linkage.lengths
@@ -435,7 +437,9 @@ def _compute_moved(linkage: FourBar, bar: int, limit: mobility.LimitPosition) ->
     return find_roundoff(linkage) * spread / max(upright, EPS)
 
 
-def _check_dead_centres(stated: Stated, bar: int, seen: Seen) -> Iterator[Finding]:
+def _check_dead_centres(
+    stated: StatedLimits, bar: int, seen: Seen
+) -> Iterator[Finding]:
     """Check that the other two bars are in one line there, and the bar is at rest."""
     linkage = stated.linkage
     for limit, collinear in zip(
@@ -491,7 +495,7 @@ def _check_dead_centres(stated: Stated, bar: int, seen: Seen) -> Iterator[Findin
         )
 
 
-def check_through(stated: Stated, seen: Seen) -> Iterator[Finding]:
+def check_through(stated: StatedLimits, seen: Seen) -> Iterator[Finding]:
     """Check the assemblies through a change point: the engine finds the speeds of each one continuous."""
     for passage in stated.passages:
         rates = np.array(

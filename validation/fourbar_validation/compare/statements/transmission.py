@@ -34,7 +34,7 @@ RADII = (0.2, 0.3)
 """m; where the forces of the mechanical advantage act. Any two that differ."""
 
 
-class Stated(NamedTuple):
+class StatedTransmission(NamedTuple):
     """Statements of the formulas on the angle at B and on the strokes, evaluated once for all engines."""
 
     linkage: FourBar
@@ -45,7 +45,7 @@ class Stated(NamedTuple):
     """What bar 2 turns while bar 4 goes between its limits, and theta_2 amid that and the rest, rad."""
 
     @classmethod
-    def of(cls, linkage: FourBar) -> "Stated":
+    def of(cls, linkage: FourBar) -> "StatedTransmission":
         """Evaluate the formulas."""
         extremes = transmission.transmission_extremes(linkage)
         return cls(linkage, extremes, _find_collinear(linkage), _find_strokes(linkage))
@@ -99,7 +99,7 @@ class StatedOver(NamedTuple):
         )
 
 
-def choose_places(stated: Stated) -> list[Place]:
+def choose_places(stated: StatedTransmission) -> list[Place]:
     """Return the places where an engine is evaluated: the extremes that are no limits, and both strokes of bar 4."""
     places = [
         (theta_2, 1) for value, theta_2, collinear in stated.ends if value != collinear
@@ -110,7 +110,7 @@ def choose_places(stated: Stated) -> list[Place]:
 
 
 def compare_transmission(
-    stated: Stated,
+    stated: StatedTransmission,
     over: StatedOver | None,
     seen: Seen,
     answer: Answer,
@@ -271,7 +271,7 @@ def _compute_to_singular(scene: Scene, command: Command) -> Array:
     return nearest
 
 
-def _compare_extremes(stated: Stated, seen: Seen) -> Iterator[Finding]:
+def _compare_extremes(stated: StatedTransmission, seen: Seen) -> Iterator[Finding]:
     linkage = stated.linkage
     for value, theta_2, collinear in stated.ends:
         if value == collinear:
@@ -327,7 +327,7 @@ def _find_strokes(linkage: FourBar) -> tuple[float, tuple[float, float]] | None:
     return stroke, (dead[0] + stroke / 2.0, dead[1] + (TURN - stroke) / 2.0)
 
 
-def _compare_time_ratio(stated: Stated, seen: Seen) -> Iterator[Finding]:
+def _compare_time_ratio(stated: StatedTransmission, seen: Seen) -> Iterator[Finding]:
     linkage, strokes = stated.linkage, stated.strokes
     ratio, theta_1 = mobility.time_ratio(linkage), linkage.ground_angle
     agree = (strokes is None) == (ratio is None)
