@@ -7,6 +7,7 @@ code compute; it needs no reference. Scaling by powers of two changes no digit a
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -32,7 +33,7 @@ from fourbar.scene.motion import Motion
 from fourbar.solution import Solution
 from fourbar.solve import solve
 from fourbar_validation.compare.rows import Row
-from fourbar_validation.compare.scales import scale_of, sum_terms
+from fourbar_validation.compare.scales import Sizes
 from fourbar_validation.compare.tolerance import (
     EQUIVALENCE,
     WELL_CONDITIONED,
@@ -99,6 +100,10 @@ class _Few:
     sizes: dict[str, tuple[Array, Array, Array]] = field(default_factory=dict)
     """Scale, condition and sum of the terms of each quantity that was compared."""
 
+    @cached_property
+    def _terms(self) -> Sizes:
+        return Sizes(self.scene, self.solution)
+
     def solve(self, scene: Scene, **changed: Any) -> Solution:
         """Solve another scene at the same positions, some entries of the command changed."""
         return _solve(scene, self.command._replace(**changed))
@@ -106,12 +111,11 @@ class _Few:
     def size(self, name: str) -> tuple[Array, Array, Array]:
         """Return scale, condition and sum of the terms of a quantity, (n,) each."""
         if name not in self.sizes:
-            numbers = name, self.scene, self.solution
             condition = find_condition(name, self.scene.linkage, self.solution)
             self.sizes[name] = (
-                scale_of(*numbers, getattr(self.solution, name)),
+                self._terms.scale(name, getattr(self.solution, name)),
                 np.minimum(condition, 1.0),
-                sum_terms(*numbers),
+                self._terms.sum_terms(name),
             )
         return self.sizes[name]
 
