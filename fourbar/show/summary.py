@@ -267,6 +267,7 @@ def _find_largest(
 ) -> tuple[Array, set[str]]:
     """Find the places of the local maxima of each magnitude, and the names of those that grow."""
     places, peaks = solution.at.places, list[tuple[str, int, int, int]]()
+    passed = _find_dead_points(scene, solution)
     present = sizes(solution)
     for name, size in present.items():
         padded = np.concatenate(
@@ -283,6 +284,9 @@ def _find_largest(
             start = i - (before[i] >= 0.0)
             stop = i + (after[i] >= 0.0)
             peaks.append((name, i, start, stop))
+        for step in passed:
+            rises = bool(padded[step + 1] < padded[step + 2])
+            peaks.append((name, step + rises, step, step + 1))
         for i, j in pairwise(
             range(len(places))
         ):  # towards a gap a magnitude may grow without a local maximum
@@ -324,6 +328,21 @@ def _find_largest(
         peak_places[kept],
         {name for name, grows in zip(names, growing, strict=True) if grows},
     )
+
+
+def _find_dead_points(scene: Scene, solution: Solution) -> list[int]:
+    """List the steps within which the drive stands still while the linkage moves: forces have a pole there.
+
+    Its two ends need not be maxima of the positions.
+    """
+    at = solution.at
+    if at.stroke is not None or (scene.drive is None and scene.drive_bar == at.bar):
+        return []
+    one = np.ones(len(solution))
+    moving = solve(scene, "velocity", at=at._replace(speed=one, acceleration=0.0 * one))
+    speed = np.nan_to_num(getattr(moving, read_drive(moving).speed_key))
+    steps: list[int] = np.flatnonzero(speed[:-1] * speed[1:] < 0.0).tolist()
+    return steps
 
 
 def _find_growing(

@@ -148,3 +148,23 @@ def test_a_gap_within_a_step_is_no_full_turn() -> None:
     text = write(scene)
     assert "assembles up to theta_2 = " in text
     assert "input turns fully" not in text and "per turn" not in text
+
+
+@pytest.mark.parametrize("speed", (0.0, 5.0))
+def test_a_pole_between_two_positions_that_rise_past_it_is_found(speed: float) -> None:
+    """The output stands still where bars 2 and 3 are in line; the torque on it grows there."""
+    d, a, b, c = 0.3, 0.1, 0.25, 0.22
+    dead = math.acos(((a + b) ** 2 + d**2 - c**2) / (2.0 * (a + b) * d))
+    hidden = 0
+    for first in np.linspace(0.01, 0.4, 14):
+        angle = fourbar.Sweep(dead - first, dead - first + 0.8, 2)
+        scene = fourbar.Scene(
+            fourbar.uniform(d, a, b, c),
+            fourbar.Motion(angle, speed),
+            4,
+            effects=(fourbar.Gravity(9.81),),
+        )
+        size = np.abs(np.asarray(fourbar.solve(scene).torque))
+        hidden += int(size[0] < size[1] < size[2] or size[0] > size[1] > size[2])
+        assert "torque" in find_facts(scene).between.growing
+    assert hidden > 3

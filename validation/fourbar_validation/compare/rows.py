@@ -47,6 +47,7 @@ SHIPPED = (
     "study",
     "sensitivity",
     "internal_forces",
+    "summary",
     "tolerances",
     "equilibria",
     "sdf",

@@ -36,6 +36,7 @@ from fourbar_validation.run.shipped.cuts import internal_forces
 from fourbar_validation.run.shipped.equilibria import equilibria
 from fourbar_validation.run.shipped.files import sdf, usd
 from fourbar_validation.run.shipped.sensitivities import sensitivity, study, tolerances
+from fourbar_validation.run.shipped.summary import summary
 from fourbar_validation.run.transformed import check_transformed
 
 
@@ -85,6 +86,7 @@ CHECKS = (
             study,
             sensitivity,
             internal_forces,
+            summary,
             tolerances,
             equilibria,
         )

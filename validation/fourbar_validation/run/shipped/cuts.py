@@ -47,13 +47,13 @@ def internal_forces(question: Question) -> list[Row]:
     scene = take_few(question)
     command = command_of(scene)
     answer, solution = ask_free_bodies(scene, command), fourbar.solve(scene)
-    motion = _move(scene, command, answer)
+    motion = move_bars(scene, command, answer)
     rows = []
     for bar in MOVING_BARS:
         length = scene.linkage.bar(bar).length
         cuts = np.array([part * length for part in WHERE])
         stated = state_from_pins(scene)
-        pieces = [_free(stated, motion, answer, bar, cut) for cut in cuts]
+        pieces = [free_piece(stated, motion, answer, bar, cut) for cut in cuts]
         forces = fourbar.internal_forces(scene, solution, bar, cuts)
         for name, ours in (("N", forces.N), ("V", forces.V), ("M", forces.M)):
             theirs = np.stack([getattr(piece, name) for piece in pieces], axis=1)
@@ -80,7 +80,7 @@ def internal_forces(question: Question) -> list[Row]:
     return rows
 
 
-def _move(scene: Scene, command: Command, answer: Answer) -> BodyMotion:
+def move_bars(scene: Scene, command: Command, answer: Answer) -> BodyMotion:
     """Move the bars as the free bodies have them."""
     theta = [answer.quantities[f"theta_{bar}"] for bar in MOVING_BARS]
     omega, alpha = (
@@ -139,7 +139,7 @@ class _Piece(BodyWrenches):
             self.place = 0.0
 
 
-def _free(
+def free_piece(
     scene: Scene, motion: BodyMotion, answer: Answer, bar: int, cut: float
 ) -> _Piece:
     """Free the piece of a bar beyond a cut."""

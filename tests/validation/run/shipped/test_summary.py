@@ -1,0 +1,149 @@
+"""Rows of what `analyze` prints: they agree, and each number that is off fails its own."""
+
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fourbar
+from fourbar.effects import Place
+from fourbar.show.summary import Facts
+from fourbar_validation.compare.rows import Row
+from fourbar_validation.run.judge import ask
+from fourbar_validation.run.question import NotAskedError
+from fourbar_validation.run.shipped import summary as module
+from fourbar_validation.run.shipped.summary import summary
+from tests.support.scenes import crank_rocker
+
+TURN = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.1, 0.1 + 2 * np.pi, 36), 9.0))
+CYLINDER = crank_rocker(
+    motion=fourbar.Motion(
+        stroke=fourbar.Sweep(0.19, 0.31, 36), stroke_speed=0.2, side="left"
+    ),
+    drive=fourbar.LinearDrive(Place(1, (0.25, -2.8)), Place(2, (0.09, 0.17))),
+)
+
+
+def judge(scene: fourbar.Scene) -> dict[str, Row]:
+    return {row.quantity: row for row in summary(ask("scene", scene, ()))}
+
+
+@pytest.mark.parametrize("scene", (TURN, CYLINDER), ids=("turn", "cylinder"))
+def test_the_summary_of_a_scene_agrees_with_free_bodies(scene: fourbar.Scene) -> None:
+    rows = judge(scene)
+    assert not [row for row in rows.values() if row.failed]
+    names = {"ranges", "peaks", "means", "pins", "bending"}
+    names |= {"bore"} if scene is CYLINDER else {"shaking_force"}
+    assert rows.keys() == names
+
+
+def move_peak(peak: Any, part: float) -> Any:
+    return peak._replace(value=peak.value * (1.0 + part))
+
+
+FAULTS: dict[str, tuple[str, Callable[[Facts], Facts]]] = {
+    "a range that ends short": (
+        "ranges",
+        lambda f: replace(
+            f,
+            angles={**f.angles, 4: (f.angles[4][0], move_peak(f.angles[4][1], -1e-6))},
+        ),
+    ),
+    "a range that ends late": (
+        "ranges",
+        lambda f: replace(
+            f, angles={**f.angles, 3: (f.angles[3][0], move_peak(f.angles[3][1], 1e-6))}
+        ),
+    ),
+    "a peak of the positions": (
+        "peaks",
+        lambda f: replace(f, peak=move_peak(f.peak, -1e-6)),
+    ),
+    "a place of another peak": (
+        "peaks",
+        lambda f: replace(f, peak=f.peak._replace(place=f.peak.place + 0.01)),  # type: ignore[union-attr]
+    ),
+    "the load of another pin": (
+        "pins",
+        lambda f: replace(f, pins={**f.pins, "A": f.pins["B"]}),
+    ),
+    "a mean of a pin that counts both ends": (
+        "pins",
+        lambda f: replace(
+            f, pins={**f.pins, "A": f.pins["A"]._replace(rms=f.pins["A"].rms * 1.001)}
+        ),
+    ),
+    "a bending moment of another place": (
+        "bending",
+        lambda f: replace(
+            f, bending={**f.bending, 3: f.bending[3]._replace(x=f.bending[3].x * 0.9)}
+        ),
+    ),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_fact_that_is_off_fails_its_row(
+    fault: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    name, change = FAULTS[fault]
+    summarize = module.summarize
+    monkeypatch.setattr(module, "summarize", lambda *of: change(summarize(*of)))
+    failing = {row.quantity for row in judge(TURN).values() if row.failed}
+    assert name in failing
+
+
+@pytest.mark.parametrize("factor", (1.0 - 2e-3, 1.0 + 2e-3))
+@pytest.mark.parametrize(
+    ("key", "name"),
+    [
+        ("peak_torque", "peaks"),
+        ("peak_speed", "peaks"),
+        ("peak_power", "peaks"),
+        ("rms_torque", "means"),
+        ("rms_power", "means"),
+        ("energy_in", "means"),
+        ("energy_out", "means"),
+    ],
+)
+def test_a_number_of_the_json_that_is_off_fails_its_row(
+    key: str, name: str, factor: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write = module.write_motor
+
+    def off(*of: Any) -> Any:
+        entry = write(*of)
+        assert entry is not None
+        return {**entry, key: entry[key] * factor}
+
+    monkeypatch.setattr(module, "write_motor", off)
+    rows = judge(TURN)
+    assert {row.quantity for row in rows.values() if row.failed} == {name}
+
+
+def test_a_printed_bore_that_is_off_fails_its_row(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    write = module.write_block
+
+    def off(*of: Any, **options: Any) -> list[str]:
+        lines = write(*of, **options)
+        return [re.sub(r"at least (\d)", r"at least 1\1", line) for line in lines]
+
+    monkeypatch.setattr(module, "write_block", off)
+    rows = judge(CYLINDER)
+    assert {row.quantity for row in rows.values() if row.failed} == {"bore"}
+
+
+def test_what_has_poles_or_jumps_is_not_asked() -> None:
+    rocker = fourbar.Motion(theta_4=fourbar.Sweep(1.5, 3.5, 20), omega_4=2.0)
+    for scene, why in (
+        (crank_rocker(motion=rocker), "no forces somewhere"),
+        (crank_rocker(effects=(fourbar.Friction.at(A=0.1),)), "jump"),
+        (crank_rocker(motion=fourbar.Motion(np.array([0.1, 0.2]), 1.0)), "no sweep"),
+    ):
+        with pytest.raises(NotAskedError, match=why):
+            judge(scene)

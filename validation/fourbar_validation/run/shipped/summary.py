@@ -1,0 +1,329 @@
+"""What `analyze` prints and its JSON holds, against free bodies at many positions and plain sums.
+
+Each peak and each end of a range is taken at the place that is printed with it, and none of many positions between the
+scene's own may exceed it. Means and energies are summed anew from the free bodies' forces.
+"""
+
+import math
+import re
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from fourbar.linkage import MOVING_BARS, PIN_FORCE
+from fourbar.quantities import OK
+from fourbar.scene import Scene, command_at
+from fourbar.scene.motion import FromLimit
+from fourbar.show.block import write_block, write_motor
+from fourbar.show.duty import is_once_round, read_drive, shaking_force
+from fourbar.show.summary import Facts, Peak, summarize
+from fourbar.solution import Solution
+from fourbar_validation.compare.answer import Answer
+from fourbar_validation.compare.rows import Row
+from fourbar_validation.compare.scales import make_reference
+from fourbar_validation.compare.tolerance import (
+    Array,
+    ErrorBound,
+    magnitude,
+    wrap_angle,
+)
+from fourbar_validation.engines.description import state_from_pins
+from fourbar_validation.run.question import NotAskedError, Question
+from fourbar_validation.run.shipped.cuts import free_piece, move_bars
+from fourbar_validation.run.shipped.variants import ask_free_bodies, make_row
+
+FINE = 1440
+"""Intervals of the motion at whose ends nothing may exceed a peak or a range."""
+BETWEEN = 1e-3
+"""Part by which a largest value without a place may exceed that of many positions, which it lies between."""
+LEAST_CONDITION = 1e-2
+"""A motion that is worse conditioned somewhere has poles, beside which peaks are those of its positions."""
+PRESSURE = 1e6
+"""Pressure of the cylinder whose bore is judged, Pa."""
+PRINTED = ErrorBound(
+    "summary",
+    "1e-8 of the value: five calls leave a place to 1e-7 of a step, a range the fourth power of 0.05 degrees",
+    1e-8,
+    conditioned=False,
+)
+LOCATED_ROUGHLY = ErrorBound(
+    "summary, bending",
+    "1e-6 of the moment: three calls of 40 cuts leave a place to 1e-4 of a step, a maximum the square of that",
+    1e-6,
+    conditioned=False,
+)
+FOUR_DIGITS = ErrorBound(
+    "summary, printed",
+    "6e-4 of the value: what is printed has four digits",
+    6e-4,
+    conditioned=False,
+)
+TOLERANCES = {"bore": FOUR_DIGITS, "bending": LOCATED_ROUGHLY}
+
+
+@dataclass
+class _Judged:
+    """A scene, what is said of it, and the free bodies' answers."""
+
+    question: Question
+    facts: Facts
+    errors: dict[str, list[float]] = field(default_factory=dict)
+    """Errors in parts of the value, by the name of the row."""
+
+    @property
+    def scene(self) -> Scene:
+        """Return the scene."""
+        return self.facts.scene
+
+    @property
+    def solution(self) -> Solution:
+        """Return the solution of the scene's own positions."""
+        return self.facts.solution
+
+    @cached_property
+    def own(self) -> Answer:
+        """Return the free bodies' answer at the scene's own positions."""
+        return ask_free_bodies(self.scene, self.solution.at)
+
+    @cached_property
+    def fine(self) -> Answer:
+        """Return their answer at many positions."""
+        places = self.solution.at.places
+        return self.ask(np.linspace(places[0], places[-1], FINE + 1))
+
+    def ask(self, places: Any) -> Answer:
+        """Ask the free bodies at other positions of the motion."""
+        return ask_free_bodies(self.scene, command_at(self.scene, np.ravel(places)))
+
+    def add(self, row: str, error: Any) -> None:
+        """Add errors to a row."""
+        self.errors.setdefault(row, []).extend(np.ravel(error).tolist())
+
+    def add_value(self, row: str, ours: float | None, theirs: float) -> None:
+        """Add the error of a number."""
+        self.add(row, math.nan if ours is None else abs(ours - theirs) / abs(theirs))
+
+    def add_peak(self, row: str, peak: Peak, at_peak: Array, fine: Array) -> None:
+        """Add by how much a peak is no value at its place, and by how much another one exceeds it."""
+        size = abs(peak.value)
+        self.add(row, np.abs(np.abs(at_peak) - size) / size)
+        self.add(row, max(float(np.abs(fine).max()) - size, 0.0) / size)
+
+
+def summary(question: Question) -> list[Row]:
+    """Judge ranges, peaks, means, energies, pin loads, shaking force, bending and bore."""
+    judged = _Judged(question, _summarize(question))
+    _judge_ranges(judged)
+    _judge_drive(judged)
+    _judge_pins(judged)
+    _judge_bending(judged)
+    rows = []
+    for name, errors in judged.errors.items():
+        tolerance = TOLERANCES.get(name, PRINTED)
+        error = np.array(errors)
+        reason = f"{len(errors)} numbers, {FINE + 1} positions"
+        nowhere = np.full(len(errors), math.nan)
+        rows.append(
+            make_row(question, "summary", name, error, tolerance, nowhere, reason)
+        )
+    return rows
+
+
+def _summarize(question: Question) -> Facts:
+    """Summarize the scene; NotAskedError where its motion has nothing between its positions, or poles."""
+    scene, solution = question.scene, question.solution
+    listed = isinstance(scene.motion.angle, (float, np.ndarray, FromLimit))
+    if listed or len(solution) < 2 or scene.motion.free is not None:
+        raise NotAskedError("no sweep or motion law that has a summary")
+    if any(effect.dry for effect in scene.effects):
+        raise NotAskedError("dry friction, whose forces jump between the positions")
+    assert solution.drive_condition is not None
+    worst = min(solution.condition.min(), solution.drive_condition.min())
+    if (solution.status_code != OK).any() or not worst > LEAST_CONDITION:
+        raise NotAskedError("the motion has no forces somewhere, or nearly none")
+    return summarize(scene, solution)
+
+
+def _judge_ranges(judged: _Judged) -> None:
+    """Judge the ends of the ranges of all bars, and the smallest transmission angle."""
+    for bar, ends in judged.facts.angles.items():
+        there = _take(judged, judged.ask([end.place for end in ends]), f"theta_{bar}")
+        low, high = ends
+        judged.add("ranges", np.abs(wrap_angle(there - [low.value, high.value])))
+        fine = np.unwrap(_take(judged, judged.fine, f"theta_{bar}"))
+        fine -= 2.0 * math.pi * round((fine.min() - low.value) / (2.0 * math.pi))
+        judged.add("ranges", max(fine.max() - high.value, low.value - fine.min(), 0.0))
+    least = judged.facts.transmission
+    answers = judged.ask(least.place), judged.fine
+    sines = [
+        np.abs(np.sin(of.quantities["theta_4"] - of.quantities["theta_3"]))
+        for of in answers
+    ]
+    judged.add("ranges", np.abs(sines[0] - math.sin(least.value)))
+    judged.add("ranges", max(math.sin(least.value) - float(sines[1].min()), 0.0))
+
+
+def _take(judged: _Judged, answer: Answer, name: str) -> Array:
+    """Return a quantity that the free bodies found or were commanded."""
+    if name in answer.quantities:
+        return np.array(answer.quantities[name])
+    assert answer.at is not None
+    return np.array(answer.at.angle)
+
+
+def _find_work(judged: _Judged, answer: Answer) -> tuple[Array, Array]:
+    """Return torque or force of the drive, and its speed."""
+    drive = read_drive(judged.solution)
+    values = np.array(answer.quantities[drive.keys.value])
+    if judged.scene.drive is None:
+        assert answer.at is not None
+        name = f"omega_{judged.scene.drive_bar}"
+        speed = answer.quantities.get(name, answer.at.speed)
+        return values, np.broadcast_to(np.asarray(speed, float), values.shape)
+    reference = make_reference(judged.scene, answer)
+    assert reference is not None and reference.stroke_speed is not None
+    return values, reference.stroke_speed
+
+
+def _judge_drive(judged: _Judged) -> None:
+    """Judge peak, mean, power and energies of the drive, as printed and in the JSON."""
+    facts, solution = judged.facts, judged.solution
+    entry = write_motor(judged.scene, solution, {})
+    if facts.peak is None or facts.duty is None or entry is None:
+        return
+    values, speed = _find_work(judged, judged.own)
+    if not np.abs(values).max() > 0.0:
+        return
+    power = values * speed
+    name = read_drive(solution).keys.value
+    fine_values, fine_speed = _find_work(judged, judged.fine)
+    kind = "force" if facts.linear else "torque"
+    if name not in facts.between.growing:
+        at_peak, _ = _find_work(judged, judged.ask(facts.peak.place))
+        judged.add_peak("peaks", facts.peak, at_peak, fine_values)
+        judged.add_value("peaks", entry[f"peak_{kind}"], abs(facts.peak.value))
+    counted = slice(None, -1) if bool(is_once_round(solution)) else slice(None)
+    for key, of_own in ((f"rms_{kind}", values), ("rms_power", power)):
+        if np.abs(of_own).max() > 0.0:
+            mean = math.sqrt(np.square(of_own[counted]).mean())
+            judged.add_value("means", entry[key], mean)
+    for key, fine in (
+        ("peak_speed", fine_speed),
+        ("peak_power", fine_values * fine_speed),
+    ):
+        most = float(np.abs(fine).max())
+        if key.removeprefix("peak_") not in facts.between.growing and most > 0.0:
+            judged.add("peaks", max(most - entry[key], 0.0) / most)
+            judged.add("peaks", max(entry[key] / most - 1.0 - BETWEEN, 0.0))
+    _judge_energy(judged, entry, power)
+    _judge_bore(judged, fine_values)
+
+
+def _judge_energy(judged: _Judged, entry: dict[str, Any], power: Array) -> None:
+    """Judge both energies: the trapezoidal rule over the times at which the positions are passed."""
+    at = judged.solution.at
+    if at.time is not None:
+        spans = np.diff(at.time)
+    else:
+        speed = at.speed if at.stroke is None else at.stroke_speed
+        speeds = np.broadcast_to(np.asarray(speed, float), power.shape)[:-1]
+        if not np.all(speeds):
+            return
+        spans = np.abs(np.diff(at.places) / speeds)
+    sums = []
+    for part in (np.maximum(power, 0.0), np.maximum(-power, 0.0)):
+        sums.append(float((spans * 0.5 * (part[:-1] + part[1:])).sum()))
+    for key, total in zip(("energy_in", "energy_out"), sums, strict=True):
+        judged.add("means", abs(entry[key] - total) / max(sums) if max(sums) else 0.0)
+
+
+def _judge_bore(judged: _Judged, fine: Array) -> None:
+    """Judge the bores that are printed for a cylinder that pushes, and that pulls."""
+    if not judged.facts.linear or judged.facts.between.growing:
+        return
+    if judged.scene.drive is None or not judged.scene.drive.has_stroke:
+        return
+    units = {"m": ("mm", 1e3), "N": ("N", 1.0)}
+    lines = write_block(judged.scene, judged.solution, units, pressure=PRESSURE)
+    text = " ".join(" ".join(lines).split()).partition("bore at least ")[2]
+    printed = {
+        word: 1e-3 * float(number)
+        for number, word in re.findall(r"(\d\S*) mm\b[^;]*? to (\w+) ", text)
+    }
+    for word, force in (("push", float(fine.max())), ("pull", -float(fine.min()))):
+        if force > 0.0:
+            bore = math.sqrt(4.0 * force / (math.pi * PRESSURE))
+            judged.add_value("bore", printed.get(word), bore)
+
+
+def _judge_pins(judged: _Judged) -> None:
+    """Judge peak, place and mean of each pin's load, as printed and in the JSON, and the force on the frame."""
+    facts, solution = judged.facts, judged.solution
+    entry = write_motor(judged.scene, solution, {})
+    counted = slice(None, -1) if bool(is_once_round(solution)) else slice(None)
+    for pin, load in facts.pins.items():
+        name = PIN_FORCE[pin]
+        own = magnitude(judged.own.quantities[name])
+        if not own.max() > 0.0:
+            continue
+        mean = math.sqrt(np.square(own[counted]).mean())
+        judged.add_value("pins", load.rms, mean)
+        if name in facts.between.growing:
+            continue
+        there = judged.ask(load.peak.place)
+        at_peak = magnitude(there.quantities[name])
+        fine = magnitude(judged.fine.quantities[name])
+        judged.add_peak("pins", load.peak, at_peak, fine)
+        if entry is not None:
+            of_pin = entry["pins"][pin]
+            judged.add_value("pins", of_pin["peak"], load.peak.value)
+            judged.add_value("pins", of_pin["rms"], mean)
+            apart = _take(judged, there, "theta_2") - of_pin["theta_2"]
+            judged.add("pins", np.abs(wrap_angle(apart)))
+    if judged.scene.drive is None:
+        on_frame = -(judged.own.quantities["F12"] + judged.own.quantities["F14"])
+        size = magnitude(judged.own.quantities["F12"]).max()
+        size += magnitude(judged.own.quantities["F14"]).max()
+        if size > 0.0:
+            apart = magnitude(shaking_force(solution) - on_frame)
+            judged.add("shaking_force", apart / size)
+
+
+def _judge_bending(judged: _Judged) -> None:
+    """Judge the largest bending moment of each bar: at its place by cutting there, and at many positions."""
+    stated = state_from_pins(judged.scene)
+    fine_motion = move_bars(judged.scene, _command_of(judged.fine), judged.fine)
+    for bar in MOVING_BARS:
+        largest = judged.facts.bending.get(bar)
+        if largest is None or largest.grows or not largest.peak.value > 0.0:
+            continue
+        there = judged.ask(largest.peak.place)
+        motion = move_bars(judged.scene, _command_of(there), there)
+        length = judged.scene.linkage.bar(bar).length
+        beside = [
+            largest.x * (1.0 + off) + off * length for off in (-CUT_BESIDE, CUT_BESIDE)
+        ]
+        moments = [
+            float(np.abs(free_piece(stated, motion, there, bar, cut).M[0]))
+            for cut in beside
+        ]
+        size = abs(largest.peak.value)
+        judged.add("bending", abs(max(moments) - size) / size)
+        others = [
+            float(
+                np.abs(free_piece(stated, fine_motion, judged.fine, bar, cut).M).max()
+            )
+            for cut in beside
+        ]
+        judged.add("bending", max(max(others) - size, 0.0) / size)
+
+
+CUT_BESIDE = 1e-10
+"""Part of the length by which a bar is cut on either side of a place: a couple that acts there makes a jump."""
+
+
+def _command_of(answer: Answer) -> Any:
+    assert answer.at is not None
+    return answer.at
