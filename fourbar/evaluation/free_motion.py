@@ -412,7 +412,7 @@ class _Run:
         return Released(
             motion,
             self.drift / self.largest if self.largest else 0.0,
-            tuple(self.change_points),
+            tuple(sorted(self.change_points)),  # two may lie within one step
         )
 
     def _follow_solver(self, solver: Any) -> bool:

@@ -361,3 +361,54 @@ def test_a_release_at_an_angle_of_another_bar_is_the_same_motion(bar: int) -> No
     two = fourbar.release(replace(scene, motion=other))
     assert np.abs(np.sin(0.5 * (one.theta_2 - two.theta_2))).max() < 1e-9
     assert np.abs(one.omega_2 - two.omega_2).max() < 1e-7
+
+
+def test_change_points_of_several_turns_are_noted_when_they_are_passed() -> None:
+    """A flywheel turns a massless parallelogram evenly: all bars are in line at each half turn of the input."""
+    linkage = fourbar.FourBar(
+        0.3, fourbar.Bar(0.1), fourbar.Bar(0.3), fourbar.Bar(0.1), ground_angle=0.2
+    )
+    for speed in (10.0, -10.0):
+        scene = fourbar.Scene(
+            linkage,
+            fourbar.Motion(0.5, speed, free=fourbar.Free(1.5, 6)),
+            effects=(fourbar.Flywheel(0.3),),
+        )
+        released = fourbar.release(scene)
+        turned = 0.5 - 0.2 if speed < 0.0 else math.pi - (0.5 - 0.2)
+        right = [(turned + k * math.pi) / 10.0 for k in range(5)]
+        right = [t for t in right if t < 1.5]
+        assert released.change_points == pytest.approx(right, abs=1e-9)
+        assert np.abs(released.omega_2 - speed).max() < 1e-9
+
+
+def test_a_released_spring_is_followed_up_to_half_a_turn_and_no_further() -> None:
+    spring = fourbar.Torsion.at(O2=(0.01, 0.5, 0.0))
+    still = fourbar.Scene(
+        HANGING,
+        fourbar.Motion(0.5, 1.0, free=fourbar.Free(0.2, 4)),
+        effects=(fourbar.Gravity(), spring),
+    )
+    assert len(fourbar.release(still).time) == 5
+    fast = replace(still, motion=fourbar.Motion(0.5, 40.0, free=fourbar.Free(0.2, 40)))
+    with pytest.raises(
+        LimitError, match=r"effects\.torsion: at 0.*more than half a turn"
+    ):
+        fourbar.release(fast)
+
+
+def test_the_drift_is_a_part_of_the_largest_energy_or_work() -> None:
+    """From rest all kinetic energy is the weight's work; the largest of it is what a drift is measured by."""
+    scene = fourbar.Scene(
+        HANGING,
+        fourbar.Motion(0.9, 0.0, free=fourbar.Free(0.5, 5)),
+        effects=(fourbar.Gravity(),),
+    )
+    run = free_motion._Run(scene.linkage, scene.effects, 0.9, 0.0, 1, 2)
+    released = run.integrate(np.linspace(0.0, 0.5, 6))
+    energy = run.start_energy + abs(float(run.y[2]))
+    assert run.largest >= (1.0 - 1e-9) * energy > 0.0
+    assert released.energy_drift == run.drift / run.largest < 1e-10
+    moving = free_motion._Run(scene.linkage, (), 0.9, 5.0, 1, 2)
+    moving.integrate(np.linspace(0.0, 0.5, 6))
+    assert moving.largest == pytest.approx(moving.start_energy, rel=1e-9)

@@ -11,8 +11,8 @@ import pytest
 import fourbar
 from fourbar.effects import Torsion
 from fourbar.formulas.mobility import choose_range, turns_fully
-from fourbar.mjcf import Settings, list_defaults, make_scene, write_mjcf
-from fourbar.mjcf.document import SETTLING
+from fourbar.mjcf import RECIPE, Settings, list_defaults, make_scene, write_mjcf
+from fourbar.mjcf.document import SETTLING, choose_run
 from fourbar_validation.scenes.random import (
     MACHINES,
     DrawnType,
@@ -294,3 +294,15 @@ def test_a_spring_at_a_ground_pin_rests_at_an_angle_from_the_ground(
     (sprung_joint,) = np.flatnonzero(model.jnt_stiffness)
     assert model.jnt_stiffness[sprung_joint] == 0.5
     assert model.qpos_spring[sprung_joint] == pytest.approx(0.4 + theta_1 - 0.2)
+
+
+def test_a_window_has_its_steps_wherever_it_lies() -> None:
+    """A quarter radian at 3 rad/s takes 1/12 s; the steps in it do not depend on the angle at which it begins."""
+    steps = {
+        choose_run(np.array([start, start + 0.25]), 3.0, 0.0).timestep()
+        for start in (0.1, 2.0, 4.0)
+    }
+    assert max(steps) == pytest.approx(min(steps), rel=1e-12)
+    run = choose_run(np.array([2.0, 2.25]), 3.0, 0.0)
+    count = run.time(run.stop) / run.timestep()
+    assert count == pytest.approx(round(count)) and count >= RECIPE.steps_per_window

@@ -410,3 +410,27 @@ def test_the_json_names_the_angle_of_the_peak_that_is_located() -> None:
 def swept_finely(steps: int) -> fourbar.Scene:
     motion = fourbar.Motion(fourbar.Sweep(0.1, 0.1 + math.tau, steps), 10.0)
     return crank_rocker(motion=motion)
+
+
+@pytest.mark.parametrize("branch", (1, -1))
+def test_the_largest_rates_of_following_bars_are_those_of_fine_steps(
+    branch: int,
+) -> None:
+    """Where nothing acts the summary has speeds and accelerations of bars 3 and 4, signed, and where they are."""
+    linkage = fourbar.FourBar(D, *(fourbar.Bar(x) for x in (A, B, C)))  # type: ignore[arg-type]
+
+    def make(steps: int) -> fourbar.Scene:
+        sweep = fourbar.Sweep(0.2, 0.2 + math.tau, steps)
+        return fourbar.Scene(linkage, fourbar.Motion(sweep, 10.0, branch=branch))
+
+    scene, fine = make(90), fourbar.solve(make(36_000))
+    rates = summarize(scene, fourbar.solve(scene)).rates
+    assert rates.keys() == {3, 4}
+    for bar, (speed, acceleration) in rates.items():
+        for name, peak in (("omega", speed), ("alpha", acceleration)):
+            values = getattr(fine, f"{name}_{bar}")
+            i = int(np.argmax(np.abs(values)))
+            assert peak.value == pytest.approx(values[i], rel=2e-3)
+            assert math.remainder(peak.place - fine.theta_2[i], math.tau) == (
+                pytest.approx(0.0, abs=0.07)
+            )
