@@ -142,7 +142,7 @@ def write_sdf(
     reader : who closes the loop how: "gazebo" by a fourth joint, "drake" by its own ball constraint.
     start : the assembled state to stand in; None: that of `find_start`.
     without_loads : leave the scene's loads out, for the program to apply; otherwise they are refused.
-    plane : where the linkage stands in the world.
+    plane : where the linkage, or the drawing that states its pins, stands in the world.
 
     Raises
     ------
@@ -153,6 +153,7 @@ def write_sdf(
     Source: sdformat.org/spec, and Drake's documentation of its parser.
     """
     linkage = scene.linkage
+    plane = plane.moved(*scene.origin)
     form = f"SDF for {reader}"
     assembled = assemble(scene, start, form, reader, without_loads=without_loads)
     turn, foot, numbers, inertia, gravity, dynamics = assembled
@@ -276,6 +277,7 @@ def write_usd(
     Source: openusd.org, UsdPhysics.
     """
     linkage = scene.linkage
+    plane = plane.moved(*scene.origin)
     assembled = assemble(scene, start, "USD", None, without_loads=without_loads)
     turn, foot, _, inertia, (x, y), _ = assembled
     pull = math.hypot(x, y)

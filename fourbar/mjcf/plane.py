@@ -99,6 +99,10 @@ class Plane:
         dx, dy, dz = self.turn(x, y, z)
         return self.origin[0] + dx, self.origin[1] + dy, self.origin[2] + dz
 
+    def moved(self, x: float, y: float) -> "Plane":
+        """Return the frame with its origin at a point of this one: that of a drawing has O2 there, m."""
+        return Plane(self.axis, self.place(x, y)) if x or y else self
+
     def turn_on(self, angle: float) -> tuple[float, float, float, float]:
         """Return the quaternion of a body that is turned by an angle (rad) in the plane."""
         w, x, y, z = self.quaternion

@@ -137,7 +137,7 @@ def _write_ordinal(number: int) -> str:
 def write_value(number: float, unit: str, units: Conversion) -> str:
     """Write a number of an SI unit with six digits and the unit it is shown in."""
     name, factor = find_unit_in(unit, units)
-    return f"{number * factor:.6g} {name}"
+    return f"{number * factor + 0.0:.6g} {name}"
 
 
 def list_columns(

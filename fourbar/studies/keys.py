@@ -190,6 +190,11 @@ def command_key(scene: Scene) -> str:
 def refuse_key(key: str, value: object, keys: list[str]) -> InputError:
     """Make the error for a key that a study cannot vary."""
     expect("key", key, str)
+    if key.split(".", maxsplit=1)[0] == "pins":
+        lengths = ", ".join(name for name in keys if name.startswith("lengths."))
+        return InputError(
+            key, value, f"a drawing is varied by the lengths that follow: {lengths}"
+        )
     inner = [name for name in keys if name.startswith(f"{key}.")]
     if inner:
         return InputError(

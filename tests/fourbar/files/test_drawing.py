@@ -9,6 +9,8 @@ import pytest
 import fourbar
 from fourbar.errors import InputError
 from fourbar.files import dump, loads
+from fourbar.mjcf.assembly import write_sdf, write_usd
+from fourbar.mjcf.plane import Plane
 from fourbar.scene.motion import COMMANDS
 
 EPS = 2.0**-52
@@ -278,6 +280,26 @@ O4 = ["300.0 mm", "30.0 mm"]
     d, a, b, c = drawn = tuple(pins.length(bar) for bar in (1, 2, 3, 4))
     assert 1e-5 < abs(d + a - b - c) < 5e-5
     assert scene.linkage.lengths == drawn
+
+
+def test_sdf_and_usd_stand_where_the_drawing_has_them() -> None:
+    """The frame of a model file is the drawing's: O2 at its place there, moved on by --origin."""
+    moved = DRAWN.replace('"0 mm", "0 mm"', '"41 mm", "37.5 mm"')
+    masses = (
+        f"[bars.{name}]\nmass = '1 kg'" for name in ("input", "coupler", "output")
+    )
+    scene = loads("\n".join([moved, *masses, '[motion]\nomega_2 = "1 rad/s"\n']))
+    assert "<pose>0.041 0.0375 0 " in write_sdf(scene)
+    assert "translate = (0.041, 0.0375, 0)" in write_usd(scene)
+    on_a_base = Plane(origin=(1.0, 0.0, 2.0))
+    assert "translate = (1.041, 0.0375, 2.0)" in write_usd(scene, plane=on_a_base)
+
+
+def test_a_study_of_a_drawing_names_the_lengths_that_follow() -> None:
+    with pytest.raises(
+        InputError, match=r"varied by the lengths that follow: lengths\."
+    ):
+        fourbar.vary(loads(DRAWN), {"pins.A.0": [0.0, 0.1]})
 
 
 @pytest.mark.parametrize("bar", [2, 4])

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 import fourbar
+import fourbar.cli
 from fourbar.errors import BAD_INPUT, FAILED, HOLDS, InputError
 from fourbar.quantities import LINE_QUANTITIES, OK, UNITS, VECTORS
 from fourbar.scene import Command, Scene, command
@@ -1118,3 +1119,31 @@ def test_a_column_without_information_is_an_error_and_zeros_that_are_right_are_n
     form = lines("theta_2 [deg],torque,alpha_2\n", "{theta:.0f},{torque:.9e},0\n")
     path = write_torques(tmp_path / "theirs.csv", form)
     assert judged(SCENES["crank_rocker"], path).status == HOLDS
+
+
+def test_the_table_of_a_drawing_agrees_in_its_coordinates(tmp_path: Path) -> None:
+    scene = tmp_path / "drawn.toml"
+    scene.write_text(
+        """\
+[pins]
+O2 = ["41 mm", "37.5 mm"]
+A = ["41 mm", "137.5 mm"]
+B = ["216 mm", "87.5 mm"]
+O4 = ["291 mm", "87.5 mm"]
+[bars.coupler]
+mass = "1 kg"
+[motion]
+theta_2 = { from = "0 deg", to = "90 deg", steps = 9 }
+omega_2 = "1 rad/s"
+"""
+    )
+    table = tmp_path / "theirs.csv"
+    assert fourbar.cli.status(["analyze", str(scene), "-o", str(table)]) == HOLDS
+    assert status(["check", str(scene), str(table)]) == HOLDS
+    judged = judge_table(
+        fourbar.load(scene), read_table(table).from_pin((0.041, 0.0375))
+    )
+    assert judged.status == 0
+    assert not judged.differing
+    as_it_stands = judge_table(fourbar.load(scene), read_table(table))
+    assert {finding.quantity for finding in as_it_stands.differing} >= {"A", "B"}

@@ -316,7 +316,9 @@ def check(
     tolerance = (
         None if rtol is None and atol is None else Allowance(rtol or 0.0, atol or 0.0)
     )
-    judgement = judge_table(load(scene), table, tolerance)
+    stated = load(scene)
+    table = table.from_pin(stated.origin)
+    judgement = judge_table(stated, table, tolerance)
     if json is not None:
         write_text(json, write_json(judgement, table))
     if junit is not None:

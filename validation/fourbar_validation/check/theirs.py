@@ -14,7 +14,7 @@ import csv
 import io
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from decimal import Decimal, InvalidOperation
 from pathlib import Path
 
@@ -104,6 +104,10 @@ HEADING = re.compile(
 )
 
 
+PLACES = frozenset(name for name in VECTORS if UNITS[name] == "m")
+"""Quantities that are places, in the coordinates of a scene's drawing."""
+
+
 @dataclass(frozen=True, slots=True)
 class Unit:
     """Unit of the numbers of a column."""
@@ -148,6 +152,22 @@ class TheirTable:
         """Mark the rows in which a quantity has any number, (n,)."""
         finite = np.isfinite(self.values[key])
         return np.asarray(finite.any(axis=1) if finite.ndim == 2 else finite)
+
+    def from_pin(self, origin: tuple[float, float]) -> "TheirTable":
+        """Return the table with its places from O2, which stands at `origin` in a drawing's coordinates."""
+        if not any(origin):
+            return self
+        values = {
+            key: value - origin if key in PLACES else value
+            for key, value in self.values.items()
+        }
+        if not values.keys() & PLACES:
+            return self
+        x, y = origin
+        note = (
+            f"places are those of the drawing; shown from O2, at ({x:.6g}, {y:.6g}) m"
+        )
+        return replace(self, values=values, notes=(*self.notes, note))
 
 
 def name_quantity(key: str) -> str:
