@@ -121,6 +121,14 @@ def test_a_tilted_file_differs_in_its_plane_alone(
         assert max(errors(CRANK_ROCKER, examination, how).values()) <= SIMULATED.factor
 
 
+def test_a_hinge_that_is_not_parallel_is_named() -> None:
+    hinge = 'name="A" type="hinge" axis="0 0 1"'
+    assert hinge in GENERATED
+    text = GENERATED.replace(hinge, hinge.replace("0 0 1", "0 1e-6 1"))
+    with pytest.raises(InputError, match="--loop NAME measures a loop whose axes"):
+        examine(CRANK_ROCKER, text, {})
+
+
 def test_the_description_is_that_of_the_scene() -> None:
     numbers, linkage = values(generated(CRANK_ROCKER)), CRANK_ROCKER.linkage
     for number, name in ((2, "input"), (3, "coupler"), (4, "output")):

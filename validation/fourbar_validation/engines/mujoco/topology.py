@@ -183,8 +183,9 @@ class Topology:
                 name,
                 "joins bars that have no pin in common, or have one already",
             )
-        along = float(self.data.xaxis[joint] @ self.normal)
-        if abs(along) < 1.0 - STRAIGHT**2:
+        axis = self.data.xaxis[joint]
+        along = float(axis @ self.normal)
+        if float(np.linalg.norm(np.cross(axis, self.normal))) > STRAIGHT:
             raise InputError(
                 "MJCF",
                 name,
