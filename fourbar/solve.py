@@ -85,7 +85,7 @@ def solve(
         return _require_study(scene, at).solve(stage, out=out, side=side)
     change_points: tuple[float, ...] | None = None
     if at is not None:
-        _refuse(at)
+        _require_command(at)
         commanded = at
     elif scene.motion.free is not None:
         from fourbar.evaluation.free_motion import release
@@ -99,7 +99,7 @@ def solve(
         if commanded.independent is not None:
             results = _solve_released(scene, commanded.independent, request)
         else:
-            case = _begin(scene, commanded, request, side)
+            case = _make_case(scene, commanded, request, side)
             alone = _solve_alone(case, commanded, request)
             results = alone or _solve_blocks(case, commanded, request)
     solution = make_solution(scene, commanded, results)
@@ -159,7 +159,7 @@ class Results:
                 array[*part, 0], array[*part, 1] = value.real, value.imag
 
 
-def _begin(scene: Scene, commanded: Command, request: Requested, side: int) -> Case:
+def _make_case(scene: Scene, commanded: Command, request: Requested, side: int) -> Case:
     """Make the case of one linkage, with effects that count turns from where the motion begins."""
     case = Case.of(scene, commanded.bar)._replace(side=side)
     if not request.asks_forces or not scene.counts_turns:
@@ -240,7 +240,7 @@ def _require_study(study: object, at: Command | None) -> ManyScenes:
     return study
 
 
-def _refuse(commanded: Command) -> None:
+def _require_command(commanded: Command) -> None:
     """Raise an InputError where a command is none."""
     expect("at", commanded, Command)
     require_bar("at.bar", commanded.bar)
