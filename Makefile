@@ -9,10 +9,12 @@ LONG := kills package oldest prereleases machines engines simulators problems be
 
 
 validate: setup
+	@echo "validate: scenes in MuJoCo and Pinocchio, half a minute; the report is results/report.html"
 	$(BIN)/python -m validation run
 
 # the contributor's loop: two minutes on two idle cores
 test: check
+	@echo "test: the quick tests, two minutes"
 	$(BIN)/python -m pytest -n 2 --dist worksteal -m "not slow"
 
 # every test that is not of a night
@@ -20,9 +22,12 @@ test-all: check
 	$(BIN)/python -m pytest -n 2 --dist worksteal
 
 check: setup
+	@echo "check: style"
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	@echo "check: types"
 	$(BIN)/mypy
+	$(BIN)/python -m tests.support.public_types
 
 # everything that `make test-all` samples, in full; each part ends within one hour on two cores. Minutes of two idle cores: kills
 # at most 16, suites 6, package 3, oldest and prereleases 8 each; from the processor's time of a share: machines 7 for each kernel that the
@@ -76,10 +81,14 @@ models: setup
 setup: $(STAMP)
 
 $(STAMP): pyproject.toml lab/pyproject.toml
+	@echo "setup, 1 of 3: an environment in $(VENV)"
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	@echo "setup, 2 of 3: the newest pip"
 	$(BIN)/python -m pip install --quiet --upgrade pip
-	$(BIN)/python -m pip install --quiet --editable ".[test]" --editable lab
+	@echo "setup, 3 of 3: MuJoCo, Pinocchio and the other libraries, some three minutes"
+	$(BIN)/python -m pip install --editable ".[test]" --editable lab
 	touch $(STAMP)
+	@echo "setup: done"
 
 clean:
 	rm -rf $(VENV) results site

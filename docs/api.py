@@ -54,6 +54,10 @@ def fields(kind: type) -> list[tuple[str, str, str]]:
     return rows + (fields(Quantities) if Quantities in kind.__bases__ else [])
 
 
+NOT_STATED = ("init=False)", "kw_only=True)")
+"""Ends of fields that nobody states: those of a solution, which `solve` makes."""
+
+
 def signature(thing: Any) -> str:
     """Return the arguments as the source has them, without "self"; for a description, its fields."""
     node = parse(thing.fget if isinstance(thing, property) else thing)
@@ -72,7 +76,7 @@ def signature(thing: Any) -> str:
             for statement in node.body
             if isinstance(statement, ast.AnnAssign)
             and not is_of_class(statement)
-            and not ast.unparse(statement).endswith("init=False)")
+            and not ast.unparse(statement).endswith(NOT_STATED)
         ]
         return f"({', '.join(arguments)})"
     node.args.args = [argument for argument in node.args.args if argument.arg != "self"]

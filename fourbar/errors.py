@@ -34,7 +34,10 @@ class InputError(FourBarError):
     def __init__(
         self, key: str, value: object, allowed: str, file: str | None = None
     ) -> None:
-        self.key, self.value, self.allowed, self.file = key, value, allowed, file
+        self.key: str = key
+        self.value: object = value
+        self.allowed: str = allowed
+        self.file: str | None = file
         # a reader wants 0.21, not np.float64(0.21); an interruption while numpy is
         # imported is one line too, so that this module does not import it
         numpy = sys.modules.get("numpy")

@@ -4,9 +4,9 @@ import csv
 import io
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,8 +49,8 @@ SI: Conversion = {}
 DEGREES: Conversion = {"rad": ("deg", 180.0 / math.pi)}
 
 
-@dataclass(slots=True, eq=False)
-class Solution(Quantities):
+@dataclass(frozen=True, slots=True, eq=False)
+class Solution(Quantities):  # noqa: PLW1641 - arrays have no hash
     """The answer of the formulas at n positions, or at n positions of each of m linkages, SI units and radians.
 
     Scalars have shape (n,), vectors (n, 2), of a study (m, n) and (m, n, 2); NaN marks a position where a
@@ -74,28 +74,52 @@ class Solution(Quantities):
     bound there, are NaN."""
     branch: NDArray[np.int8]
     """Sign of sin(theta_4 - theta_3): +1 or -1."""
-    points: dict[str, Array] = field(default_factory=dict, init=False)
+    points: dict[str, Array] = field(default_factory=dict, kw_only=True)
     """Positions of the scene's own points by name, (n, 2), m."""
-    velocity: dict[str, Array] = field(default_factory=dict, init=False)
+    velocity: dict[str, Array] = field(default_factory=dict, kw_only=True)
     """Velocities of the scene's points, m/s."""
-    acceleration: dict[str, Array] = field(default_factory=dict, init=False)
+    acceleration: dict[str, Array] = field(default_factory=dict, kw_only=True)
     """Accelerations of the scene's points, m/s^2."""
-    ground: tuple[Any, Any] | None = field(default=None, init=False)
+    ground: tuple[Any, Any] | None = field(default=None, kw_only=True)
     """Length and angle of the ground bar, m and rad; of a study (m, 1) each where they vary."""
-    scene: "Scene | None" = field(default=None, init=False)
+    scene: "Scene | None" = field(default=None, kw_only=True)
     """Scene that was solved; None for a study."""
-    lengths: tuple[Any, Any, Any, Any] | None = field(default=None, init=False)
+    lengths: tuple[Any, Any, Any, Any] | None = field(default=None, kw_only=True)
     """Lengths of ground, input, coupler and output, m; of a study (m, 1) each where they vary."""
-    drive: "ForceDrive | None" = field(default=None, init=False)
+    drive: "ForceDrive | None" = field(default=None, kw_only=True)
     """Linear drive of the scene; None: a bar is driven."""
-    change_points: tuple[float, ...] | None = field(default=None, init=False)
+    change_points: tuple[float, ...] | None = field(default=None, kw_only=True)
     """Times at which a free motion passed a change point, s: another motion was possible there."""
 
-    at: Command = field(default=None, init=False)  # type: ignore[assignment]  # `solve` states it
+    at: Command = field(default=None, kw_only=True)  # type: ignore[assignment]  # `solve` states it
     """Name of the commanded quantity; theta_2 for a free motion."""
 
     def __len__(self) -> int:
         return len(self.theta_2)
+
+    def __getitem__(self, name: str) -> Array:
+        """Return a quantity by its name, that of a point of the scene too (`P`, `v_P`, `a_P`), in SI units.
+
+        InputError for another name, and for a quantity that was not evaluated.
+        """
+        names = _list_quantities(self)
+        if not isinstance(name, str) or name not in names:
+            raise InputError("solution", name, f"must be among {', '.join(names)}")
+        values: Array | None = _find_si(self, name)
+        if values is None:
+            raise InputError("solution", name, "was not evaluated: solve as far as it")
+        return values
+
+    __iter__: ClassVar[None] = None  # neither positions nor names
+
+    def __eq__(self, other: object) -> bool:
+        """Return whether everything is equal, each number bit by bit and NaN to NaN."""
+        if not isinstance(other, Solution):
+            return NotImplemented
+        return all(
+            _is_equal(getattr(self, part.name), getattr(other, part.name))
+            for part in fields(self)
+        )
 
     def __repr__(self) -> str:
         """Say in ten lines what it holds."""
@@ -175,6 +199,8 @@ class Solution(Quantities):
     def to_pandas(self, units: Conversion = SI) -> "DataFrame":
         """Make a table of what was evaluated, a row per position, vectors as `A_x`, `A_y`; SI and radians by default.
 
+        `attrs["units"]` of the table is the unit of each column of numbers.
+
         Raises DependencyError where pandas is not installed.
         """
         columns = {
@@ -182,7 +208,34 @@ class Solution(Quantities):
             for name, values in list_scalars(self, require_units(units)).items()
             if values is not None
         }
-        return make_data_frame({**list_leading(self), **columns})
+        table = make_data_frame({**list_leading(self), **columns})
+        table.attrs["units"] = {heading: _read_unit(heading) for heading in columns}
+        return table
+
+
+def _read_unit(heading: str) -> str:
+    """Return the unit of a column of numbers: the one that its heading names, else the SI unit."""
+    name, _, unit = heading.partition(" [")
+    if unit:
+        return unit.removesuffix("]")
+    stem = name.strip("|")
+    if stem not in UNITS and stem not in DERIVED_NAMES:
+        stem = stem.removesuffix("_x").removesuffix("_y")
+    return find_unit(stem)
+
+
+def _is_equal(one: Any, another: Any) -> bool:
+    """Return whether two parts of a solution are equal, arrays in them too."""
+    if isinstance(one, np.ndarray) or isinstance(another, np.ndarray):
+        of_numbers = np.issubdtype(np.asarray(one).dtype, np.floating)
+        return np.array_equal(one, another, equal_nan=of_numbers)
+    if isinstance(one, dict) and isinstance(another, dict):
+        alike = one.keys() == another.keys()
+        return alike and all(_is_equal(one[name], another[name]) for name in one)
+    if isinstance(one, tuple) and isinstance(another, tuple):
+        alike = len(one) == len(another)
+        return alike and all(map(_is_equal, one, another))
+    return bool(one == another)
 
 
 def split_parts(name: str, values: Array) -> dict[str, Array]:
@@ -410,16 +463,21 @@ def find_values(solution: Solution, name: str, units: Conversion = SI) -> Any:
 
     Places are those in the coordinates of the scene's drawing.
     """
-    values: Array | None
-    if name in UNITS:
-        values = getattr(solution, name)
-    else:
-        table = {"v_": solution.velocity, "a_": solution.acceleration}.get(name[:2])
-        values = solution.points.get(name) if table is None else table.get(name[2:])
+    values = _find_si(solution, name)
     unit = find_unit(name)
     if values is not None and unit == "m" and not is_scalar(name):
         values = shift_to_drawing(solution, values)
     return values if values is None or unit not in units else values * units[unit][1]
+
+
+def _find_si(solution: Solution, name: str) -> Array | None:
+    """Return a quantity, or a point's, in SI units and from O2; None where it was not evaluated."""
+    values: Array | None
+    if name in UNITS:
+        values = getattr(solution, name)
+        return values
+    table = {"v_": solution.velocity, "a_": solution.acceleration}.get(name[:2])
+    return solution.points.get(name) if table is None else table.get(name[2:])
 
 
 def shift_to_drawing(solution: Solution, places: Array) -> Array:

@@ -6,6 +6,7 @@ from functools import cache
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fourbar.errors import InputError, expect
 from fourbar.evaluation.case import BLOCK, Case
@@ -102,9 +103,9 @@ def solve(
             case = _make_case(scene, commanded, request, side)
             alone = _solve_alone(case, commanded, request)
             results = alone or _solve_blocks(case, commanded, request)
-    solution = make_solution(scene, commanded, results)
-    solution.scene, solution.change_points = scene, change_points
-    return solution
+    return make_solution(
+        scene, commanded, results, solved=scene, change_points=change_points
+    )
 
 
 class Requested(NamedTuple):
@@ -135,7 +136,7 @@ class Results:
 
     def __init__(self, request: Requested) -> None:
         shape, given = request.shape, request.out or {}
-        self.codes = np.zeros(shape, dtype=np.uint8)
+        self.codes: NDArray[np.uint8] = np.zeros(shape, dtype=np.uint8)
         self.arrays: dict[str, Array] = {}
         for name in request.names:
             shape_of_one = shape if name in SCALARS else (*shape, 2)
@@ -373,8 +374,21 @@ def _list_names(
     }.keys()
 
 
-def make_solution(scene: Scene, commanded: Command, results: Results) -> Solution:
-    """Put the arrays of a solution in their places."""
+def make_solution(
+    scene: Scene,
+    commanded: Command,
+    results: Results,
+    *,
+    solved: Scene | None = None,
+    change_points: tuple[float, ...] | None = None,
+) -> Solution:
+    """Put the arrays of a solution in their places.
+
+    Parameters
+    ----------
+    solved : the scene, or None for a study, whose numbers are arrays.
+    change_points : times at which a free motion passed a change point, s.
+    """
     codes, quantities_by_name = results.codes, results.arrays
     unwrap_angles(quantities_by_name, commanded.bar)
     if commanded.stroke is not None:
@@ -402,19 +416,24 @@ def make_solution(scene: Scene, commanded: Command, results: Results) -> Solutio
         branch = np.where(np.abs(sine) > 0.0, np.sign(sine), branch).astype(np.int8)
     else:
         branch = with_signs(scene.linkage, commanded).branch
-    solution = Solution(
-        scene.title, scene.drive_bar, codes, branch, theta_2=theta_2, **quantities
+    quantities = {**quantities, "time": commanded.time}
+    return Solution(
+        scene.title,
+        scene.drive_bar,
+        codes,
+        branch,
+        theta_2=theta_2,
+        **quantities,
+        points=of_points[""],
+        velocity=of_points["v_"],
+        acceleration=of_points["a_"],
+        ground=(scene.linkage.ground, scene.linkage.ground_angle),
+        scene=solved,
+        lengths=scene.linkage.lengths,
+        drive=scene.settled().drive,
+        change_points=change_points,
+        at=commanded,
     )
-    solution.drive, solution.at = scene.settled().drive, commanded
-    solution.time = commanded.time
-    solution.points, solution.velocity, solution.acceleration = (
-        of_points[""],
-        of_points["v_"],
-        of_points["a_"],
-    )
-    solution.ground = (scene.linkage.ground, scene.linkage.ground_angle)
-    solution.lengths = scene.linkage.lengths
-    return solution
 
 
 def unwrap_angles(arrays: Mapping[str, Array], bar: int) -> None:

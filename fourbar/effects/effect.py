@@ -67,7 +67,9 @@ class Actions:
     """
 
     def __init__(self, state: State, bodies: Bodies, side: Number = 0) -> None:
-        self.state, self.bodies, self.side = state, bodies, side
+        self.state: State = state
+        self.bodies: Bodies = bodies
+        self.side: Number = side
         self.forces: dict[int, Any] = {}
         """Resultants of the bars on which any acts, complex, N."""
         self.moments: dict[int, Any] = {}

@@ -35,7 +35,7 @@ def _vector(*line: str | None) -> Any:
     return field(default=None, metadata={"line": ("vector", *line)})
 
 
-@dataclass(slots=True, eq=False, kw_only=True)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Quantities:
     """The quantities, one line each; `Solution` inherits them as fields, tables have them in this order.
 

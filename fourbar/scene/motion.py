@@ -397,15 +397,18 @@ class Motion:
         for names in commands
         for name, per in zip(names, ("", "/s", "/s^2"), strict=True)
     }
-    theta_2, theta_3, theta_4, stroke = (
-        _read_number(names[0], 0) for names in (*COMMANDS.values(), STROKE_COMMAND)
-    )
-    omega_2, omega_3, omega_4, stroke_speed = (
-        _read_number(names[1], 1) for names in (*COMMANDS.values(), STROKE_COMMAND)
-    )
-    alpha_2, alpha_3, alpha_4, stroke_acceleration = (
-        _read_number(names[2], 2) for names in (*COMMANDS.values(), STROKE_COMMAND)
-    )
+    theta_2: ClassVar[Any] = _read_number("theta_2", 0)
+    theta_3: ClassVar[Any] = _read_number("theta_3", 0)
+    theta_4: ClassVar[Any] = _read_number("theta_4", 0)
+    stroke: ClassVar[Any] = _read_number("stroke", 0)
+    omega_2: ClassVar[Any] = _read_number("omega_2", 1)
+    omega_3: ClassVar[Any] = _read_number("omega_3", 1)
+    omega_4: ClassVar[Any] = _read_number("omega_4", 1)
+    stroke_speed: ClassVar[Any] = _read_number("stroke_speed", 1)
+    alpha_2: ClassVar[Any] = _read_number("alpha_2", 2)
+    alpha_3: ClassVar[Any] = _read_number("alpha_3", 2)
+    alpha_4: ClassVar[Any] = _read_number("alpha_4", 2)
+    stroke_acceleration: ClassVar[Any] = _read_number("stroke_acceleration", 2)
 
     def __init__(  # noqa: PLR0913 - the keywords of a command, of any bar
         self,

@@ -110,7 +110,8 @@ class InUnits:
 
     def __init__(self, shown: Scene | Solution, units: str) -> None:
         expect("shown", shown, Scene, Solution)
-        self.shown, self.units = shown, read_units(units)
+        self.shown: Scene | Solution = shown
+        self.units: Conversion = read_units(units)
 
     def _repr_html_(self) -> str:
         if isinstance(self.shown, Solution):

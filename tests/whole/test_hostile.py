@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import fourbar
-import fourbar_validation.run.run
+import fourbar_validation.run.plan
 from fourbar.errors import BAD_INPUT, FAILED, HOLDS, InputError
 from fourbar.mjcf import write_mjcf
 from fourbar.mjcf.assembly import write_sdf, write_usd
@@ -351,7 +351,7 @@ def test_running_out_of_memory_costs_its_own_row(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     suite = read_suite(listed(tmp_path, "a.toml\nb.toml\n"))
-    monkeypatch.setattr(fourbar_validation.run.run, "CHUNK", {True: 2, False: 2})
+    monkeypatch.setattr(fourbar_validation.run.plan, "CHUNK", {True: 2, False: 2})
     greedy = Engine("greedy", Greedy, EQUIVALENCE)
     run(suite, tmp_path / "run", (*EXACT, greedy), RunOptions(workers=1, drawn=False))
     failing = [

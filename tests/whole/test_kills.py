@@ -16,7 +16,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-import fourbar_validation.run.run
+import fourbar_validation.run.plan
 from fourbar.errors import BROKEN, DependencyError, FourBarError, InputError
 from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Answer
@@ -59,9 +59,7 @@ KILLS_OF_BLAME = 4
 """Kills of one scene that an engine is blamed for: twice with the others, twice alone."""
 COUNT, IN_A_CHUNK = (220, 20) if FULL else (30, 3)
 """Scenes of a run, none of them drawn, so that the work is the judging alone; and as many chunks in a small run."""
-SMALL = (
-    f"import fourbar_validation.run.run as run; run.CHUNK = {{False: {IN_A_CHUNK}}}; "
-)
+SMALL = f"import fourbar_validation.run.plan as plan; plan.CHUNK = {{False: {IN_A_CHUNK}}}; "
 HARNESS = (
     "import runpy; runpy.run_module('validation', run_name='__main__', alter_sys=True)"
 )
@@ -92,7 +90,7 @@ def judge_all(
 def test_an_engine_that_crashes_or_hangs_costs_its_own_rows(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(fourbar_validation.run.run, "CHUNK", {True: 2, False: 2})
+    monkeypatch.setattr(fourbar_validation.run.plan, "CHUNK", {True: 2, False: 2})
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
     hangs = 2.0 * max(
         1.0, load / (os.cpu_count() or 1)
@@ -166,7 +164,7 @@ def test_the_bytes_do_not_depend_on_the_workers(
     tmp_path: Path, undisturbed: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """None, in order, or two."""
-    monkeypatch.setattr(fourbar_validation.run.run, "CHUNK", {False: IN_A_CHUNK})
+    monkeypatch.setattr(fourbar_validation.run.plan, "CHUNK", {False: IN_A_CHUNK})
     judge_all(Random(COUNT, 0, TYPES), tmp_path, workers=2)
     for name in ("results.csv", "results.parquet"):
         assert (tmp_path / name).read_bytes() == (undisturbed / name).read_bytes()

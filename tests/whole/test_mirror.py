@@ -31,7 +31,7 @@ JUDGED_BY = {
     "fourbar/files/test_files.py": "fourbar/files: fields scene_text",
     "fourbar/formulas/test_formulas.py": "fourbar/formulas: arithmetic many_digits path",
     "fourbar/studies/test_equilibrium.py": "fourbar/studies: circuit_curve; fourbar/show: studies",
-    "fourbar/test_solve.py": "fourbar: solution; fourbar/scene: motion; fourbar/evaluation: case",
+    "fourbar/test_solve.py": "fourbar/scene: motion; fourbar/evaluation: case",
     "fourbar/studies/test_study.py": "fourbar/scene: motion; fourbar/studies: keys",
     # parts of one document or picture
     "fourbar/mjcf/test_mjcf.py": "fourbar/mjcf: document model",
@@ -41,6 +41,7 @@ JUDGED_BY = {
     # a comparison is tested by engines with given answers
     "validation/run/test_judge.py": "validation/compare: answer effects; "
     "validation/run: answers command identities question",
+    "validation/run/test_parts.py": "validation/run: plan progress request",
     "validation/compare/statements/test_statements.py": "validation/compare/statements: limit_positions transmission",
     # adapters: judged against printed figures, each other, and faults put in front of them
     "validation/engines/test_engines.py": "validation/engines: balls description "

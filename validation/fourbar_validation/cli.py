@@ -13,6 +13,7 @@ from fourbar_validation.places import PROGRAM
 
 COMMANDS = {
     "run": "fourbar_validation.run.command:command",
+    "collect": "fourbar_validation.run.parts:command",
     "accept": "fourbar_validation.regression.accept:accept_command",
     "compare": "fourbar_validation.regression.accept:compare",
     "check": "fourbar_validation.check:check",

@@ -22,8 +22,8 @@ from fourbar_validation.compare.columns import read_columns
 from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES
 from fourbar_validation.engines import guests, processes
 from fourbar_validation.engines.registry import ENGINES, load_further
-from fourbar_validation.run.command import Request, select_engines
 from fourbar_validation.run.judge import judge
+from fourbar_validation.run.request import Request, select_engines
 from fourbar_validation.run.run import RunOptions, run
 from fourbar_validation.scenes.suites import read_scene_files
 from tests.support.guests import end_guests, list_processes, write_program

@@ -39,7 +39,9 @@ class Columns:
         self.first_lines: dict[str, int] = {}
         """The line of results.csv at which each scene starts."""
         self._line = 2
-        self._waiting: list[Row] = []
+        self._waiting: list[Any] = []
+        """Arrow tables that wait to be a row group: rows themselves would take five times the memory."""
+        self._rows_waiting = 0
         self._files = ExitStack()
 
     def __enter__(self) -> "Columns":
@@ -74,23 +76,32 @@ class Columns:
             if self._line <= CSV_ROWS:
                 self.first_lines.setdefault(row.scene, self._line)
             self._line += 1
-        self._waiting += rows
+        if rows:
+            self._wait(rows)
         if self._line <= CSV_ROWS:
             with name_file(self.out / "results.csv"):
                 self._csv.write(write_rows(rows).partition("\n")[2])
-        if len(self._waiting) >= GROUP_ROWS:
+        if self._rows_waiting >= GROUP_ROWS:
             self._write_group()
+
+    def _wait(self, rows: Sequence[Row]) -> None:
+        """Keep rows until there are enough for a row group."""
+        import pyarrow as pa
+
+        by_column = {
+            name: [null_nan(getattr(row, name)) for row in rows] for name in COLUMNS
+        }
+        self._waiting.append(pa.table(by_column, schema=self._schema))
+        self._rows_waiting += len(rows)
 
     def _write_group(self) -> None:
         import pyarrow as pa
 
-        by_column = {
-            name: [null_nan(getattr(row, name)) for row in self._waiting]
-            for name in COLUMNS
-        }
+        group = pa.concat_tables(self._waiting).combine_chunks()
         with name_file(self.out / "results.parquet"):
-            self._parquet.write_table(pa.table(by_column, schema=self._schema))
+            self._parquet.write_table(group)
         self._waiting.clear()
+        self._rows_waiting = 0
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         """Put both in place, the text only where it is not too long."""

@@ -10,6 +10,7 @@ is too large. So another derivation, the reference, is asked too, and the strict
 """
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -251,92 +252,82 @@ def make_reference(scene: Scene, answer: Answer) -> Solution | None:
         answer.at.angle if answer.at.commanded == "theta_2" else answered["theta_2"]
     )
     theta = {2: theta_2, 3: answered["theta_3"], 4: answered["theta_4"]}
-    code = np.full(len(theta_2), OK, dtype=np.uint8)
-    reference = Solution(
-        scene.title, scene.drive_bar, code, answer.at.branch, theta_2=theta_2
-    )
-    for name in UNITS:
-        if name in answered:
-            setattr(reference, name, answered[name])
-    reference.at = answer.at
+    known: dict[str, Any] = {name: answered[name] for name in UNITS if name in answered}
     if answer.at.speed is not None:
         rates = (("omega", answer.at.speed), ("alpha", answer.at.acceleration))
         for name, x in (
             rates if answer.at.stroke is None else ()
         ):  # the engine finds them if a stroke is commanded
-            setattr(
-                reference,
-                f"{name}_{answer.at.bar}",
-                np.broadcast_to(np.asarray(x, float), theta_2.shape),
-            )
-        if reference.omega_3 is not None and reference.omega_4 is not None:
-            _add_velocities(scene.linkage, theta, reference)
-    reference.drive = scene.drive
+            rate = np.broadcast_to(np.asarray(x, float), theta_2.shape)
+            known[f"{name}_{answer.at.bar}"] = rate
+        if {"omega_3", "omega_4"} <= known.keys():
+            known |= _find_velocities(scene.linkage, theta, known)
     if scene.drive is not None:
-        _add_line(scene.linkage, scene.drive, theta, reference)
-    reference.sin_mu = np.sin(theta[4] - theta[3])
+        known |= _find_line(scene.linkage, scene.drive, theta, known)
+    known["sin_mu"] = np.sin(theta[4] - theta[3])
     one, second = (theta[bar] for bar in theta if bar != answer.at.bar)
-    reference.condition = np.abs(np.sin(second - one))
-    if answer.at.stroke is not None and scene.drive is not None:
+    known["condition"] = np.abs(np.sin(second - one))
+    at = answer.at
+    if at.stroke is not None and scene.drive is not None:
         lever = place_line(scene.linkage, scene.drive, theta).lever
-        reference.at, reference.condition = (
-            answer.at._replace(condition=lever),
-            reference.condition * lever,
-        )
-    if (
-        reference.drive_condition is None
-    ):  # one that knows how near friction is to jamming answers it
+        at = at._replace(condition=lever)
+        known["condition"] = known["condition"] * lever
+    if "drive_condition" not in known:
+        # an engine that knows how near friction is to jamming answers it
         one, second = (theta[bar] for bar in theta if bar != scene.drive_bar)
         # not of their difference: of an angle many turns away that has fewer digits than its sine
-        reference.drive_condition = np.abs(
+        known["drive_condition"] = np.abs(
             np.sin(second) * np.cos(one) - np.cos(second) * np.sin(one)
         )
-    return reference
+    return Solution(
+        scene.title,
+        scene.drive_bar,
+        np.full(len(theta_2), OK, dtype=np.uint8),
+        answer.at.branch,
+        **{**known, "theta_2": theta_2},
+        drive=scene.drive,
+        at=at,
+    )
 
 
-def _add_line(
-    linkage: FourBar, drive: ForceDrive, theta: dict[int, Array], reference: Solution
-) -> None:
-    """Add stroke, direction, speed and leverage of a linear drive, from the answer's own angles and speeds."""
+def _find_line(
+    linkage: FourBar,
+    drive: ForceDrive,
+    theta: dict[int, Array],
+    known: dict[str, Any],
+) -> dict[str, Array]:
+    """Find stroke, direction, speed and leverage of a linear drive, from the answer's own angles and speeds."""
     line = place_line(linkage, drive, theta)
+    quantities = {"drive_line": np.stack((line.unit.real, line.unit.imag), axis=1)}
     if drive.has_stroke:
-        reference.stroke = line.stroke
-    reference.drive_line = np.stack((line.unit.real, line.unit.imag), axis=1)
-    if (
-        reference.omega_2 is not None
-        and reference.omega_3 is not None
-        and reference.omega_4 is not None
-    ):
-        omega = {
-            1: np.zeros(len(reference)),
-            2: reference.omega_2,
-            3: reference.omega_3,
-            4: reference.omega_4,
-        }
-        reference.stroke_speed = line.speed(omega)
-    if reference.drive_condition is None:
-        reference.drive_condition = line.condition
+        quantities["stroke"] = line.stroke
+    if all(f"omega_{bar}" in known for bar in MOVING_BARS):
+        omega = {bar: known[f"omega_{bar}"] for bar in MOVING_BARS}
+        omega[1] = np.zeros(len(theta[2]))
+        quantities["stroke_speed"] = line.speed(omega)
+    if "drive_condition" not in known:
+        quantities["drive_condition"] = line.condition
+    return quantities
 
 
-def _add_velocities(
-    linkage: FourBar, theta: dict[int, Array], reference: Solution
-) -> None:
-    """Add the speeds of A, B and the mass centres, from the answer's own angles and speeds, m/s."""
+def _find_velocities(
+    linkage: FourBar, theta: dict[int, Array], known: dict[str, Any]
+) -> dict[str, Array]:
+    """Find the speeds of A, B and the mass centres, from the answer's own angles and speeds, m/s."""
 
     def swung(bar: int, distance: float, angle: float) -> Array:
-        speed, direction = (
-            distance * getattr(reference, f"omega_{bar}"),
-            theta[bar] + angle,
-        )
+        speed, direction = distance * known[f"omega_{bar}"], theta[bar] + angle
         return np.stack((-speed * np.sin(direction), speed * np.cos(direction)), axis=1)
 
-    reference.v_A, reference.v_B = (
-        swung(2, linkage.input.length, 0.0),
-        swung(4, linkage.output.length, 0.0),
-    )
+    velocities = {
+        "v_A": swung(2, linkage.input.length, 0.0),
+        "v_B": swung(4, linkage.output.length, 0.0),
+    }
     for bar in MOVING_BARS:
         centre = swung(bar, *linkage.bar(bar).mass_centre)
-        setattr(reference, f"v_G{bar}", centre + reference.v_A if bar == 3 else centre)
+        moved = centre + velocities["v_A"] if bar == 3 else centre
+        velocities[f"v_G{bar}"] = moved
+    return velocities
 
 
 def take_strictest_condition(

@@ -268,8 +268,9 @@ def _compare_forces_by(
         solution,
         condition=reference.condition,
         drive_condition=reference.drive_condition,
+        drive_bar=2,
+        at=driven.at,
     )
-    conditioned.drive_bar, conditioned.at = 2, driven.at
     names = tuple(name for name in UNKNOWNS if name in engine.answers)
     # nor are theta_2, omega_2 and alpha_2 more than that angle's, rounded: what that costs there is computed
     held = hold(replace(engine, answers=names), scene, driven.at, answer)

@@ -1,20 +1,17 @@
 """The run: every scene judged, the results streamed to disk, the pictures drawn, the report written."""
 
-import math
 import os
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TextIO
+from typing import Any, TextIO
 
 from fourbar.errors import FourBarError
 from fourbar.mjcf import write_mjcf
 from fourbar.writing import name_file, write_text
 from fourbar_validation.compare.columns import Columns, read_columns
 from fourbar_validation.compare.rows import FAILS, FORMULAS, Row, make_plain, write_csv
-from fourbar_validation.compare.tolerance import IDENTITY
-from fourbar_validation.engines.guests import Guest, list_numbers
+from fourbar_validation.engines.guests import list_numbers
 from fourbar_validation.engines.mujoco.picture import render_pictures
 from fourbar_validation.engines.registry import Engine
 from fourbar_validation.regression.record import (
@@ -29,65 +26,38 @@ from fourbar_validation.regression.record import (
 from fourbar_validation.regression.rules import list_weakened
 from fourbar_validation.regression.scenes import describe_scenes
 from fourbar_validation.report.html import write_html, write_markdown
-from fourbar_validation.report.machine import name_code
 from fourbar_validation.report.record import Record
 from fourbar_validation.report.sections import collect_sections
-from fourbar_validation.report.summary import PICTURED, SKETCHED, Summary
+from fourbar_validation.report.summary import Summary
 from fourbar_validation.report.svg import NUMBERS
 from fourbar_validation.run import pool
 from fourbar_validation.run.judge import OUTPUT
+from fourbar_validation.run.plan import (
+    COLLECTING,
+    DEFAULTS,
+    DRAWING,
+    UNHEARD,
+    WHOLE,
+    Plan,
+    Progress,
+    RunOptions,
+)
+from fourbar_validation.run.request import forget_request
 from fourbar_validation.run.store import Store
 from fourbar_validation.scenes.hard_families import Hard
-from fourbar_validation.scenes.suites import Files, Suite
+from fourbar_validation.scenes.suites import Suite
 
-WORKERS = 2
-SAMPLE = 30
-"""Scenes in which everything else that is shipped is judged. In a scene that takes as long as judging thirty scenes:
-a tenth more for 10 000 random ones."""
-CHUNK = {True: 1, False: 20}
-"""Scenes per task: one where something is simulated or drawn (a second each), else twenty (a second together)."""
-MOST_PARTS = 10_000
-"""Files that a run keeps while it goes on: of a million scenes a hundred stand in each."""
 TIMINGS = ("scene", "engine", "setting", "positions", "seconds", "times_formulas")
 OUTCOME = (TABLE, COLUMNS, ABOUT, "timings.csv", "report.md", "report.html", OUTPUT)
 """Files that a run ends with. A run first removes those of an earlier run, so that none passes for its own if it ends
 early."""
-JUDGING, COLLECTING, DRAWING = "judging", "collecting", "drawing"
-"""Stages of a run, as its progress is told."""
-
-
-@dataclass(frozen=True, slots=True)
-class RunOptions:
-    """Options of a run; only the sample changes a result."""
-
-    workers: int = WORKERS
-    """Number of processes."""
-    drawn: bool = True
-    """True for pictures; a long suite has them at the end, of the scenes that fail or come nearest to failing."""
-    against: Path | None = None
-    """Earlier run in which the failure that the verdict names is looked up, and whose rules must not be stricter."""
-    sample: int = SAMPLE
-    """Scenes, evenly chosen, in which functions other than `solve` are checked."""
-
-
-class Progress:
-    """Listener to a run; this one ignores what it is told."""
-
-    def note(self, line: str) -> None:
-        """Hear why a part of an earlier run is made again."""
-
-    def advance(self, stage: str, scenes: int) -> None:
-        """Hear that a stage has done so many scenes more."""
-
-
-UNHEARD = Progress()
 
 
 def run(
     suite: Suite,
     out: Path,
     engines: tuple[Engine, ...],
-    options: RunOptions = RunOptions(),
+    options: RunOptions = DEFAULTS,
     missing: Sequence[tuple[str, str]] = (),
     progress: Progress = UNHEARD,
 ) -> Summary:
@@ -95,95 +65,69 @@ def run(
 
     `missing`: the engines that cannot answer here, each with the reason.
     """
-    without_pictures = len(suite.not_drawn) if isinstance(suite, Files) else 0
-    draw_at_once = options.drawn and len(suite) - without_pictures <= PICTURED
-    sketch = options.drawn and len(suite) <= SKETCHED
-    simulated = any(engine.through_time for engine in engines)
-    size = max(CHUNK[draw_at_once or simulated], math.ceil(len(suite) / MOST_PARTS))
-    chunks = [
-        range(start, min(start + size, len(suite)))
-        for start in range(0, len(suite), size)
-    ]
-    identity = {
-        "scenes": suite.fingerprint(),
-        "engines": [engine.fingerprint() for engine in engines],
-        **name_code(),
-        "draw": draw_at_once,
-        "sketch": sketch,
-        "sample": options.sample,
-    }
-    summary = Summary()
-    summary.tolerances = list(
-        dict.fromkeys((IDENTITY, *(engine.tolerance for engine in engines)))
-    )
-    summary.missing = missing
-    summary.stated = {
-        guest.name: guest.version for guest in engines if isinstance(guest, Guest)
-    }
-    with Store(out, identity, OUTCOME).held() as store:
+    plan = Plan(suite, engines, options, missing)
+    with open_store(plan, out) as store:
+        plan.judge(store, WHOLE, progress)
+        summary = write_outcome(plan, store.read, out, progress)
+        store.finish()
+        forget_request(out)
+    return summary
+
+
+@contextmanager
+def open_store(plan: Plan, out: Path) -> Iterator[Store]:
+    """Hold the folder of a run, without the files of an earlier one."""
+    with Store(out, plan.identity, OUTCOME).held() as store:
         for name in OUTCOME:
             (out / name).unlink(missing_ok=True)
-        done = store.done()
-        for line in store.notes:
-            progress.note(line)
-        progress.advance(JUDGING, sum(len(chunks[number]) for number in done))
-        todo = (number for number in range(len(chunks)) if number not in done)
-        jobs = (
-            (
-                n,
-                pool.make_jobs(
-                    suite, chunks[n], engines, draw_at_once, options.sample, sketch
-                ),
-            )
-            for n in todo
-        )
+        yield store
+
+
+def write_outcome(
+    plan: Plan, read: Callable[[int], list[Any]], out: Path, progress: Progress
+) -> Summary:
+    """Write tables and report of what was judged; `read` returns the results of a task."""
+    suite, engines, options = plan.suite, plan.engines, plan.options
+    summary = plan.summarise()
+    first_lines = _collect(plan, read, out, summary, progress)
+    pictured = {record.name for record in summary.pictured} if options.drawn else set()
+    shown = [
+        index
+        for index in range(len(suite))
+        if make_plain(suite.name(index)) in pictured
+    ]
+    if shown and not plan.draw_at_once:
+        jobs = ((index, [_redraw(suite, index, summary, engines)]) for index in shown)
         limit = pool.find_time_limit(suite, engines)
-        for number, records in pool.judge_chunks(jobs, limit, options.workers):
-            store.put(number, [record.kept_all() for record in records])
-            progress.advance(JUDGING, len(records))
-        first_lines = _collect(suite, chunks, store, summary, progress)
-        pictured = (
-            {record.name for record in summary.pictured} if options.drawn else set()
-        )
-        shown = [
-            index
-            for index in range(len(suite))
-            if make_plain(suite.name(index)) in pictured
-        ]
-        if shown and not draw_at_once:
-            jobs = (
-                (index, [_redraw(suite, index, summary, engines)]) for index in shown
-            )
-            for _, records in pool.judge_chunks(jobs, limit, options.workers):
-                summary.picture(*records)
-                progress.advance(DRAWING, 1)
-        about = describe_run(engines, suite.fingerprint(), describe_scenes(suite))
-        write_about(about, out)
-        summary.date, summary.commit = about.date, about.commit
-        summary.asked = make_plain(suite.name(0)) if len(suite) == 1 else ""
-        if options.against is not None:
-            before = open_run(options.against, "--against")
-            overview = summary.overview
-            overview.since = find_since(overview.named_failure, before)
-            weakened = list_weakened(before.about.rules, about.rules)
-            overview.weaker = [f"{rule}" for rule in weakened]
-            overview.baseline = before.describe()
-        write_text(out / "report.md", write_markdown(summary))
-        generated = any(engine.generated for engine in engines)
-        models, why_not = picture_models(suite, shown) if generated else ({}, "")
-        sections = collect_sections(
-            read_columns(out / COLUMNS) if isinstance(suite, Hard) else None, out
-        )
-        NUMBERS.update(list_numbers(engines))
-        page = write_html(
-            summary,
-            first_lines,
-            pictures=models,
-            no_pictures=why_not,
-            sections=sections,
-        )
-        write_text(out / "report.html", page)
-        store.finish()
+        for _, records in pool.judge_chunks(jobs, limit, options.workers):
+            summary.picture(*records)
+            progress.advance(DRAWING, 1)
+    about = describe_run(engines, suite.fingerprint(), describe_scenes(suite))
+    write_about(about, out)
+    summary.date, summary.commit = about.date, about.commit
+    summary.asked = make_plain(suite.name(0)) if len(suite) == 1 else ""
+    if options.against is not None:
+        before = open_run(options.against, "--against")
+        overview = summary.overview
+        overview.since = find_since(overview.named_failure, before)
+        weakened = list_weakened(before.about.rules, about.rules)
+        overview.weaker = [f"{rule}" for rule in weakened]
+        overview.baseline = before.describe()
+    write_text(out / "report.md", write_markdown(summary))
+    generated = any(engine.generated for engine in engines)
+    models, why_not = picture_models(suite, shown) if generated else ({}, "")
+    sections = collect_sections(
+        read_columns(out / COLUMNS) if isinstance(suite, Hard) else None, out
+    )
+    NUMBERS.update(list_numbers(engines))
+    page = write_html(
+        summary,
+        first_lines,
+        pictures=models,
+        no_pictures=why_not,
+        sections=sections,
+    )
+    write_text(out / "report.html", page)
     return summary
 
 
@@ -208,24 +152,23 @@ def find_since(failure: Row | None, before: Recorded) -> str:
 
 
 def _collect(
-    suite: Suite,
-    chunks: Sequence[range],
-    store: Store,
+    plan: Plan,
+    read: Callable[[int], list[Any]],
+    out: Path,
     summary: Summary,
     progress: Progress,
 ) -> dict[str, int]:
-    """Write the tables from the parts of the store, add each scene to the summary; return each scene's first line."""
-    out = store.folder
+    """Write the tables task by task, add each scene to the summary; return each scene's first line."""
     with (
         Columns(out) as columns,
         draft_file(out / OUTPUT) as output,
         draft_file(out / "timings.csv") as times,
     ):
         times.write(write_csv(TIMINGS, []))
-        for number, scenes in enumerate(chunks):
-            records = [Record.restore(kept) for kept in store.read(number)]
+        for number, scenes in enumerate(plan.chunks):
+            records = [Record.restore(kept) for kept in read(number)]
             for scene, record in zip(scenes, records, strict=True):
-                name = make_plain(suite.name(scene))
+                name = make_plain(plan.suite.name(scene))
                 record.rows = record.rows or [
                     Row.unmeasured(
                         name, FORMULAS, "", "all", FAILS, "nothing was judged"

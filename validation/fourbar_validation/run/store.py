@@ -17,6 +17,7 @@ from typing import Any
 
 from fourbar.errors import DependencyError, FourBarError, InputError
 from fourbar.writing import require_file, write_bytes, write_text
+from fourbar_validation.regression.record import UNFINISHED
 
 
 class RunningError(FourBarError):
@@ -32,7 +33,7 @@ class Store:
         self.folder, self.parts, self._written = (
             folder,
             folder / "parts",
-            ("lock", "run.json", *outcome),
+            ("lock", UNFINISHED, *outcome),
         )
         self._identity = json.dumps(identity, indent=1, sort_keys=True) + "\n"
         self._run = hashlib.sha256(self._identity.encode()).hexdigest()
@@ -67,7 +68,7 @@ class Store:
             lock.release()
 
     def _begin(self) -> None:
-        marker = self.folder / "run.json"
+        marker = self.folder / UNFINISHED
         same = marker.is_file() and marker.read_text(encoding="utf-8") == self._identity
         if not same:
             if marker.is_file() and self.parts.is_dir() and any(self.parts.iterdir()):
@@ -83,12 +84,10 @@ class Store:
             write_text(marker, self._identity)
 
     def _name_difference(self, marker: Path) -> str:
-        """Name what the earlier run differs in from this one."""
+        """Name what the earlier run differs in from this one; nothing if they are the same run."""
         try:
-            before, now = (
-                json.loads(marker.read_text(encoding="utf-8")),
-                json.loads(self._identity),
-            )
+            before = json.loads(marker.read_text(encoding="utf-8"))
+            now = json.loads(self._identity)
             return ", ".join(
                 name
                 for name in sorted({*before, *now})
@@ -97,19 +96,38 @@ class Store:
         except (AttributeError, TypeError, ValueError):
             return "its run.json is damaged"
 
+    def require_same(self, key: str) -> None:
+        """Raise InputError unless the folder holds parts of this run."""
+        marker = self.folder / UNFINISHED
+        if not marker.is_file() or not self.parts.is_dir():
+            why = "must hold a run.json and the parts that `run --part` wrote"
+            raise InputError(key, str(self.folder), why)
+        if difference := self._name_difference(marker):
+            why = f"is of another run: it differs in {difference}"
+            raise InputError(key, str(self.folder), why)
+
     def done(self) -> set[int]:
         """List the chunks whose parts are complete and of this run; others are removed, and noted."""
         done = set()
+        for path, damage in self.examine():
+            if damage:
+                self.notes.append(
+                    f"made again: {path.parent.name}/{path.name}: {damage}"
+                )
+                _remove(path)
+            else:
+                done.add(int(path.name))
+        return done
+
+    def examine(self) -> Iterator[tuple[Path, str]]:
+        """Yield each part with what is wrong with it; nothing if it is complete and of this run."""
         for path in sorted(self.parts.iterdir()):
             try:
                 self._unpack(path)
-                done.add(int(path.name))
             except ValueError as error:
-                self.notes.append(
-                    f"made again: {path.parent.name}/{path.name}: {error}"
-                )
-                _remove(path)
-        return done
+                yield path, str(error)
+            else:
+                yield path, ""
 
     def put(self, chunk: int, results: Sequence[Any]) -> None:
         """Write a finished chunk, its results as JSON has them."""
@@ -155,7 +173,7 @@ class Store:
     def finish(self) -> None:
         """Remove the parts, once the results are written."""
         shutil.rmtree(self.parts)
-        (self.folder / "run.json").unlink()
+        (self.folder / UNFINISHED).unlink()
 
 
 def _remove(path: Path) -> None:

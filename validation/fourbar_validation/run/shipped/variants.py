@@ -258,19 +258,9 @@ def take_member(study: Solution, index: int | NDArray[np.intp]) -> Solution:
             return {name: values[index] for name, values in value.items()}
         return value[index] if isinstance(value, np.ndarray) else value
 
-    one = replace(
-        study,
-        **{
-            field.name: take(getattr(study, field.name))
-            for field in fields(study)
-            if field.init
-        },
-    )
-    one.points, one.velocity, one.acceleration = (
-        take(table) for table in (study.points, study.velocity, study.acceleration)
-    )
-    one.drive, one.at = study.drive, study.at.part(index)
-    return one
+    taken = {field.name: take(getattr(study, field.name)) for field in fields(study)}
+    taken |= {"at": study.at.part(index), "ground": None, "lengths": None}
+    return Solution(**taken)
 
 
 def split_parts(answer: Answer) -> dict[str, Array]:

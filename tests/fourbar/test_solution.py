@@ -1,0 +1,69 @@
+"""A solution as its users hold it: by name, frozen, comparable, as a data frame with units."""
+
+from dataclasses import FrozenInstanceError, replace
+
+import numpy as np
+import pytest
+
+import fourbar
+from fourbar import Point, Scene
+from fourbar.errors import InputError
+from tests.support.scenes import crank_rocker
+
+
+def pointed() -> Scene:
+    return replace(crank_rocker(), points=(Point("P", 3, (0.1, 0.2)),))
+
+
+def test_a_quantity_is_found_by_its_name() -> None:
+    solution = fourbar.solve(pointed())
+    assert solution["torque"] is solution.torque
+    assert solution["F12"] is solution.F12
+    assert solution["P"] is solution.points["P"]
+    assert solution["v_P"] is solution.velocity["P"]
+    for name in ("tork", 0, "F12_x"):
+        with pytest.raises(InputError, match="must be among theta_2, "):
+            solution[name]  # type: ignore[index]
+    positions = fourbar.solve(crank_rocker(), "position")
+    with pytest.raises(InputError, match="'torque': was not evaluated"):
+        positions["torque"]
+    with pytest.raises(TypeError, match="not iterable"):
+        iter(solution)
+
+
+def test_a_solution_is_frozen() -> None:
+    solution = fourbar.solve(crank_rocker())
+    for name in ("torque", "scene", "title"):
+        with pytest.raises(FrozenInstanceError):
+            setattr(solution, name, None)
+
+
+def test_solutions_are_equal_bit_by_bit() -> None:
+    scene = pointed()
+    solution, again = fourbar.solve(scene), fourbar.solve(scene)
+    assert solution == again
+    assert solution != "a solution"
+    assert solution.torque is not None and again.torque is not None
+    again.torque[3] = np.nextafter(again.torque[3], np.inf)
+    assert solution != again
+    solution.torque[3] = again.torque[3] = np.nan
+    assert solution == again
+    again.points["P"][0, 0] += 1e-15
+    assert solution != again
+    assert fourbar.solve(scene, "velocity") != fourbar.solve(scene)
+
+
+def test_a_data_frame_names_the_unit_of_each_column() -> None:
+    pytest.importorskip("pandas", reason="to_pandas needs pandas: pip install pandas")
+    table = fourbar.solve(pointed()).to_pandas()
+    units = table.attrs["units"]
+    assert set(units) == set(table.columns) - {"status", "branch", "drive_bar"}
+    wanted = {
+        **{"theta_2": "rad", "torque": "N m", "F12_x": "N", "|F12|": "N"},
+        **{"B_y": "m", "v_P_x": "m/s", "P_y": "m", "sin_mu": "1", "a_B_x": "m/s^2"},
+        **{"omega_3": "rad/s", "power": "W"},
+    }
+    assert {name: units[name] for name in wanted} == wanted
+    inches = fourbar.solve(pointed()).to_pandas(fourbar.units("imperial")).attrs
+    assert inches["units"]["torque [lbf in]"] == "lbf in"
+    assert inches["units"]["P_x [in]"] == "in"

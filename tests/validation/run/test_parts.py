@@ -1,0 +1,140 @@
+"""A run in parts: the bytes of a whole one, and a line that names what is missing, damaged or of another run."""
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+
+from fourbar.errors import BAD_INPUT, HOLDS, InputError
+from fourbar_validation.cli import status
+from fourbar_validation.run import plan
+from fourbar_validation.run.plan import Part
+from tests.support.here import judge_here
+
+OPTIONS = ["--random", "7", "--engines", "free-body", "--no-pictures"]
+TABLES = ("results.csv", "results.parquet")
+
+
+@pytest.fixture(autouse=True)
+def small_tasks(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two scenes a task, judged in this process."""
+    judge_here(monkeypatch)
+    monkeypatch.setattr(plan, "CHUNK", {True: 1, False: 2})
+
+
+@pytest.fixture
+def parts(tmp_path: Path) -> list[str]:
+    """The folders of three parts: of four tasks the first and the last are of part 1."""
+    folders = [str(tmp_path / f"part-{k}") for k in (1, 2, 3)]
+    for k, folder in enumerate(folders, 1):
+        assert status(["run", *OPTIONS, "--part", f"{k}/3", "-o", folder]) == HOLDS
+    return folders
+
+
+def assert_same(out: Path, whole: Path) -> None:
+    assert status(["run", *OPTIONS, "-o", str(whole)]) == HOLDS
+    for name in TABLES:
+        assert (out / name).read_bytes() == (whole / name).read_bytes()
+
+
+def test_parts_are_collected_into_the_bytes_of_a_whole_run(
+    parts: list[str], tmp_path: Path
+) -> None:
+    out = tmp_path / "all"
+    assert status(["collect", *reversed(parts), "-o", str(out)]) == HOLDS
+    assert_same(out, tmp_path / "whole")
+    assert (out / "report.html").is_file() and not (out / "run.json").exists()
+    tasks = [sorted(p.name for p in Path(f, "parts").iterdir()) for f in parts]
+    assert tasks == [["000000", "000003"], ["000001"], ["000002"]]
+    assert not Path(parts[0], "results.csv").exists()
+
+
+def test_a_run_over_all_parts_in_one_folder_writes_the_report(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    for k in (2, 1):
+        assert status(["run", *OPTIONS, "--part", f"{k}/2", "-o", str(out)]) == HOLDS
+    assert len(list((out / "parts").iterdir())) == 4
+    before = {p: p.stat().st_mtime_ns for p in (out / "parts").iterdir()}
+    assert len(before) == 4
+    assert status(["run", *OPTIONS, "-o", str(out)]) == HOLDS
+    assert not (out / "request.json").exists() and not (out / "parts").exists()
+    assert_same(out, tmp_path / "whole")
+
+
+def refusal(line: list[str], capsys: pytest.CaptureFixture[str]) -> str:
+    """The one line with which a command refuses its input."""
+    capsys.readouterr()
+    assert status(line) == BAD_INPUT
+    return " ".join(capsys.readouterr().err.split())
+
+
+def test_what_is_missing_is_named_by_its_part(
+    parts: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = ["-o", str(tmp_path / "all")]
+    said = refusal(["collect", parts[0], parts[2], *out], capsys)
+    assert "1 of 4 tasks are missing: run --part 2/3 again" in said
+    damaged = Path(parts[0], "parts", "000003")
+    damaged.write_bytes(damaged.read_bytes()[:-3])
+    said = refusal(["collect", *parts, *out], capsys)
+    assert "000003 is damaged" in said and "--part 1/3 again" in said
+    assert damaged.exists() and not (tmp_path / "all" / "results.csv").exists()
+
+
+def test_parts_of_another_run_are_refused(
+    parts: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out, other = ["-o", str(tmp_path / "all")], str(tmp_path / "other")
+    asked = [*OPTIONS, "--seed", "1", "--part", "2/3", "-o", other]
+    assert status(["run", *asked]) == HOLDS
+    said = refusal(["collect", parts[0], other, parts[2], *out], capsys)
+    assert "other" in said and "is of another run: it differs in scenes" in said
+    marker = Path(parts[1], "run.json")
+    judged_with = json.loads(marker.read_text()) | {"code": "of yesterday"}
+    marker.write_text(json.dumps(judged_with))
+    said = refusal(["collect", *parts, *out], capsys)
+    assert "it differs in code" in said
+
+
+def test_what_is_no_folder_of_a_part_is_refused(
+    parts: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    line = ["collect", str(tmp_path), "-o", str(tmp_path / "all")]
+    assert "must be a folder that `run --part` wrote" in refusal(line, capsys)
+    said = refusal(["collect", *parts, "-o", parts[1]], capsys)
+    assert "holds parts of a run" in said and list(Path(parts[1], "parts").iterdir())
+    Path(parts[0], "request.json").write_text('{"parts": 3}')
+    line = ["collect", *parts, "-o", str(tmp_path / "all")]
+    assert "must be a folder that `run --part` wrote" in refusal(line, capsys)
+
+
+def test_scene_files_need_not_be_where_parts_are_collected(tmp_path: Path) -> None:
+    scene = tmp_path / "models" / "mine.toml"
+    scene.parent.mkdir()
+    root = Path(__file__).parents[3]
+    shutil.copy(root / "models" / "crank_rocker.toml", scene)
+    asked = [str(scene), "--engines", "free-body", "--no-pictures"]
+    part = str(tmp_path / "part")
+    assert status(["run", *asked, "--part", "1/1", "-o", part]) == HOLDS
+    scene.unlink()
+    out = tmp_path / "all"
+    assert status(["collect", part, "-o", str(out)]) == HOLDS
+    assert (out / "results.csv").read_text().count("\nmine,") > 20
+
+
+@pytest.mark.parametrize(
+    "text", ["0/3", "4/3", "1", "1/", "a/b", "-1/3", "1/0", "1.5/3"]
+)
+def test_a_part_is_k_of_n(text: str) -> None:
+    assert Part.read("2/3") == (2, 3)
+    with pytest.raises(InputError, match="must be K/N"):
+        Part.read(text)
+
+
+def test_a_part_has_no_verdict_to_compare(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    line = ["run", *OPTIONS, "--part", "1/3", "--against", "accepted"]
+    said = refusal([*line, "-o", str(tmp_path / "out")], capsys)
+    assert "--against" in said and "collect the parts first" in said

@@ -1,0 +1,183 @@
+"""The page on many machines is run: a Slurm array, a workflow's matrix and Dask judge parts, and no byte changes.
+
+A worker is a machine here: it shares with the others what the page says that it shares.
+"""
+
+import importlib.util
+import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from fourbar_validation.cli import status
+
+ROOT = Path(__file__).parents[2]
+CI = ROOT / "docs" / "ci"
+SCENES = 41
+"""Scenes of the run: three tasks, the last of which has one scene."""
+OPTIONS = ["--random", str(SCENES), "--engines", "free-body", "--no-pictures"]
+OPTIONS += ["--sample-shipped", "0"]
+TABLES = ("results.csv", "results.parquet")
+PROGRAM = Path(sys.executable).with_name("fourbar-validation")
+TIME = 240.0
+"""s; what takes longer has failed."""
+
+pytestmark = [pytest.mark.slow, pytest.mark.posix, pytest.mark.timeout(600)]
+
+
+@pytest.fixture(scope="module")
+def alone(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of the same run on one machine."""
+    out = tmp_path_factory.mktemp("alone")
+    assert status(["run", *OPTIONS, "--out", str(out)]) == 0
+    return out
+
+
+def assert_same_bytes(out: Path, alone: Path) -> None:
+    for name in TABLES:
+        assert (out / name).read_bytes() == (alone / name).read_bytes(), name
+
+
+def run_shell(
+    script: str, folder: Path, options: Sequence[str] = (), **variables: str
+) -> None:
+    """Run a script as a machine does that has the programs of this environment."""
+    path = f"{PROGRAM.parent}{os.pathsep}{os.environ['PATH']}"
+    subprocess.run(
+        ["sh", "-e", "-c", script, "sh", *options],
+        cwd=folder,
+        env=os.environ | {"PATH": path} | variables,
+        check=True,
+        timeout=TIME,
+    )
+
+
+def collect_as_shown(folder: Path) -> Path:
+    """Run the command that the page shows for collecting."""
+    page = (ROOT / "docs" / "many-machines.md").read_text(encoding="utf-8")
+    line = "fourbar-validation collect parts/* --out results"
+    assert line in page
+    run_shell(line, folder)
+    return folder / "results"
+
+
+def test_a_slurm_array_changes_no_byte(alone: Path, tmp_path: Path) -> None:
+    """One task is killed in the middle, and submitted again."""
+    script = (CI / "slurm.sh").read_text(encoding="utf-8")
+    for task in (1, 2):
+        of_slurm = {
+            "SLURM_ARRAY_TASK_ID": str(task),
+            "SLURM_ARRAY_TASK_COUNT": "2",
+            "SLURM_CPUS_PER_TASK": "1",
+        }
+        run_shell(script, tmp_path, OPTIONS, **of_slurm)
+    (tmp_path / "parts" / "2" / "parts" / "000001").unlink()
+    run_shell(
+        script,
+        tmp_path,
+        OPTIONS,
+        SLURM_ARRAY_TASK_ID="2",
+        SLURM_ARRAY_TASK_COUNT="1",
+        SLURM_CPUS_PER_TASK="1",
+        PARTS="2",
+    )
+    assert_same_bytes(collect_as_shown(tmp_path), alone)
+
+
+def test_a_matrix_of_a_workflow_changes_no_byte(alone: Path, tmp_path: Path) -> None:
+    """Every machine has folders of its own; artefacts alone go from one to another."""
+    workflow = (CI / "parts.yml").read_text(encoding="utf-8")
+    (numbers,) = re.findall(r"part: \[(.*)\]", workflow)
+    judge, collect = re.findall(
+        r"- run: \.venv/bin/python -m validation ((?:run|collect) .*)", workflow
+    )
+    (options,) = re.findall(r"^  RUN: (.*)$", workflow, re.MULTILINE)
+    assert {"--random", "--engines", "--no-pictures"} <= set(options.split())
+    parts = numbers.split(", ")
+    assert f"/{len(parts)}" in judge
+    last = tmp_path / "last"
+    for part in parts:
+        machine = tmp_path / part
+        machine.mkdir()
+        variables = {"RUN": " ".join(OPTIONS), "PART": part}
+        run_shell(f"fourbar-validation {judge}", machine, **variables)
+        shutil.copytree(machine / "parts", last / "parts", dirs_exist_ok=True)
+        shutil.rmtree(machine)
+    run_shell(f"fourbar-validation {collect}", last)
+    assert_same_bytes(last / "results", alone)
+
+
+@contextmanager
+def started(*line: str, folder: Path) -> Iterator[subprocess.Popen[bytes]]:
+    """Start a program of Dask, and end it."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "dask", *line],
+        cwd=folder,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.wait()
+
+
+def wait_for(path: Path, process: subprocess.Popen[bytes] | None = None) -> None:
+    """Wait until a file is there."""
+    latest = time.monotonic() + TIME
+    while not path.exists():
+        assert time.monotonic() < latest, f"{path} never came"
+        assert process is None or process.poll() is None
+        time.sleep(0.02)
+
+
+@pytest.mark.skipif(
+    importlib.util.find_spec("distributed") is None,
+    reason="not run: distributed is not installed: pip install distributed",
+)
+def test_a_dask_worker_that_dies_and_one_that_joins_change_no_byte(
+    alone: Path, tmp_path: Path
+) -> None:
+    assert len((CI / "dask_run.py").read_text().splitlines()) <= 40
+    scheduler = tmp_path / "scheduler.json"
+    worker = ("worker", "--scheduler-file", str(scheduler), "--nthreads", "1")
+    worker = (*worker, "--no-nanny", "--no-dashboard")
+    out = tmp_path / "parts"
+    with started(
+        *("scheduler", "--scheduler-file", str(scheduler), "--port", "0"),
+        "--no-dashboard",
+        folder=tmp_path,
+    ):
+        wait_for(scheduler)
+        address = json.loads(scheduler.read_text())["address"]
+        with started(*worker, folder=tmp_path) as first:
+            line = [str(CI / "dask_run.py"), address, "3", str(out), *OPTIONS]
+            program = subprocess.Popen([sys.executable, *line], cwd=tmp_path)
+            wait_for(out, program)
+            first.send_signal(signal.SIGKILL)
+            with started(*worker, folder=tmp_path):
+                assert program.wait(TIME) == 0
+    assert_same_bytes(out, alone)
+
+
+@pytest.mark.skipif(
+    importlib.util.find_spec("distributed") is None,
+    reason="not run: distributed is not installed: pip install distributed",
+)
+def test_a_worker_with_other_code_judges_nothing() -> None:
+    spec = importlib.util.spec_from_file_location("dask_run", CI / "dask_run.py")
+    assert spec is not None and spec.loader is not None
+    program = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(program)
+    with pytest.raises(AssertionError, match="other versions or code"):
+        program.judge("1/1", {"code": "of yesterday"}, OPTIONS)

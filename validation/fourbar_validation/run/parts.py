@@ -1,0 +1,126 @@
+"""Parts of one run, judged in folders of their own, and the command that collects them."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import click
+
+from fourbar.errors import InputError
+from fourbar_validation.report.summary import Summary
+from fourbar_validation.run.plan import UNHEARD, Part, Plan, Progress
+from fourbar_validation.run.progress import ShownProgress
+from fourbar_validation.run.request import (
+    Request,
+    keep_request,
+    make_plan,
+    read_request,
+)
+from fourbar_validation.run.run import open_store, write_outcome
+from fourbar_validation.run.store import Store
+
+MOST_NAMED = 5
+"""Parts that a message names; further ones are counted."""
+
+
+def judge_part(
+    plan: Plan, part: Part, request: Request, progress: Progress = UNHEARD
+) -> None:
+    """Judge a part of a run into the parts of its folder, which keeps what an interrupted one left."""
+    with open_store(plan, request.out) as store:
+        keep_request(request, part, plan.suite, request.out)
+        plan.judge(store, part, progress)
+
+
+class Gathered:
+    """Finished tasks of one run that lie in several folders."""
+
+    def __init__(self, plan: Plan, folders: Sequence[Path], parts: int) -> None:
+        self._plan, self._parts = plan, parts
+        self._stores: dict[int, Store] = {}
+        """Store of each task."""
+        self._damaged: list[str] = []
+        for folder in folders:
+            self._add(folder)
+        self._require_all()
+
+    def _add(self, folder: Path) -> None:
+        """Add the tasks of a folder; InputError if they are of another run."""
+        store = Store(folder, self._plan.identity)
+        store.require_same("DIR")
+        for path, damage in store.examine():
+            if damage:
+                self._damaged.append(f"{path} {damage}")
+            else:
+                self._stores.setdefault(int(path.name), store)
+
+    def _require_all(self) -> None:
+        """Raise InputError that names the parts of which tasks are missing or damaged."""
+        chunks = range(len(self._plan.chunks))
+        missing = [chunk for chunk in chunks if chunk not in self._stores]
+        if not missing:
+            return
+        numbers = sorted({chunk % self._parts + 1 for chunk in missing})
+        named = [f"--part {number}/{self._parts}" for number in numbers]
+        further = len(named) - MOST_NAMED
+        words = ", ".join(named[:MOST_NAMED]) + (
+            f" and {further} more" if further > 0 else ""
+        )
+        why = f"{len(missing)} of {len(chunks)} tasks are missing: run {words} again"
+        raise InputError("DIR", "; ".join(self._damaged[:MOST_NAMED]) or None, why)
+
+    def read(self, chunk: int) -> list[Any]:
+        """Read the results of a task."""
+        return self._stores[chunk].read(chunk)
+
+
+def collect(
+    plan: Plan,
+    folders: Sequence[Path],
+    parts: int,
+    out: Path,
+    progress: Progress = UNHEARD,
+) -> Summary:
+    """Write tables and report of a run into `out` from the folders of its parts, which stay as they are."""
+    if any((out / "parts").glob("*")):
+        raise InputError(
+            "--out",
+            str(out),
+            "holds parts of a run: name it among the folders and choose another",
+        )
+    gathered = Gathered(plan, folders, parts)
+    with open_store(plan, out) as store:
+        summary = write_outcome(plan, gathered.read, out, progress)
+        store.finish()
+    return summary
+
+
+@click.command(name="collect")
+@click.argument(
+    "folders",
+    metavar="DIR...",
+    nargs=-1,
+    required=True,
+    type=click.Path(path_type=Path),
+)
+@click.option(
+    "-o",
+    "--out",
+    type=click.Path(path_type=Path, file_okay=False),
+    required=True,
+    help="Folder for tables and report.",
+)
+@click.option("--verbose", is_flag=True, help="Print the worst row of each scene too.")
+def command(folders: tuple[Path, ...], out: Path, verbose: bool) -> int:
+    """Write tables and report of a run from the folders in which `run --part` judged its parts.
+
+    Raises InputError for parts of different runs, and names those that are missing.
+    """
+    from fourbar_validation.report.terminal import print_table
+
+    parts, request, files = read_request(folders[0])
+    plan = make_plan(request, files)
+    with ShownProgress(len(plan.suite)) as progress:
+        summary = collect(plan, folders, parts, out, progress)
+    print_table(summary, out, verbose=verbose)
+    return summary.counts.status

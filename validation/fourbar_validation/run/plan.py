@@ -1,0 +1,178 @@
+"""How a run is cut into tasks: what each machine judges alike, whichever of them judges it."""
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from fourbar.errors import InputError
+from fourbar_validation.compare.tolerance import IDENTITY
+from fourbar_validation.engines.guests import Guest
+from fourbar_validation.engines.registry import Engine
+from fourbar_validation.report.machine import name_code
+from fourbar_validation.report.summary import PICTURED, SKETCHED, Summary
+from fourbar_validation.run import pool
+from fourbar_validation.run.store import Store
+from fourbar_validation.scenes.suites import Files, Suite
+
+WORKERS = 2
+SAMPLE = 30
+"""Scenes in which everything else that is shipped is judged. In a scene that takes as long as judging thirty scenes:
+a tenth more for 10 000 random ones."""
+CHUNK = {True: 1, False: 20}
+"""Scenes per task: one where something is simulated or drawn (a second each), else twenty (a second together)."""
+MOST_PARTS = 10_000
+"""Files that a run keeps while it goes on: of a million scenes a hundred stand in each."""
+JUDGING, COLLECTING, DRAWING = "judging", "collecting", "drawing"
+"""Stages of a run, as its progress is told."""
+
+
+@dataclass(frozen=True, slots=True)
+class RunOptions:
+    """Options of a run; only the sample changes a result."""
+
+    workers: int = WORKERS
+    """Number of processes."""
+    drawn: bool = True
+    """True for pictures; a long suite has them at the end, of the scenes that fail or come nearest to failing."""
+    against: Path | None = None
+    """Earlier run in which the failure that the verdict names is looked up, and whose rules must not be stricter."""
+    sample: int = SAMPLE
+    """Scenes, evenly chosen, in which functions other than `solve` are checked."""
+
+
+DEFAULTS = RunOptions()
+
+
+class Progress:
+    """Listener to a run; this one ignores what it is told."""
+
+    def note(self, line: str) -> None:
+        """Hear why a part of an earlier run is made again."""
+
+    def advance(self, stage: str, scenes: int) -> None:
+        """Hear that a stage has done so many scenes more."""
+
+
+UNHEARD = Progress()
+
+
+class Part(NamedTuple):
+    """The share of a run that one machine judges: every `of`-th task, from task `number` on."""
+
+    number: int = 1
+    of: int = 1
+
+    @classmethod
+    def read(cls, text: str) -> "Part":
+        """Read `K/N`; InputError for anything else."""
+        number, _, of = text.partition("/")
+        if number.isdecimal() and of.isdecimal() and 1 <= int(number) <= int(of):
+            return cls(int(number), int(of))
+        allowed = "must be K/N, part K of N parts: --part 1/8 to --part 8/8"
+        raise InputError("--part", text, allowed)
+
+    def holds(self, chunk: int) -> bool:
+        """Return whether a task, counted from 0, is of this part."""
+        return chunk % self.of == self.number - 1
+
+
+WHOLE = Part()
+"""The only part of a run that one machine judges."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A suite, the engines that are asked, and the tasks into which this is cut, the same on every machine."""
+
+    suite: Suite
+    engines: tuple[Engine, ...]
+    options: RunOptions = DEFAULTS
+    missing: Sequence[tuple[str, str]] = ()
+    """Engines that cannot answer here, each with the reason."""
+
+    @property
+    def draw_at_once(self) -> bool:
+        """Return whether scenes are drawn as they are judged, because there are few."""
+        suite = self.suite
+        without_pictures = len(suite.not_drawn) if isinstance(suite, Files) else 0
+        return self.options.drawn and len(suite) - without_pictures <= PICTURED
+
+    @property
+    def sketch(self) -> bool:
+        """Return whether scenes have small pictures."""
+        return self.options.drawn and len(self.suite) <= SKETCHED
+
+    @cached_property
+    def chunks(self) -> list[range]:
+        """Return the scenes of each task."""
+        count = len(self.suite)
+        simulated = any(engine.through_time for engine in self.engines)
+        least = CHUNK[self.draw_at_once or simulated]
+        size = max(least, math.ceil(count / MOST_PARTS))
+        return [
+            range(start, min(start + size, count)) for start in range(0, count, size)
+        ]
+
+    @cached_property
+    def identity(self) -> dict[str, Any]:
+        """Return all that a result depends on; two folders hold parts of one run if it is equal."""
+        return {
+            "scenes": self.suite.fingerprint(),
+            "engines": [engine.fingerprint() for engine in self.engines],
+            **name_code(),
+            "draw": self.draw_at_once,
+            "sketch": self.sketch,
+            "sample": self.options.sample,
+        }
+
+    def list_chunks(self, part: Part) -> list[int]:
+        """List the tasks of a part."""
+        return [chunk for chunk in range(len(self.chunks)) if part.holds(chunk)]
+
+    def count_scenes(self, chunks: Iterable[int]) -> int:
+        """Count the scenes of some tasks."""
+        return sum(len(self.chunks[chunk]) for chunk in chunks)
+
+    def judge(self, store: Store, part: Part, progress: Progress) -> None:
+        """Judge the tasks of a part that the store does not have yet."""
+        wanted = self.list_chunks(part)
+        done = store.done()
+        for line in store.notes:
+            progress.note(line)
+        progress.advance(JUDGING, self.count_scenes(done.intersection(wanted)))
+        jobs = self._make_jobs(chunk for chunk in wanted if chunk not in done)
+        workers = self.options.workers
+        limit = pool.find_time_limit(self.suite, self.engines)
+        for chunk, records in pool.judge_chunks(jobs, limit, workers):
+            store.put(chunk, [record.kept_all() for record in records])
+            progress.advance(JUDGING, len(records))
+
+    def _make_jobs(self, chunks: Iterable[int]) -> Iterator[tuple[int, list[pool.Job]]]:
+        for chunk in chunks:
+            yield (
+                chunk,
+                pool.make_jobs(
+                    self.suite,
+                    self.chunks[chunk],
+                    self.engines,
+                    self.draw_at_once,
+                    self.options.sample,
+                    self.sketch,
+                ),
+            )
+
+    def summarise(self) -> Summary:
+        """Return a summary that knows the engines, and no scene yet."""
+        tolerances = (IDENTITY, *(engine.tolerance for engine in self.engines))
+        summary = Summary()
+        summary.tolerances = list(dict.fromkeys(tolerances))
+        summary.missing = self.missing
+        summary.stated = {
+            engine.name: engine.version
+            for engine in self.engines
+            if isinstance(engine, Guest)
+        }
+        return summary

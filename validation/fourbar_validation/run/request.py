@@ -1,0 +1,222 @@
+"""What a run is asked for: the options of its command line, its suite and its engines, and how a part keeps them."""
+
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from fourbar.errors import DependencyError, InputError
+from fourbar.writing import require_file, write_text
+from fourbar_validation.engines.guests import adjust_engines
+from fourbar_validation.engines.registry import Engine, hold_fully
+from fourbar_validation.engines.table import choose_engines, fill_table
+from fourbar_validation.regression.accept import FORMS
+from fourbar_validation.regression.record import find_baseline, open_run
+from fourbar_validation.run.plan import SAMPLE, WORKERS, Part, Plan, RunOptions
+from fourbar_validation.scenes.hard_families import Hard
+from fourbar_validation.scenes.random import UNEVEN_TYPE, DrawnType
+from fourbar_validation.scenes.suites import (
+    Files,
+    Random,
+    Suite,
+    read_default_suite,
+    read_scene_files,
+    read_suite,
+)
+
+ALL_TYPES = ",".join(kind.value for kind in DrawnType)
+EXCLUDED = (
+    ("random", "scenes", "judges random linkages; leave out the scene files"),
+    ("suite", "scenes", "has its own scenes; leave out scene files and --random"),
+    ("suite", "random", "has its own scenes; leave out scene files and --random"),
+)
+"""Option, what it cannot be combined with, and why."""
+HARD = "hard"
+"""Name of the suite of hard cases."""
+OF_RANDOM = ("seed", "type")
+"""Options that say which random linkages are drawn."""
+OF_A_REPORT = ("against", *FORMS)
+"""Options of the verdict, which a part has none of."""
+REQUEST = "request.json"
+"""File beside a part that says what was asked for, so that parts can be collected."""
+KEPT = (
+    *("scenes", "engines", "error", "suite", "random", "seed", "type"),
+    *("guest", "time_limit", "sample_shipped", "no_pictures"),
+)
+"""Options that a part keeps."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Request:
+    """Everything that the command line of a run states, by the names of its options; None where it states nothing."""
+
+    scenes: tuple[Path, ...] = ()
+    out: Path = Path("results")
+    engines: str | None = None
+    error: float | None = None
+    suite: str | None = None
+    random: int | None = None
+    seed: int | None = None
+    type: str | None = None
+    workers: int = WORKERS
+    against: str | None = None
+    guest: tuple[str, ...] = ()
+    time_limit: float | None = None
+    sample_shipped: int = SAMPLE
+    part: str | None = None
+    verbose: bool = False
+    no_pictures: bool = False
+    markdown: Path | None = None
+    html: Path | None = None
+    junit: Path | None = None
+
+    @property
+    def forms(self) -> dict[str, Path | None]:
+        """Return the files in which differences are written, by their form."""
+        return {form: getattr(self, form) for form in FORMS}
+
+    def require_consistent(self) -> None:
+        """Refuse options that contradict each other or would do nothing, and files that cannot be written."""
+        for option, excluded, why in EXCLUDED:
+            if getattr(self, option) is not None and getattr(self, excluded) not in (
+                None,
+                (),
+            ):
+                raise InputError(f"--{option}", getattr(self, option), why)
+        for option in OF_RANDOM:
+            if getattr(self, option) is not None and self.random is None:
+                raise InputError(
+                    f"--{option}",
+                    getattr(self, option),
+                    "is of random linkages; say --random N too",
+                )
+        for option in OF_A_REPORT if self.part is not None else ():
+            if (value := getattr(self, option)) is not None:
+                why = "is of a report: leave it out, and collect the parts first"
+                raise InputError(f"--{option}", str(value), why)
+        for form, path in self.forms.items():
+            if path is not None:
+                if self.against is None and form != "junit":
+                    raise InputError(
+                        f"--{form}",
+                        str(path),
+                        "tells differences; say --against BASELINE too",
+                    )
+                if (
+                    self.out.exists() or path.parent != self.out
+                ):  # a folder that the run will make
+                    require_file(path, *self.scenes)
+        if self.against is not None:
+            open_run(find_baseline(self.against), "--against")
+
+    @property
+    def options(self) -> RunOptions:
+        """Return the options of the run itself."""
+        against = None if self.against is None else find_baseline(self.against)
+        return RunOptions(
+            self.workers,
+            not self.no_pictures,
+            against=against,
+            sample=self.sample_shipped,
+        )
+
+
+def make_plan(request: Request, files: Files | None = None) -> Plan:
+    """Read the scenes and make the engines ready; DependencyError where one that is named cannot answer here.
+
+    `files`: the scenes as a part kept them.
+    """
+    suite = select_scenes(request) if files is None else files
+    engines = select_engines(request)
+    present, missing = find_askable(engines, by_name=request.engines is not None)
+    return Plan(suite, present, request.options, missing)
+
+
+def keep_request(request: Request, part: Part, suite: Suite, out: Path) -> None:
+    """Write what was asked for beside a part, with the text of scene files, which another machine need not have."""
+    asked = {name: getattr(request, name) for name in KEPT}
+    kept: dict[str, Any] = {"parts": part.of, "asked": asked}
+    if isinstance(suite, Files):
+        kept["files"] = asdict(suite) | {"not_drawn": sorted(suite.not_drawn)}
+    write_text(out / REQUEST, json.dumps(kept, default=str) + "\n")
+
+
+def read_request(folder: Path) -> tuple[int, Request, Files | None]:
+    """Read beside a part how many there are, what was asked for, and the scene files; InputError without it."""
+    try:
+        kept = json.loads((folder / REQUEST).read_text(encoding="utf-8"))
+        asked = kept["asked"]
+        asked |= {
+            "scenes": tuple(map(Path, asked["scenes"])),
+            "guest": tuple(asked["guest"]),
+        }
+        request = Request(**asked)
+        files = kept.get("files")
+        if files is not None:
+            texts = tuple((name, text) for name, text in files["texts"])
+            files = Files(texts, files["positions"], frozenset(files["not_drawn"]))
+        return int(kept["parts"]), request, files
+    except (OSError, KeyError, TypeError, ValueError):
+        why = "must be a folder that `run --part` wrote and that was not collected yet"
+        raise InputError("DIR", str(folder), why) from None
+
+
+def forget_request(folder: Path) -> None:
+    """Remove what was kept beside parts, once their results are written."""
+    (folder / REQUEST).unlink(missing_ok=True)
+
+
+def select_scenes(request: Request) -> Suite:
+    """Select the scenes."""
+    if request.suite == HARD:
+        return Hard()
+    if request.suite is not None:
+        return read_suite(Path(request.suite))
+    if request.random is not None:
+        types = read_linkage_types(request.type or ALL_TYPES)
+        return Random(request.random, request.seed or 0, types)
+    if request.scenes:
+        return read_scene_files(request.scenes)
+    return read_default_suite()
+
+
+def select_engines(request: Request) -> tuple[Engine, ...]:
+    """Select the engines that are to answer, and say what each is held to."""
+    hard = request.suite == HARD
+    folders = [path.parent for path in request.scenes]
+    table = fill_table(folders, request.guest, request.time_limit, balls=hard)
+    engines = choose_engines(request.engines, table)
+    if hard:
+        engines = tuple(map(hold_fully, engines))
+    if request.error is not None:
+        engines = adjust_engines(engines, request.error)
+    return engines
+
+
+def read_linkage_types(text: str) -> tuple[DrawnType, ...]:
+    """Read the types named in a comma-separated list; none for uneven linkages."""
+    if text == UNEVEN_TYPE:
+        return ()
+    try:
+        return tuple(DrawnType(name.strip()) for name in text.split(","))
+    except ValueError:
+        allowed = ALL_TYPES.replace(",", ", ")
+        raise InputError(
+            "--type",
+            text,
+            f"must be {UNEVEN_TYPE} or a comma-separated list of {allowed}",
+        ) from None
+
+
+def find_askable(
+    engines: tuple[Engine, ...], *, by_name: bool
+) -> tuple[tuple[Engine, ...], list[tuple[str, str]]]:
+    """Find those that can answer here, and the others with the reason; DependencyError where those were named."""
+    missing = [
+        (engine.name, reason) for engine in engines if (reason := engine.missing())
+    ]
+    if missing and by_name:
+        raise DependencyError(
+            "; ".join(f"{name}: {reason}" for name, reason in missing)
+        )
+    return tuple(engine for engine in engines if not engine.missing()), missing
