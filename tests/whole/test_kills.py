@@ -559,7 +559,7 @@ def test_of_a_long_suite_what_fails_has_pictures_and_what_is_nearest_to_it(
 
     monkeypatch.setattr(pool, "judge_job", noting)
     monkeypatch.setattr("fourbar_validation.report.summary.PICTURED", 3)
-    monkeypatch.setattr(fourbar_validation.run.run, "PICTURED", 3)
+    monkeypatch.setattr(fourbar_validation.run.plan, "PICTURED", 3)
     monkeypatch.setattr(fourbar_validation.run.run, "write_html", lambda *_, **__: "")
     blunders = Engine("blunders", Blunders, EQUIVALENCE)
     without = run(

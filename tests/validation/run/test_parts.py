@@ -9,7 +9,7 @@ import pytest
 from fourbar.errors import BAD_INPUT, HOLDS, InputError
 from fourbar_validation.cli import status
 from fourbar_validation.run import plan
-from fourbar_validation.run.plan import Part
+from fourbar_validation.run.plan import RunPart
 from tests.support.here import judge_here
 
 OPTIONS = ["--random", "7", "--engines", "free-body", "--no-pictures"]
@@ -127,9 +127,9 @@ def test_scene_files_need_not_be_where_parts_are_collected(tmp_path: Path) -> No
     "text", ["0/3", "4/3", "1", "1/", "a/b", "-1/3", "1/0", "1.5/3"]
 )
 def test_a_part_is_k_of_n(text: str) -> None:
-    assert Part.read("2/3") == (2, 3)
+    assert RunPart.read("2/3") == (2, 3)
     with pytest.raises(InputError, match="must be K/N"):
-        Part.read(text)
+        RunPart.read(text)
 
 
 def test_a_part_has_no_verdict_to_compare(

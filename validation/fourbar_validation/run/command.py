@@ -16,8 +16,8 @@ from fourbar_validation.run.parts import judge_part
 from fourbar_validation.run.plan import (
     SAMPLE,
     WORKERS,
-    Part,
     Plan,
+    RunPart,
 )
 from fourbar_validation.run.progress import ShownProgress
 from fourbar_validation.run.request import ALL_TYPES, Request, make_plan
@@ -121,7 +121,7 @@ def command(**stated: Any) -> int:
 
     request = Request(**stated)
     request.require_consistent()
-    part = None if request.part is None else Part.read(request.part)
+    part = None if request.part is None else RunPart.read(request.part)
     plan = make_plan(request)
     if part is not None:
         scenes = plan.count_scenes(plan.list_chunks(part))

@@ -8,7 +8,7 @@ import click
 
 from fourbar.errors import InputError
 from fourbar_validation.report.summary import Summary
-from fourbar_validation.run.plan import UNHEARD, Part, Plan, Progress
+from fourbar_validation.run.plan import UNHEARD, Plan, Progress, RunPart
 from fourbar_validation.run.progress import ShownProgress
 from fourbar_validation.run.request import (
     Request,
@@ -24,7 +24,7 @@ MOST_NAMED = 5
 
 
 def judge_part(
-    plan: Plan, part: Part, request: Request, progress: Progress = UNHEARD
+    plan: Plan, part: RunPart, request: Request, progress: Progress = UNHEARD
 ) -> None:
     """Judge a part of a run into the parts of its folder, which keeps what an interrupted one left."""
     with open_store(plan, request.out) as store:

@@ -59,14 +59,14 @@ class Progress:
 UNHEARD = Progress()
 
 
-class Part(NamedTuple):
+class RunPart(NamedTuple):
     """The share of a run that one machine judges: every `of`-th task, from task `number` on."""
 
     number: int = 1
     of: int = 1
 
     @classmethod
-    def read(cls, text: str) -> "Part":
+    def read(cls, text: str) -> "RunPart":
         """Read `K/N`; InputError for anything else."""
         number, _, of = text.partition("/")
         if number.isdecimal() and of.isdecimal() and 1 <= int(number) <= int(of):
@@ -79,7 +79,7 @@ class Part(NamedTuple):
         return chunk % self.of == self.number - 1
 
 
-WHOLE = Part()
+WHOLE = RunPart()
 """The only part of a run that one machine judges."""
 
 
@@ -128,7 +128,7 @@ class Plan:
             "sample": self.options.sample,
         }
 
-    def list_chunks(self, part: Part) -> list[int]:
+    def list_chunks(self, part: RunPart) -> list[int]:
         """List the tasks of a part."""
         return [chunk for chunk in range(len(self.chunks)) if part.holds(chunk)]
 
@@ -136,7 +136,7 @@ class Plan:
         """Count the scenes of some tasks."""
         return sum(len(self.chunks[chunk]) for chunk in chunks)
 
-    def judge(self, store: Store, part: Part, progress: Progress) -> None:
+    def judge(self, store: Store, part: RunPart, progress: Progress) -> None:
         """Judge the tasks of a part that the store does not have yet."""
         wanted = self.list_chunks(part)
         done = store.done()

@@ -12,7 +12,7 @@ from fourbar_validation.engines.registry import Engine, hold_fully
 from fourbar_validation.engines.table import choose_engines, fill_table
 from fourbar_validation.regression.accept import FORMS
 from fourbar_validation.regression.record import find_baseline, open_run
-from fourbar_validation.run.plan import SAMPLE, WORKERS, Part, Plan, RunOptions
+from fourbar_validation.run.plan import SAMPLE, WORKERS, Plan, RunOptions, RunPart
 from fourbar_validation.scenes.hard_families import Hard
 from fourbar_validation.scenes.random import UNEVEN_TYPE, DrawnType
 from fourbar_validation.scenes.suites import (
@@ -132,7 +132,7 @@ def make_plan(request: Request, files: Files | None = None) -> Plan:
     return Plan(suite, present, request.options, missing)
 
 
-def keep_request(request: Request, part: Part, suite: Suite, out: Path) -> None:
+def keep_request(request: Request, part: RunPart, suite: Suite, out: Path) -> None:
     """Write what was asked for beside a part, with the text of scene files, which another machine need not have."""
     asked = {name: getattr(request, name) for name in KEPT}
     kept: dict[str, Any] = {"parts": part.of, "asked": asked}
