@@ -71,7 +71,7 @@ without_loads_option = click.option(
 @click.option(
     "--dimensions", is_flag=True, help="Write the lengths of the bars at them."
 )
-@given.units_option
+@given.own_units_option
 def plot(
     scene: Path,
     out: Path,
@@ -79,7 +79,7 @@ def plot(
     at: str | None,
     branches: str,
     dimensions: bool,
-    units: Conversion,
+    units: Conversion | None,
 ) -> None:
     """Draw a scene as SVG, PNG or PDF."""
     from fourbar.show.plot import draw
@@ -92,7 +92,7 @@ def plot(
             figure,
             position=place,
             branches=branches,
-            units=units,
+            units=given.suit_units() if units is None else units,
             dimensions=dimensions,
         )
 
@@ -124,14 +124,14 @@ def _find_place(scene: Scene, text: str) -> float:
 @click.option(
     "--vectors", is_flag=True, help="Draw velocity and acceleration at the points."
 )
-@given.units_option
+@given.own_units_option
 def animate(
     scene: Path,
     out: Path,
     pictures: tuple[str, ...],
     seconds: float | None,
     vectors: bool,
-    units: Conversion,
+    units: Conversion | None,
 ) -> None:
     """Animate a scene as a web page (.html) or a film (.gif, .mp4)."""
     from fourbar.show.animate import write
@@ -148,7 +148,7 @@ def animate(
             out,
             pictures=attached,
             seconds=seconds,
-            units=units,
+            units=given.suit_units() if units is None else units,
             vectors=vectors,
         )
 

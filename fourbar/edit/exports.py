@@ -74,7 +74,8 @@ def evaluate_scene(
     data["handles"] = [handle.drawn() for handle in list_handles(scene, plain)]
     if settled:  # what `analyze` and `classify` print
         block = write_block(scene, solution, {**COMMON, **units}, pressure=pressure)
-        data["summary"] = [*block, "", *write_type(scene.linkage, everything=True)]
+        limits = write_type(scene.linkage, {**COMMON, **units}, everything=True)
+        data["summary"] = [*block, "", *limits]
     return data
 
 

@@ -23,11 +23,11 @@ from fourbar.files.fields import Reader
 from fourbar.files.scene_file import LARGEST_FILE
 from fourbar.files.scene_text import BRANCHES, write_drawn_scene, write_new_scene
 from fourbar.linkage import PINS, POSITIVE
-from fourbar.quantities.units import find_unit, to_si
+from fourbar.quantities.units import UnitError, find_unit, to_si
 from fourbar.scene import Scene
 from fourbar.scene.motion import COMMANDS, SIDES, STROKE_COMMAND, require_steps
 from fourbar.show.units import find_length, units, units_of_scene
-from fourbar.solution import Conversion, Solution
+from fourbar.solution import Conversion, Solution, find_unit_in
 from fourbar.solve import solve
 from fourbar.studies.keys import list_entries, read_place
 from fourbar.writing import read_bytes, write_bytes
@@ -287,10 +287,32 @@ def _hash_text(data: bytes) -> str:
     return hashlib.sha256(data).hexdigest()
 
 
+SUITED = ("m", "N", "N m", "kg")
+"""SI units whose quantities a new entry states in the scene's own units."""
+
+
+def _suit_entry(value: Any, plain: dict[str, Any]) -> Any:
+    """Write the quantities of a new entry in the units of the scene, of two digits."""
+    if isinstance(value, dict):
+        return {key: _suit_entry(inner, plain) for key, inner in value.items()}
+    if isinstance(value, list):
+        return [_suit_entry(inner, plain) for inner in value]
+    if not isinstance(value, str):
+        return value
+    for si in SUITED:
+        unit, factor = find_unit_in(si, units_of_scene(plain))
+        try:
+            number = factor * to_si(value, si)
+        except UnitError:
+            continue
+        return value if unit == si else f"{float(f'{number:.2g}'):g} {unit}"
+    return value
+
+
 def _add(session: Session, asked: dict[str, Any]) -> None:
     part, name = list_offers()["parts"][int(asked["part"])], str(asked.get("name", ""))
     path = [name if step == "" else step for step in part["at"]]
-    value = part["value"]
+    value = _suit_entry(part["value"], session.now.plain)
     if path[0] == "tolerances":
         entries = list_entries(session.now.scene)
         if name in entries:  # a thousandth of the number, until the designer says more
@@ -298,7 +320,7 @@ def _add(session: Session, asked: dict[str, Any]) -> None:
                 abs(float(read_place(session.now.scene, entries[name].place) or 1.0))
                 / 1000.0
             )
-            value = f"{size:.1g} {entries[name].unit}"
+            value = _suit_entry(f"{size:.1g} {entries[name].unit}", session.now.plain)
     session.change(lambda document: document.put(path, value))
 
 
@@ -391,7 +413,8 @@ def _command(session: Session, asked: dict[str, Any]) -> None:
         raise InputError(
             "command", place, "needs a cylinder: add one in place of the bar first"
         )
-    first, last = _find_monotone(values)
+    shown = _find_shown(before.theta_2, asked)
+    first, last = _find_monotone(values, shown)
     if last == first:
         raise InputError(
             "command", place, "does not move in this motion: choose another sweep first"
@@ -451,8 +474,19 @@ def _read_pose(solution: Solution, index: int) -> Any:
     )
 
 
-def _find_monotone(values: Any) -> tuple[int, int]:
-    """Return the ends of the longest run in which numbers exist and rise, or fall, throughout."""
+def _find_shown(theta_2: Any, asked: dict[str, Any]) -> int | None:
+    """Return the position that the page shows, by its theta_2; None where it says none."""
+    if asked.get("theta_2") is None:
+        return None
+    turned = np.abs(np.exp(1j * theta_2) - np.exp(1j * float(asked["theta_2"])))
+    return int(np.argmin(np.nan_to_num(turned, nan=np.inf)))
+
+
+def _find_monotone(values: Any, shown: int | None) -> tuple[int, int]:
+    """Return the ends of the run in which numbers exist and rise, or fall, throughout.
+
+    It is the one with the position shown, or else the longest.
+    """
     signs = np.nan_to_num(np.sign(np.diff(values)))
     ends = np.concatenate([[0], np.flatnonzero(np.diff(signs)) + 1, [len(signs)]])
     runs = [
@@ -460,7 +494,8 @@ def _find_monotone(values: Any) -> tuple[int, int]:
         for start, stop in pairwise(ends)
         if signs[start : start + 1].any()
     ]
-    return max(runs, key=lambda run: run[1] - run[0], default=(0, 0))
+    around = [run for run in runs if shown is not None and run[0] <= shown <= run[1]]
+    return max(around or runs, key=lambda run: run[1] - run[0], default=(0, 0))
 
 
 def _restate(session: Session, asked: dict[str, Any]) -> None:

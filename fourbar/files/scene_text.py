@@ -354,7 +354,7 @@ def write_new_scene(lengths: tuple[str, ...] | list[str]) -> str:
     ]
     d, a, b, c = (read.quantity(name, text, "m", POSITIVE) for name, text in stated)
     FourBar(d, Bar(a), Bar(b), Bar(c))
-    lines = "\n".join(f'{name} = "{text}"' for name, text in stated)
+    lines = "\n".join(f"{name} = {_quote(text)}" for name, text in stated)
     lines = f'[lengths]\n{lines}\nground_angle = "0 deg"  # from O2 to O4'
     return _fill_in(lines, (a, b, c), BRANCH_LINE)
 
@@ -371,10 +371,16 @@ def write_drawn_scene(pins: dict[str, tuple[str, str]]) -> str:
     read = Reader("--pins")
     places = {pin: read_point(read, pin, list(texts)) for pin, texts in pins.items()}
     drawing = DrawnPins(**places)
-    rows = (f'{pin} = ["{x}", "{y}"]' for pin, (x, y) in pins.items())
+    rows = (f"{pin} = [{_quote(x)}, {_quote(y)}]" for pin, (x, y) in pins.items())
     lines = "\n".join(["[pins]  # x and y in the position that is drawn", *rows])
     a, b, c = (drawing.length(bar) for bar in MOVING_BARS)
     return _fill_in(lines, (a, b, c), "")
+
+
+def _quote(text: str) -> str:
+    """Write a quantity as a text of TOML, which the mark of inches would end: 12" as "12 in"."""
+    inches = re.fullmatch(r"([^'′’]*\d)\s*[\"”″]", text)
+    return json.dumps(f"{inches[1]} in" if inches else text, ensure_ascii=False)
 
 
 def _fill_in(lines: str, lengths: tuple[float, float, float], branch: str) -> str:

@@ -64,6 +64,12 @@ SCALARS = (
 )
 
 
+STRIP = """<p id="strip" class="hint"></p>
+<p id="type-change" class="warning" role="status" hidden></p>
+"""
+"""Place of the largest numbers beside the drawing of the workbench."""
+
+
 def collect_page_data(
     scene: Scene,
     pictures: Mapping[str, str | Path],
@@ -399,6 +405,7 @@ def write_page(
         script_hash=_hash_content(script),
         connect=f"connect-src ws://{live.split('/')[2]}; " if live else "",
         panel=asset("edit.html") if live else "",
+        strip=STRIP if live else "",
         results=asset("bench.html") if live else "",
         data=embed_json(
             collect_page_data(

@@ -17,6 +17,8 @@ DERIVED = {"m/s": ("m", "{}/s"), "m/s^2": ("m", "{}/s^2"), "J": ("N m", "{}")}
 """Not stated, these follow another one: energy the unit of torque, speeds that of length."""
 IMPERIAL = ("in", "inch", "inches", "ft", "foot", "feet")
 """Units of lengths.ground with which a scene is shown in imperial units."""
+POUNDS = ("lb", "lbs", "pound", "pounds", "lbm")
+"""Names of the pound, a mass; a list that names no force may mean pounds-force."""
 METRIC = ("mm", "cm", "dm", "m")
 """Units of lengths.ground in which lengths are shown as they are stated."""
 ROTATIONS = ("rpm", "rad/s", "deg/s", "rad/s^2", "deg/s^2", "rad/s²", "deg/s²")
@@ -66,6 +68,12 @@ def units(text: str) -> Conversion:
             )
             raise InputError("units", name, f"{reason}; {ALLOWED}")
         stated[unit] = name.replace(".", " ")
+    mass = stated.get("kg", "")
+    if mass.casefold() in POUNDS and "N" not in stated:
+        reason = "is a mass, and the list names no unit of force"
+        raise InputError(
+            "units", mass, f"{reason}: write lbf for pounds-force, or both"
+        )
     for unit, (base, form) in DERIVED.items():
         if base in stated and unit not in stated:
             stated[unit] = form.format(stated[base])

@@ -61,11 +61,18 @@ function captured(name) {
 }
 const peakOf = values => values.reduce((most, v) => Math.abs(v) > Math.abs(most) ? v : most, 0);
 let unchanged = false;   // whether the scene is the one it is compared with
+// A change of a peak in percent; one of more than ten times as a factor, and none from what rounding leaves of zero.
+function changeOf(then, now) {
+  if (!(then > 1e-9 * now)) return "";
+  const grown = now / then - 1;
+  if (grown > 9) return ` (${text(now / then, 3)} times)`;
+  return ` (${grown < 0 ? "\u2212" : "+"}${Math.abs(100 * grown).toFixed(Math.abs(grown) < 0.1 ? 1 : 0)} %)`;
+}
 function comparison(name, values) {
   const before = reference?.values[name];
   if (!before || unchanged) return "";
   const [then, now] = [peakOf(before), peakOf(values)].map(Math.abs), label = QUANTITIES.find(q => q[0] === name)[1], cut = label.lastIndexOf(", ");
-  const change = then > 0 ? ` (${now < then ? "\u2212" : "+"}${Math.abs(100 * (now / then - 1)).toFixed(Math.abs(now / then - 1) < 0.1 ? 1 : 0)} %)` : "";
+  const change = changeOf(then, now);
   return `peak ${label.slice(0, cut)} ${text(then, 3)} \u2192 ${text(now, 3)} ${label.slice(cut + 2)}${change}, against ${reference.name}`;
 }
 

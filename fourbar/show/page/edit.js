@@ -97,7 +97,7 @@ function show(about, own) {
   const keep = row;
   adopt(about.data);
   unchanged = !about.changed;
-  row = same && own?.theta == null ? keep : single() ? Math.min(keep, grid.length - 1) : nearest(theta);
+  row = same && own?.theta == null ? keep : single() && own?.request.do !== "command" ? Math.min(keep, grid.length - 1) : nearest(theta);
   if (!playing) phase = row;
   furnish();
   refresh();
@@ -114,6 +114,7 @@ function show(about, own) {
   document.querySelector("h1").textContent = document.title = about.plain.title || "Four-bar linkage";
   document.querySelector(".source").textContent = about.plain.source ?? "";
   byId("computing").hidden = "summary" in about.data;
+  showStrip();
   if (about.data.summary) byId("summary").replaceChildren(...about.data.summary.map(line => {
     const shown = document.createElement("div");
     shown.textContent = line || "\u00a0";
@@ -123,6 +124,29 @@ function show(about, own) {
   if (about.saved !== undefined) say(about.saved ? `${fileName} is saved` : `${fileName}: not saved yet; kept in ${fileName}.edit`);
   else if (own && own.request.do !== "hello") say(`${fileName}: changed`);
   showPositions();
+}
+
+// ---- the strip beside the drawing: the largest numbers, while one drags -----------------------------------
+const PIN_OF = { F12: "O2", F32: "A", F43: "B", F14: "O4" };
+let typeBefore = null;
+function showStrip() {
+  const t = table(), drive = ["torque", "drive_force"].find(name => name in t), sines = t.transmission ?? [];
+  const sizes = name => t[name].map(v => Array.isArray(v) ? (v[0] === null ? 0 : Math.hypot(...v)) : Math.abs(v ?? 0));
+  const most = name => sizes(name).reduce((a, b) => Math.max(a, b), 0), words = [];
+  if (drive) words.push(`peak ${drive.replace("_", " ")} ${text(inUnit(drive === "torque" ? "N m" : "N", most(drive)))} ${nameOf(drive === "torque" ? "N m" : "N")}`);
+  const pins = FORCES.filter(name => name in t);
+  if (pins.length) {
+    const largest = pins.reduce((a, b) => most(b) > most(a) ? b : a);
+    words.push(`largest pin force ${text(inUnit("N", most(largest)))} ${nameOf("N")} at ${PIN_OF[largest]}`);
+  }
+  const angles = sines.filter(v => v !== null);
+  if (angles.length) words.push(`transmission angle at least ${(Math.min(...angles) * DEG).toFixed(1)}\u00b0`);
+  byId("strip").textContent = words.join("; ");
+  if (typeBefore && typeBefore !== data.type) {
+    byId("type-change").textContent = `The type has changed from ${typeBefore} to ${data.type}.`;
+    byId("type-change").hidden = false;
+  }
+  typeBefore = data.type;
 }
 
 // ---- the table of positions --------------------------------------------------------------------------

@@ -36,7 +36,7 @@ function fieldsAt(path, example) {
 }
 function commandField() {
   const input = element("select", { id: "command" }, ...Object.entries(offers.commands).filter(([key]) => key !== "stroke" || plain.drive?.from).map(([key, { label }]) => new Option(label, key, false, key === commanded())));
-  input.addEventListener("change", () => ask({ do: "command", command: input.value }));
+  input.addEventListener("change", () => ask({ do: "command", command: input.value, theta_2: grid[row] }, null, grid[row]));
   return element("label", { className: "field long" }, "commanded", input);
 }
 const element = (name, attributes = {}, ...inner) => {
@@ -54,7 +54,7 @@ function field(path, value, example) {
   input.setAttribute("aria-describedby", `${id}!`);
   let gesture = "";
   input.addEventListener("focus", () => { gesture = `type:${id}:${++typing}`; });
-  input.addEventListener("blur", () => { if (input.getAttribute("aria-invalid") !== "true") input.value = entryAt(plain, path) ?? ""; });
+  input.addEventListener("blur", () => { if (!unsettled(input)) input.value = entryAt(plain, path) ?? ""; });
   const changed = () => ask({ do: "set", path, value: input.value, gesture }, path);
   input.addEventListener("input", changed);
   const by = (direction, event) => {
@@ -88,6 +88,12 @@ function refuse(path, words) {
   if (input) input.setAttribute("aria-invalid", String(words !== ""));
   place.textContent = words;
   place.hidden = words === "";
+}
+
+// Whether what a field says is no state yet: it was refused, or the answer is on its way.
+function unsettled(input) {
+  const asked = [inFlight, ...waiting].some(own => own?.path && own.path !== TEXT && fieldId(own.path) === input.id);
+  return asked || input.getAttribute("aria-invalid") === "true";
 }
 
 // What a field says in the last good state.
@@ -157,17 +163,19 @@ function showFields() {
   const now = outline(plain, []);
   if (now !== shape) {
     const focused = document.activeElement?.id, open = shape !== "";
+    const refused = [...byId("fields").querySelectorAll("[aria-invalid=true]")].map(input => [input.id, input.value, document.getElementById(`${input.id}!`)?.textContent]);
     shape = now;
     byId("fields").replaceChildren(group([], plain, offers.fields));
+    for (const [id, value, words] of refused) {
+      const input = document.getElementById(id);
+      if (input) { input.value = value; refuse(entryPath(input), words); }
+    }
     if (open && focused) document.getElementById(focused)?.focus();
   }
   for (const input of byId("fields").querySelectorAll("[id^='field:']:is(input,select)")) {
-    if (input === document.activeElement && !input.dataset.follows) continue;
+    if (input === document.activeElement && !input.dataset.follows || unsettled(input)) continue;
     const value = entryAt(plain, entryPath(input));
     if (!scalar(value ?? null) || input.value === String(value ?? "")) continue;
     input.value = value ?? "";
-    input.removeAttribute("aria-invalid");
-    const place = document.getElementById(`${input.id}!`);
-    if (place) place.hidden = true;
   }
 }

@@ -565,6 +565,41 @@ def test_the_command_that_new_names_can_be_copied(tmp_path: Path, run: Fourbar) 
     assert shlex.split(out.strip())[-3:] == ["fourbar", "analyze", str(path)]
 
 
+@pytest.mark.parametrize(
+    "texts",
+    [
+        ('12"', '4"', '10"', '9"'),
+        ("12″", "4 ″", "10”", "9 in"),
+        ("2'", '8"', "1'8\"", "1'6\""),
+    ],
+)
+def test_new_writes_lengths_with_marks_of_inches_as_a_file_that_is_read(
+    texts: tuple[str, ...], tmp_path: Path, run: Fourbar
+) -> None:
+    path = tmp_path / "inches.toml"
+    assert run("new", path, "--lengths", *texts)[0] == HOLDS
+    lengths = load(path).linkage.lengths
+    scale = 2.0 if "'" in texts[0] else 1.0
+    expected = [0.0254 * scale * inches for inches in (12, 4, 10, 9)]
+    assert lengths == pytest.approx(expected, rel=1e-15)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("units", "unit"), [((), "lbf in"), (("--units", "SI"), "N m")]
+)
+def test_plot_and_animate_show_the_units_of_the_scene(
+    units: tuple[str, ...], unit: str, tmp_path: Path, run: Fourbar
+) -> None:
+    path, picture = tmp_path / "inches.toml", tmp_path / "a.svg"
+    run("new", path, "--lengths", "12 in", "4 in", "10 in", "9 in")
+    assert run("plot", path, *units, "-o", picture)[0] == HOLDS
+    assert f"$T_2$ ({unit})" in picture.read_text().replace("mN m", "N m")
+    page = tmp_path / "a.html"
+    assert run("animate", path, *units, "-o", page)[0] == HOLDS
+    assert ('"lbf in"' in page.read_text()) == (unit == "lbf in")
+
+
 @pytest.mark.parametrize("form", ["sdf", "usd"])
 def test_sdf_and_usd_name_the_loads_that_they_leave_out(
     form: str, tmp_path: Path, run: Fourbar

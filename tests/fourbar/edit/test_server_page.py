@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 import subprocess
 import sys
 import time
@@ -591,3 +592,73 @@ def test_a_page_finds_its_server_again_and_a_new_one_goes_on_from_the_state(
     wait_for(driver, "offers && data.lengths[1] === 0.11")
     driver.find_element("id", "undo").click()
     wait_for(driver, "data.lengths[1] === 0.1")
+
+
+@pytest.mark.slow
+def test_a_refused_entry_stays_with_its_message_when_tab_follows_at_once(
+    chromium, opened, tmp_path: Path
+) -> None:
+    driver = chromium
+    open_scene(driver, opened(tmp_path / "mine.toml"))
+    type_into(driver, "field:lengths/input", f"4 lb{Keys.TAB}")
+    entry = "document.getElementById('field:lengths/input')"
+    wait_for(driver, f"{entry}.getAttribute('aria-invalid') === 'true'")
+    words = driver.find_element("id", "field:lengths/input!").text
+    assert "does not convert to m" in words
+    type_into(driver, "field:lengths/coupler", f"260 mm{Keys.TAB}")
+    wait_for(driver, "data.lengths[2] === 0.26")
+    buttons = driver.find_elements("css selector", ".parts button")
+    next(button for button in buttons if button.text == "+ force").click()
+    wait_for(driver, "plain.loads?.length === 1")  # the fields are built anew
+    assert driver.execute_script(f"return {entry}.value") == "4 lb"
+    assert driver.find_element("id", "field:lengths/input!").text == words
+    type_into(driver, "field:lengths/input", f"110 mm{Keys.TAB}")
+    wait_for(driver, "data.lengths[1] === 0.11")
+    assert not driver.find_element("id", "field:lengths/input!").is_displayed()
+
+
+@pytest.mark.slow
+def test_a_strip_beside_the_drawing_tells_the_largest_numbers_and_a_change_of_type(
+    chromium, opened, tmp_path: Path
+) -> None:
+    driver = chromium
+    open_scene(driver, opened(tmp_path / "mine.toml"))
+    wait_for(driver, "document.getElementById('strip').textContent !== ''")
+    strip = driver.find_element("id", "strip").text
+    peak = driver.execute_script("return peakOf(table().torque)")
+    assert float(re.search(r"peak torque ([\d.]+)", strip)[1]) == pytest.approx(
+        abs(peak), rel=1e-3
+    )
+    assert re.search(r"largest pin force [\d.]+ N at \w+; transmission angle", strip)
+    assert not driver.find_element("id", "type-change").is_displayed()
+    type_into(driver, "field:lengths/input", f"290 mm{Keys.TAB}")
+    wait_for(driver, "!document.getElementById('type-change').hidden")
+    said = driver.find_element("id", "type-change").text
+    assert said.startswith("The type has changed from crank-rocker to ")
+    assert driver.find_element("id", "strip").text != strip
+
+
+@pytest.mark.slow
+def test_choosing_another_commanded_angle_keeps_the_position(
+    chromium, opened, tmp_path: Path
+) -> None:
+    driver = chromium
+    open_scene(driver, opened(tmp_path / "mine.toml"))
+    driver.execute_script("go(nearest(2.0))")
+    choose = "const s = document.getElementById('command'); s.value = 'theta_4'; "
+    driver.execute_script(choose + "s.dispatchEvent(new Event('change'))")
+    wait_for(driver, "plain.motion.theta_4 && data.over.commanded === 'theta_4'")
+    assert driver.execute_script("return grid[row]") == pytest.approx(2.0, abs=0.03)
+
+
+@pytest.mark.slow
+def test_a_change_beyond_ten_times_is_no_percentage(
+    chromium, opened, tmp_path: Path
+) -> None:
+    driver = chromium
+    open_scene(driver, opened(tmp_path / "mine.toml"))
+    said = driver.execute_script(
+        "return [changeOf(1, 8835.11), changeOf(2, 3), changeOf(2, 1.9),"
+        " changeOf(1e-17, 1), changeOf(0, 1)]"
+    )
+    assert said == [" (8.84e3 times)", " (+50 %)", " (\u22125.0 %)", "", ""]

@@ -14,6 +14,7 @@ import pytest
 
 import fourbar
 from fourbar.files import loads
+from fourbar.files.scene_text import write_new_scene
 from fourbar.quantities.units import find_unit
 
 pytest.importorskip(
@@ -710,3 +711,36 @@ def test_a_slip_of_the_finger_on_the_steps_does_not_fill_the_memory(
         == f"motion.theta_2.steps: must be below {MOST_POSITIONS} in the workbench"
     )
     assert "refused" not in session.do({"do": "set", "path": path, "value": "100"})
+
+
+def test_another_command_goes_over_the_position_that_is_shown(tmp_path: Path) -> None:
+    """The output of a crank-rocker turns back twice: the page shows one of the stretches."""
+    path = tmp_path / "crank.toml"
+    path.write_text((ROOT / "models" / "crank_rocker.toml").read_text())
+    for shown in (0.2, 2.0, 5.0):
+        session = Session(path, tmp_path / "exports")
+        asked = {"do": "command", "command": "theta_4", "theta_2": shown}
+        assert "refused" not in session.do(asked)
+        covered = fourbar.solve(session.now.scene, "position").theta_2
+        assert np.abs(np.exp(1j * covered) - np.exp(1j * shown)).min() < 0.03
+
+
+def test_new_entries_and_limits_have_the_units_of_the_scene(tmp_path: Path) -> None:
+    path = tmp_path / "inches.toml"
+    path.write_text(write_new_scene(["12 in", "4 in", "10 in", "9 in"]))
+    session = Session(path, tmp_path / "exports")
+    offered = session.do({"do": "hello"})["offers"]["parts"]
+    numbers = {row["label"]: n for n, row in enumerate(offered) if "label" in row}
+    for label in ("force", "moment", "point"):
+        session.do({"do": "add", "part": numbers[label], "name": "P"})
+    stated = session.now.plain
+    assert [load.get("force") for load in stated["loads"]] == [
+        ["2.2 lbf", "-90 deg"],
+        None,
+    ]
+    assert stated["loads"][1]["moment"] == "-8.9 lbf in"
+    assert stated["points"]["P"]["from_pin"] == ["2 in", "20 deg"]
+    data = evaluate_scene(
+        session.now.scene, session.now.plain, session.units, settled=True
+    )
+    assert "s + l = 16 in < p + q = 19 in" in data["summary"]

@@ -200,3 +200,12 @@ def test_plots_and_notebooks_say_theirs() -> None:
     assert " in" in notebook.in_units(scene, "imperial")._repr_html_()
     table = notebook.in_units(fourbar.solve(scene), "imperial")._repr_html_()
     assert "lbf in" in table and "deg" in table and "N m" not in table
+
+
+@pytest.mark.parametrize("text", ["inches pounds", "in lb", "mm lbs deg"])
+def test_pounds_without_a_unit_of_force_are_one_line_that_says_what_to_write(
+    text: str,
+) -> None:
+    with pytest.raises(InputError, match="write lbf for pounds-force"):
+        units(text)
+    assert units("in lb lbf")["N"][0] == "lbf"
