@@ -530,3 +530,18 @@ def test_the_wiper_of_the_page_needs_less_torque_by_other_means(
         0.5 <= new / old <= 2.0
         for new, old in zip(better.linkage.lengths, scene.linkage.lengths, strict=True)
     )
+
+
+def test_the_python_page_goes_to_a_table_of_torque_in_five_lines(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    pytest.importorskip("pandas", reason="the table needs pandas: pip install pandas")
+    program = blocks("python", read("docs/api.md"))[0]
+    assert len(list(filter(None, program.splitlines()))) == 5
+    names: dict[str, Any] = {}
+    exec(program, names)
+    table, solution = names["table"], names["solution"]
+    assert table.columns.tolist() == ["theta_2", "torque"] and len(table) == 361
+    assert (table["torque"].to_numpy() == solution["torque"]).all()
+    assert np.ptp(table["theta_2"]) == pytest.approx(2.0 * np.pi)
+    assert "torque" in capsys.readouterr().out
