@@ -128,6 +128,8 @@ def orient(topology: Topology, scene: Scene) -> Topology:
     A linkage that is turned in its plane together with gravity, or seen from the other side, is the same one.
     """
     model = topology.model
+    if not np.all(np.isfinite(topology.rest_angles)):
+        return topology  # its lengths are beyond the range of doubles, which is said of them
     gravity = model.opt.gravity * is_enabled(model, "gravity")
     wanted = sum(
         (effect.vector for effect in scene.effects if isinstance(effect, Gravity)),
