@@ -37,6 +37,7 @@ from fourbar_validation.run.answers import check_statements
 from fourbar_validation.run.judge import CHECKS
 from fourbar_validation.run.released import FORWARD, FULL
 from fourbar_validation.run.run import RunOptions, run
+from fourbar_validation.run.shipped.summary import ROWS
 from fourbar_validation.scenes.random import DrawnType
 from fourbar_validation.scenes.suites import Random
 from tests.support.here import judge_here
@@ -129,7 +130,8 @@ def test_every_quantity_of_a_scene_is_described(results: Path) -> None:
     of_positions = {q.name for q in QUANTITIES}
     assert (
         set(described)
-        == ({*IDENTITIES, *WHOLE, *FULL, *stated, SHIPPED, *OF_A_SCENE}) - of_positions
+        == ({*IDENTITIES, *WHOLE, *FULL, *stated, SHIPPED, *OF_A_SCENE, *ROWS})
+        - of_positions
     )
     shipped = {
         check.make_rows.__name__ for check in CHECKS if check.shipped

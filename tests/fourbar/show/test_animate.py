@@ -278,3 +278,10 @@ def test_a_film_of_a_free_motion_runs_forward_and_as_long_as_it_does(
     animate.write(RELEASED, tmp_path / "a.gif")
     with Image.open(tmp_path / "a.gif") as film:
         assert film.n_frames == 9
+
+
+def test_instant_centres_are_no_curves_of_the_page() -> None:
+    columns = animate._collect_columns(fourbar.solve(crank_rocker()))
+    assert "torque" in columns and "theta_4" in columns
+    assert columns.keys().isdisjoint(animate.CENTRES)
+    assert all(values is not None for values in columns.values())

@@ -251,3 +251,20 @@ def test_the_energy_of_a_backward_sweep_is_that_of_the_work_of_the_loads(
     assert duty.energy_in >= 0.0 and duty.energy_out >= 0.0
     assert duty.energy_in + duty.energy_out > 0.1 * abs(gained)
     assert duty.energy_in - duty.energy_out == pytest.approx(gained, rel=1e-5)
+
+
+def test_a_position_without_forces_is_not_where_a_light_load_is_largest() -> None:
+    """Loads below 1 N, in a sweep that begins where the linkage does not assemble."""
+    bars = (fourbar.Bar(length, 1e-3) for length in (0.25, 0.1, 0.22))
+    scene = fourbar.Scene(
+        fourbar.FourBar(0.3, *bars),  # type: ignore[arg-type]
+        fourbar.Motion(fourbar.Sweep(-math.pi, math.pi, 90), 1.0),
+        effects=(fourbar.Gravity(),),
+    )
+    s = fourbar.solve(scene)
+    assert s.F12 is not None and not s.assembled[0] and s.assembled.any()
+    size = np.hypot(*s.F12.T)
+    assert np.nanmax(size) < 1.0
+    load = bearing_load(s, "O2")
+    assert load.largest == np.nanmax(size)
+    assert load.where == s.theta_2[np.nanargmax(size)]

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import fourbar
 from fourbar import (
     Bar,
     FourBar,
@@ -354,3 +355,20 @@ def test_a_study_is_given_no_other_positions() -> None:
     study = vary(scene(), {"bars.coupler.mass": [1.0, 2.0]})
     with pytest.raises(InputError, match="states its own positions"):
         solve(study, at=command(scene()))
+
+
+def test_springs_of_members_count_their_turns_from_where_each_assembles() -> None:
+    """The sweep begins where the members do not assemble; each is what it is alone."""
+    linkage = fourbar.uniform(0.2, 0.25, 0.21, 0.22)
+    low, high = fourbar.formulas.mobility.choose_range(linkage)
+    sweep = fourbar.Sweep(low - 0.5, high + 0.2, 40)
+    for effect in (
+        fourbar.Torsion.at(O2=(2.0, low - 2.5, 0.1)),
+        fourbar.Torsion.at(B=(2.0, 3.0, 0.1), O2=(1.0, high + 2.5, 0.0)),
+    ):
+        scene = fourbar.Scene(linkage, fourbar.Motion(sweep, 1.0), effects=(effect,))
+        together = fourbar.solve(fourbar.vary(scene, {"bars.coupler.mass": [0.1, 0.1]}))
+        alone = fourbar.solve(scene)
+        assert not alone.assembled[0] and alone.assembled.any()
+        assert {"ok", "wound"} <= set(alone.status)
+        assert together.status == [alone.status, alone.status]

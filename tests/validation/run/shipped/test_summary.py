@@ -36,7 +36,7 @@ def test_the_summary_of_a_scene_agrees_with_free_bodies(scene: fourbar.Scene) ->
     rows = judge(scene)
     assert not [row for row in rows.values() if row.failed]
     names = {"ranges", "peaks", "means", "pins", "bending"}
-    names |= {"bore"} if scene is CYLINDER else {"shaking_force"}
+    names |= {"bore"} if scene is CYLINDER else {"frame_force"}
     assert rows.keys() == names
 
 

@@ -34,6 +34,8 @@ from fourbar_validation.run.question import NotAskedError, Question
 from fourbar_validation.run.shipped.cuts import free_piece, move_bars
 from fourbar_validation.run.shipped.variants import ask_free_bodies, make_row
 
+ROWS = ("ranges", "peaks", "means", "pins", "frame_force", "bending", "bore")
+"""Names of the rows."""
 FINE = 1440
 """Intervals of the motion at whose ends nothing may exceed a peak or a range."""
 BETWEEN = 1e-3
@@ -64,7 +66,7 @@ TOLERANCES = {"bore": FOUR_DIGITS, "bending": LOCATED_ROUGHLY}
 
 
 @dataclass
-class _Judged:
+class _SummaryJudge:
     """A scene, what is said of it, and the free bodies' answers."""
 
     question: Question
@@ -114,13 +116,16 @@ class _Judged:
 
 def summary(question: Question) -> list[Row]:
     """Judge ranges, peaks, means, energies, pin loads, shaking force, bending and bore."""
-    judged = _Judged(question, _summarize(question))
+    judged = _SummaryJudge(question, _summarize(question))
     _judge_ranges(judged)
     _judge_drive(judged)
     _judge_pins(judged)
     _judge_bending(judged)
     rows = []
-    for name, errors in judged.errors.items():
+    for name in ROWS:
+        errors = judged.errors.get(name, [])
+        if not errors:
+            continue
         tolerance = TOLERANCES.get(name, PRINTED)
         error = np.array(errors)
         reason = f"{len(errors)} numbers, {FINE + 1} positions"
@@ -146,7 +151,7 @@ def _summarize(question: Question) -> Facts:
     return summarize(scene, solution)
 
 
-def _judge_ranges(judged: _Judged) -> None:
+def _judge_ranges(judged: _SummaryJudge) -> None:
     """Judge the ends of the ranges of all bars, and the smallest transmission angle."""
     for bar, ends in judged.facts.angles.items():
         there = _take(judged, judged.ask([end.place for end in ends]), f"theta_{bar}")
@@ -165,7 +170,7 @@ def _judge_ranges(judged: _Judged) -> None:
     judged.add("ranges", max(math.sin(least.value) - float(sines[1].min()), 0.0))
 
 
-def _take(judged: _Judged, answer: Answer, name: str) -> Array:
+def _take(judged: _SummaryJudge, answer: Answer, name: str) -> Array:
     """Return a quantity that the free bodies found or were commanded."""
     if name in answer.quantities:
         return np.array(answer.quantities[name])
@@ -173,7 +178,7 @@ def _take(judged: _Judged, answer: Answer, name: str) -> Array:
     return np.array(answer.at.angle)
 
 
-def _find_work(judged: _Judged, answer: Answer) -> tuple[Array, Array]:
+def _find_work(judged: _SummaryJudge, answer: Answer) -> tuple[Array, Array]:
     """Return torque or force of the drive, and its speed."""
     drive = read_drive(judged.solution)
     values = np.array(answer.quantities[drive.keys.value])
@@ -187,7 +192,7 @@ def _find_work(judged: _Judged, answer: Answer) -> tuple[Array, Array]:
     return values, reference.stroke_speed
 
 
-def _judge_drive(judged: _Judged) -> None:
+def _judge_drive(judged: _SummaryJudge) -> None:
     """Judge peak, mean, power and energies of the drive, as printed and in the JSON."""
     facts, solution = judged.facts, judged.solution
     entry = write_motor(judged.scene, solution, {})
@@ -221,7 +226,7 @@ def _judge_drive(judged: _Judged) -> None:
     _judge_bore(judged, fine_values)
 
 
-def _judge_energy(judged: _Judged, entry: dict[str, Any], power: Array) -> None:
+def _judge_energy(judged: _SummaryJudge, entry: dict[str, Any], power: Array) -> None:
     """Judge both energies: the trapezoidal rule over the times at which the positions are passed."""
     at = judged.solution.at
     if at.time is not None:
@@ -239,7 +244,7 @@ def _judge_energy(judged: _Judged, entry: dict[str, Any], power: Array) -> None:
         judged.add("means", abs(entry[key] - total) / max(sums) if max(sums) else 0.0)
 
 
-def _judge_bore(judged: _Judged, fine: Array) -> None:
+def _judge_bore(judged: _SummaryJudge, fine: Array) -> None:
     """Judge the bores that are printed for a cylinder that pushes, and that pulls."""
     if not judged.facts.linear or judged.facts.between.growing:
         return
@@ -258,7 +263,7 @@ def _judge_bore(judged: _Judged, fine: Array) -> None:
             judged.add_value("bore", printed.get(word), bore)
 
 
-def _judge_pins(judged: _Judged) -> None:
+def _judge_pins(judged: _SummaryJudge) -> None:
     """Judge peak, place and mean of each pin's load, as printed and in the JSON, and the force on the frame."""
     facts, solution = judged.facts, judged.solution
     entry = write_motor(judged.scene, solution, {})
@@ -288,10 +293,10 @@ def _judge_pins(judged: _Judged) -> None:
         size += magnitude(judged.own.quantities["F14"]).max()
         if size > 0.0:
             apart = magnitude(shaking_force(solution) - on_frame)
-            judged.add("shaking_force", apart / size)
+            judged.add("frame_force", apart / size)
 
 
-def _judge_bending(judged: _Judged) -> None:
+def _judge_bending(judged: _SummaryJudge) -> None:
     """Judge the largest bending moment of each bar: at its place by cutting there, and at many positions."""
     stated = state_from_pins(judged.scene)
     fine_motion = move_bars(judged.scene, _command_of(judged.fine), judged.fine)
