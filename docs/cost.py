@@ -16,7 +16,7 @@ import numpy as np
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import command
 from fourbar.show.plot.style import apply_style
-from fourbar.solve import solve
+from fourbar.solving import solve
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.compare.tolerance import EPS, K, find_condition
 from fourbar_validation.cost.pictures import (

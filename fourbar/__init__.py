@@ -31,7 +31,7 @@ from fourbar.scene.numbers import Point as Point
 from fourbar.scene.numbers import Tolerance as Tolerance
 from fourbar.scene.pictures import Picture as Picture
 from fourbar.solution import Solution as Solution
-from fourbar.solve import solve as solve
+from fourbar.solving import solve as solve
 
 __version__ = "1.0.0"
 

@@ -235,7 +235,7 @@ def analyze(  # noqa: PLR0913 - one for each option
             )
         _print_sensitivity(scene, form == "json", out)
         return
-    from fourbar.solve import find_last_stage, solve
+    from fourbar.solving import find_last_stage, solve
     from fourbar.studies.passing import find_positions
 
     with given.open_scene(scene) as described, given.show_waiting(described):
@@ -279,7 +279,7 @@ def _write_summary(
 ) -> str:
     """Write the block of a scene, or one block for each of its positions."""
     from fourbar.show.block import write_block
-    from fourbar.solve import find_last_stage, solve
+    from fourbar.solving import find_last_stage, solve
 
     if not apart:
         return "\n".join([*write_block(scene, solution, units, pressure=pressure), ""])

@@ -18,7 +18,7 @@ from fourbar.linkage import BAR_NAMES, MOVING_BARS
 from fourbar.quantities.units import find_unit, to_si
 from fourbar.scene import Command, Scene
 from fourbar.scene.drawing import DrawnPins
-from fourbar.solve import solve
+from fourbar.solving import solve
 
 PINS = ("A", "B", "O4")
 SAME_ANGLE = 1e-9

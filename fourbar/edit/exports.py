@@ -29,7 +29,7 @@ from fourbar.show.block import write_block
 from fourbar.show.studies import write_type
 from fourbar.show.units import COMMON
 from fourbar.solution import Conversion, write_csv
-from fourbar.solve import find_last_stage, solve
+from fourbar.solving import find_last_stage, solve
 from fourbar.writing import write_text
 
 ENDINGS = {

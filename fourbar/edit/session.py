@@ -28,7 +28,7 @@ from fourbar.scene import Scene
 from fourbar.scene.motion import COMMANDS, SIDES, STROKE_COMMAND, require_steps
 from fourbar.show.units import find_length, units, units_of_scene
 from fourbar.solution import Conversion, Solution, find_unit_in
-from fourbar.solve import solve
+from fourbar.solving import solve
 from fourbar.studies.keys import list_entries, read_place
 from fourbar.writing import read_bytes, write_bytes
 

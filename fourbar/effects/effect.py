@@ -100,24 +100,26 @@ class Actions:
         if bar != 1:
             self.forces[bar] = self.forces[bar] + force if bar in self.forces else force
             arm = point * self.state.direction(bar)
-            self.twist(bar, cross(-force, arm if beyond is None else arm + beyond))
+            self.moment_about_pin(
+                bar, cross(-force, arm if beyond is None else arm + beyond)
+            )
             if bar == 3:
                 self.on_coupler.append((force, point, beyond, 0.0))
 
-    def moment(self, bar: int, moment: Number) -> None:
+    def couple(self, bar: int, moment: Number) -> None:
         """Add a pure couple on a bar, N m; on the ground it does nothing."""
         if bar != 1:
-            self.twist(bar, moment)
+            self.moment_about_pin(bar, moment)
             if bar == 3:
                 self.on_coupler.append((None, 0.0j, None, moment))
 
-    def twist(self, bar: int, moment: Number) -> None:
+    def moment_about_pin(self, bar: int, moment: Number) -> None:
         """Add a moment about a bar's first pin."""
         self.moments[bar] = (
             self.moments[bar] + moment if bar in self.moments else moment
         )
 
-    def couple(self, pin: str, couple: Number) -> None:
+    def pin_couple(self, pin: str, couple: Number) -> None:
         """Add a couple on the second of the two bars that meet at a pin, and its opposite on the first, N m."""
         self.couples[pin] = (
             self.couples[pin] + couple if pin in self.couples else couple
@@ -142,7 +144,7 @@ class Actions:
             from_start * self.state.direction(start.bar),
             from_end * self.state.direction(end.bar),
         )
-        self.couple(
+        self.pin_couple(
             pin,
             select(
                 square < other_square,
@@ -293,7 +295,7 @@ class Effect:
     """True if the couples jump where the relative rotation at a pin reverses."""
 
     counts_turns: ClassVar[bool] = False
-    """True if the effect depends on where the motion began (`counted_from`)."""
+    """True if the effect depends on where the motion began (`begin_at`)."""
     in_balls: ClassVar[bool] = False
     """True if the reference in ball arithmetic has a model of it."""
     joint_elements: ClassVar[Mapping[str, str]] = {}
@@ -377,7 +379,7 @@ class Effect:
     def act_known(self, actions: Actions, forces: Mapping[str, Array]) -> None:
         """Add what `act` leaves to the solution of the pin forces, once these are computed (name: (n, 2), N)."""
 
-    def counted_from(self, start: State, branch: Number) -> Self:
+    def begin_at(self, start: State, branch: Number) -> Self:
         """Return the same effect in a motion that begins at this position, on this branch."""
         return self
 

@@ -33,7 +33,7 @@ class Friction(PinRows):
     def act(self, actions: Actions, state: State) -> None:
         """Add M on bar j = -f sign(omega_j - omega_i), its opposite on bar i."""
         for pin, f in self.torques:
-            actions.couple(pin, -f * actions.sense(pin))
+            actions.pin_couple(pin, -f * actions.sense(pin))
 
     def add_to_mjcf(self, model: Any) -> None:
         """Set the attribute ``frictionloss`` of the hinge (of a tendon at the cut pin B)."""

@@ -223,7 +223,7 @@ class Load(Effect):
                 assert self.place is not None
                 actions.force(self.bar, factor * force, self.place.vector())
         if is_any(self.moment != 0.0):
-            actions.moment(self.bar, factor * self.moment)
+            actions.couple(self.bar, factor * self.moment)
 
     def greatest_force(self, linkage: FourBar) -> float:
         """Return the force with its lever, and the couple divided by the bar's length, N; of a settled load."""

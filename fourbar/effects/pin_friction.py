@@ -81,7 +81,7 @@ class PinFriction(PinRows):
         forces = {}
         for pin in self.loaded_pins:
             single = Actions(actions.state, actions.bodies)
-            single.couple(pin, -actions.sense(pin))
+            single.pin_couple(pin, -actions.sense(pin))
             forces[pin] = eliminate(single, with_inertia=False)
         return forces
 
@@ -123,7 +123,7 @@ class PinFriction(PinRows):
         }
         couples = self._refine(couples, pins, per_unit)
         for pin, couple in couples.items():
-            actions.couple(pin, -senses[pin] * couple)
+            actions.pin_couple(pin, -senses[pin] * couple)
         loaded = eliminate(actions)
         residuals = [
             np.abs(
@@ -192,7 +192,7 @@ class PinFriction(PinRows):
         """Add the friction couples for pin forces that are known already (name: (n, 2), N)."""
         for pin, mu, r in self.pins:
             load = np.hypot(*np.asarray(forces[PIN_FORCE[pin]]).T)
-            actions.couple(pin, -actions.sense(pin) * (mu * r * load))
+            actions.pin_couple(pin, -actions.sense(pin) * (mu * r * load))
 
 
 class Sliding(NamedTuple):

@@ -60,9 +60,9 @@ class Torsion(PinRows):
         for pin, k, rest, preload in self.springs:
             i, j = PINS[pin]
             turned = angle(state.direction(j) * state.direction(i).conjugate())
-            actions.couple(pin, -(preload + k * wrap_angle(turned - rest)))
+            actions.pin_couple(pin, -(preload + k * wrap_angle(turned - rest)))
 
-    def counted_from(self, start: State, branch: Number) -> "Torsion":
+    def begin_at(self, start: State, branch: Number) -> "Torsion":
         """Count whole turns where the motion begins."""
         away = [
             followed - rest

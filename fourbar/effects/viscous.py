@@ -22,7 +22,7 @@ class Viscous(PinRows):
     def act(self, actions: Actions, state: State) -> None:
         """Add M on bar j = -k (omega_j - omega_i), its opposite on bar i."""
         for pin, k in self.coefficients:
-            actions.couple(pin, -k * (state.slip(pin) * state.speed))
+            actions.pin_couple(pin, -k * (state.slip(pin) * state.speed))
 
     def add_to_mjcf(self, model: Any) -> None:
         """Set the attribute ``damping`` of the hinge (of a tendon at the cut pin B)."""

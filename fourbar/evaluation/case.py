@@ -152,7 +152,7 @@ class Case(NamedTuple):
         )
 
     @property
-    def names(self) -> DriveNames:
+    def drive_names(self) -> DriveNames:
         """Return the names of the drive's quantities."""
         return COUPLE if self.drive is None else LINE
 
@@ -242,21 +242,21 @@ class Case(NamedTuple):
         """Collect the numbers of a released linkage, read in the angle of bar 2 or 4, which no couple drives."""
         return cls.of(scene, bar)._replace(drive_bar=bar, drive=None, side=side)
 
-    def started(self, start: Command) -> "Case":
+    def begin_at(self, start: Command) -> "Case":
         """Return a copy whose path-dependent effects begin at this position; it may hold many linkages."""
         state, _ = self.at(start)
         return self._replace(
-            terms=tuple(term.counted_from(state, start.branch) for term in self.terms)
+            terms=tuple(term.begin_at(state, start.branch) for term in self.terms)
         )
 
-    def with_start(self, motion: Command) -> "Case":
+    def begin_with(self, motion: Command) -> "Case":
         """Let the effects begin where the linkage first assembles in a motion, if that keeps its branch."""
         half, _ = self.half_angle(motion.angle, motion.remainder)
         assembled = (half.outer >= 0.0) & (half.inner >= 0.0)
         if not assembled.any() or np.ptp(motion.branch) != 0:
             return self
         first = int(np.argmax(assembled))
-        return self.started(
+        return self.begin_at(
             Command(
                 motion.angle[first], motion.branch[first], 0.0, 0.0, motion.remainder
             )

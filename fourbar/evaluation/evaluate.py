@@ -72,18 +72,18 @@ class Evaluated(NamedTuple):
 
 
 def evaluate(
-    case: Case, command: Command, last_stage: int, names: Set[str]
+    case: Case, command: Command, last_stage: int, wanted: Set[str]
 ) -> Evaluated:
     """Evaluate the named quantities at the positions of a command, up to the last stage that they need.
 
     `command`: positions (n,), or one in plain numbers.
     """
-    if _asks_angles_alone(case, command, names):
-        return _evaluate_angles(case, command, names)
+    if _asks_angles_alone(case, command, wanted):
+        return _evaluate_angles(case, command, wanted)
     state, refined_rows = case.at(command, moving=last_stage > 0)
     codes = _compute_codes(case.path, state.sine, state.position.half, command)
-    values = list_kinematics(case, state, names)
-    if command.condition is not None and "condition" in names:
+    values = list_kinematics(case, state, wanted)
+    if command.condition is not None and "condition" in wanted:
         values["condition"] = values["condition"] * command.condition
     if last_stage >= FORCE:
         acceleration = command.acceleration
@@ -94,9 +94,9 @@ def evaluate(
                 case, command, state, dynamics, refined_rows
             )
         codes, forces = _list_forces(
-            case, command, state, codes, names, dynamics, error_bars
+            case, command, state, codes, wanted, dynamics, error_bars
         )
-        values |= {name: value for name, value in forces.items() if name in names}
+        values |= {name: value for name, value in forces.items() if name in wanted}
     return Evaluated(codes, values, state)
 
 
@@ -105,20 +105,20 @@ def evaluate_released(
     command: Command,
     drive: "ForceDrive | None",
     last_stage: int,
-    names: Set[str],
+    wanted: Set[str],
 ) -> Evaluated:
     """Evaluate instants of a released motion, whose drive exerts nothing.
 
     Results are those of a command of theta_2, in whichever bar's angle they are read.
     """
-    codes, values, state = evaluate(case, command, last_stage, names)
+    codes, values, state = evaluate(case, command, last_stage, wanted)
     if state is not None:
         by_input = state._replace(bar=2, sine=state.position.sin_mu)
-        others = names & {"theta_4", "condition", *LINE_QUANTITIES}
+        others = wanted & {"theta_4", "condition", *LINE_QUANTITIES}
         values |= list_kinematics(case._replace(drive=drive), by_input, others)
     if last_stage >= FORCE:
         of_drive = {"power", *(COUPLE if drive is None else LINE)}
-        values |= {name: np.zeros(codes.shape) for name in of_drive & names}
+        values |= {name: np.zeros(codes.shape) for name in of_drive & wanted}
     return Evaluated(codes, values, state)
 
 
@@ -144,21 +144,21 @@ def _compute_codes(
     return codes
 
 
-def _asks_angles_alone(case: Case, command: Command, names: Set[str]) -> bool:
+def _asks_angles_alone(case: Case, command: Command, wanted: Set[str]) -> bool:
     """Return True if theta_3 and theta_4 are all that is wanted, for which bars need no vectors."""
-    angles_alone = len(names) <= len(ANGLES) and names <= set(ANGLES)
+    angles_alone = len(wanted) <= len(ANGLES) and wanted <= set(ANGLES)
     of_input = command.bar == 2 and command.remainder is None
     return angles_alone and of_input and not case.path.may_stay_parallel
 
 
-def _evaluate_angles(case: Case, command: Command, names: Set[str]) -> Evaluated:
+def _evaluate_angles(case: Case, command: Command, wanted: Set[str]) -> Evaluated:
     """Evaluate theta_3 and theta_4 alone, without the vectors of the bars."""
     half, _ = case.half_angle(command.angle, None)
     theta_3, theta_4, root = case.path.angles(half, find_sign(command.branch))
     unit = 2.0 * case.path.lengths.b * case.path.lengths.c
     codes = _compute_codes(case.path, root, half, command, unit)
     angles = {"theta_3": theta_3, "theta_4": theta_4}
-    return Evaluated(codes, {name: angles[name] for name in names}, None)
+    return Evaluated(codes, {name: angles[name] for name in wanted}, None)
 
 
 def _list_forces(
@@ -166,31 +166,31 @@ def _list_forces(
     command: Command,
     state: State,
     codes: Any,
-    names: Set[str],
+    wanted: Set[str],
     dynamics: Dynamics,
     error_bars: dict[str, Any],
 ) -> tuple[Any, dict[str, Any]]:
     """List the quantities of the force stage, error bars included, and the statuses with those of the effects."""
-    drive_names = case.names
+    drive_names = case.drive_names
     values: dict[str, Any] = {
         **dynamics.pins._asdict(),
         drive_names.value: dynamics.drive,
         **error_bars,
     }
-    if "power" in names:
+    if "power" in wanted:
         values["power"] = dynamics.drive * case.drive_speed(state)
-    if "drive_condition" in names:
+    if "drive_condition" in wanted:
         condition = case.drive_condition(state)
         values["drive_condition"] = (
             condition
             if dynamics.from_jamming is None
             else condition * dynamics.from_jamming
         )
-    if "friction_residual" in names:
+    if "friction_residual" in wanted:
         values["friction_residual"] = (
             0.0 if dynamics.residual is None else dynamics.residual
         )
-    if drive_names.low in names or drive_names.high in names:
+    if drive_names.low in wanted or drive_names.high in wanted:
         *ends, held = case.drive_interval(state, command.acceleration, dynamics.drive)
         values |= zip(drive_names[2:], ends, strict=True)
         if held is not None and dynamics.status is not None:
@@ -291,7 +291,7 @@ def compute_error_bars(
         drive_gap = np.fmax(drive_gap, drive_unresolved)
     drive_error = compute_error_bar(drive_gap, np.abs(dynamics.drive))
     force_error = compute_error_bar(gap, reduce(np.maximum, map(np.abs, dynamics.pins)))
-    return {case.names.error: drive_error, "force_error": force_error}
+    return {case.drive_names.error: drive_error, "force_error": force_error}
 
 
 def _compute_unresolved(
@@ -424,20 +424,20 @@ PLACES = frozenset(
 """Names of the vectors that come before the forces, at the pins and mass centres of the linkage."""
 
 
-def list_kinematics(case: Case, state: State, names: Set[str]) -> dict[str, Any]:
+def list_kinematics(case: Case, state: State, wanted: Set[str]) -> dict[str, Any]:
     """List the named quantities that come before the forces, those of the scene's own points included."""
     values = {
         name: formula(state)
         for name, formula in SCALAR_FORMULAS.items()
-        if name in names
+        if name in wanted
     }
-    if case.drive is not None and not names.isdisjoint(LINE_QUANTITIES):
+    if case.drive is not None and not wanted.isdisjoint(LINE_QUANTITIES):
         stroke, unit = case.drive.line(state)
         of_line = {"drive_line": unit, "stroke_speed": case.drive_speed(state)}
         if case.drive.has_stroke:
             of_line["stroke"] = stroke
-        values |= {name: value for name, value in of_line.items() if name in names}
-    if not case.points and names.isdisjoint(PLACES):
+        values |= {name: value for name, value in of_line.items() if name in wanted}
+    if not case.points and wanted.isdisjoint(PLACES):
         return values
     lengths, (two, three, four) = case.lengths, case.bodies
     places: dict[int, list[tuple[str, Any]]] = {
@@ -451,10 +451,10 @@ def list_kinematics(case: Case, state: State, names: Set[str]) -> dict[str, Any]
         frame = state.frame(bar)
         for name, z in of_bar:
             r = z * frame.u
-            if name in names:
+            if name in wanted:
                 values[name] = frame.pin + r
-            if (velocity := f"v_{name}") in names:
+            if (velocity := f"v_{name}") in wanted:
                 values[velocity] = frame.velocity(r)
-            if (acceleration := f"a_{name}") in names:
+            if (acceleration := f"a_{name}") in wanted:
                 values[acceleration] = frame.acceleration(r)
     return values

@@ -123,7 +123,7 @@ def release(scene: Scene) -> Released:
     if scene.counts_turns:
         motion = released.command
         with np.errstate(all="ignore"):
-            begun = Case.of(scene).with_start(motion.part(slice(0, 1)))
+            begun = Case.of(scene).begin_with(motion.part(slice(0, 1)))
             state, _ = begun.at(motion)
             for term in begun.terms:
                 codes = term.status(state, motion.branch) if term.counts_turns else None

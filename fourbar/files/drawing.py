@@ -15,7 +15,7 @@ from fourbar.quantities.units import find_rounding
 from fourbar.scene import Scene, command_at
 from fourbar.scene.drawing import DrawnPins
 from fourbar.scene.motion import BRANCH_NAMES, COMMANDS, STROKE_COMMAND, Motion
-from fourbar.solve import solve
+from fourbar.solving import solve
 
 DRAWN = "drawn"
 """Word that stands for the drawn angle, stroke or side; key of a place of the drawing."""

@@ -31,7 +31,7 @@ from fourbar.quantities import OK
 from fourbar.scene import Command, Scene, command, require_input
 from fourbar.scene.motion import Motion
 from fourbar.solution import Array
-from fourbar.solve import solve
+from fourbar.solving import solve
 
 NOTES: dict[str, Any] = tomllib.loads(
     files("fourbar.mjcf").joinpath("notes.toml").read_text(encoding="utf-8")

@@ -457,7 +457,7 @@ def default_places(scene: Scene, holding: float | None = None) -> Array:
     return np.linspace(first, last, DEFAULT_STEPS + 1)
 
 
-def turn_bar(
+def compute_bar_motion(
     scene: Scene, place: Any, speed: Any, acceleration: Any
 ) -> tuple[Any, Any, Any, Any]:
     """Compute angle, speed and acceleration of the commanded bar, and the condition of the command (None: 1).
@@ -476,7 +476,9 @@ def command_stroke(
     scene: Scene, stroke: Array, speed: Any, acceleration: Any
 ) -> Command:
     """Command the bar that a cylinder turns, from strokes and their rates; the branch is that of the motion."""
-    angle, omega, alpha, condition = turn_bar(scene, stroke, speed, acceleration)
+    angle, omega, alpha, condition = compute_bar_motion(
+        scene, stroke, speed, acceleration
+    )
     lost = None
     if speed is not None:  # what angle, speed and acceleration leave out as doubles
         with np.errstate(all="ignore"):

@@ -41,7 +41,7 @@ from fourbar.show.plot.view import (
 from fourbar.show.tolerances import collect_tolerances
 from fourbar.show.units import choose_unit
 from fourbar.solution import SI, Array, Conversion, Solution
-from fourbar.solve import solve
+from fourbar.solving import solve
 from fourbar.writing import null_nan, write_text
 
 MAX_ROWS = 1441

@@ -24,7 +24,7 @@ from fourbar.solution import (
     find_values,
     is_scalar,
 )
-from fourbar.solve import solve
+from fourbar.solving import solve
 
 AXES = {"_x": 0, "_y": 1}
 

@@ -27,7 +27,7 @@ from fourbar.show.duty import (
     read_drive,
 )
 from fourbar.solution import Array, Solution
-from fourbar.solve import solve
+from fourbar.solving import solve
 from fourbar.studies.internal_forces import Bending, internal_forces
 
 CUTS = 40

@@ -29,7 +29,7 @@ from fourbar.formulas.position import Loop, Position, half_angle, loop
 from fourbar.scene import Command, Scene, command, with_signs
 from fourbar.scene.motion import Sweep
 from fourbar.solution import Array
-from fourbar.solve import solve
+from fourbar.solving import solve
 from fourbar.studies.sloped import Sloped
 
 SAMPLES = 3600
@@ -72,12 +72,12 @@ class _Sizes(Actions):
         if bar == 3:
             self.size = self.size + np.abs(force) * self.state.lengths.a * self.fastest
 
-    def twist(self, bar: int, moment: Any) -> None:
-        super().twist(bar, moment)
+    def moment_about_pin(self, bar: int, moment: Any) -> None:
+        super().moment_about_pin(bar, moment)
         self.size = self.size + np.abs(moment) * self.fastest
 
-    def couple(self, pin: str, couple: Any) -> None:
-        super().couple(pin, couple)
+    def pin_couple(self, pin: str, couple: Any) -> None:
+        super().pin_couple(pin, couple)
         self.size = self.size + np.abs(couple) * self.fastest
 
 
@@ -107,7 +107,7 @@ class CircuitCurve:
     def __init__(self, scene: Scene) -> None:
         self.scene, self.case = scene, Case.of(scene)
         commanded, linkage = of_input(scene), scene.linkage
-        self.case = self.case.with_start(commanded) if scene.counts_turns else self.case
+        self.case = self.case.begin_with(commanded) if scene.counts_turns else self.case
         self.lengths, self.theta_1 = loop(*linkage.lengths), linkage.ground_angle
         self.ratios = self.case.path.lengths
         """The lengths by a unit near them, of which no product leaves the range of doubles."""

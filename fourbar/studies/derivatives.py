@@ -28,9 +28,9 @@ from fourbar.quantities import (
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import FromLimit
 from fourbar.scene.numbers import POINT_STAGES
-from fourbar.scene.scene import turn_bar
+from fourbar.scene.scene import compute_bar_motion
 from fourbar.solution import Array, Solution, find_values, split_parts
-from fourbar.solve import solve
+from fourbar.solving import solve
 from fourbar.studies.keys import (
     SceneNumber,
     command_key,
@@ -356,7 +356,7 @@ def _compute_derivatives(
         name: seeded(f"motion.{name}", number)
         for name, number in zip(scene.motion.names, numbers, strict=True)
     }
-    q, speed, acceleration, condition = turn_bar(scene, *commanded.values())
+    q, speed, acceleration, condition = compute_bar_motion(scene, *commanded.values())
     case, branch = Case.of(scene, stated.bar), stated.branch[index].astype(float)
     case = case._replace(path=_SlopedPath(*case.path))
     state = case.assemble(
@@ -373,7 +373,10 @@ def _compute_derivatives(
                 take_values(speed) == 0.0
             )
         dynamics = case.dynamics(state, acceleration)
-        quantities |= {**dynamics.pins._asdict(), case.names.value: dynamics.drive}
+        quantities |= {
+            **dynamics.pins._asdict(),
+            case.drive_names.value: dynamics.drive,
+        }
         quantities["power"] = dynamics.work * speed
         quantities["drive_condition"] = case.drive_condition(state)
     return {name: quantities[name] for name in names}, held

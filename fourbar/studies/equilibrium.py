@@ -29,7 +29,7 @@ from fourbar.quantities import JAMMED, NOT_ASSEMBLED, SINGULAR
 from fourbar.scene import Command, Scene
 from fourbar.scene.motion import DEFAULT_STEPS
 from fourbar.solution import Array, Solution
-from fourbar.solve import solve
+from fourbar.solving import solve
 from fourbar.studies.circuit_curve import (
     NOTHING,
     SAMPLES,

@@ -191,12 +191,12 @@ class _Recorder(Actions):
             place = point if beyond is None else point + beyond * back
             self.items.append((place, force * back, 0.0))
 
-    def moment(self, bar: int, moment: Any) -> None:
+    def couple(self, bar: int, moment: Any) -> None:
         """Record a couple on the bar."""
         if bar == self.bar:
             self.items.append((self.place, 0.0j, moment))
 
-    def couple(self, pin: str, couple: Any) -> None:
+    def pin_couple(self, pin: str, couple: Any) -> None:
         """Record a couple between two bars at their pin."""
         for bar, sign in zip(PINS[pin], (-1.0, 1.0), strict=True):
             if bar == self.bar:
@@ -217,7 +217,7 @@ def _collect(scene: Scene, solution: Solution, bar: int) -> _Beam:
     """Collect all that acts on a bar."""
     described, n = scene.linkage.bar(bar), len(solution)
     with np.errstate(all="ignore"):
-        case = Case.of(scene, solution.at.bar).with_start(solution.at)
+        case = Case.of(scene, solution.at.bar).begin_with(solution.at)
         state, _ = case.at(solution.at)
         recorder = _Recorder(state, scene, bar)
         _record_pins(recorder, solution)
@@ -337,4 +337,4 @@ def _record_drive(recorder: _Recorder, scene: Scene, solution: Solution) -> None
         assert solution.drive is not None
         solution.drive.act(recorder, solution.drive_force)
     elif scene.drive_bar == recorder.bar:
-        recorder.moment(recorder.bar, solution.torque)
+        recorder.couple(recorder.bar, solution.torque)

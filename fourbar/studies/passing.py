@@ -14,7 +14,7 @@ from fourbar.quantities import Array
 from fourbar.scene import Command, Scene, command, command_at
 from fourbar.scene.motion import COMMANDS, SIDES, STROKE_COMMAND, Motion
 from fourbar.scene.scene import Independent
-from fourbar.solve import solve
+from fourbar.solving import solve
 
 ANGLES = tuple(names[0] for names in COMMANDS.values())
 PLACES = (*ANGLES, STROKE_COMMAND[0], "time")

@@ -12,7 +12,7 @@ from fourbar.linkage import FourBar
 from fourbar.quantities import Array
 from fourbar.scene import Scene, command
 from fourbar.solution import Solution
-from fourbar.solve import solve
+from fourbar.solving import solve
 
 
 def instant_centres(

@@ -11,7 +11,7 @@ from fourbar.errors import DependencyError, InputError, expect, say_install
 from fourbar.quantities import NOT_ASSEMBLED, PIN_FORCES
 from fourbar.scene import Command, Scene, command
 from fourbar.solution import Array, find_values, split_parts
-from fourbar.solve import solve
+from fourbar.solving import solve
 from fourbar.studies.derivatives import Sensitivity, sensitivity
 from fourbar.studies.keys import (
     LEFT_OUT,

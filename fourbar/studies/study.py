@@ -18,7 +18,7 @@ from fourbar.scene.motion import FromLimit
 from fourbar.scene.numbers import find_unit
 from fourbar.scene.scene import command_stroke
 from fourbar.solution import Array, Solution
-from fourbar.solve import Results, find_requested, make_solution, split
+from fourbar.solving import Results, find_requested, make_solution, split
 from fourbar.studies.keys import (
     COMMAND_KEYS,
     command_key,
@@ -82,7 +82,7 @@ class Study:
                     positions = take_members(commanded, rows, columns)
                     # kept until the next block is evaluated, so that its memory is used again
                     evaluated = evaluate(
-                        case, positions, request.last_stage, request.names
+                        case, positions, request.last_stage, request.wanted
                     )
                     results.store(case, evaluated, (rows, columns))
         solution = make_solution(self.columns(), commanded, results)
@@ -129,7 +129,7 @@ class Study:
         counted = (
             Case.of(self.members(rows, 1, scene), commanded.bar)
             .beside(self.scene)
-            .started(start)
+            .begin_at(start)
             .terms[len(scene.loads) :]
         )
         for index, turns in _find_turns(counted).items():

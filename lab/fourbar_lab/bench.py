@@ -21,7 +21,7 @@ from fourbar.linkage import Bar, FourBar
 from fourbar.quantities import ANGLES, UNKNOWNS
 from fourbar.scene import Command
 from fourbar.show.plot.style import format_of
-from fourbar.solve import solve
+from fourbar.solving import solve
 from fourbar_lab.contenders import (
     POSITIONS,
     STUDY,

@@ -18,7 +18,7 @@ from fourbar import Bar, FourBar, Gravity, Motion, Scene, vary
 from fourbar.quantities import UNKNOWNS, VECTORS
 from fourbar.scene import Command
 from fourbar.show.plot.style import Drawing, apply_style
-from fourbar.solve import solve
+from fourbar.solving import solve
 from fourbar_validation.cost.study import time_call, time_in_turns
 from fourbar_validation.report.machine import name_machine
 

@@ -17,7 +17,7 @@ from fourbar.linkage import Bar, FourBar
 from fourbar.mjcf import write_mjcf
 from fourbar.scene import Scene, command
 from fourbar.scene.motion import Motion, Sweep
-from fourbar.solve import solve
+from fourbar.solving import solve
 from fourbar.writing import write_text
 from fourbar_validation.cost.study import time_call, time_in_turns
 from fourbar_validation.engines.registry import ENGINES

@@ -23,7 +23,7 @@ from fourbar.linkage import MOVING_BARS, PINS, SECOND_PIN, Bar, FourBar
 from fourbar.scene import Scene
 from fourbar.scene.motion import Motion
 from fourbar.scene.numbers import Point
-from fourbar.solve import solve
+from fourbar.solving import solve
 from fourbar_validation.scenes.random import (
     DrawnLinkage,
     RandomFamily,

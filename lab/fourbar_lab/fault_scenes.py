@@ -313,11 +313,11 @@ FAULT_SCENES: dict[str, Scene] = {
         3,
         effects=(WEIGHT,),
     ),
-    "shipped": Scene(SLENDER, TURN, effects=(WEIGHT,), points=POINTS),
-    "shipped, limited": Scene(
+    "derived": Scene(SLENDER, TURN, effects=(WEIGHT,), points=POINTS),
+    "derived, limited": Scene(
         ROCKER, Motion(Sweep(0.3, 1.4, 22), 3.0), effects=(WEIGHT,)
     ),
-    "shipped, loaded": Scene(SLENDER, TURN, 2, LOADS, (WEIGHT,)),
+    "derived, loaded": Scene(SLENDER, TURN, 2, LOADS, (WEIGHT,)),
     "simulated": Scene(
         CRANK,
         Motion(Sweep(0.1, 6.0, 12), 10.0),
@@ -357,12 +357,12 @@ FAULT_SCENES: dict[str, Scene] = {
         CRANK, Motion(Sweep(0.1, 3.0, 8), 10.0, 20.0), 4, effects=(Flywheel(0.003, 4),)
     ),
 }
-"""Scenes by the name under which an entry of faults.toml tries its fault; scenes called "shipped" judge what else is
-shipped."""
+"""Scenes by the name under which an entry of faults.toml tries its fault; scenes called
+"derived" judge what is derived from `solve` too."""
 CAPABILITIES = read_default_suite()
 for index in range(len(CAPABILITIES)):
     if (name := CAPABILITIES.name(index)) in CAPABILITIES.not_drawn:
         FAULT_SCENES |= {
             f"{judged}, {name}": CAPABILITIES.scene(index)
-            for judged in ("simulated", "shipped")
+            for judged in ("simulated", "derived")
         }

@@ -23,8 +23,8 @@ from fourbar.solution import Solution
 from fourbar_validation.compare.compare import Comparison
 from fourbar_validation.compare.rows import FAILS, say_error
 from fourbar_validation.compare.tolerance import TOUCHING_MARGIN, find_margin
-from fourbar_validation.engines import workers as processes
-from fourbar_validation.engines.registry import ENGINES, hold, hold_fully
+from fourbar_validation.engines import workers as worker_processes
+from fourbar_validation.engines.registry import ENGINES, hold_fully, make_demands
 from fourbar_validation.places import CHECKOUT
 from fourbar_validation.report.machine import name_code
 from fourbar_validation.run.answers import check_statements
@@ -298,7 +298,7 @@ def _check_engines(question: Question) -> list[str]:
     )
     for engine in EXACT:
         answer = ask_at(engine.start(), scene, commanded)
-        held = hold(engine, scene, commanded, answer)
+        held = make_demands(engine, scene, commanded, answer)
         rows += Comparison("", scene, answer, solution, held).rows()
         if (
             engine.name == "pinocchio-inverse" and answer.refusal is None
@@ -334,11 +334,11 @@ def run(
         done = store.done() & chunks.keys()
         yield from (store.read(stop)[0] for stop in sorted(done))
         todo = [chunk for chunk in chunks.items() if chunk[0] not in done]
-        for stop, outcomes in processes.apply_over_processes(
+        for stop, outcomes in worker_processes.apply_over_processes(
             partial(examine, seed),
             todo,
             workers,
-            seconds=processes.SECONDS,
+            seconds=worker_processes.SECONDS,
             instead=_find_lost,
         ):
             wrong = {

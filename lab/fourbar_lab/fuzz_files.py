@@ -9,7 +9,7 @@ import numpy as np
 from fourbar.errors import FourBarError
 from fourbar.files import loads
 from fourbar.scene import command
-from fourbar.solve import find_last_stage, solve
+from fourbar.solving import find_last_stage, solve
 from fourbar_validation.scenes.suites import list_model_files
 
 HANG = 5.0

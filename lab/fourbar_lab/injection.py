@@ -107,7 +107,7 @@ def list_failing(names: list[str]) -> dict[str, list[str]]:
         offered = HARD_ENGINES if name.startswith("to full accuracy") else ENGINES
         engines = [engine for engine in offered if simulated or not engine.through_time]
         rows = judge(
-            name, FAULT_SCENES[name], engines, shipped=name.startswith("shipped")
+            name, FAULT_SCENES[name], engines, derived=name.startswith("derived")
         ).rows
         failing[name] = [
             f"{row.engine} {row.quantity}: {row.reason}" for row in rows if row.failed

@@ -25,13 +25,13 @@ from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.quantities import UNITS
 from fourbar.scene import Command, Scene, with_signs
 from fourbar.scene import command as command_of
-from fourbar.solve import solve
+from fourbar.solving import solve
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.compare import Comparison
 from fourbar_validation.compare.rows import FAILS
 from fourbar_validation.compare.scales import make_reference
 from fourbar_validation.engines.free_body import NAME as FREE_BODY
-from fourbar_validation.engines.registry import ENGINES, Engine, hold
+from fourbar_validation.engines.registry import ENGINES, Engine, make_demands
 from fourbar_validation.run.answers import check_statements
 from fourbar_validation.run.identities import check_identities, compare_status
 from fourbar_validation.run.question import Question, ask_at
@@ -254,7 +254,7 @@ def is_caught(
     solution, rows = question.solution, list(check_identities(question))
     for engine, answer in answers:
         rows += Comparison(
-            "", scene, answer, solution, hold(engine, scene, command, answer)
+            "", scene, answer, solution, make_demands(engine, scene, command, answer)
         ).rows()
         if (
             engine.name == FREE_BODY

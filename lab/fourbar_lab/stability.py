@@ -15,7 +15,7 @@ from fourbar.quantities import OK, PIN_FORCES, UNITS
 from fourbar.scene import Command, Scene, command, with_signs
 from fourbar.scene.motion import Motion
 from fourbar.solution import Solution
-from fourbar.solve import solve
+from fourbar.solving import solve
 from fourbar_lab.families import FAMILIES
 from fourbar_lab.slopes import judge_slopes
 from fourbar_lab.tally import (

@@ -9,7 +9,7 @@ from click.testing import CliRunner
 
 from fourbar.errors import HOLDS
 from fourbar.quantities import UNKNOWNS
-from fourbar.solve import solve
+from fourbar.solving import solve
 from fourbar_lab import bench, contenders
 from fourbar_lab.contenders import make_command, make_example
 

@@ -13,7 +13,7 @@ import fourbar.formulas.mobility
 from fourbar.files import loads
 from fourbar_lab import fuzz as examine
 from fourbar_lab.fuzz import KEPT, LAB, draw_fuzz_scene, keep, run, shrink_scene
-from fourbar_validation.compare.compare import Held
+from fourbar_validation.compare.compare import Demands
 from fourbar_validation.report.machine import name_code
 from fourbar_validation.run.store import Store
 from tests.support.scenes import crank_rocker
@@ -115,7 +115,7 @@ def test_a_force_that_vanishes_is_held_to_its_prediction(
     answer = engine.start().answer(scene, examine.command(scene))
     wrong = np.array([[times, 0.0]])
     answer.quantities["F12"] = wrong
-    held = Held(engine.tolerance, ("F12",), lambda quantity, mask: np.ones(1))
+    held = Demands(engine.tolerance, ("F12",), lambda quantity, mask: np.ones(1))
     rows = examine.Comparison("", scene, answer, solution, held).rows()
     assert [row.verdict == "fails" for row in rows if row.quantity == "F12"] == [found]
 

@@ -17,7 +17,7 @@ from fourbar.errors import InputError, LimitError
 from fourbar.files import dump, loads
 from fourbar.mjcf import write_mjcf
 from fourbar.scene import Scene, command
-from fourbar.solve import solve
+from fourbar.solving import solve
 from fourbar.studies.derivatives import sensitivity
 from fourbar.studies.study import vary
 from fourbar_validation.engines import effects as on_trees

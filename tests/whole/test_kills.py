@@ -309,7 +309,7 @@ def start(
             "--engines",
             "free-body",
             "--no-pictures",
-            "--sample-shipped",
+            "--sample-derived",
             "0",
             "--out",
             str(out),

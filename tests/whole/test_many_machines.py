@@ -25,7 +25,7 @@ CI = ROOT / "docs" / "ci"
 SCENES = 41
 """Scenes of the run: three tasks, the last of which has one scene."""
 OPTIONS = ["--random", str(SCENES), "--engines", "free-body", "--no-pictures"]
-OPTIONS += ["--sample-shipped", "0"]
+OPTIONS += ["--sample-derived", "0"]
 TABLES = ("results.csv", "results.parquet")
 PROGRAM = Path(sys.executable).with_name("fourbar-validation")
 TIME = 240.0

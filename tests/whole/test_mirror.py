@@ -31,7 +31,7 @@ JUDGED_BY = {
     "fourbar/files/test_files.py": "fourbar/files: fields scene_text",
     "fourbar/formulas/test_formulas.py": "fourbar/formulas: arithmetic many_digits path",
     "fourbar/studies/test_equilibrium.py": "fourbar/studies: circuit_curve; fourbar/show: studies",
-    "fourbar/test_solve.py": "fourbar/scene: motion; fourbar/evaluation: case",
+    "fourbar/test_solving.py": "fourbar/scene: motion; fourbar/evaluation: case",
     "fourbar/studies/test_study.py": "fourbar/scene: motion; fourbar/studies: keys",
     # parts of one document or picture
     "fourbar/mjcf/test_mjcf.py": "fourbar/mjcf: document model",
@@ -53,7 +53,7 @@ JUDGED_BY = {
     "validation/scenes/test_hard_families.py": "validation/engines: exact; validation/engines/mujoco: shipped",
     "validation/report/test_sections.py": "validation/report: hard_picture",
     "validation/engines/mujoco/test_simulate.py": "validation/engines/mujoco: drives monitor",
-    "validation/run/shipped/test_shipped.py": "validation/run/shipped: cuts sensitivities equilibria "
+    "validation/run/derived/test_derived.py": "validation/run/derived: cuts sensitivities equilibria "
     "files variants",
     "validation/run/test_released.py": "validation/engines/mujoco: forward",
     "validation/check/test_check.py": "validation/check: calculated fitted judge "

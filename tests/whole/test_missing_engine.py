@@ -63,7 +63,7 @@ def without(
             "--workers",
             "1",
             "--no-pictures",
-            "--sample-shipped=0",
+            "--sample-derived=0",
             "--out",
             "out",
             *arguments,

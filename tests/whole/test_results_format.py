@@ -34,10 +34,10 @@ from fourbar_validation.engines.table import choose_engines
 from fourbar_validation.regression.change import WHOLE
 from fourbar_validation.regression.record import ACCEPTED, find_baseline
 from fourbar_validation.run.answers import check_statements
+from fourbar_validation.run.derived.summary import ROWS
 from fourbar_validation.run.judge import CHECKS
 from fourbar_validation.run.released import FORWARD, FULL
 from fourbar_validation.run.run import RunOptions, run
-from fourbar_validation.run.shipped.summary import ROWS
 from fourbar_validation.scenes.random import DrawnType
 from fourbar_validation.scenes.suites import Random
 from tests.support.here import judge_here
@@ -110,7 +110,7 @@ def test_every_quantity_stands_in_the_row_of_its_stage_with_its_unit() -> None:
 def test_every_engine_is_described() -> None:
     table = PAGE.partition("## The engines")[2].partition("## The quantities")[0]
     described = re.findall(r"^\| `([\w-]+)` \| .+ \|$", table, re.MULTILINE)
-    shipped = [check.make_rows.__name__ for check in CHECKS if check.shipped]
+    shipped = [check.make_rows.__name__ for check in CHECKS if check.derived]
     assert sorted(described) == sorted(["engine", *WORK, *FORWARD, *shipped])
     names = {engine.name for engine in (*ENGINES, *load_further(), *HARD_ENGINES)}
     assert names | {FORMULAS} == set(WORK)
@@ -134,7 +134,7 @@ def test_every_quantity_of_a_scene_is_described(results: Path) -> None:
         - of_positions
     )
     shipped = {
-        check.make_rows.__name__ for check in CHECKS if check.shipped
+        check.make_rows.__name__ for check in CHECKS if check.derived
     }  # each judges quantities of its own
     rows = (
         row

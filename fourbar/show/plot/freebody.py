@@ -139,17 +139,17 @@ class Recorder(Actions):
         """Add both forces, between neighbours too: a freed bar shows each where it acts."""
         self.pull_ends(start, end, force)
 
-    def moment(self, bar: int, moment: Number) -> None:
+    def couple(self, bar: int, moment: Number) -> None:
         """Add a pure couple on a bar."""
         self.turns[bar].append(
             Couple(self.name.replace("#", str(bar)), take_one(moment).real)
         )
 
-    def couple(self, pin: str, couple: Number) -> None:
+    def pin_couple(self, pin: str, couple: Number) -> None:
         """Add a couple on the second of the two bars that meet at a pin, and its opposite on the first."""
         first, second = PINS[pin]
-        self.moment(second, couple)
-        self.moment(first, -couple)
+        self.couple(second, couple)
+        self.couple(first, -couple)
 
 
 def take_one(vector: Any) -> complex:

@@ -10,7 +10,7 @@ from fourbar.scene import Command, command_at
 from fourbar.scene.motion import Sweep
 from fourbar.show.plot.view import View
 from fourbar.solution import Array, Solution
-from fourbar.solve import solve
+from fourbar.solving import solve
 
 STEPS = (1440, 7200, 36_000, 180_000)
 """Steps that are tried until no chord is long, each a multiple of 4."""

@@ -14,7 +14,7 @@ from fourbar.scene import Command, Scene, command, command_at, default_places
 from fourbar.scene.motion import BRANCH_NAMES
 from fourbar.show.units import choose_unit
 from fourbar.solution import Array, Conversion, Solution
-from fourbar.solve import solve
+from fourbar.solving import solve
 
 CLEAR = 0.3
 """Motion and drive condition of the position drawn, where any has them: next to a pole forces dwarf all others."""

@@ -23,7 +23,7 @@ from fourbar.effects.pin_friction import MANY, NONE, ONE, solve_sliding
 from fourbar.errors import InputError, LimitError
 from fourbar.scene import Scene
 from fourbar.scene.motion import Law, Motion, Rise, Sweep
-from fourbar.solve import solve
+from fourbar.solving import solve
 from fourbar_validation.engines.effects import look_up
 from tests.support.scenes import crank_rocker
 

@@ -13,7 +13,7 @@ from fourbar.formulas.mobility import choose_range
 from fourbar.linkage import PINS
 from fourbar.scene import Command, Scene
 from fourbar.scene.motion import Free, Motion, Sweep
-from fourbar.solve import solve
+from fourbar.solving import solve
 from fourbar_validation.run.judge import judge
 
 FINE = 20_000

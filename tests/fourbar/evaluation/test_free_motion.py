@@ -10,7 +10,7 @@ import fourbar
 from fourbar.errors import LimitError
 from fourbar.evaluation import free_motion
 from fourbar.evaluation.free_motion import integrate
-from fourbar.solve import solve
+from fourbar.solving import solve
 
 HANGING = fourbar.FourBar(
     0.3,

@@ -16,7 +16,7 @@ from fourbar.formulas.path import prepare_path
 from fourbar.formulas.position import TOUCHING, loop
 from fourbar.formulas.torque import half_slope, inertia
 from fourbar.scene import Command
-from fourbar.solve import solve
+from fourbar.solving import solve
 from fourbar_validation.cost.formulas import solve_thirteen_equations
 from tests.support.balls import answer_in_balls
 

@@ -15,7 +15,7 @@ from fourbar.scene.motion import Law
 from fourbar.show.block import WIDTH, write_block, write_motor
 from fourbar.show.summary import summarize
 from fourbar.show.units import suit_units
-from fourbar.solve import find_last_stage
+from fourbar.solving import find_last_stage
 from tests.support.scenes import crank_rocker, thesis
 
 LOCATED = 1e-6

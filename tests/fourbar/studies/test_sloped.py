@@ -113,11 +113,11 @@ class Drag(Effect):
         omega = state.omega(2)
         square = self.strength * omega * omega
         if self.form == "copysign":
-            actions.moment(2, -np.copysign(square, omega))
+            actions.couple(2, -np.copysign(square, omega))
         elif self.form == "absolute":
-            actions.moment(2, -self.strength * omega * np.abs(omega))
+            actions.couple(2, -self.strength * omega * np.abs(omega))
         else:
-            actions.moment(2, -np.maximum(square, 0.0) * np.sign(omega))
+            actions.couple(2, -np.maximum(square, 0.0) * np.sign(omega))
 
 
 @pytest.mark.parametrize("speed", [-2.0, 2.0])

@@ -87,9 +87,9 @@ def test_a_simulator_starts_from_its_own_assembly_without_the_formulas() -> None
         assert not {
             name
             for name in imported(path)
-            if name.startswith(("fourbar.solve", "fourbar.formulas"))
+            if name.startswith(("fourbar.solving", "fourbar.formulas"))
         }, path
-        assert "fourbar.solve" not in path.read_text(), path
+        assert "fourbar.solving" not in path.read_text(), path
     for branch in (1, -1):
         scene = fourbar.load(PROBLEMS / "crank_rocker.toml")
         scene = replace(

@@ -18,7 +18,7 @@ from fourbar.errors import BAD_INPUT, FAILED, HOLDS, InputError
 from fourbar.quantities import LINE_QUANTITIES, OK, UNITS, VECTORS
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import Law
-from fourbar.solve import solve
+from fourbar.solving import solve
 from fourbar_validation.check.check import Judgement, judge_table
 from fourbar_validation.check.judge import Allowance
 from fourbar_validation.check.mistakes import list_hypotheses

@@ -21,7 +21,7 @@ from fourbar.errors import InputError
 from fourbar.mjcf import Plane, write_mjcf
 from fourbar.quantities import PIN_FORCES, UNKNOWNS
 from fourbar.scene import Scene
-from fourbar.solve import solve
+from fourbar.solving import solve
 from fourbar_validation.check import mjcf
 from fourbar_validation.check.differences import (
     Difference,
@@ -32,7 +32,7 @@ from fourbar_validation.check.differences import (
 from fourbar_validation.cli import status
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.columns import read_columns
-from fourbar_validation.compare.compare import Comparison, Held
+from fourbar_validation.compare.compare import Comparison, Demands
 from fourbar_validation.compare.rows import FAILS, Row
 from fourbar_validation.compare.tolerance import SIMULATED
 from fourbar_validation.engines.description import ModelEntry, Value
@@ -88,7 +88,7 @@ def rows_of(scene: Scene, answers: Sequence[Answer]) -> list[Row]:
         row
         for answer in answers
         for row in Comparison(
-            "", scene, answer, solve(scene, at=answer.at), Held(SIMULATED, UNKNOWNS)
+            "", scene, answer, solve(scene, at=answer.at), Demands(SIMULATED, UNKNOWNS)
         ).rows()
     ]
 

@@ -18,7 +18,7 @@ from fourbar.linkage import Bar, FourBar
 from fourbar.mjcf import RECIPE, write_mjcf
 from fourbar.quantities import FORCES
 from fourbar.scene import Scene
-from fourbar.solve import solve
+from fourbar.solving import solve
 from fourbar_validation.check.differences import find_differences
 from fourbar_validation.check.mjcf import ModelReport, examine_model
 from fourbar_validation.compare.answer import Answer

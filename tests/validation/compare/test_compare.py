@@ -9,8 +9,8 @@ import fourbar
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.compare import (
     Comparison,
+    Demands,
     Errors,
-    Held,
     Predicted,
     judge_errors,
 )
@@ -92,7 +92,7 @@ def compare(
     quantities = {name: np.array(getattr(solution, name)) for name in names}
     answer = Answer("e", "exact", solution.at, solution.assembled, quantities)
     change(answer)
-    held = Held(EQUIVALENCE, names, predicted, nearby)
+    held = Demands(EQUIVALENCE, names, predicted, nearby)
     rows = Comparison("s", scene, answer, solution, held).rows()
     return {row.quantity: row for row in rows}
 

@@ -8,7 +8,7 @@ import pytest
 
 import fourbar
 from fourbar_validation.compare.answer import Answer
-from fourbar_validation.compare.compare import COMPARED, Comparison, Held
+from fourbar_validation.compare.compare import COMPARED_QUANTITIES, Comparison, Demands
 from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, UNDECIDED, Row
 from fourbar_validation.compare.tolerance import EPS, EQUIVALENCE, IDENTITY, Array, K
 from tests.support.scenes import crank_rocker
@@ -23,7 +23,9 @@ FIRST, MIDDLE, LAST = 0, 17, POSITIONS - 1
 
 def make_answer(**changed: Array | None) -> Answer:
     """Make an answer of an exact engine that agrees to the last digit but for what is changed; None: left out."""
-    quantities = {name: np.array(getattr(FORMULAS, name)) for name in COMPARED}
+    quantities = {
+        name: np.array(getattr(FORMULAS, name)) for name in COMPARED_QUANTITIES
+    }
     for name, values in changed.items():
         if values is None:
             del quantities[name]
@@ -39,7 +41,7 @@ def compare(answer: Answer, **held: object) -> dict[str, Row]:
         SCENE,
         answer,
         FORMULAS,
-        Held(EQUIVALENCE, COMPARED, **held),  # type: ignore[arg-type]
+        Demands(EQUIVALENCE, COMPARED_QUANTITIES, **held),  # type: ignore[arg-type]
     )
     return {row.quantity: row for row in [*comparison.rows(), comparison.closure()]}
 
@@ -54,7 +56,7 @@ def moved(name: str, place: int, by: float) -> Array:
 def test_an_answer_without_an_error_agrees_in_every_quantity() -> None:
     rows = compare(make_answer())
     assert {row.verdict for row in rows.values()} == {AGREES}
-    assert {*COMPARED, "closure", "assembled", "undecided"} == rows.keys()
+    assert {*COMPARED_QUANTITIES, "closure", "assembled", "undecided"} == rows.keys()
 
 
 @pytest.mark.parametrize("place", (FIRST, MIDDLE, LAST))
@@ -108,7 +110,7 @@ def test_an_engine_that_closes_elsewhere_fails_either_way() -> None:
     solution = fourbar.solve(longer, "position")
     assert not solution.assembled.all() and solution.assembled.any()
     answer = Answer("other", "exact", solution.at, np.ones(len(solution), dtype=bool))
-    held = Held(EQUIVALENCE, ())
+    held = Demands(EQUIVALENCE, ())
     (row, *_) = Comparison("", longer, answer, solution, held).rows()
     assert row.quantity == "assembled" and row.failed
 
@@ -145,7 +147,7 @@ def test_a_scene_of_which_most_numbers_are_undecided_does_not_hold() -> None:
         setattr(blind, name, getattr(FORMULAS, name))
     blind.condition = np.full(POSITIONS, 1e-14)
     answer = make_answer()
-    held = Held(EQUIVALENCE, ("omega_3", "F12"))
+    held = Demands(EQUIVALENCE, ("omega_3", "F12"))
     rows = {
         row.quantity: row
         for row in Comparison("", SCENE, answer, blind, held, blind).rows()

@@ -9,7 +9,7 @@ import fourbar
 from fourbar.effects import Friction
 from fourbar.scene import Scene, command
 from fourbar.scene.motion import Motion, Sweep
-from fourbar.solve import solve
+from fourbar.solving import solve
 from fourbar_validation.compare.reversals import break_curve, find_reversals
 from fourbar_validation.engines.registry import ENGINES
 from fourbar_validation.run.judge import judge

@@ -18,7 +18,7 @@ from fourbar_validation.check.mjcf import ModelReport
 from fourbar_validation.cli import status
 from fourbar_validation.compare.answer import Answer, ReleasedAnswer
 from fourbar_validation.compare.columns import read_columns
-from fourbar_validation.compare.compare import Comparison, Held
+from fourbar_validation.compare.compare import Comparison, Demands
 from fourbar_validation.compare.rows import (
     AGREES,
     DEGRADED,
@@ -261,7 +261,7 @@ def test_formulas_without_an_answer_fail() -> None:
     (row,) = [
         r
         for r in Comparison(
-            "", scene, answer, positions, Held(EQUIVALENCE, ("torque",))
+            "", scene, answer, positions, Demands(EQUIVALENCE, ("torque",))
         ).rows()
         if r.quantity == "torque"
     ]

@@ -7,7 +7,7 @@ from fourbar.formulas.mobility import limit_positions
 from fourbar.linkage import uniform
 from fourbar.scene import Scene
 from fourbar.scene.motion import Motion, Sweep
-from fourbar.solve import solve
+from fourbar.solving import solve
 from fourbar_validation.compare.scales import scale_of
 from fourbar_validation.compare.tolerance import WELL_CONDITIONED
 

@@ -234,8 +234,8 @@ class FaultyTree:
     def push(self, bar: int, force: Any, point: Any) -> None:
         self.tree.push(bar, [self.factor * axis for axis in force], point)
 
-    def twist(self, bar: int, couple: float) -> None:
-        self.tree.twist(bar, self.factor * couple)
+    def couple(self, bar: int, couple: float) -> None:
+        self.tree.couple(bar, self.factor * couple)
 
     def gravity(self, vector: tuple[float, float]) -> None:
         self.tree.gravity((self.factor * vector[0], self.factor * vector[1]))
@@ -256,7 +256,7 @@ def test_a_fault_in_the_wrench_on_the_free_bodies_fails_the_run(
             right(effect, motion, alone)
             for bar in (2, 3, 4):
                 wrenches.push(bar, factor * alone.force[bar], 0.0)
-                wrenches.twist(bar, factor * alone.moment[bar])
+                wrenches.couple(bar, factor * alone.moment[bar])
 
         return act
 

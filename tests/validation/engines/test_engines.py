@@ -25,8 +25,8 @@ from fourbar.errors import InputError
 from fourbar.linkage import Bar, FourBar, uniform
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import Motion
-from fourbar.solve import solve
-from fourbar_validation.compare.compare import COMPARED, Comparison, Held
+from fourbar.solving import solve
+from fourbar_validation.compare.compare import COMPARED_QUANTITIES, Comparison, Demands
 from fourbar_validation.compare.rows import AGREES, REFUSES
 from fourbar_validation.compare.tolerance import EQUIVALENCE
 from fourbar_validation.engines import loop
@@ -131,7 +131,7 @@ def failures(name: str, case: Scene, every: int = 1) -> list[tuple[str, str]]:
         case,
         answer,
         solve(case, "force", at=commanded),
-        Held(EQUIVALENCE, COMPARED),
+        Demands(EQUIVALENCE, COMPARED_QUANTITIES),
     )
     rows = [*comparison.rows(), comparison.closure()]
     return [(row.quantity, row.reason) for row in rows if not row.passed]

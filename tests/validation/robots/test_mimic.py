@@ -12,7 +12,7 @@ import fourbar
 from fourbar.errors import InputError
 from fourbar.linkage import Bar, FourBar
 from fourbar.scene import Command, Scene
-from fourbar.solve import solve
+from fourbar.solving import solve
 from fourbar_validation.robots.mimic import (
     fit_minimax,
     fit_squares,

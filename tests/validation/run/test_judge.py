@@ -12,7 +12,7 @@ from fourbar.scene import Command, Scene, command, with_signs
 from fourbar_lab.fault_scenes import FAULT_SCENES
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.columns import read_columns
-from fourbar_validation.compare.compare import COMPARED
+from fourbar_validation.compare.compare import COMPARED_QUANTITIES
 from fourbar_validation.compare.rows import (
     AGREES,
     FAILS,
@@ -39,7 +39,7 @@ class Echo:
 
     def answer(self, scene: Scene, command: Command) -> Answer:
         s = fourbar.solve(scene, at=with_signs(scene.linkage, command))
-        numbers = {name: np.array(getattr(s, name)) for name in COMPARED}
+        numbers = {name: np.array(getattr(s, name)) for name in COMPARED_QUANTITIES}
         return self.spoil(
             Answer("echo", "exact", command, np.array(s.assembled), numbers)
         )
@@ -97,7 +97,8 @@ def test_an_equal_answer_agrees_in_every_quantity() -> None:
     stated = {"range", "limit_positions", "transmission"}
     assert (
         set(rows)
-        == {*COMPARED, "assembled", "undecided", "closure", "torque_inertia"} | stated
+        == {*COMPARED_QUANTITIES, "assembled", "undecided", "closure", "torque_inertia"}
+        | stated
     )
     assert all(row.verdict == AGREES for row in rows.values())
 
@@ -177,7 +178,7 @@ def with_friction() -> Scene:
 
 def test_where_dry_friction_reverses_forces_are_not_judged_and_the_motion_is() -> None:
     rows = rows_of(OffAtTheReversal, with_friction())
-    for quantity in COMPARED:
+    for quantity in COMPARED_QUANTITIES:
         row = rows[quantity]
         noted = "1 positions at which dry friction reverses not judged" in row.reason
         assert (row.verdict, noted) == (
@@ -290,7 +291,7 @@ def test_an_answer_that_the_formulas_withhold_is_not_compared() -> None:
     motion = fourbar.Motion(np.linspace(0.3, 2.0, 5), 1.0)
     for engine in (Echo, AnswersAnyway):
         rows = rows_of(engine, Scene(fourbar.uniform(1.0, 0.5, 1.0, 0.5), motion, 3))
-        for quantity in COMPARED:
+        for quantity in COMPARED_QUANTITIES:
             row = rows[quantity]
             expected = (REFUSES, "the formulas state no value: 5 no_torque")
             if quantity in FORCES:
@@ -322,7 +323,7 @@ def test_beyond_the_range_of_doubles_what_was_before_is_judged() -> None:
     rows = rows_of(
         AnswersAnyway, Scene(heavy, fourbar.Motion(np.linspace(0.3, 2.0, 5), 10.0))
     )
-    for quantity in COMPARED:
+    for quantity in COMPARED_QUANTITIES:
         assert rows[quantity].verdict == (REFUSES if quantity in FORCES else AGREES), (
             quantity
         )

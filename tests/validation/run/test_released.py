@@ -9,7 +9,7 @@ import pytest
 
 import fourbar
 from fourbar.scene import Scene
-from fourbar.solve import solve
+from fourbar.solving import solve
 from fourbar_validation.compare.rows import DEGRADED, FAILS, UNDECIDED, Row
 from fourbar_validation.report.record import Record
 from fourbar_validation.run import released as free

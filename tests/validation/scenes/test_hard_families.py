@@ -13,7 +13,7 @@ import fourbar_validation.run.question
 from fourbar.mjcf import RECIPE, Settings
 from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Answer
-from fourbar_validation.compare.compare import COMPARED
+from fourbar_validation.compare.compare import COMPARED_QUANTITIES
 from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, UNDECIDED, VERDICTS
 from fourbar_validation.compare.tolerance import FULL_ACCURACY
 from fourbar_validation.engines.limits import LIMITS
@@ -188,7 +188,7 @@ class Spoiled:
 
     def answer(self, scene: Scene, command: Command) -> Answer:
         s = fourbar.solve(scene, at=command)
-        numbers = {name: np.array(getattr(s, name)) for name in COMPARED}
+        numbers = {name: np.array(getattr(s, name)) for name in COMPARED_QUANTITIES}
         numbers["F32"] *= 1.0 + self.part
         return Answer(self.name, "exact", command, np.array(s.assembled), numbers)
 

@@ -9,7 +9,7 @@ import numpy as np
 from fourbar.mjcf import Settings
 from fourbar.mjcf.document import LIGHT, compute_load_ratio, compute_mass_ratio
 from fourbar.scene import Command, Scene
-from fourbar.solve import solve
+from fourbar.solving import solve
 from fourbar_validation.advise.worst_errors import (
     NO_ANSWER,
     WorstErrors,

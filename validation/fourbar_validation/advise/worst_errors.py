@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from fourbar.quantities import OK
 from fourbar.scene import Command, Scene
 from fourbar.solution import Solution
-from fourbar.solve import solve
+from fourbar.solving import solve
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.compare.compare import mark_turning
 from fourbar_validation.compare.scales import scale_of

@@ -24,7 +24,7 @@ from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import FORCES, PIN_FORCES, VECTORS
 from fourbar.scene import Scene
 from fourbar.solution import Solution
-from fourbar.solve import solve
+from fourbar.solving import solve
 from fourbar_validation.check.judge import Judge, Mistake
 from fourbar_validation.check.theirs import Array, name_quantity
 

@@ -17,7 +17,7 @@ from fourbar.quantities import FORCES, UNITS, VECTORS
 from fourbar.quantities.units import find_factor
 from fourbar.scene import Scene
 from fourbar.solution import Solution
-from fourbar.solve import solve
+from fourbar.solving import solve
 from fourbar_validation.check.judge import Judge, Mistake
 from fourbar_validation.check.theirs import OTHER_UNITS, Array, name_quantity
 from fourbar_validation.compare.tolerance import compute_difference, replace_zero_size

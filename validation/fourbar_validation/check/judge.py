@@ -14,7 +14,7 @@ from fourbar.quantities import OK
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.scene import require_input
 from fourbar.solution import Solution
-from fourbar.solve import solve
+from fourbar.solving import solve
 from fourbar_validation.check.theirs import Array, TheirTable, name_quantity
 from fourbar_validation.compare.scales import scale_of
 from fourbar_validation.compare.tolerance import (

@@ -14,7 +14,7 @@ from fourbar.linkage import Bar
 from fourbar.quantities import FORCES, VECTORS
 from fourbar.scene import Command, Scene
 from fourbar.solution import Solution
-from fourbar.solve import solve
+from fourbar.solving import solve
 from fourbar_validation.check.calculated import find_miscalculated
 from fourbar_validation.check.fitted import ENOUGH, find_fitted
 from fourbar_validation.check.judge import Judge, Mistake

@@ -15,7 +15,7 @@ import numpy as np
 from fourbar.errors import InputError
 from fourbar.quantities import FORCES, PIN_FORCES, UNKNOWNS
 from fourbar.scene import Scene
-from fourbar.solve import solve
+from fourbar.solving import solve
 from fourbar.writing import write_text
 from fourbar_validation.check.differences import (
     Difference,
@@ -26,7 +26,7 @@ from fourbar_validation.check.differences import (
 )
 from fourbar_validation.check.unread import list_unread
 from fourbar_validation.compare.answer import Answer
-from fourbar_validation.compare.compare import Comparison, Held
+from fourbar_validation.compare.compare import Comparison, Demands
 from fourbar_validation.compare.rows import (
     DEGRADED,
     FAILS,
@@ -35,9 +35,9 @@ from fourbar_validation.compare.rows import (
     make_plain,
     write_results,
 )
-from fourbar_validation.compare.tolerance import DEGRADED as TIMES_PREDICTED
 from fourbar_validation.compare.tolerance import (
     SIMULATED,
+    TIMES_PREDICTED,
     Array,
     ErrorBound,
     Mask,
@@ -273,7 +273,7 @@ def _list_rows(
     def predicted(quantity: str, mask: Mask) -> Array:
         return np.full(len(mask), (softness or {}).get(quantity, 0.0))
 
-    held = Held(tolerance, JUDGED)
+    held = Demands(tolerance, JUDGED)
     if softness:
         held = held._replace(predicted=predicted, method=f", {STIFFEST}")
     rows = []

@@ -13,7 +13,7 @@ import numpy as np
 from fourbar.errors import FAILED, HOLDS, InputError
 from fourbar.quantities import PIN_FORCES
 from fourbar.solution import Solution
-from fourbar.solve import solve
+from fourbar.solving import solve
 from fourbar.writing import read_text
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.compare.rows import make_plain, write_one_line

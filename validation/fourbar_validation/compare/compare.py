@@ -43,11 +43,11 @@ from fourbar_validation.compare.scales import (
     take_smallest_scale,
     take_strictest_condition,
 )
-from fourbar_validation.compare.tolerance import DEGRADED as TIMES_PREDICTED
 from fourbar_validation.compare.tolerance import (
     EPS,
     IDENTITY,
     NOTHING_TO_TELL,
+    TIMES_PREDICTED,
     Array,
     ErrorBound,
     Mask,
@@ -78,7 +78,7 @@ OF_THE_FORMULAS = (
     "power",
 )
 """Quantities with checks of their own: the range in which dry friction holds, its residual, error bars, a product."""
-COMPARED = tuple(
+COMPARED_QUANTITIES = tuple(
     name for name in STAGE_OF if name not in (*OF_THE_FORMULAS, *LINE_QUANTITIES)
 )
 """Quantities that are compared with an exact engine: all that is printed of a position."""
@@ -101,14 +101,18 @@ NUMBERS = ("error", "allowed", "theta_2", "condition")
 """Names of the numbers of a row."""
 
 
-class Held(NamedTuple):
+class Demands(NamedTuple):
     """Tolerance, quantities and predictions that an answer is held to."""
 
     tolerance: ErrorBound
     quantities: Sequence[str]
     """Quantities that it must have."""
     predicted: Predicted | None = None
-    """Errors predicted for it. With them an error beyond the tolerance must be within DEGRADED times its prediction."""
+    """Errors predicted for it.
+
+    With them an error beyond the tolerance must be within TIMES_PREDICTED times its
+    prediction.
+    """
     nearby: Nearby | None = None
     """Evaluation near a position. With it an error beyond the tolerance is taken again within theta_2's rounding."""
     method: str = ""
@@ -147,7 +151,7 @@ class Comparison:
     answer: Answer
     formulas: Solution
     """Solution of the formulas at `answer.at`."""
-    held: Held
+    demands: Demands
     reference: Solution | None = None
     """Second derivation at the same positions; by default the answer itself. The stricter of its scale and condition
     and those of the formulas sets the allowed error."""
@@ -179,7 +183,7 @@ class Comparison:
                     self.name, answer.engine, answer.setting, "assembled", FAILS, what
                 )
             ]
-        names = set(self.held.quantities)
+        names = set(self.demands.quantities)
         if self.scene.drive is not None:
             names |= {
                 line
@@ -218,7 +222,7 @@ class Comparison:
         theta_3, theta_4 = answer.quantities["theta_3"], answer.quantities["theta_4"]
         condition = 1.0 / count_half_turns(linkage.ground_angle, theta_2)
         allowed = (
-            IDENTITY if answer.setting == "exact" else self.held.tolerance
+            IDENTITY if answer.setting == "exact" else self.demands.tolerance
         ).factor / condition
         reason = f"identity: {CLOSURE}" if answer.assembled.any() else NOWHERE
         gap = find_gap(linkage, theta_2, theta_3, theta_4)
@@ -246,13 +250,13 @@ class Comparison:
     @cached_property
     def _answered_nearby(self) -> dict[str, Array]:
         """Ask again near each position, once an error calls for it."""
-        assert self.held.nearby is not None
-        return self.held.nearby(self.formulas.assembled)
+        assert self.demands.nearby is not None
+        return self.demands.nearby(self.formulas.assembled)
 
     @cached_property
     def _reversing(self) -> Mask:
         """Positions at which dry friction reverses, so that a force may have either of two values."""
-        tolerance = self.held.tolerance
+        tolerance = self.demands.tolerance
         return mark_reversing(
             self.scene, self.formulas, tolerance.factor, in_time=tolerance.in_time
         )
@@ -319,7 +323,7 @@ class Comparison:
 
     def _prepare(self, quantity: str) -> _Judged | _Due | None:
         """Find where both close the loop and the formulas state a value; None if neither side has the quantity."""
-        formulas, scene, tolerance = self.formulas, self.scene, self.held.tolerance
+        formulas, scene, tolerance = self.formulas, self.scene, self.demands.tolerance
         ours, theirs = (
             getattr(formulas, quantity, None),
             self.answer.quantities.get(quantity),
@@ -374,7 +378,7 @@ class Comparison:
             else:
                 of_one = self._take_again(one.quantity, one.ours, of_one)
                 predicted = self._predict(one.quantity, of_one)
-                worst = judge_errors(of_one, predicted, self.held.method)
+                worst = judge_errors(of_one, predicted, self.demands.method)
             position = worst.position
             row = self._row(
                 one.quantity,
@@ -397,7 +401,7 @@ class Comparison:
         scale, condition = map(np.stack, zip(*map(self._scale, names), strict=True))
         vanishes = scale == 0.0
         unit = replace_zero_size(scale)
-        tolerance = self.held.tolerance
+        tolerance = self.demands.tolerance
         mask = decidable = np.stack(masks)
         if tolerance.conditioned:
             decidable = mask & (condition * NOTHING_TO_TELL > EPS)
@@ -415,7 +419,7 @@ class Comparison:
     def _take_again(self, quantity: str, ours: Array, errors: "Errors") -> "Errors":
         """Ask again within the rounding of theta_2 where an error is beyond the allowed one."""
         beyond = errors.mask & (errors.error > errors.allowed)
-        if self.held.nearby is None or not beyond.any():
+        if self.demands.nearby is None or not beyond.any():
             return errors
         theirs = self._answered_nearby[quantity]
         again = find_error(quantity, ours, theirs, errors.unit)
@@ -431,7 +435,7 @@ class Comparison:
         None where nothing predicts them. A position that was asked again needs no more
         than what is allowed there: the prediction knows nothing of theta_2's rounding.
         """
-        predicted = self.held.predicted
+        predicted = self.demands.predicted
         if predicted is None:
             return None
         beyond = errors.beyond
@@ -542,7 +546,7 @@ def find_worst_used(errors: Errors) -> NDArray[np.intp]:
 def judge_errors(
     errors: Errors, predicted: Array | None, method: str = ""
 ) -> WorstPosition:
-    """Judge errors by the allowed error, and larger ones by DEGRADED times the predicted one.
+    """Judge errors by the allowed error, and larger ones by TIMES_PREDICTED times the predicted one.
 
     An error that is no number fails. `predicted` is None where nothing predicts it;
     `method` says for which method it is predicted.

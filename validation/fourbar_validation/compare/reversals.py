@@ -14,7 +14,7 @@ from fourbar.linkage import MOVING_BARS, PIN_FORCE, PINS
 from fourbar.quantities import OK
 from fourbar.scene import Command, Scene
 from fourbar.solution import Solution
-from fourbar.solve import solve
+from fourbar.solving import solve
 from fourbar_validation.compare.tolerance import EPS, Array, K
 
 HALVINGS = 60

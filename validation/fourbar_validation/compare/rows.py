@@ -21,8 +21,8 @@ AGREES, DEGRADED, UNDECIDED, REFUSES, FAILS = (
 )
 VERDICTS = (AGREES, DEGRADED, UNDECIDED, REFUSES, FAILS)
 """Verdicts from the best to the worst."""
-HELD = (AGREES, DEGRADED)
-COMPARED = (*HELD, FAILS)
+HOLDING_VERDICTS = (AGREES, DEGRADED)
+COMPARED_VERDICTS = (*HOLDING_VERDICTS, FAILS)
 """Verdicts of comparisons that took place; otherwise no digit is left to decide by, or the engine declared a limit."""
 
 FORMULAS = "formulas"
@@ -79,12 +79,12 @@ class Row:
     def __post_init__(self) -> None:
         """Raise ValueError for a verdict that nobody knows, and for one that holds without a number."""
         if self.verdict not in VERDICTS or (
-            self.verdict in HELD and math.isnan(self.error)
+            self.verdict in HOLDING_VERDICTS and math.isnan(self.error)
         ):
             raise ValueError(
                 f"{self.verdict!r} is no verdict on an error of {self.error!r}"
             )
-        object.__setattr__(self, "passed", self.verdict in HELD)
+        object.__setattr__(self, "passed", self.verdict in HOLDING_VERDICTS)
 
     @classmethod
     def unmeasured(
@@ -157,7 +157,7 @@ class Row:
     @property
     def compared(self) -> bool:
         """Return whether anything was compared."""
-        return self.verdict in COMPARED
+        return self.verdict in COMPARED_VERDICTS
 
     @property
     def failed(self) -> bool:
@@ -318,7 +318,7 @@ class Counts:
     @property
     def compared(self) -> int:
         """Comparisons that were made."""
-        return sum(self[verdict] for verdict in COMPARED)
+        return sum(self[verdict] for verdict in COMPARED_VERDICTS)
 
     @property
     def nothing(self) -> bool:
@@ -363,7 +363,7 @@ class Counts:
         if self.nothing:
             held = [f"{total} of the formulas' own identities hold"] if total else []
         else:
-            held = self._write_worded(COMPARED)
+            held = self._write_worded(COMPARED_VERDICTS)
         apart = self._write_worded((UNDECIDED, REFUSES))
         if apart and not self.nothing:
             apart[0] = "not compared: " + apart[0]

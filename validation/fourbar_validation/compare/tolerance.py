@@ -36,7 +36,7 @@ WELL_CONDITIONED = 0.1
 """Positions whose condition is at least this set the scale of a quantity."""
 SMALL = 1e-12
 """Allowed errors below this are stated in parts of eps."""
-DEGRADED = 10.0
+TIMES_PREDICTED = 10.0
 """An engine whose error is predicted may exceed the prediction by this factor, not more."""
 
 

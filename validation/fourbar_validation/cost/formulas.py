@@ -15,7 +15,7 @@ from fourbar.formulas.pin_forces import Wrenches
 from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Command, Scene, with_signs
-from fourbar.solve import solve
+from fourbar.solving import solve
 from fourbar_validation.advise.worst_errors import WorstErrors, find_greatest
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.compare.scales import scale_of

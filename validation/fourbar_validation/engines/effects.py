@@ -49,8 +49,8 @@ def _compute_slip(bars: Loaded, pin: str) -> float:
 def _apply_twist(bars: Loaded, pin: str, couple: float) -> None:
     """Apply a couple to the second bar of a pin, and its opposite to the first."""
     one, second = PINS[pin]
-    bars.twist(second, couple)
-    bars.twist(one, -couple)
+    bars.couple(second, couple)
+    bars.couple(one, -couple)
 
 
 def _apply_viscous(effect: "Viscous", bars: Loaded) -> None:
@@ -104,7 +104,7 @@ def _apply_springs(effect: "Springs", bars: Loaded) -> None:
 
 def _apply_flywheel(effect: "Flywheel", bars: Loaded) -> None:
     """Apply the couple that accelerating the wheel takes, from the engine's own angular acceleration."""
-    bars.twist(effect.bar, -effect.inertia * bars.alpha(effect.bar))
+    bars.couple(effect.bar, -effect.inertia * bars.alpha(effect.bar))
 
 
 def _load(load: "Load", bars: Loaded) -> None:
@@ -122,7 +122,7 @@ def _load(load: "Load", bars: Loaded) -> None:
             assert load.place is not None
             point = bars.end(load.place)
         bars.push(load.bar, (factor * force[0], factor * force[1]), point)
-    bars.twist(load.bar, factor * load.moment)
+    bars.couple(load.bar, factor * load.moment)
 
 
 def look_up(table: "Table", theta_2: float) -> float:

@@ -27,7 +27,7 @@ LARGEST_FILE = 10**6
 CACHE = (
     Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "fourbar-engines"
 )
-HELD = (
+KEPT_FIELDS = (
     "tolerance",
     "answers",
     "positions",
@@ -203,7 +203,7 @@ def start_engine(
     program = prepare_program(entry, seconds)
     (guest,) = name_guests([(entry.adapter or entry.name, entry.name, program)], taken)
     if like is not None:
-        guest = replace(guest, **{name: getattr(like, name) for name in HELD})
+        guest = replace(guest, **{name: getattr(like, name) for name in KEPT_FIELDS})
     setting: dict[str, Any] = {}
     if entry.setting:
         setting["name"] = entry.setting

@@ -10,7 +10,7 @@ from fourbar.linkage import FourBar
 from fourbar.quantities import VECTORS
 from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Answer, Array
-from fourbar_validation.compare.compare import COMPARED
+from fourbar_validation.compare.compare import COMPARED_QUANTITIES
 from fourbar_validation.compare.tolerance import EPS, ROUNDINGS
 from fourbar_validation.engines.description import SHARED, find_unknown, list_speeds
 from fourbar_validation.engines.loop import make_blank
@@ -38,7 +38,9 @@ class BallArithmetic:
             return Answer(NAME, "exact", refusal=reason)
         n = len(command.theta_2)
         names = [
-            q for q in COMPARED if command.omega_2 is not None or q.startswith("theta")
+            q
+            for q in COMPARED_QUANTITIES
+            if command.omega_2 is not None or q.startswith("theta")
         ]
         out, assembled, (omega, alpha) = (
             make_blank(n, names),

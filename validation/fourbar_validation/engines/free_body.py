@@ -367,7 +367,7 @@ def _add_inertia(motion: BodyMotion, wrenches: BodyWrenches) -> None:
         bar = motion.linkage.bar(number)
         arm, alpha = motion.to_centre(number), motion.alpha[number]
         wrenches.push(number, -find_mass(bar) * motion.swing(number, arm), 0.0)
-        wrenches.twist(number, -about_first_pin(bar) * alpha)
+        wrenches.couple(number, -about_first_pin(bar) * alpha)
     wrenches.push(
         3,
         -find_mass(motion.linkage.coupler) * motion.swing(2, motion.first_pin[3]),

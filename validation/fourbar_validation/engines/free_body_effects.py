@@ -87,7 +87,7 @@ class BodyWrenches:
             self.force[bar] = self.force[bar] + force
             self.moment[bar] = self.moment[bar] + cross(arm, force)
 
-    def twist(self, bar: int, couple: Any) -> None:
+    def couple(self, bar: int, couple: Any) -> None:
         """Add a couple; on the ground it does nothing."""
         if bar in self.moment:
             self.moment[bar] = self.moment[bar] + couple
@@ -95,8 +95,8 @@ class BodyWrenches:
     def twist_at(self, pin: str, couple: Any) -> None:
         """Add a couple to bar j of a pin (i, j), its opposite to bar i."""
         i, j = PINS[pin]
-        self.twist(j, couple)
-        self.twist(i, -couple)
+        self.couple(j, couple)
+        self.couple(i, -couple)
 
 
 MEET = 16.0 * 2.0**-52
@@ -177,7 +177,7 @@ def _apply_springs(effect: Any, motion: BodyMotion, wrenches: BodyWrenches) -> N
 
 def _apply_flywheel(effect: Any, motion: BodyMotion, wrenches: BodyWrenches) -> None:
     """Couple -J alpha (d'Alembert)."""
-    wrenches.twist(effect.bar, -effect.inertia * motion.alpha[effect.bar])
+    wrenches.couple(effect.bar, -effect.inertia * motion.alpha[effect.bar])
 
 
 WRENCH_OF: dict[str, Callable[[Any, BodyMotion, BodyWrenches], None]] = {
@@ -227,7 +227,7 @@ def apply_load(load: Any, motion: BodyMotion, wrenches: BodyWrenches) -> None:
         if load.frame == "bar":
             force = motion.unit[load.bar] * force
         wrenches.push(load.bar, factor * force, find_arm(load, motion))
-    wrenches.twist(load.bar, factor * load.moment)
+    wrenches.couple(load.bar, factor * load.moment)
 
 
 def find_arm(load: Any, motion: BodyMotion) -> Any:

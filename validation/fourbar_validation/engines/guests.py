@@ -19,7 +19,7 @@ from fourbar.errors import InputError
 from fourbar.quantities import ANGLES, DRY_FRICTION_QUANTITIES
 from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Answer, Array, EngineError, ReleasedAnswer
-from fourbar_validation.compare.compare import COMPARED
+from fourbar_validation.compare.compare import COMPARED_QUANTITIES
 from fourbar_validation.compare.rows import FORMULAS, write_one_line
 from fourbar_validation.compare.tolerance import EQUIVALENCE, ErrorBound, hold_simulated
 from fourbar_validation.engines import protocol
@@ -34,7 +34,7 @@ NOT_FOUND = 2
 """Exit status of our host where there is no such class or engine."""
 QUESTIONS = 4
 """Most questions to a guest about one scene, hello included; each may take as long as the guest's time limit."""
-QUANTITIES = (*COMPARED, *DRY_FRICTION_QUANTITIES)
+QUANTITIES = (*COMPARED_QUANTITIES, *DRY_FRICTION_QUANTITIES)
 """Names of what an engine can answer."""
 STATED = "as the engine states"
 """Class of the tolerance that a guest states itself."""
@@ -47,7 +47,7 @@ class Hello:
     """First message of an engine, which states what it answers, checked."""
 
     name: str
-    answers: tuple[str, ...] = COMPARED
+    answers: tuple[str, ...] = COMPARED_QUANTITIES
     commands: tuple[str, ...] = ("theta_2",)
     effects: tuple[str, ...] = ()
     tolerance: ErrorBound = EQUIVALENCE

@@ -187,7 +187,7 @@ class Loaded(EngineBars, Protocol):
     def work(self, size: float) -> None:
         """Let the drive act with a torque, N m, or a force, N."""
         if self.linear is None:
-            self.twist(self.drive_bar, size)
+            self.couple(self.drive_bar, size)
             return
         ends, _, along = self.line()
         for sense, bar, point in ends:
@@ -206,7 +206,7 @@ class Loaded(EngineBars, Protocol):
             wrench[1] += f_y
             wrench[2] += (x - x_0) * f_y - (y - y_0) * f_x
 
-    def twist(self, bar: int, couple: float) -> None:
+    def couple(self, bar: int, couple: float) -> None:
         """Add a couple, N m; on the ground it does nothing."""
         if bar != 1:
             self.wrenches[bar][2] += couple

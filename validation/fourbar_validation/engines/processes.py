@@ -196,9 +196,9 @@ KILLED = (-9, 137)
 """Exit status of a program that was killed: its own, or its shell's."""
 ENDING = 5.0
 """Seconds for a program that is told to end; then it is killed."""
-Question = dict[str, Any]
+Message = dict[str, Any]
 """A question or an answer, as an object of JSON."""
-Ask = Callable[[Question, int], Question]
+Ask = Callable[[Message, int], Message]
 """Function that asks a question about a number of positions."""
 
 
@@ -241,10 +241,10 @@ class Running:
 
     def ask_again(
         self,
-        question: Question,
+        question: Message,
         positions: int,
         greet: Callable[[Ask], None] | None = None,
-    ) -> Question:
+    ) -> Message:
         """Ask, and ask once more a program that was killed; one that fails is ended.
 
         `greet` asks what a program that is started must be asked first, and raises
@@ -258,10 +258,10 @@ class Running:
 
     def _greet_and_ask(
         self,
-        question: Question,
+        question: Message,
         positions: int,
         greet: Callable[[Ask], None] | None,
-    ) -> Question:
+    ) -> Message:
         try:
             if greet is not None and self._process is None:
                 greet(self._ask)
@@ -270,7 +270,7 @@ class Running:
             self.end()
             raise
 
-    def _ask(self, question: Question, positions: int) -> Question:
+    def _ask(self, question: Message, positions: int) -> Message:
         """Send a question and return the object that answers it, also one that says why it has no answer."""
         process = self._process or self._start()
         assert process.stdin is not None and process.stdout is not None
@@ -304,7 +304,7 @@ class Running:
             answered.set()
             self._take_errors()
 
-    def _read(self, reply: bytes) -> Question:
+    def _read(self, reply: bytes) -> Message:
         """Read a line; EngineError where it is not the answer that was asked for."""
         said = write_one_line(reply[:KEPT].decode(errors="backslashreplace"))
         try:
@@ -416,7 +416,7 @@ def _signal(process: "subprocess.Popen[bytes]", name: str) -> None:
         process.terminate()
 
 
-def _make_object(pairs: list[tuple[str, Any]]) -> Question:
+def _make_object(pairs: list[tuple[str, Any]]) -> Message:
     data = dict(pairs)
     if len(data) < len(pairs):
         raise ValueError("a key stands twice")

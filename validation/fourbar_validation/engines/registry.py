@@ -17,7 +17,12 @@ from fourbar.quantities import DRY_FRICTION_QUANTITIES, STAGE_OF, UNKNOWNS
 from fourbar.scene import Command, Scene
 from fourbar.solution import Solution
 from fourbar_validation.compare.answer import Adapter, Answer
-from fourbar_validation.compare.compare import COMPARED, Held, Nearby, Predicted
+from fourbar_validation.compare.compare import (
+    COMPARED_QUANTITIES,
+    Demands,
+    Nearby,
+    Predicted,
+)
 from fourbar_validation.compare.rows import say_error
 from fourbar_validation.compare.tolerance import (
     EQUIVALENCE,
@@ -55,7 +60,7 @@ class Engine:
     start: Callable[[], Adapter]
     """Starts it; importable by name, or `Later`."""
     tolerance: ErrorBound
-    answers: tuple[str, ...] = COMPARED
+    answers: tuple[str, ...] = COMPARED_QUANTITIES
     """Quantities that it must answer."""
     order: Order | None = None
     """Function that measures its observed order, which is shown."""
@@ -144,7 +149,9 @@ WORK = {
     "ball-arithmetic": "each position by itself, in Python, in many digits with an error bound: pin forces and torque",
 }
 """Work of each engine, by its name: the times that are compared are not for the same work."""
-OF_A_POSITION = tuple(name for name in COMPARED if STAGE_OF[name] == "position")
+OF_A_POSITION = tuple(
+    name for name in COMPARED_QUANTITIES if STAGE_OF[name] == "position"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -193,7 +200,7 @@ ENGINES = (
         "free-body",
         FreeBody,
         EQUIVALENCE,
-        (*COMPARED, *DRY_FRICTION_QUANTITIES),
+        (*COMPARED_QUANTITIES, *DRY_FRICTION_QUANTITIES),
         positions=OF_A_POSITION,
         predictor=predict_from_data,
     ),
@@ -251,13 +258,13 @@ FOLDERS = tuple(Path(folder) for spec in [find_spec(LAB.replace("-", "_"))] if s
 """Folder of the lab, whose engines.toml a run reads too; none if the lab is not installed."""
 
 
-def hold(
+def make_demands(
     engine: Engine,
     scene: Scene,
     command: Command,
     answer: Answer,
     formulas: Solution | None = None,
-) -> Held:
+) -> Demands:
     """Hold an answer to the engine's tolerance and quantities, with the errors predicted for it at a command.
 
     `formulas`: their solution at the command, with which an engine that can answers again within theta_2's rounding.
@@ -266,7 +273,7 @@ def hold(
     method = ""
     if engine.predictor is predict_for_any_method:
         method = ANY_METHOD
-    return Held(
+    return Demands(
         engine.tolerance,
         engine.answers,
         make_prediction(engine, scene, command, answer),
@@ -318,7 +325,7 @@ def make_nearby(
     omega, alpha = list_speeds(command)
 
     def answer(mask: Mask) -> dict[str, Array]:
-        adapter, out = engine.start(), make_blank(len(mask), COMPARED)
+        adapter, out = engine.start(), make_blank(len(mask), COMPARED_QUANTITIES)
         for i in np.flatnonzero(mask & np.isfinite(formulas.sin_mu)).tolist():
             shift = shift_to(
                 scene.linkage, float(command.theta_2[i]), float(formulas.sin_mu[i])

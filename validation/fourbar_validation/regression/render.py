@@ -79,13 +79,15 @@ def write_text(diff: Differences) -> str:
     lines += [f"Allowed more: {name}" for name in diff.grown]
     lines += [f"Disagreement: {sentence}" for sentence in diff.fault.sentences]
     groups, more = _group_rows(diff)
-    lines += [f"{_begin(group.kind.value)}: {group}" for group in groups] + more
+    lines += [f"{_capitalise(group.kind.value)}: {group}" for group in groups] + more
     for kind in SHOWN:
-        lines += [f"{_begin(kind.value)}: {line}" for line in _list_worst(diff, kind)]
+        lines += [
+            f"{_capitalise(kind.value)}: {line}" for line in _list_worst(diff, kind)
+        ]
     return "\n".join([*lines, f"{write_verdict(diff)}."]) + "\n"
 
 
-def _begin(text: str) -> str:
+def _capitalise(text: str) -> str:
     """Begin a line with a capital."""
     return text[:1].upper() + text[1:]
 

@@ -12,7 +12,7 @@ from fourbar.show.plot.linkage import draw_linkage
 from fourbar.show.plot.style import apply_style
 from fourbar.show.plot.view import View
 from fourbar.solution import Solution
-from fourbar.solve import solve
+from fourbar.solving import solve
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.reversals import Reversal, break_curve
 from fourbar_validation.compare.scales import scale_of

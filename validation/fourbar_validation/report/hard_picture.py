@@ -9,11 +9,11 @@ import numpy as np
 from fourbar.quantities import OK
 from fourbar.scene import Command, Scene
 from fourbar.scene import command as command_of
-from fourbar.solve import solve
+from fourbar.solving import solve
 from fourbar_validation.compare.answer import Answer, Array
 from fourbar_validation.compare.tolerance import (
-    DEGRADED,
     EPS,
+    TIMES_PREDICTED,
     K,
     divide,
     find_condition,
@@ -152,7 +152,7 @@ def _draw(axes: Any, approach: Approach, quantity: str) -> None:
     axes.fill_between(
         approach.distances[shown],
         predicted[shown],
-        DEGRADED * predicted[shown],
+        TIMES_PREDICTED * predicted[shown],
         color=INK,
         alpha=0.25,
         linewidth=0,

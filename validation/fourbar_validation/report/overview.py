@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from fourbar.quantities import LINE, PIN_FORCES, UNITS
 from fourbar_validation.compare.rows import (
     FORMULAS,
-    HELD,
+    HOLDING_VERDICTS,
     REFUSES,
     SHIPPED,
     UNDECIDED,
@@ -207,7 +207,7 @@ class Overview:
         for row in rows:
             name = "torque" if row.quantity in DRIVES else row.quantity
             if row.engine not in OWN_ENGINES and name in ("torque", *PIN_FORCES):
-                asked.setdefault(row.engine, {})[name] = row.verdict in HELD
+                asked.setdefault(row.engine, {})[name] = row.verdict in HOLDING_VERDICTS
         whole = len(PIN_FORCES) + 1
         agreeing = [all(of.values()) for of in asked.values() if len(of) == whole]
         if asked:

@@ -12,7 +12,7 @@ from fourbar.errors import InputError
 from fourbar.linkage import require
 from fourbar.quantities import OK, UNITS
 from fourbar.scene import Command, Scene
-from fourbar.solve import solve
+from fourbar.solving import solve
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.compare.reversals import mark_reversing
 from fourbar_validation.engines.mujoco.robots.answers import (

@@ -10,7 +10,7 @@ import numpy as np
 from fourbar.errors import InputError
 from fourbar.quantities import OK
 from fourbar.scene import Command, Scene, command
-from fourbar.solve import solve
+from fourbar.solving import solve
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.compare.rows import make_plain
 from fourbar_validation.engines.mujoco.robots.mimic import JointEquality

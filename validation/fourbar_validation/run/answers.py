@@ -17,7 +17,7 @@ from fourbar_validation.compare.scales import has_angles
 from fourbar_validation.compare.statements import limit_positions, transmission
 from fourbar_validation.compare.statements.limit_positions import look, make_worst_row
 from fourbar_validation.engines.description import name_driving
-from fourbar_validation.engines.registry import Engine, hold, make_prediction
+from fourbar_validation.engines.registry import Engine, make_demands, make_prediction
 from fourbar_validation.run.causes import find_causes
 from fourbar_validation.run.question import Question, remove_angles
 
@@ -45,7 +45,7 @@ def compare_answer(question: Question, engine: Engine, answer: Answer) -> list[R
     if answer.at is not None and answer.at is not question.at:
         question = Question(question.name, question.scene, answer.at)
     name, scene, formulas = question.name, question.scene, question.solution
-    held = hold(engine, scene, question.at, answer, formulas)
+    held = make_demands(engine, scene, question.at, answer, formulas)
     comparison = Comparison(
         name, scene, answer, formulas, held, question.reference, question.scales
     )

@@ -91,7 +91,7 @@ from fourbar_validation.run.run import run
     help="End a guest that takes longer for one answer; left out: a minute, and more for many positions.",
 )
 @click.option(
-    "--sample-shipped",
+    "--sample-derived",
     type=click.IntRange(min=0),
     default=SAMPLE,
     show_default=True,

@@ -137,7 +137,7 @@ class _Balance:
             point[..., 0], point[..., 1]
         ) * magnitude(force)
 
-    def twist(self, couple: Array, sense: float = 1.0) -> None:
+    def couple(self, couple: Array, sense: float = 1.0) -> None:
         """Add a couple."""
         self.moment = self.moment + sense * couple
         self.moments = self.moments + np.abs(couple)
@@ -156,7 +156,7 @@ def _check_sums(question: Question) -> Iterator[Row]:
     drive = COUPLE.value if solution.drive is None else LINE.value
     balance = _Balance()
     if solution.torque is not None:
-        balance.twist(solution.torque)
+        balance.couple(solution.torque)
     balance.push(solution.F12, np.zeros(2))
     balance.push(solution.F14, O4)
     balance.carry(solution.F32, solution.A)
@@ -171,10 +171,10 @@ def _check_sums(question: Question) -> Iterator[Row]:
         )
         load = np.broadcast_to(resultant, len(solution))
         balance.push(np.stack([load.real, load.imag], axis=1), first_pins[number])
-        balance.twist(couple)
+        balance.couple(couple)
         accelerated = scene.linkage.bar(number).mass * getattr(solution, f"a_G{number}")
         balance.push(accelerated, getattr(solution, f"G{number}"), -1.0)
-        balance.twist(
+        balance.couple(
             actions.bodies[number - 2].I * getattr(solution, f"alpha_{number}"), -1.0
         )
     # the forces of the bars that are not driven are solved apart, and the torque is that of virtual work

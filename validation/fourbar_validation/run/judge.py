@@ -22,6 +22,11 @@ from fourbar_validation.run.answers import (
     compare_inertia,
     compare_statements,
 )
+from fourbar_validation.run.derived.cuts import internal_forces
+from fourbar_validation.run.derived.equilibria import equilibria
+from fourbar_validation.run.derived.files import sdf, usd
+from fourbar_validation.run.derived.sensitivities import sensitivity, study, tolerances
+from fourbar_validation.run.derived.summary import summary
 from fourbar_validation.run.identities import check_identities, check_status
 from fourbar_validation.run.printed import (
     check_blocks,
@@ -32,11 +37,6 @@ from fourbar_validation.run.printed import (
 )
 from fourbar_validation.run.question import Question, select_positions
 from fourbar_validation.run.released import check_released
-from fourbar_validation.run.shipped.cuts import internal_forces
-from fourbar_validation.run.shipped.equilibria import equilibria
-from fourbar_validation.run.shipped.files import sdf, usd
-from fourbar_validation.run.shipped.sensitivities import sensitivity, study, tolerances
-from fourbar_validation.run.shipped.summary import summary
 from fourbar_validation.run.transformed import check_transformed
 
 
@@ -44,7 +44,7 @@ class Check(NamedTuple):
     """A check, and when it is made."""
 
     make_rows: Callable[[Question], Iterable[Row]]
-    shipped: bool = False
+    derived: bool = False
     """True if it checks a function of fourbar other than `solve`, whose name is then the engine of its rows."""
     free: bool = False
     """True if it checks a free motion, False for a prescribed one."""
@@ -73,7 +73,7 @@ CHECKS = (
         compare_statements,
         needs_theta_2="statements of the linkage: engines are led to its limits by theta_2",
     ),
-    Check(check_mjcf, needs_theta_2="MJCF as shipped: it drives bar 2"),
+    Check(check_mjcf, needs_theta_2="MJCF as derived: it drives bar 2"),
     Check(compare_inertia),
     Check(
         check_released,
@@ -81,7 +81,7 @@ CHECKS = (
         needs_theta_2="released motions: engines begin at theta_2",
     ),
     *(
-        Check(rows, shipped=True)
+        Check(rows, derived=True)
         for rows in (
             study,
             sensitivity,
@@ -94,7 +94,7 @@ CHECKS = (
     *(
         Check(
             rows,
-            shipped=True,
+            derived=True,
             needs_theta_2=f"{rows.__name__}: the file opens at theta_2",
         )
         for rows in (sdf, usd)
@@ -112,14 +112,14 @@ def judge_for_report(
     *,
     draw: bool = True,
     sketch: bool = False,
-    shipped: bool = False,
+    derived: bool = False,
 ) -> Record:
     """Judge a scene and keep what the report needs of it.
 
     `draw`: with its pictures and observed orders. `sketch`: with its small picture.
-    `shipped`: with checks of functions other than `solve`.
+    `derived`: with checks of functions other than `solve`.
     """
-    record = judge(name, scene, engines, order=draw, shipped=shipped)
+    record = judge(name, scene, engines, order=draw, derived=derived)
     for i, row in enumerate(record.rows):
         if row.failed and row.engine in record.output:
             record.rows[i] = replace(
@@ -142,12 +142,12 @@ def judge(
     engines: Sequence[Engine] = ENGINES,
     *,
     order: bool = True,
-    shipped: bool = False,
+    derived: bool = False,
 ) -> Record:
     """Make every check of one scene.
 
     `order`: measure the observed order of what is simulated, which takes two more simulations and changes no row.
-    `shipped`: check the functions other than `solve` too (studies, sensitivities, SDF and USD), which takes a second.
+    `derived`: check the functions other than `solve` too (studies, sensitivities, SDF and USD), which takes a second.
     """
     question, free = ask(name, scene, engines), scene.motion.free is not None
     question.order = order
@@ -155,7 +155,7 @@ def judge(
     question.solution  # noqa: B018 - timed
     seconds = time.perf_counter() - begin
     if (
-        shipped
+        derived
         and not free
         and (
             question.at.speed is None
@@ -165,17 +165,17 @@ def judge(
     ):
         reason = "they are checked against the free bodies, which have no forces for this scene"
         question.left_out.append(f"functions other than solve: {reason}")
-        shipped = False
+        derived = False
     rows: list[Row] = []
     for check in CHECKS:
-        if check.free == free and (shipped or not check.shipped):
+        if check.free == free and (derived or not check.derived):
             if check.needs_theta_2 and question.at.commanded != "theta_2":
                 question.left_out.append(
                     f"{check.needs_theta_2}; {question.at.commanded} is commanded"
                 )
                 continue
             called = check.make_rows.__name__
-            engine, part = (called, "") if check.shipped else (FORMULAS, called)
+            engine, part = (called, "") if check.derived else (FORMULAS, called)
             rows += question.attempt(partial(check.make_rows, question), engine, part)
     return question.record(rows, seconds)
 

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from fourbar_validation.compare.rows import make_breakdown, make_plain
-from fourbar_validation.engines import workers as processes
+from fourbar_validation.engines import workers as worker_processes
 from fourbar_validation.engines.guests import QUESTIONS, Guest
 from fourbar_validation.engines.processes import SECONDS_PER_POSITION
 from fourbar_validation.engines.registry import Engine
@@ -21,7 +21,7 @@ class Job:
     scene: int
     engines: Sequence[Engine]
     draw: bool
-    shipped: bool
+    derived: bool
     """True if functions other than `solve` are checked."""
     sketch: bool = False
 
@@ -45,7 +45,7 @@ def make_jobs(
     """
     jobs = []
     for i in scenes:
-        shipped = (i + 1) * sample // len(suite) > i * sample // len(suite)
+        derived = (i + 1) * sample // len(suite) > i * sample // len(suite)
         if isinstance(suite, Files):
             drawn = draw and suite.name(i) not in suite.not_drawn
             jobs.append(
@@ -54,12 +54,12 @@ def make_jobs(
                     0,
                     engines,
                     drawn,
-                    shipped,
+                    derived,
                     sketch,
                 )
             )
         else:
-            jobs.append(Job(suite, i, engines, draw, shipped, sketch))
+            jobs.append(Job(suite, i, engines, draw, derived, sketch))
     return jobs
 
 
@@ -72,11 +72,13 @@ def judge_job(job: Job) -> Record:
         job.engines,
         draw=job.draw,
         sketch=job.sketch,
-        shipped=job.shipped,
+        derived=job.derived,
     )
 
 
-def judge_by_engine(job: Job, _: BaseException, attempt: processes.Attempt) -> Record:
+def judge_by_engine(
+    job: Job, _: BaseException, attempt: worker_processes.Attempt
+) -> Record:
     """Judge a scene that broke down one engine at a time; those at fault have a row that says of what."""
     record: Record | None = None
     breakdowns = []
@@ -96,7 +98,7 @@ def judge_by_engine(job: Job, _: BaseException, attempt: processes.Attempt) -> R
 
 def find_time_limit(suite: Suite, engines: Iterable[Engine]) -> float:
     """Return the seconds after which a scene of the suite is taken to hang; guests have limits of their own besides."""
-    limit = processes.SECONDS + SECONDS_PER_POSITION * (
+    limit = worker_processes.SECONDS + SECONDS_PER_POSITION * (
         suite.positions if isinstance(suite, Files) else 0
     )
     return limit + QUESTIONS * sum(
@@ -108,6 +110,6 @@ def judge_chunks(
     chunks: Iterable[tuple[int, list[Job]]], limit: float, workers: int
 ) -> Iterator[tuple[int, list[Record]]]:
     """Judge numbered chunks of jobs, each as it is done; a job that takes longer than `limit` (s) hangs."""
-    return processes.apply_over_processes(
+    return worker_processes.apply_over_processes(
         judge_job, chunks, workers, seconds=limit, instead=judge_by_engine
     )

@@ -13,7 +13,7 @@ from fourbar.quantities import FORCES, OK, PIN_FORCES
 from fourbar.scene import Command, Scene
 from fourbar.scene.motion import Rise
 from fourbar.solution import Solution
-from fourbar.solve import solve
+from fourbar.solving import solve
 from fourbar_validation.compare.rows import FAILS, FORMULAS, UNDECIDED, Row
 from fourbar_validation.compare.scales import (
     Sizes,

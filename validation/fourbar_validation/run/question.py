@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fourbar.scene import Command, Scene, with_signs
 from fourbar.solution import Solution
-from fourbar.solve import solve
+from fourbar.solving import solve
 from fourbar_validation.compare.answer import Adapter, Answer, explain_refusal
 from fourbar_validation.compare.compare import Scales
 from fourbar_validation.compare.reversals import (

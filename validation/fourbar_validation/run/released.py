@@ -31,19 +31,19 @@ from fourbar_validation.compare.rows import (
     Row,
 )
 from fourbar_validation.compare.scales import make_reference
-from fourbar_validation.compare.tolerance import DEGRADED as TIMES_PREDICTED
 from fourbar_validation.compare.tolerance import (
     EQUIVALENCE,
+    TIMES_PREDICTED,
     divide,
     find_worst,
     replace_zero_size,
 )
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.guests import Guest
-from fourbar_validation.engines.registry import Engine, find_missing, hold
+from fourbar_validation.engines.registry import Engine, find_missing, make_demands
 from fourbar_validation.report.record import Timing
+from fourbar_validation.run.derived.variants import keep_worst, take_member
 from fourbar_validation.run.question import Question, select_positions
-from fourbar_validation.run.shipped.variants import keep_worst, take_member
 
 
 def _answer_mujoco(step: float) -> Any:
@@ -273,7 +273,7 @@ def _compare_forces_by(
     )
     names = tuple(name for name in UNKNOWNS if name in engine.answers)
     # nor are theta_2, omega_2 and alpha_2 more than that angle's, rounded: what that costs there is computed
-    held = hold(replace(engine, answers=names), scene, driven.at, answer)
+    held = make_demands(replace(engine, answers=names), scene, driven.at, answer)
     rows = Comparison(driven.name, scene, answer, conditioned, held, reference).rows()
     return [row for row in rows if row.quantity != "undecided"]
 

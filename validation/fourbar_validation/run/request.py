@@ -41,7 +41,7 @@ REQUEST = "request.json"
 """File beside a part that says what was asked for, so that parts can be collected."""
 KEPT = (
     *("scenes", "engines", "error", "suite", "random", "seed", "type"),
-    *("guest", "time_limit", "sample_shipped", "no_pictures"),
+    *("guest", "time_limit", "sample_derived", "no_pictures"),
 )
 """Options that a part keeps."""
 
@@ -62,7 +62,7 @@ class Request:
     against: str | None = None
     guest: tuple[str, ...] = ()
     time_limit: float | None = None
-    sample_shipped: int = SAMPLE
+    sample_derived: int = SAMPLE
     part: str | None = None
     verbose: bool = False
     no_pictures: bool = False
@@ -117,7 +117,7 @@ class Request:
             self.workers,
             not self.no_pictures,
             against=against,
-            sample=self.sample_shipped,
+            sample=self.sample_derived,
         )
 
 

@@ -31,7 +31,7 @@ from fourbar.quantities import OK, PIN_FORCES, UNITS
 from fourbar.scene import Command, Scene
 from fourbar.scene.motion import Motion
 from fourbar.solution import Solution
-from fourbar.solve import solve
+from fourbar.solving import solve
 from fourbar_validation.compare.rows import Row
 from fourbar_validation.compare.scales import Sizes
 from fourbar_validation.compare.tolerance import (
@@ -57,7 +57,7 @@ PART, APART = 0.3, 0.4
 AT_A_REVERSAL = 1e-3
 """Part of its speeds below which a pin with dry friction may reverse."""
 FORCES = (*PIN_FORCES, "torque", "drive_force")
-COMPARED = (
+COMPARED_VERDICTS = (
     *(f"{name}_{bar}" for name in ("theta", "omega", "alpha") for bar in MOVING_BARS),
     *FORCES,
     "power",
@@ -126,7 +126,7 @@ class _Few:
         return find_error(name, ours, theirs, np.maximum(scale, summed)) * condition
 
     def compare(
-        self, convert: Callable[[str], Array], names: Sequence[str] = COMPARED
+        self, convert: Callable[[str], Array], names: Sequence[str] = COMPARED_VERDICTS
     ) -> dict[str, Array]:
         """Compare the quantities that the scene has with those of another one, converted."""
         return {
@@ -449,7 +449,7 @@ def _measure_scaled(few: _Few) -> dict[str, Array]:
         name: magnitude(
             np.array(getattr(other, name)) / power.get(UNITS[name], 1.0) - ours
         )
-        for name in COMPARED
+        for name in COMPARED_VERDICTS
         if (ours := getattr(few.solution, name, None)) is not None
     }
 

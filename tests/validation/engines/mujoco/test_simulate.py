@@ -13,7 +13,7 @@ from fourbar.effects import Place
 from fourbar.mjcf import RECIPE, WindowMotion
 from fourbar.quantities import UNKNOWNS
 from fourbar_validation.compare.answer import Answer
-from fourbar_validation.compare.compare import Comparison, Held
+from fourbar_validation.compare.compare import Comparison, Demands
 from fourbar_validation.compare.rows import AGREES, FAILS, REFUSES, Row
 from fourbar_validation.compare.tolerance import SIMULATED
 from fourbar_validation.engines.mujoco.closed_loop import ClosedLoop
@@ -86,7 +86,11 @@ SCENES = {
 def compared(posed: fourbar.Scene, answer: Answer) -> list[Row]:
     """Rows of the simulation against the formulas at the motion that it made."""
     return Comparison(
-        "", posed, answer, fourbar.solve(posed, at=answer.at), Held(SIMULATED, UNKNOWNS)
+        "",
+        posed,
+        answer,
+        fourbar.solve(posed, at=answer.at),
+        Demands(SIMULATED, UNKNOWNS),
     ).rows()
 
 

@@ -15,10 +15,10 @@ from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.compare import Predicted
 from fourbar_validation.compare.statements.limit_positions import Finding, Place, Seen
 from fourbar_validation.compare.tolerance import (
-    DEGRADED,
     EPS,
     EQUIVALENCE,
     NOTHING_TO_TELL,
+    TIMES_PREDICTED,
     TURN,
     Array,
     Mask,
@@ -149,7 +149,9 @@ def _compare_over(
                 )
             else:
                 lost = predicted("theta_3", beyond) + predicted("theta_4", beyond)
-            allowed = np.where(beyond, np.fmax(allowed, DEGRADED * lost), allowed)
+            allowed = np.where(
+                beyond, np.fmax(allowed, TIMES_PREDICTED * lost), allowed
+            )
             mask = mask & ~(allowed >= NOTHING_TO_TELL)
         if mask.any():
             most = np.flatnonzero(mask)[

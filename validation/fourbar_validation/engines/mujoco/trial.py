@@ -25,7 +25,7 @@ from fourbar.mjcf import Settings, write_mjcf
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Answer, Array
-from fourbar_validation.compare.compare import COMPARED, mark_turning
+from fourbar_validation.compare.compare import COMPARED_QUANTITIES, mark_turning
 from fourbar_validation.compare.tolerance import divide, magnitude
 from fourbar_validation.engines.description import name_driving, state_from_pins
 from fourbar_validation.engines.loop import (
@@ -414,7 +414,7 @@ def compute_expected_error(scene: Scene, answer: Answer) -> float:
     """Compute the worst error that the engine predicts, relative to a quantity's largest magnitude (angles: 1 rad)."""
     worst = 0.0
     for name, predicted in answer.predicted.items():
-        if name not in COMPARED:
+        if name not in COMPARED_QUANTITIES:
             continue
         values = answer.quantities[name]
         sizes = (

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from fourbar.scene import Command
-from fourbar.solve import solve
+from fourbar.solving import solve
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.mujoco.robots.answers import QUANTITIES, measure_sizes
 from fourbar_validation.engines.mujoco.robots.closures import find_closures

@@ -23,7 +23,7 @@ from fourbar.formulas.mobility import (
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, Bar, FourBar
 from fourbar.scene import Scene
 from fourbar.scene.motion import CROSSED, OPEN, Motion, Sweep
-from fourbar.solve import solve
+from fourbar.solving import solve
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.engines.mujoco.robots.ancestry import (
     climb,

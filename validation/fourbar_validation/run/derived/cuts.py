@@ -28,8 +28,8 @@ from fourbar_validation.engines.free_body_effects import (
     list_sliding_pins,
     make_vector,
 )
+from fourbar_validation.run.derived.variants import ask_free_bodies, make_row, take_few
 from fourbar_validation.run.question import Question
-from fourbar_validation.run.shipped.variants import ask_free_bodies, make_row, take_few
 
 WHERE = (0.0, 0.137, 0.479, 0.863)
 """Cuts, in parts of the bar's length from its first pin; just beyond that pin, and none at another foot."""
@@ -124,7 +124,7 @@ class _Piece(BodyWrenches):
         self.pushing += np.abs(turned)
         self.turning += np.abs(turned) * (np.abs(lever) + abs(self.cut))
 
-    def twist(self, bar: int, couple: Any) -> None:
+    def couple(self, bar: int, couple: Any) -> None:
         """Add a couple, to the piece on which its place lies."""
         if bar == self.bar:
             self.M += np.where(self.place > self.cut, couple, 0.0)
@@ -188,7 +188,7 @@ def free_piece(
         to_G = motion.unit[bar] * centre
         piece.push(bar, -described.mass * (a_pin + motion.swing(bar, to_G)), to_G)
         piece.place = centre.real
-        piece.twist(bar, -described.moment_of_inertia * motion.alpha[bar])
+        piece.couple(bar, -described.moment_of_inertia * motion.alpha[bar])
     return piece
 
 
@@ -201,7 +201,7 @@ def _push_rigid(
     arm = middle * piece.motion.unit[bar]
     piece.push(bar, mass * (gravity - a_pin - piece.motion.swing(bar, arm)), arm)
     piece.place = middle
-    piece.twist(bar, -mass * (end - start) ** 2 / 12.0 * piece.motion.alpha[bar])
+    piece.couple(bar, -mass * (end - start) ** 2 / 12.0 * piece.motion.alpha[bar])
     piece.place = 0.0
 
 
@@ -211,7 +211,7 @@ def _push_drive(
     """Put the couple of the drive at the first pin of its bar, or its force at the ends of its line."""
     if scene.drive is None:
         if scene.drive_bar == piece.bar:
-            piece.twist(piece.bar, answer.quantities["torque"])
+            piece.couple(piece.bar, answer.quantities["torque"])
         return
     theta = {bar: np.angle(motion.unit[bar]) for bar in MOVING_BARS}
     line = place_line(scene.linkage, scene.drive, theta)

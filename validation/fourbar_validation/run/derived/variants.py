@@ -1,4 +1,4 @@
-"""Provide what the checks of shipped code share: scenes with other numbers, and the rows of a comparison."""
+"""Provide what the checks of derived results share: scenes with other numbers, and the rows of a comparison."""
 
 import json
 import math
@@ -18,7 +18,7 @@ from fourbar.scene import Command, Scene
 from fourbar.scene import command as command_of
 from fourbar.solution import Solution
 from fourbar_validation.compare.answer import Answer, Array
-from fourbar_validation.compare.compare import COMPARED, Comparison, Held
+from fourbar_validation.compare.compare import COMPARED_QUANTITIES, Comparison, Demands
 from fourbar_validation.compare.reversals import mark_reversing
 from fourbar_validation.compare.rows import VERDICTS, Row
 from fourbar_validation.compare.scales import make_reference
@@ -207,7 +207,7 @@ def hold_to(
         scene,
         answer,
         solution,
-        Held(EQUIVALENCE, COMPARED, predicted),
+        Demands(EQUIVALENCE, COMPARED_QUANTITIES, predicted),
         reference,
     ).rows()
     if scene.points and reference is not None:

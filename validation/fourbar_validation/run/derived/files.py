@@ -16,16 +16,16 @@ from fourbar.linkage import BAR_NAMES, MOVING_BARS, Bar, FourBar
 from fourbar.mjcf.assembly import write_sdf as sdf_text
 from fourbar.mjcf.assembly import write_usd as usd_text
 from fourbar.scene import Scene
-from fourbar.solve import solve
+from fourbar.solving import solve
 from fourbar_validation.compare.rows import REFUSES, Row
 from fourbar_validation.compare.tolerance import EPS, K
-from fourbar_validation.run.question import Question
-from fourbar_validation.run.shipped.variants import (
+from fourbar_validation.run.derived.variants import (
     ask_free_bodies,
     hold_to,
     keep_worst,
     take_few,
 )
+from fourbar_validation.run.question import Question
 
 NUMBER = r"[-+.\deE]+"
 BARS = {BAR_NAMES[number]: number for number in MOVING_BARS}

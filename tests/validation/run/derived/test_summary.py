@@ -12,10 +12,10 @@ import fourbar
 from fourbar.effects import Place
 from fourbar.show.summary import Facts
 from fourbar_validation.compare.rows import Row
+from fourbar_validation.run.derived import summary as module
+from fourbar_validation.run.derived.summary import summary
 from fourbar_validation.run.judge import ask
 from fourbar_validation.run.question import NotAskedError
-from fourbar_validation.run.shipped import summary as module
-from fourbar_validation.run.shipped.summary import summary
 from tests.support.scenes import crank_rocker
 
 TURN = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.1, 0.1 + 2 * np.pi, 36), 9.0))

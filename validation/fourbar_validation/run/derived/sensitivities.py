@@ -19,8 +19,7 @@ from fourbar.studies.spread import Spread
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.compare.rows import Row
 from fourbar_validation.compare.tolerance import ErrorBound, divide, magnitude
-from fourbar_validation.run.question import NotAskedError, Question
-from fourbar_validation.run.shipped.variants import (
+from fourbar_validation.run.derived.variants import (
     SceneFile,
     ask_free_bodies,
     at_places,
@@ -31,6 +30,7 @@ from fourbar_validation.run.shipped.variants import (
     take_few,
     take_member,
 )
+from fourbar_validation.run.question import NotAskedError, Question
 
 MEMBERS = 5
 """Members of the study, as many as positions: a square study, whose axes only its numbers tell apart."""

@@ -30,9 +30,9 @@ from fourbar_validation.compare.tolerance import (
     wrap_angle,
 )
 from fourbar_validation.engines.description import state_from_pins
+from fourbar_validation.run.derived.cuts import free_piece, move_bars
+from fourbar_validation.run.derived.variants import ask_free_bodies, make_row
 from fourbar_validation.run.question import NotAskedError, Question
-from fourbar_validation.run.shipped.cuts import free_piece, move_bars
-from fourbar_validation.run.shipped.variants import ask_free_bodies, make_row
 
 ROWS = ("ranges", "peaks", "means", "pins", "frame_force", "bending", "bore")
 """Names of the rows."""

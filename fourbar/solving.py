@@ -115,7 +115,7 @@ class Requested(NamedTuple):
     """Shape of the positions."""
     last_stage: int
     """Number of the last stage evaluated."""
-    names: KeysView[str]
+    wanted: KeysView[str]
     """Names of the quantities."""
     out: Mapping[str, Array] | None
     """Arrays of the caller's to write into."""
@@ -138,7 +138,7 @@ class Results:
         shape, given = request.shape, request.out or {}
         self.codes: NDArray[np.uint8] = np.zeros(shape, dtype=np.uint8)
         self.arrays: dict[str, Array] = {}
-        for name in request.names:
+        for name in request.wanted:
             shape_of_one = shape if name in SCALARS else (*shape, 2)
             self.arrays[name] = given[name] if name in given else np.empty(shape_of_one)
 
@@ -166,7 +166,7 @@ def _make_case(scene: Scene, commanded: Command, request: Requested, side: int) 
     if not request.asks_forces or not scene.counts_turns:
         return case
     stated = command(scene)
-    return case.with_start(stated if stated.bar == commanded.bar else commanded)
+    return case.begin_with(stated if stated.bar == commanded.bar else commanded)
 
 
 def _solve_alone(case: Case, commanded: Command, request: Requested) -> Results | None:
@@ -181,7 +181,7 @@ def _solve_alone(case: Case, commanded: Command, request: Requested) -> Results 
     angle: Any = position.angle.item()  # Python's own numbers halve a formula's time
     position = position._replace(angle=angle)
     try:
-        codes, values, _ = evaluate(case, position, request.last_stage, request.names)
+        codes, values, _ = evaluate(case, position, request.last_stage, request.wanted)
     except ArithmeticError:
         return None
     table = np.array([*values.values()], dtype=complex)
@@ -204,7 +204,7 @@ def _solve_blocks(case: Case, commanded: Command, request: Requested) -> Results
     for part in split(len(commanded.angle), request.block):
         block = commanded.part(part)
         # kept until the next block is evaluated, so that its memory is used again
-        evaluated = evaluate(case, block, request.last_stage, request.names)
+        evaluated = evaluate(case, block, request.last_stage, request.wanted)
         results.store(case, evaluated, (part,))
     return results
 
@@ -217,7 +217,7 @@ def _solve_released(
     for index, commanded, side in independent.commands():
         case = Case.of_released(scene, commanded.bar, side)
         evaluated = evaluate_released(
-            case, commanded, scene.drive, request.last_stage, request.names
+            case, commanded, scene.drive, request.last_stage, request.wanted
         )
         results.store(case, evaluated, (index,))
     return results
@@ -315,12 +315,12 @@ def find_requested(
         if not isinstance(stage, str) or stage not in STAGES:
             raise InputError("stage", stage, "must be one of " + ", ".join(STAGES))
         last_stage = STAGES.index(stage)
-        names = _list_names(
+        wanted = _list_wanted(
             last_stage, _list_absent(scene), tuple(point.name for point in scene.points)
         )
     else:
         expect("out", out, Mapping)
-        names = out.keys()
+        wanted = out.keys()
         foreign, stages = (
             _list_foreign(scene),
             _list_stages(tuple(point.name for point in scene.points)),
@@ -350,8 +350,8 @@ def find_requested(
             f"is needed for the stage {STAGES[last_stage]!r}",
         )
     if commanded.bar != 2:
-        names = {**dict.fromkeys(names), "theta_2": None, "sin_mu": None}.keys()
-    return Requested(shape, last_stage, names, out)
+        wanted = {**dict.fromkeys(wanted), "theta_2": None, "sin_mu": None}.keys()
+    return Requested(shape, last_stage, wanted, out)
 
 
 def _list_stages(points: tuple[str, ...]) -> dict[str, str]:
@@ -362,7 +362,7 @@ def _list_stages(points: tuple[str, ...]) -> dict[str, str]:
 
 
 @cache
-def _list_names(
+def _list_wanted(
     last_stage: int, absent: tuple[str, ...], points: tuple[str, ...]
 ) -> KeysView[str]:
     """List the quantities of the stages up to the last one evaluated."""

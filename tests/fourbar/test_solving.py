@@ -33,7 +33,7 @@ from fourbar.scene.motion import Motion, Sweep
 from fourbar.show.animate import collect_page_data
 from fourbar.show.plot import draw
 from fourbar.solution import Solution
-from fourbar.solve import solve
+from fourbar.solving import solve
 
 EXAMPLES = settings(
     max_examples=120,

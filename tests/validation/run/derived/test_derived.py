@@ -1,4 +1,4 @@
-"""What is shipped besides `solve` is judged: each check holds, and each fails where its public call errs."""
+"""What is derived from `solve` is judged: each check holds, and each fails where its public call errs."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -12,16 +12,16 @@ from fourbar.effects import Place
 from fourbar.scene import Scene, command
 from fourbar.studies.keys import read_numbers
 from fourbar_lab.fault_scenes import FAULT_SCENES
+from fourbar_validation.compare.rows import DERIVED as SHIPPED_ROWS
 from fourbar_validation.compare.rows import FAILS, REFUSES, Row
-from fourbar_validation.compare.rows import SHIPPED as SHIPPED_ROWS
 from fourbar_validation.run import judge
+from fourbar_validation.run.derived import files
+from fourbar_validation.run.derived.variants import SceneFile
 from fourbar_validation.run.question import NotAskedError, Question
-from fourbar_validation.run.shipped import files
-from fourbar_validation.run.shipped.variants import SceneFile
 from tests.support.scenes import crank_rocker
 
-SHIPPED = FAULT_SCENES["shipped"]
-CHECKS = [check.make_rows for check in judge.CHECKS if check.shipped]
+DERIVED = FAULT_SCENES["derived"]
+CHECKS = [check.make_rows for check in judge.CHECKS if check.derived]
 ENGINES = {
     "study",
     "sensitivity",
@@ -48,7 +48,7 @@ def failing(rows: list[Row]) -> set[str]:
 
 
 def test_every_engine_compares_and_holds() -> None:
-    rows = rows_of(SHIPPED)
+    rows = rows_of(DERIVED)
     compared = {row.engine for row in rows if row.compared}
     assert (
         compared == ENGINES == {check.__name__ for check in CHECKS} == set(SHIPPED_ROWS)
@@ -99,7 +99,7 @@ def test_a_public_call_that_errs_fails(
     change: Callable[[Any], None],
     quantity: str,
 ) -> None:
-    question = Question("", SHIPPED, command(SHIPPED))
+    question = Question("", DERIVED, command(DERIVED))
     monkeypatch.setattr(fourbar, call, altered(getattr(fourbar, call), change))
     assert quantity in failing(
         next(check for check in CHECKS if check.__name__ == engine)(question)
@@ -135,13 +135,13 @@ def test_equilibria_that_err_fail(
 ) -> None:
     call = fourbar.equilibrium
     monkeypatch.setattr(fourbar, "equilibrium", lambda scene: change(call(scene)))
-    assert failing(rows_of(SHIPPED, "equilibria")) >= quantities
+    assert failing(rows_of(DERIVED, "equilibria")) >= quantities
 
 
 @pytest.mark.parametrize("gravity", [-0.7, 2.1])
 def test_equilibria_near_a_limit_are_compared_too(gravity: float) -> None:
     scene = replace(
-        FAULT_SCENES["shipped, limited"], effects=(fourbar.Gravity(9.81, gravity),)
+        FAULT_SCENES["derived, limited"], effects=(fourbar.Gravity(9.81, gravity),)
     )
     rows = rows_of(scene, "equilibria")
     assert {row.reason for row in rows if row.quantity in ("torque", "slope")} == {
@@ -181,7 +181,7 @@ HARD_AT_REST = {
         effects=(fourbar.Gravity(9.81, -2.0),),
     ),
     "an equilibrium 1e-6 rad beside a limit, where rounding moves the slope by 1e-10 of itself": replace(
-        FAULT_SCENES["shipped, limited"],
+        FAULT_SCENES["derived, limited"],
         loads=(),
         effects=(fourbar.Gravity(9.81, 2.1920361095494605),),
     ),
@@ -198,7 +198,7 @@ def test_right_equilibria_hold_where_they_are_hard_to_judge(name: str) -> None:
 
 @pytest.mark.parametrize("engine", ["equilibria", "study", "sensitivity"])
 def test_where_nothing_assembles_nothing_is_asked(engine: str) -> None:
-    scene = FAULT_SCENES["shipped, limited"]
+    scene = FAULT_SCENES["derived, limited"]
     scene = replace(
         scene, motion=scene.motion.replace(angle=fourbar.Sweep(3.0, 3.1, 4))
     )
@@ -254,7 +254,7 @@ def commanding(name: str) -> Scene:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", COMMANDS)
 def test_other_commands_are_judged_too_and_what_is_not_is_named(name: str) -> None:
-    record = judge.judge("", commanding(name), (), order=False, shipped=True)
+    record = judge.judge("", commanding(name), (), order=False, derived=True)
     assert not [row for row in record.rows if row.failed]
     compared = {row.engine for row in record.rows if row.compared}
     assert compared >= ENGINES - {"sdf", "usd"} and {
@@ -312,7 +312,7 @@ def test_a_file_with_another_number_fails(
         return written
 
     monkeypatch.setattr(files, f"{engine}_text", wrong)
-    assert failing(rows_of(SHIPPED, engine))
+    assert failing(rows_of(DERIVED, engine))
 
 
 @pytest.mark.slow
@@ -323,7 +323,7 @@ def test_what_breaks_down_costs_its_own_rows_and_what_is_missing_is_named(
         raise RuntimeError("lost")
 
     monkeypatch.setattr(fourbar, "vary", broken)
-    record = judge.judge("", SHIPPED, (), shipped=True)
+    record = judge.judge("", DERIVED, (), derived=True)
     (row,) = (row for row in record.rows if row.engine == "study")
     assert (row.quantity, row.verdict) == ("all", FAILS)
     assert {row.engine for row in record.rows if row.passed} >= ENGINES - {"study"}
@@ -355,9 +355,9 @@ def test_a_check_that_raises_costs_its_own_rows_alone(
     def check_nothing(_: Question) -> list[Row]:
         raise ArithmeticError("lost")
 
-    all_rows = judge.judge("", SHIPPED, ()).rows
+    all_rows = judge.judge("", DERIVED, ()).rows
     monkeypatch.setattr(judge, "CHECKS", (judge.Check(check_nothing), *judge.CHECKS))
-    (row,) = (row for row in judge.judge("", SHIPPED, ()).rows if row not in all_rows)
+    (row,) = (row for row in judge.judge("", DERIVED, ()).rows if row not in all_rows)
     assert (row.engine, row.setting, row.quantity, row.verdict) == (
         "formulas",
         "check_nothing",

@@ -31,8 +31,8 @@ from fourbar_validation.engines.description import find_centre, find_inertia
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.prediction import FIRST_ORDER
 from fourbar_validation.engines.registry import find_missing
+from fourbar_validation.run.derived.variants import make_row
 from fourbar_validation.run.question import NotAskedError, Question
-from fourbar_validation.run.shipped.variants import make_row
 
 SAMPLES = 720
 """Positions of a turn of the input: between two of them the torque changes its sign at an odd number of equilibria."""
