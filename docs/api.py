@@ -101,9 +101,11 @@ def unwrap(text: str) -> str:
     """Join the lines of each paragraph, except in lists, underlined sections and examples."""
     paragraphs = text.split("\n\n")
     return "\n\n".join(
-        lines
-        if re.search(r"^(\s|--|>>>)", lines, re.MULTILINE)
-        else " ".join(lines.split("\n"))
+        (
+            lines
+            if re.search(r"^(\s|--|>>>)", lines, re.MULTILINE)
+            else " ".join(lines.split("\n"))
+        )
         for lines in paragraphs
     )
 

@@ -1,7 +1,8 @@
 """Writes the blocks of docs/benchmark.md and docs/findings.md between comments, and figures. `python docs/benchmark.py`
 
-Data and figures of problems come from models/problems, letters and errors from docs/examples/benchmark.csv, findings
-from the docstrings of docs/findings/*.py. The sentences around them are written by hand.
+Data and figures of problems come from models/problems, letters and errors from
+docs/examples/benchmark.csv, findings from the docstrings of docs/findings/*.py. The
+sentences around them are written by hand.
 """
 
 import csv
@@ -127,7 +128,10 @@ def write_question(problem: dict[str, Any]) -> str:
         if command.get("alpha_2")
         else ""
     )
-    branch = f"branch {command['branch'] if np.ndim(command['branch']) == 0 else 'in the file'}"
+    branch = (
+        "branch"
+        f" {command['branch'] if np.ndim(command['branch']) == 0 else 'in the file'}"
+    )
     if problem["ask"] == "release":
         times = problem["times"]
         start = f"Released at θ₂ {write_number(math.degrees(angles[0]))}°"
@@ -137,7 +141,8 @@ def write_question(problem: dict[str, Any]) -> str:
     else:
         ends = [write_number(math.degrees(angle)) for angle in (angles[0], angles[-1])]
         parts.append(
-            f"θ₂ from {ends[0]}° to {ends[1]}° in {len(angles)} positions, {rates}, {branch}."
+            f"θ₂ from {ends[0]}° to {ends[1]}° in {len(angles)} positions, {rates},"
+            f" {branch}."
         )
     asked = [
         f"`{quantity}`" for quantity in problem["answers"] if quantity not in PIN_FORCES

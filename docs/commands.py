@@ -70,7 +70,8 @@ def text() -> str:
             (*command.collect_usage_pieces(click.Context(command))[1:], *required)
         )
         parts.append(
-            f"## {name}\n\n`fourbar {name} {usage}`: {command.get_short_help_str(500)}\n"
+            f"## {name}\n\n`fourbar {name} {usage}`:"
+            f" {command.get_short_help_str(500)}\n"
         )
         if special := [row for row in rows[name] if row not in shared]:
             parts.append(write_table(special))

@@ -1,6 +1,7 @@
 """The site of these pages: `sphinx-build -W docs site`, with what `pip install ".[docs]"` installs.
 
-Formulas become MathML, which browsers draw by themselves: the site has no script for them and needs no network.
+Formulas become MathML, which browsers draw by themselves: the site has no script for
+them and needs no network.
 """
 
 import re

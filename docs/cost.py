@@ -1,6 +1,7 @@
 """Writes docs/cost/*.svg, light and dark: `python docs/cost.py results/cost/crank_rocker`.
 
-The argument is the folder of a study, by `fourbar-validation cost models/crank_rocker.toml`.
+The argument is the folder of a study, by `fourbar-validation cost
+models/crank_rocker.toml`.
 """
 
 import csv
@@ -70,7 +71,8 @@ def draw_hard() -> Any:
     """Draw the error of the exact engines over the condition, towards three kinds of singular position."""
     figure = make_figure(
         4.6,
-        "Near a singular position the error grows as\n1/condition, and stays below the limit",
+        "Near a singular position the error grows as\n1/condition, and stays below the"
+        " limit",
         "torque, towards a toggle, a pole of T4 and a change point",
     )
     axes = figure.add_axes((0.135, 0.12, 0.84, 0.6))

@@ -80,10 +80,14 @@ def text() -> str:
         label(O4 + cmath.rect(25, theta_4 / 2), "θ₄"),
         label(A + cmath.rect(41, delta / 2), "δ"),
         label(B + cmath.rect(20, (theta_3 + theta_4) / 2 + math.pi), "μ"),
-        f'<text class="said" x="{LEFT:.0f}" y="{BASE + 55:.0f}">while θ₂ grows by dθ₂: δ by t dθ₂, μ by 2g dθ₂</text>',
+        (
+            f'<text class="said" x="{LEFT:.0f}" y="{BASE + 55:.0f}">while θ₂ grows by'
+            " dθ₂: δ by t dθ₂, μ by 2g dθ₂</text>"
+        ),
     ]
     style = (
-        "text{font:15px serif;font-style:italic;text-anchor:middle;fill:#1b2733}.said{text-anchor:start;"
+        "text{font:15px"
+        " serif;font-style:italic;text-anchor:middle;fill:#1b2733}.said{text-anchor:start;"
         "font-style:normal}path{fill:none;stroke:#1b2733}.bar{stroke-width:4;stroke:#33658a}"
         ".ground{stroke-width:4;stroke:#99a3ad}.diagonal{stroke-width:2;stroke:#c1440e;stroke-dasharray:7 4}"
         ".ray{stroke-width:.8;stroke-dasharray:3 3}.arc{stroke-width:1.2}"
@@ -91,8 +95,8 @@ def text() -> str:
         "@media(prefers-color-scheme:dark){text{fill:#dfe7ee}path{stroke:#dfe7ee}circle{fill:#24323f;stroke:#dfe7ee}}"
     )
     return (
-        '<svg xmlns="http://www.w3.org/2000/svg" width="480" height="320" viewBox="0 0 480 320">\n'
-        f"<style>{style}</style>\n" + "\n".join(parts) + "\n</svg>\n"
+        '<svg xmlns="http://www.w3.org/2000/svg" width="480" height="320" viewBox="0 0'
+        f' 480 320">\n<style>{style}</style>\n' + "\n".join(parts) + "\n</svg>\n"
     )
 
 

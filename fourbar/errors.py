@@ -123,7 +123,8 @@ def run(
 ) -> int:
     """Run a command of a group; the exit status is what the command returns, or says what went wrong.
 
-    `extra`: the one that brings what the program needs, named where a module is missing.
+    `extra`: the one that brings what the program needs, named where a module is
+    missing.
     """
     import click  # on the command line alone
 
@@ -164,7 +165,8 @@ def run(
         if "--traceback" in words or os.environ.get("FOURBAR_TRACEBACK"):
             raise
         return _say(
-            f"internal error: {type(error).__name__}: {error} (FOURBAR_TRACEBACK=1 shows where)",
+            f"internal error: {type(error).__name__}: {error} (FOURBAR_TRACEBACK=1"
+            " shows where)",
             BROKEN,
         )
 
@@ -172,8 +174,9 @@ def run(
 def _read_exit(raised: SystemExit, streams: tuple[TextIO, ...]) -> int:
     """Return the exit status of a command that raised SystemExit.
 
-    Click and rich leave with 1 where the reader of a pipe has gone; it has what it wants. Click lets go of standard
-    output then, and does so for every pipe that breaks, that of a worker too.
+    Click and rich leave with 1 where the reader of a pipe has gone; it has what it
+    wants. Click lets go of standard output then, and does so for every pipe that
+    breaks, that of a worker too.
     """
     if sys.stdout is not streams[0]:
         return (

@@ -54,8 +54,8 @@ def is_within(number: float, bound: str) -> bool:
 def require(key: str, value: object, unit: str = "1", bound: str = ANY) -> float:
     """Return the value as a float, or raise an InputError that says what is allowed.
 
-    `unit`: of the number; a text like "48 cm" and a `pint.Quantity` are converted to it. "1": there is none, and
-    neither is read.
+    `unit`: of the number; a text like "48 cm" and a `pint.Quantity` are converted to
+    it. "1": there is none, and neither is read.
     """
     number = math.nan
     if unit != "1":
@@ -127,7 +127,8 @@ def require_pair(
 ) -> tuple[float, float]:
     """Return a pair of numbers, mostly a size and an angle, as floats, or raise an InputError.
 
-    `unit`, `second`: of the two; `bound`: of the first, and of the second unless it is an angle.
+    `unit`, `second`: of the two; `bound`: of the first, and of the second unless it is
+    an angle.
     """
     try:
         size, other = value
@@ -189,14 +190,15 @@ class Bar:
 
     Parameters
     ----------
-    length : distance between its two pins, m, > 0.
-    mass : kg, >= 0.
-    inertia : about the mass centre G, kg m^2, >= 0; left out: uniform slender bar, m L^2/12.
-    centre : (r, phi), polar position of G from the bar's first pin (O2, A, O4), phi measured
+    length : distance between its two pins, m, > 0. mass : kg, >= 0. inertia : about the
+    mass centre G, kg m^2, >= 0; left out: uniform slender bar, m L^2/12. centre : (r,
+    phi), polar position of G from the bar's first pin (O2, A, O4), phi measured
         from the bar's line, m and rad; left out: mid-bar.
-    density : kg/m^3, > 0, in place of `mass`, which is then that of a uniform bar from pin to pin
+    density : kg/m^3, > 0, in place of `mass`, which is then that of a uniform bar from
+    pin to pin
         and follows the length.
-    section : (height, thickness) of a rectangular cross-section, m: the height lies in the plane
+    section : (height, thickness) of a rectangular cross-section, m: the height lies in
+    the plane
         of motion.
     diameter : of a round cross-section, m, in place of `section`.
 
@@ -297,8 +299,8 @@ class Bar:
 class FourBar:
     """A four-bar linkage: ground length d and angle theta_1 (O2 to O4), and three moving bars.
 
-    Raises InputError where the four lengths cannot close anywhere (the longest exceeds the sum
-    of the other three).
+    Raises InputError where the four lengths cannot close anywhere (the longest exceeds
+    the sum of the other three).
     """
 
     ground: float

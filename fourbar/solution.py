@@ -53,8 +53,9 @@ DEGREES: Conversion = {"rad": ("deg", 180.0 / math.pi)}
 class Solution(Quantities):  # noqa: PLW1641 - arrays have no hash
     """The answer of the formulas at n positions, or at n positions of each of m linkages, SI units and radians.
 
-    Scalars have shape (n,), vectors (n, 2), of a study (m, n) and (m, n, 2); NaN marks a position where a
-    quantity has no value (see `status`), None a quantity that was not requested.
+    Scalars have shape (n,), vectors (n, 2), of a study (m, n) and (m, n, 2); NaN marks
+    a position where a quantity has no value (see `status`), None a quantity that was
+    not requested.
     """
 
     title: str
@@ -71,7 +72,8 @@ class Solution(Quantities):  # noqa: PLW1641 - arrays have no hash
     a study with numbers that a scene refuses (a length that is not positive, a mass below 0); all of it is NaN.
     10 no_lever: the line of the drive has none there, its stroke stands still, forces are NaN. 11 change_point: all
     bars are in line; positions, speeds and the drive are their limits along the assembly, pin forces, which have no
-    bound there, are NaN."""
+    bound there, are NaN.
+    """
     branch: NDArray[np.int8]
     """Sign of sin(theta_4 - theta_3): +1 or -1."""
     points: dict[str, Array] = field(default_factory=dict, kw_only=True)
@@ -180,9 +182,9 @@ class Solution(Quantities):  # noqa: PLW1641 - arrays have no hash
 
         Parameters
         ----------
-        degrees : theta in deg.
-        units : other units, as `fourbar.units("mm N.mm")` makes them; every heading then names its unit.
-        decimal : "," writes decimal commas, and semicolons between the columns, as many spreadsheets expect.
+        degrees : theta in deg. units : other units, as `fourbar.units("mm N.mm")` makes
+        them; every heading then names its unit. decimal : "," writes decimal commas,
+        and semicolons between the columns, as many spreadsheets expect.
         """
         expect("path", path, str, Path, type(None))
         expect("degrees", degrees, bool)
@@ -345,8 +347,8 @@ def list_leading(solution: Solution) -> dict[str, list[Any]]:
 def list_scalars(solution: Solution, units: Conversion = SI) -> dict[str, Array | None]:
     """List every quantity as columns of numbers, vectors as `A_x`, `A_y`; None for what was not evaluated.
 
-    Of a pin force the magnitude too, and where it is known the time. In other units than SI every heading names its
-    own: `F12_x [lbf]`.
+    Of a pin force the magnitude too, and where it is known the time. In other units
+    than SI every heading names its own: `F12_x [lbf]`.
     """
     columns: dict[str, Array | None] = {}
     for name in _list_quantities(solution):

@@ -36,13 +36,12 @@ def read_bytes(
 
     Parameters
     ----------
-    key : what names the file, for the error.
-    largest : bytes.
-    shown : how the error names it; left out: by its path.
-    pipes : read standard input for the path `-`, and pipes (those of a shell's `<(...)` too) until they end.
+    key : what names the file, for the error. largest : bytes. shown : how the error
+    names it; left out: by its path. pipes : read standard input for the path `-`, and
+    pipes (those of a shell's `<(...)` too) until they end.
 
-    Raises InputError for a file that is missing, too large or unreadable, for a directory, for devices, and for pipes
-    where they are not read.
+    Raises InputError for a file that is missing, too large or unreadable, for a
+    directory, for devices, and for pipes where they are not read.
     """
 
     def refuse(allowed: str) -> InputError:
@@ -124,10 +123,12 @@ def require_file(target: Path, *read: Path) -> None:
 def write_bytes(path: str | Path, data: bytes, *, private: bool = False) -> None:
     """Write a file whole; on any failure the old file, or none, stays.
 
-    A symbolic link stays and the file that it names is written. An existing file keeps its mode; a new one is an
-    ordinary file, and with `private` it is readable by its owner alone in either case. `-` is standard output.
+    A symbolic link stays and the file that it names is written. An existing file keeps
+    its mode; a new one is an ordinary file, and with `private` it is readable by its
+    owner alone in either case. `-` is standard output.
 
-    Raises InputError as `require_file` does, OSError for what fails otherwise (full disk, read-only folder).
+    Raises InputError as `require_file` does, OSError for what fails otherwise (full
+    disk, read-only folder).
     """
     if Path(path) == STANDARD_STREAM:
         sys.stdout.flush()
@@ -138,7 +139,8 @@ def write_bytes(path: str | Path, data: bytes, *, private: bool = False) -> None
     target = Path(os.path.realpath(path))
     require_file(target)
     if target.exists() and not target.is_file():
-        # a device or pipe is written to; renaming onto it would replace /dev/null itself
+        # a device or pipe is written to; renaming onto it would replace /dev/null
+        # itself
         with name_file(target), target.open("wb") as file:
             file.write(data)
         return

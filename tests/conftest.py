@@ -54,7 +54,8 @@ def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator:
     """One browser for all tests of pages; each test opens its own page in it."""
     if CHROMIUM is None or DRIVER is None:
         pytest.skip(
-            "pages are tested in Chromium: install chromium and chromedriver (chromium-driver)"
+            "pages are tested in Chromium: install chromium and chromedriver"
+            " (chromium-driver)"
         )
     from selenium import webdriver
 

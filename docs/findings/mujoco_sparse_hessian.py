@@ -17,8 +17,8 @@ import mujoco
 import numpy as np
 
 BAR = (
-    '<body pos="{0} 0 0"><joint axis="0 0 1"/><inertial pos=".1 0 0" mass="1" diaginertia=".01 .01 .01"/>'
-    '<site name="{1}" pos=".2 0 0"/>{2}</body>'
+    '<body pos="{0} 0 0"><joint axis="0 0 1"/><inertial pos=".1 0 0" mass="1"'
+    ' diaginertia=".01 .01 .01"/><site name="{1}" pos=".2 0 0"/>{2}</body>'
 )
 couplers = BAR.format(0.2, "one", "") + BAR.format(0.2, "other", "")
 bars = (
@@ -26,7 +26,10 @@ bars = (
     + BAR.format(0, "second", "")
     + BAR.format(0, "crank", couplers)
 )
-LOOPS = '<equality><connect site1="rocker" site2="one"/><connect site1="second" site2="other"/></equality>'
+LOOPS = (
+    '<equality><connect site1="rocker" site2="one"/><connect site1="second"'
+    ' site2="other"/></equality>'
+)
 found = {}
 for jacobian in ("dense", "sparse"):
     for iterations in (1, 100):

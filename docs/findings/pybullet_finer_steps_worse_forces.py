@@ -21,8 +21,8 @@ LINK = (
     '<inertia ixx=".1" iyy=".1" izz=".1" ixy="0" ixz="0" iyz="0"/></inertial></link>'
 )
 JOINT = (
-    '<joint name="to_{1}" type="continuous"><parent link="{0}"/><child link="{1}"/><origin xyz="{2} 0 0"/>'
-    '<axis xyz="0 0 1"/></joint>'
+    '<joint name="to_{1}" type="continuous"><parent link="{0}"/><child'
+    ' link="{1}"/><origin xyz="{2} 0 0"/><axis xyz="0 0 1"/></joint>'
 )
 PLACES = ("ground", "a", 0), ("a", "b", 1), ("ground", "c", 1)
 URDF = "".join(LINK.format(name) for name in ("ground", "a", "b", "c")) + "".join(
@@ -69,7 +69,8 @@ for step in (1e-4, 1e-5):
     default, none = torque(step), torque(step, solverResidualThreshold=0.0)
     apart[step] = abs(default - none)
     print(
-        f"step {step:g} s: torque {default:.9f} N m by default, {none:.9f} with no threshold"
+        f"step {step:g} s: torque {default:.9f} N m by default, {none:.9f} with no"
+        " threshold"
     )
 if not (apart[1e-5] > 1e-5 and apart[1e-5] > 100.0 * apart[1e-4]):
     sys.exit("fixed")

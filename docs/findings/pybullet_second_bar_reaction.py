@@ -20,12 +20,15 @@ from pathlib import Path
 import pybullet as bullet
 
 LINK = (
-    '<link name="{0}"><inertial><origin xyz=".5 0 0"/><mass value="1"/>'
-    '<inertia ixx=".1" iyy=".1" izz=".1" ixy="0" ixz="0" iyz="0"/></inertial></link>'
-    '<joint name="to_{0}" type="continuous"><parent link="{1}"/><child link="{0}"/><origin xyz="{2} 0 0"/>'
-    '<axis xyz="0 0 1"/></joint>'
+    '<link name="{0}"><inertial><origin xyz=".5 0 0"/><mass value="1"/><inertia'
+    ' ixx=".1" iyy=".1" izz=".1" ixy="0" ixz="0" iyz="0"/></inertial></link><joint'
+    ' name="to_{0}" type="continuous"><parent link="{1}"/><child link="{0}"/><origin'
+    ' xyz="{2} 0 0"/><axis xyz="0 0 1"/></joint>'
 )
-URDF = f'<robot name="two"><link name="ground"/>{LINK.format("a", "ground", 0)}{LINK.format("b", "a", 1)}</robot>'
+URDF = (
+    '<robot name="two"><link'
+    f' name="ground"/>{LINK.format("a", "ground", 0)}{LINK.format("b", "a", 1)}</robot>'
+)
 STEP = 1e-5
 
 
@@ -68,7 +71,8 @@ for v in ((2.0, -3.0), (2.0, 0.0), (0.0, -3.0)):
     reported, right = reaction((0.3, 0.7), v)
     worst[v] = abs(reported - right)
     print(
-        f"speeds {v}: second joint {reported:.4f} N, mass times acceleration {right:.4f} N"
+        f"speeds {v}: second joint {reported:.4f} N, mass times acceleration"
+        f" {right:.4f} N"
     )
 if not (worst[2.0, -3.0] > 1.0 and max(worst[2.0, 0.0], worst[0.0, -3.0]) < 1e-3):
     sys.exit("fixed")

@@ -15,8 +15,9 @@ import mujoco
 import mujoco_warp as mjw
 
 model = mujoco.MjModel.from_xml_string(
-    '<mujoco><option><flag contact="disable" midphase="disable"/></option><worldbody><body><joint/>'
-    '<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body></worldbody></mujoco>'
+    '<mujoco><option><flag contact="disable"'
+    ' midphase="disable"/></option><worldbody><body><joint/><inertial pos="0 0 0"'
+    ' mass="1" diaginertia="1 1 1"/></body></worldbody></mujoco>'
 )
 try:
     mjw.put_model(model)

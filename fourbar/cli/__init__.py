@@ -54,10 +54,11 @@ class SectionedGroup(click.Group):
 def group(context: click.Context, traceback: bool) -> None:
     """Evaluate closed formulas of the planar four-bar: from a scene file to torque and pin forces.
 
-    The checks against MuJoCo and Pinocchio are fourbar-validation, with the extra "validation".
+    The checks against MuJoCo and Pinocchio are fourbar-validation, with the extra
+    "validation".
 
-    Exit status: 0 all well (also when some positions do not assemble), 2 the input is bad, 3 the
-    environment or the program failed, 130 interrupted.
+    Exit status: 0 all well (also when some positions do not assemble), 2 the input is
+    bad, 3 the environment or the program failed, 130 interrupted.
     """
     del traceback  # looked at where errors are reported
     if context.invoked_subcommand is None:

@@ -32,7 +32,8 @@ def classify(
 ) -> None:
     """Classify a linkage by its lengths: which bars turn, and how far.
 
-    D A B C are ground, input, coupler and output: four bare numbers are ratios; lengths like 30cm work too.
+    D A B C are ground, input, coupler and output: four bare numbers are ratios; lengths
+    like 30cm work too.
     """
     from fourbar.linkage import Bar, FourBar
     from fourbar.show.studies import write_type, write_type_json
@@ -120,7 +121,8 @@ def _add_unit(option: str, text: str, unit: str | None) -> str:
         raise InputError(
             option,
             text,
-            "the unit is missing; write each with its own, like 300mm, or --unit mm once",
+            "the unit is missing; write each with its own, like 300mm, or --unit mm"
+            " once",
         )
     return f"{text} {unit}"
 
@@ -150,7 +152,8 @@ def _choose_form(table: bool, as_json: bool, as_csv: bool, out: Path | None) -> 
         )
     if table and (as_json or as_csv):
         raise click.UsageError(
-            "--table, --every and --all shape the table; --json and --csv hold every position"
+            "--table, --every and --all shape the table; --json and --csv hold every"
+            " position"
         )
     if table:
         return "table"
@@ -166,7 +169,10 @@ def _choose_form(table: bool, as_json: bool, as_csv: bool, out: Path | None) -> 
 @click.option(
     "--columns",
     metavar="NAMES",
-    help="Columns of the table or CSV, like theta_2,time,torque,F12,F12_x,omega_4/omega_2.",
+    help=(
+        "Columns of the table or CSV, like"
+        " theta_2,time,torque,F12,F12_x,omega_4/omega_2."
+    ),
 )
 @click.option(
     "--every",
@@ -220,8 +226,8 @@ def analyze(  # noqa: PLR0913 - one for each option
 ) -> None:
     """Solve a scene: ranges, torque, pin forces, and what the drive must deliver.
 
-    Of one position, the scene's or that of --at, everything is printed. A FILE that ends in .csv
-    or .json asks for that form.
+    Of one position, the scene's or that of --at, everything is printed. A FILE that
+    ends in .csv or .json asks for that form.
     """
     form = _choose_form(table or every is not None, as_json, decimal is not None, out)
     if columns is not None and form == "json":
@@ -333,7 +339,8 @@ def _list_chosen(columns: "list[Column]", units: Conversion) -> dict[str, Array]
 
 def _assembles_nowhere(path: Path, scene: Scene) -> NotAssembledError:
     return NotAssembledError(
-        f"{path}: motion.{scene.motion.commanded}: the linkage assembles at none of the positions requested"
+        f"{path}: motion.{scene.motion.commanded}: the linkage assembles at none of the"
+        " positions requested"
     )
 
 
@@ -423,9 +430,11 @@ def tolerance(
     if out is not None:
         draw_tolerances(spreads, out, units)
     given.print_to(
-        shown.write_json(spreads)
-        if as_json
-        else shown.write_text(spreads, {**DEGREES, **units}),
+        (
+            shown.write_json(spreads)
+            if as_json
+            else shown.write_text(spreads, {**DEGREES, **units})
+        ),
         None,
     )
 

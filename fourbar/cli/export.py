@@ -53,8 +53,11 @@ without_loads_option = click.option(
     default="overview",
     show_default=True,
     metavar="NAME",
-    help="Figure: overview, linkage, coupler, kinematics, points, torque, forces, hodograph, energy, "
-    "transmission, shaking, ratios, centres, freebody, bars, sensitivity or stroke.",
+    help=(
+        "Figure: overview, linkage, coupler, kinematics, points, torque, forces,"
+        " hodograph, energy, transmission, shaking, ratios, centres, freebody, bars,"
+        " sensitivity or stroke."
+    ),
 )
 @click.option(
     "--at",
@@ -175,7 +178,10 @@ def animate(
     type=click.Choice(["flywheel", "motor", "none"]),
     default="flywheel",
     show_default=True,
-    help="What drives it: a flywheel keeps omega_2; a motor takes the couple or force of your controller.",
+    help=(
+        "What drives it: a flywheel keeps omega_2; a motor takes the couple or force of"
+        " your controller."
+    ),
 )
 @plane_options
 @given.text_option(".xml", ".mjcf", required=True)

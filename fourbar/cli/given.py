@@ -60,7 +60,10 @@ own_units_option = click.option(
     "--units",
     callback=_read_units,
     metavar="UNITS",
-    help='Units: SI, imperial or a list like "mm N.mm deg" (default: those of the file; of CSV and JSON SI).',
+    help=(
+        'Units: SI, imperial or a list like "mm N.mm deg" (default: those of the file;'
+        " of CSV and JSON SI)."
+    ),
 )
 
 
@@ -112,8 +115,8 @@ def ends_in(out: Path | None, suffix: str) -> bool:
 def open_scene(path: Path) -> Iterator[Scene]:
     """Read the scene of a file; InputError where it cannot be printed, or not to the file of -o.
 
-    The output is looked at before anything is solved, which may take minutes. Mistakes that show only then name the
-    file too.
+    The output is looked at before anything is solved, which may take minutes. Mistakes
+    that show only then name the file too.
     """
     from fourbar.files import loads, read_text
     from fourbar.scene.motion import require_steps

@@ -50,8 +50,9 @@ LONGEST_TEXT = 10_000
 def list_offers() -> dict[str, Any]:
     """List what the declarations of a scene's numbers and effects let a page offer.
 
-    `fields`: empty fields with an example; `commands`: what can be commanded, with its fields; `parts`: what a button
-    adds; `words`: what an entry is one of; `bars`: their names; `pairs`: the names of what pairs consist of.
+    `fields`: empty fields with an example; `commands`: what can be commanded, with its
+    fields; `parts`: what a button adds; `words`: what an entry is one of; `bars`: their
+    names; `pairs`: the names of what pairs consist of.
     """
     offers = tomllib.loads(
         files("fourbar.edit").joinpath("offers.toml").read_text(encoding="utf-8")
@@ -115,8 +116,9 @@ def _offer_commands() -> dict[str, Any]:
     return {
         names[0]: {
             "label": label,
-            "fields": {name: MOVING[Motion.numbers[name].unit] for name in names}
-            | words,
+            "fields": (
+                {name: MOVING[Motion.numbers[name].unit] for name in names} | words
+            ),
         }
         for names, (label, words) in commands.items()
     }
@@ -166,9 +168,11 @@ class SceneDocument:
             )
             self.put(
                 path,
-                text
-                if isinstance(example, str) or example is None
-                else _read_number(text),
+                (
+                    text
+                    if isinstance(example, str) or example is None
+                    else _read_number(text)
+                ),
             )
 
     def put(self, path: Path, value: Any) -> None:

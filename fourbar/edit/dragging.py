@@ -1,7 +1,8 @@
 """Dragging in the drawing: from a place in the plane to the lengths, angles and forces of the file.
 
-A pin changes the lengths that meet in it, a point its distance and angle, an arrow its force; each number keeps the
-unit that it has in the file and gets no more digits than a pixel is worth.
+A pin changes the lengths that meet in it, a point its distance and angle, an arrow its
+force; each number keeps the unit that it has in the file and gets no more digits than a
+pixel is worth.
 """
 
 import cmath
@@ -145,7 +146,8 @@ def drag(
 ) -> None:
     """Change the numbers of the file for a drag that began in `scene`, whose entries are `plain`.
 
-    Raises InputError where nothing of that name can be dragged, or the linkage does not assemble there.
+    Raises InputError where nothing of that name can be dragged, or the linkage does not
+    assemble there.
     """
     position = Command(
         np.array([dragged.theta_2]),
@@ -245,7 +247,8 @@ def _drag_drawn_pin(
         raise InputError(
             "drag",
             dragged.what,
-            f"the pins are those of the drawing: go to theta_2 = {math.degrees(drawn):.6g} deg",
+            "the pins are those of the drawing: go to theta_2 ="
+            f" {math.degrees(drawn):.6g} deg",
         )
     x0, y0 = drawing.O2
     for axis, x in enumerate((dragged.to.real + x0, dragged.to.imag + y0)):

@@ -1,8 +1,8 @@
 """What the workbench makes of a scene: the reply to a page, exports, and the harness's report.
 
-The frame of a reply: four bytes with the length of its JSON (little-endian), the JSON padded to a multiple of eight
-bytes, then columns of doubles one after the other, as the JSON lists them: writing these as text takes longer than
-solving.
+The frame of a reply: four bytes with the length of its JSON (little-endian), the JSON
+padded to a multiple of eight bytes, then columns of doubles one after the other, as the
+JSON lists them: writing these as text takes longer than solving.
 """
 
 import asyncio
@@ -151,7 +151,8 @@ def find_harness() -> list[str]:
     if engines and (CHECKOUT / "validation" / "__main__.py").is_file():
         return [sys.executable, "-m", "validation"]
     raise DependencyError(
-        f"the harness with MuJoCo and Pinocchio is not installed: {say_install('validation')}"
+        "the harness with MuJoCo and Pinocchio is not installed:"
+        f" {say_install('validation')}"
     )
 
 

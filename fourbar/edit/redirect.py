@@ -1,8 +1,9 @@
 """A private page next to the scene file: it leads a browser to the workbench, and a second `fourbar edit` to the first.
 
-The address of the workbench holds its token. A browser gets the name of this page instead, for the arguments of a
-program are seen by every user of the machine. The page is locked while its server runs: two servers on one file would
-share its state file and lose work.
+The address of the workbench holds its token. A browser gets the name of this page
+instead, for the arguments of a program are seen by every user of the machine. The page
+is locked while its server runs: two servers on one file would share its state file and
+lose work.
 """
 
 import os
@@ -46,7 +47,10 @@ class Redirect:
                 )
             except OSError as error:
                 if os.path.lexists(self.path):
-                    reason = f"may be open in another workbench: {self.path} cannot be read ({error.strerror})"
+                    reason = (
+                        f"may be open in another workbench: {self.path} cannot be read"
+                        f" ({error.strerror})"
+                    )
                     raise InputError("scene file", str(self.scene), reason) from None
                 handle, name = tempfile.mkstemp(
                     suffix=ENDING

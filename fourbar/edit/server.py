@@ -103,9 +103,11 @@ class Workbench:
         if self.ended.is_set():  # a page may go on sending while the server ends
             return
         if asked.get("do") in ("check", "stop"):
-            self.check.start(self.session.now.text) if asked[
-                "do"
-            ] == "check" else self.check.stop()
+            (
+                self.check.start(self.session.now.text)
+                if asked["do"] == "check"
+                else self.check.stop()
+            )
             self.tell({"for": asked.get("id")}, to=line)
             return
         last = self.waiting[-1] if self.waiting else None
@@ -445,8 +447,9 @@ class Nothing(RequestHandler):
 def edit(path: Path, exports: Path, port: int = 0, *, browse: bool = True) -> None:
     """Open a scene in the workbench, and serve it until all pages have gone.
 
-    A file that does not exist is begun; exports and reports go to the folder `exports`; port 0: any that is free. Where
-    another process serves the file, its address is printed and its page opened.
+    A file that does not exist is begun; exports and reports go to the folder `exports`;
+    port 0: any that is free. Where another process serves the file, its address is
+    printed and its page opened.
     """
     redirect = Redirect(Path(os.path.realpath(path)))
     if not redirect.claim():

@@ -121,7 +121,10 @@ class Session:
             RecursionError,
             FourBarError,
         ) as error:
-            allowed = f"cannot be read as a state of the workbench ({error}): remove it to begin from the scene file"
+            allowed = (
+                f"cannot be read as a state of the workbench ({error}): remove it to"
+                " begin from the scene file"
+            )
             raise InputError("state file", str(self.state_file), allowed) from None
 
     def keep(self) -> None:
@@ -192,7 +195,8 @@ class Session:
         require_steps(scene.motion, MOST_POSITIONS, "in the workbench", str(self.path))
         return SceneState(text, scene, tomllib.loads(text))
 
-    # ---- what a page asks for ----------------------------------------------------------------
+    # ---- what a page asks for
+    # ----------------------------------------------------------------
 
     def answer(self) -> dict[str, Any]:
         """Describe the present state, without error bars and summary."""
@@ -364,7 +368,10 @@ def _move(session: Session, by: int) -> None:
 
 
 def _keep(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
-    name = f"state {max((int(name.split()[1]) for name in session.kept if name != 'start'), default=0) + 1}"
+    name = (
+        "state"
+        f" {max((int(name.split()[1]) for name in session.kept if name != 'start'), default=0) + 1}"
+    )
     session.kept[name] = session.now.text
     if len(session.kept) > MOST_KEPT:
         del session.kept[next(name for name in session.kept if name != "start")]
@@ -539,7 +546,9 @@ def _save(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
     """Write the file; where it is another one than was read, only on demand."""
     if session._read_disk() != session.disk and not asked.get("over"):
         return {
-            "ask": f"{session.path.name} was changed on the disk meanwhile. Overwrite it?"
+            "ask": (
+                f"{session.path.name} was changed on the disk meanwhile. Overwrite it?"
+            )
         }
     data = session.now.text.encode()
     write_bytes(session.path, data)
@@ -569,7 +578,10 @@ ACTIONS: dict[str, Callable[[Session, dict[str, Any]], dict[str, Any] | None]] =
     "draw": _draw,
     "save": _save,
     "export": lambda session, asked: {
-        "note": f"wrote {session.exports.write(session.now.scene, str(asked['format']), session.units)}"
+        "note": (
+            "wrote"
+            f" {session.exports.write(session.now.scene, str(asked['format']), session.units)}"
+        )
     },
     "bodies": lambda session, asked: {
         "bodies": session.exports.free_bodies(

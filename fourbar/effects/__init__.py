@@ -1,8 +1,8 @@
 """The effects a scene can call for, one per file; what a scene does not name does not exist.
 
-An effect is a frozen subclass of `Effect` and holds physics alone; docs/extending.md shows one
-being added. Each file is imported when its effect is first named. A file that is not
-listed here is found in the folder.
+An effect is a frozen subclass of `Effect` and holds physics alone; docs/extending.md
+shows one being added. Each file is imported when its effect is first named. A file that
+is not listed here is found in the folder.
 """
 
 from functools import cache

@@ -60,9 +60,9 @@ class Actions:
 
     Parameters
     ----------
-    state : positions and motion.
-    bodies : of bars 2, 3, 4.
-    side : the sense in which pins at rest are about to turn: +1 as theta_2 grows, -1 as it falls, 0 neither; between
+    state : positions and motion. bodies : of bars 2, 3, 4. side : the sense in which
+    pins at rest are about to turn: +1 as theta_2 grows, -1 as it falls, 0 neither;
+    between
         them the part of its torque that dry friction holds them with.
     """
 
@@ -94,8 +94,8 @@ class Actions:
 
         Parameters
         ----------
-        point : of the bar's frame at its first pin, complex, m.
-        beyond : vector from there to where the force acts, complex, m, world axes; left out: it acts there.
+        point : of the bar's frame at its first pin, complex, m. beyond : vector from
+        there to where the force acts, complex, m, world axes; left out: it acts there.
         """
         if bar != 1:
             self.forces[bar] = self.forces[bar] + force if bar in self.forces else force
@@ -128,8 +128,9 @@ class Actions:
     def pull(self, start: Any, end: Any, force: Number) -> None:
         """Add a force (complex, N, world axes) at a point of a bar, and its opposite at one of another bar.
 
-        It acts along the line of the two points. Between bars that meet at a pin it goes through the pin and leaves a
-        couple, by the arm of the point that is nearer to the pin; between moving bars it is in no sum of another bar.
+        It acts along the line of the two points. Between bars that meet at a pin it
+        goes through the pin and leaves a couple, by the arm of the point that is nearer
+        to the pin; between moving bars it is in no sum of another bar.
         """
         pin = find_common_pin(start.bar, end.bar)
         if pin is None:
@@ -220,8 +221,8 @@ class Actions:
     def sense(self, pin: str) -> Number:
         """Return the sign of omega_j - omega_i at a pin; at rest the one that a motion beginning to `side` would have.
 
-        A linkage at rest begins to move as theta_2 grows or falls; a pin that is at rest in a linkage that
-        moves turns in either sense.
+        A linkage at rest begins to move as theta_2 grows or falls; a pin that is at
+        rest in a linkage that moves turns in either sense.
         """
         slip, turning = self.state.slip(pin), self.turning(pin)
         if not is_any(self.side != 0):
@@ -280,8 +281,9 @@ class SolvedFriction(NamedTuple):
 class Effect:
     """One effect in one file: what it does to the bars, and where it has no value.
 
-    A subclass is a frozen dataclass. What it leaves at the default it does not have: an engine without a model of
-    the effect refuses the scene, and without a size nothing is compared.
+    A subclass is a frozen dataclass. What it leaves at the default it does not have: an
+    engine without a model of the effect refuses the scene, and without a size nothing
+    is compared.
     """
 
     __slots__ = ()
@@ -329,7 +331,8 @@ class Effect:
     def act_on_engine(self, bars: Any) -> None:
         """Apply it to an engine's bars, from the engine's own motion: a second derivation, with nothing of `act`.
 
-        `bars`: of `engines.loaded.Loaded`, with `push`, `twist`, `angle`, `velocity`, `alpha`, `rotate`, `point`.
+        `bars`: of `engines.loaded.Loaded`, with `push`, `twist`, `angle`, `velocity`,
+        `alpha`, `rotate`, `point`.
         """
         raise NotImplementedError
 
@@ -371,8 +374,8 @@ class Effect:
     ) -> SolvedFriction:
         """Solve for what depends on the pin forces, where there are `loaded_pins`, and add it to the actions.
 
-        `pins`: pin forces under the actions, without it. `eliminate`: computes the pin forces under some actions, and
-        under inertia if `with_inertia`.
+        `pins`: pin forces under the actions, without it. `eliminate`: computes the pin
+        forces under some actions, and under inertia if `with_inertia`.
         """
         raise NotImplementedError
 

@@ -1,12 +1,13 @@
 """Base class of the drives that exert a force instead of a couple.
 
-Per newton of the drive the bars get unit vectors at its points. The power of that over the speed of the independent
-angle q is ds/dq, and virtual work gives the force,
+Per newton of the drive the bars get unit vectors at its points. The power of that over
+the speed of the independent angle q is ds/dq, and virtual work gives the force,
     F ds/dq = J q'' + J'/2 q'^2 - Q,
 as it gives the torque on a bar k, where h_k stands for ds/dq. There is no force where
     P = (ds/dtheta_2) sin(theta_4 - theta_3) = 0,
-which is of the same form, with (theta_2', theta_3', theta_4') = (sin(theta_4 - theta_3), (a/b) sin(theta_2 - theta_4),
-(a/c) sin(theta_2 - theta_3)) for the coefficients h_k, and so is finite where these are not.
+which is of the same form, with (theta_2', theta_3', theta_4') = (sin(theta_4 -
+theta_3), (a/b) sin(theta_2 - theta_4), (a/c) sin(theta_2 - theta_3)) for the
+coefficients h_k, and so is finite where these are not.
 """
 
 from abc import ABC, abstractmethod
@@ -73,9 +74,11 @@ class ForceDrive(ABC):
     def leverage(self, state: State, sines: dict[int, Number]) -> tuple[Number, Number]:
         """Compute P and the most that it could be: L, the sum of what each end could move, m.
 
-        That is r on bar 2, a + r a/b on bar 3, r a/c on bar 4, r its distance from the bar's first pin.
+        That is r on bar 2, a + r a/b on bar 3, r a/c on bar 4, r its distance from the
+        bar's first pin.
 
-        `sines`: of theta_4 - theta_3, theta_4 - theta_2, theta_3 - theta_2, as of a drive on bar 2, 3, 4.
+        `sines`: of theta_4 - theta_3, theta_4 - theta_2, theta_3 - theta_2, as of a
+        drive on bar 2, 3, 4.
         """
         _, a, b, c, _, _ = state.lengths
         h2, h3, h4 = sines[2], (-a / b) * sines[3], (-a / c) * sines[4]

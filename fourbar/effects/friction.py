@@ -13,8 +13,9 @@ from fourbar.linkage import AT_LEAST_ZERO, Declared, FourBar
 class Friction(PinRows):
     """Friction torques per pin, N m, as pairs (pin, value).
 
-    At a pin that does not turn the couple may have any value up to the torque; 0, the middle, is
-    taken, and `torque_low`, `torque_high` of the solution are what the ends give.
+    At a pin that does not turn the couple may have any value up to the torque; 0, the
+    middle, is taken, and `torque_low`, `torque_high` of the solution are what the ends
+    give.
     """
 
     torques: tuple[tuple[str, float], ...]

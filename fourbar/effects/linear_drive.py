@@ -1,7 +1,7 @@
 """A drive along the line between two points of two bars: a cylinder, a spindle, a linear actuator.
 
-Per newton that it pushes its ends apart the bars get the unit vector of the line at one end, its opposite at the
-other; s is the stroke, the distance of the ends.
+Per newton that it pushes its ends apart the bars get the unit vector of the line at one
+end, its opposite at the other; s is the stroke, the distance of the ends.
 """
 
 from collections.abc import Callable
@@ -54,7 +54,8 @@ class LinearDrive(ForceDrive):
     def apart(self) -> tuple[int, ...]:
         """Bars of which one may be left out so that the moments of the other two give the force between them.
 
-        From the ground to bar 2 or 4 it is in the moment of that bar alone, as a couple is; else it is in any pair's.
+        From the ground to bar 2 or 4 it is in the moment of that bar alone, as a couple
+        is; else it is in any pair's.
         """
         bars = {self.start.bar, self.end.bar}
         return (*bars - {1},) if bars in ({1, 2}, {1, 4}) else MOVING_BARS
@@ -62,7 +63,10 @@ class LinearDrive(ForceDrive):
     def require_motion(self, linkage: FourBar) -> None:
         """Raise InputError where no motion changes the distance of the ends, as where one bar holds both."""
         if common := _list_bars(linkage, self.start) & _list_bars(linkage, self.end):
-            allowed = f"keeps its distance from `from` at every position: bar {min(common)} holds both"
+            allowed = (
+                f"keeps its distance from `from` at every position: bar {min(common)}"
+                " holds both"
+            )
             raise InputError(
                 "drive.to", f"bar {self.end.bar} at {self.end.distance:g} m", allowed
             )
@@ -80,7 +84,8 @@ class LinearDrive(ForceDrive):
     def status(self, state: State, sines: dict[int, Number]) -> Number:
         """Return NO_DIRECTION where the ends coincide, NO_LEVER where P lies within its rounding; None: nowhere.
 
-        Places are rounded by the lengths over which they are reached, the line's direction by that over the stroke.
+        Places are rounded by the lengths over which they are reached, the line's
+        direction by that over the stroke.
         """
         stroke, (lever, most) = self.line(state)[0], self.leverage(state, sines)
         away = (

@@ -86,8 +86,8 @@ class Table:
     def at(self, theta_2: Any) -> Any:
         """Interpolate the factor; InputError for a position that the table does not cover.
 
-        What the angle is beyond the table's last point before it is theta_2 less the point and whole turns, of which
-        nothing is rounded but the result.
+        What the angle is beyond the table's last point before it is theta_2 less the
+        point and whole turns, of which nothing is rounded but the result.
         """
         first = self.theta_2[0]
         place = first + np.remainder(shorten(angle(polar(1.0, theta_2))) - first, TURN)
@@ -118,7 +118,10 @@ class Table:
         round_ = beyond & (first + TURN - place < 1e-12 * TURN)
         if not (round_ == beyond).all():
             ends, bad = np.degrees((first, last)), math.degrees(float(np.max(place)))
-            allowed = f"covers {ends[0]:.6g} to {ends[1]:.6g} deg; the position at {bad:.6g} deg lies outside"
+            allowed = (
+                f"covers {ends[0]:.6g} to {ends[1]:.6g} deg; the position at {bad:.6g}"
+                " deg lies outside"
+            )
             raise InputError("loads.table.theta_2", None, allowed)
         return np.where(round_, first, place)
 

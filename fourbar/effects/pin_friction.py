@@ -1,11 +1,13 @@
 """Coulomb friction in the pins: a couple mu r |F| against the rotation, with F the pin force it helps to make.
 
-x_p = k_p |F_p + sum over q of C_pq x_q|, x >= 0: sliding friction couples that make the pin forces they depend on.
+x_p = k_p |F_p + sum over q of C_pq x_q|, x >= 0: sliding friction couples that make the
+pin forces they depend on.
 
-With K_pq = k_p |C_pq| the right-hand side is a contraction in a weighted maximum norm where the
-spectral radius of K is below 1 (Perron): exactly one solution. For one pin the squared equation
-is a quadratic, and decides at any K. For several pins beyond that radius solutions are searched
-for from many starts: what is not found there is taken not to exist.
+With K_pq = k_p |C_pq| the right-hand side is a contraction in a weighted maximum norm
+where the spectral radius of K is below 1 (Perron): exactly one solution. For one pin
+the squared equation is a quadratic, and decides at any K. For several pins beyond that
+radius solutions are searched for from many starts: what is not found there is taken not
+to exist.
 """
 
 import math
@@ -43,9 +45,10 @@ SEARCHED = 256
 class PinFriction(PinRows):
     """Pins as (pin, coefficient of friction mu, pin radius r in m): couple mu r |F| where the pin turns.
 
-    At a pin that does not turn the couple may have any value up to that; 0, the middle, is taken, and
-    `torque_low`, `torque_high` of the solution are the torques at which the motion would begin.
-    Where no couples fulfil the equations the status is "jammed", where several do it is "several".
+    At a pin that does not turn the couple may have any value up to that; 0, the middle,
+    is taken, and `torque_low`, `torque_high` of the solution are the torques at which
+    the motion would begin. Where no couples fulfil the equations the status is
+    "jammed", where several do it is "several".
     """
 
     pins: tuple[tuple[str, float, float], ...]
@@ -148,8 +151,9 @@ class PinFriction(PinRows):
     ) -> dict[str, Any]:
         """Take Newton's steps from couples in doubles, in whatever numbers the forces are.
 
-        (1 - J) dx = mu r |F + C x| - x, J the slope of the right-hand side by x: of numbers that carry their
-        derivatives the same steps are the theorem of the implicit function.
+        (1 - J) dx = mu r |F + C x| - x, J the slope of the right-hand side by x: of
+        numbers that carry their derivatives the same steps are the theorem of the
+        implicit function.
         """
         names, arms = list(couples), {pin: mu * r for pin, mu, r in self.pins}
         for _ in range(2):

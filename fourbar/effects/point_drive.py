@@ -1,7 +1,7 @@
 """A drive that pushes a point of a bar in a direction: a hand on a lid, the handle of pliers.
 
-Per newton the bar gets the unit vector of the direction at the point; ds/dq is the component in that direction of the
-point's derivative by the independent angle.
+Per newton the bar gets the unit vector of the direction at the point; ds/dq is the
+component in that direction of the point's derivative by the independent angle.
 """
 
 from collections.abc import Callable
@@ -28,9 +28,9 @@ class PointDrive(ForceDrive):
 
     Parameters
     ----------
-    place : where the force acts, which turns with its bar.
-    direction : angle of the force, rad.
-    frame : "world": the direction is from +x; "bar": from the bar's line, and turns with it.
+    place : where the force acts, which turns with its bar. direction : angle of the
+    force, rad. frame : "world": the direction is from +x; "bar": from the bar's line,
+    and turns with it.
     """
 
     place: Place
@@ -57,7 +57,8 @@ class PointDrive(ForceDrive):
     def apart(self) -> tuple[int, ...]:
         """Bars of which one may be left out so that the moments of the other two give the force between them.
 
-        The force on bar 2 or 4 is in the moment of that bar alone, as a couple is; on bar 3 it is in any pair's.
+        The force on bar 2 or 4 is in the moment of that bar alone, as a couple is; on
+        bar 3 it is in any pair's.
         """
         return MOVING_BARS if self.place.bar == 3 else (self.place.bar,)
 

@@ -43,8 +43,9 @@ GAS = {
 class Spring:
     """A spring that pulls its two points together with preload + stiffness (distance - length), N.
 
-    Where that is negative it pushes them apart: a compression spring is shorter than `length`, a gas spring has a
-    negative preload. With stiffness 0 the force is constant.
+    Where that is negative it pushes them apart: a compression spring is shorter than
+    `length`, a gas spring has a negative preload. With stiffness 0 the force is
+    constant.
 
     Parameters
     ----------
@@ -137,8 +138,9 @@ class Spring:
 class Springs(Effect):
     """Linear springs.
 
-    Where the two points of a spring coincide its pull has no direction: status "no_direction". One that pulls
-    with stiffness times distance alone (preload = stiffness length) pulls with 0 there.
+    Where the two points of a spring coincide its pull has no direction: status
+    "no_direction". One that pulls with stiffness times distance alone (preload =
+    stiffness length) pulls with 0 there.
     """
 
     springs: tuple[Spring, ...]

@@ -26,9 +26,10 @@ class Torsion(PinRows):
     """Springs as (pin, stiffness in N m/rad, rest angle in rad, preload in N m).
 
     With beta = theta_j - theta_i (theta_1 for the ground) the couple on bar j is
-    -(preload + stiffness (beta - rest)). Where the motion begins beta - rest is within half a turn, whatever
-    whole turns the scene's angles count; where the pin then turns beyond half a turn from rest, followed
-    continuously along the commanded angle, the status is "wound" and there are no forces.
+    -(preload + stiffness (beta - rest)). Where the motion begins beta - rest is within
+    half a turn, whatever whole turns the scene's angles count; where the pin then turns
+    beyond half a turn from rest, followed continuously along the commanded angle, the
+    status is "wound" and there are no forces.
     """
 
     springs: tuple[tuple[str, float, float, float], ...]
@@ -38,7 +39,8 @@ class Torsion(PinRows):
     key: ClassVar[str] = "torsion"
     in_balls: ClassVar[bool] = True
     example: ClassVar[str] = (
-        'torsion = { B = { stiffness = "2 N m/rad", rest = "30 deg", preload = "0.1 N m" } }'
+        'torsion = { B = { stiffness = "2 N m/rad", rest = "30 deg", preload = "0.1 N'
+        ' m" } }'
     )
     numbers: ClassVar[dict[str, Declared]] = {
         "stiffness": Declared("N m/rad", POSITIVE),
@@ -130,7 +132,8 @@ class Torsion(PinRows):
             q3 -= at_B
         elif at_B:
             raise LimitError(
-                "the springs at A, B and O4 count turns that MuJoCo's joints cannot have at once"
+                "the springs at A, B and O4 count turns that MuJoCo's joints cannot"
+                " have at once"
             )
         return q2, q3, q4
 
@@ -143,8 +146,9 @@ class Torsion(PinRows):
 def _remove_jumps(state: State, branch: Number) -> dict[int, Number]:
     """Compute theta_1 .. theta_4 without jumps at whole turns, on one branch of the loop read from the commanded bar.
 
-    The diagonal from A to O4 swings about the ground's line where a < d, and otherwise about the input's, never by
-    more than a quarter turn; bars 3 and 4 make angles with it that stay between 0 and half a turn.
+    The diagonal from A to O4 swings about the ground's line where a < d, and otherwise
+    about the input's, never by more than a quarter turn; bars 3 and 4 make angles with
+    it that stay between 0 and half a turn.
     """
     bar, theta_1, theta_2 = (
         state.bar,

@@ -32,13 +32,16 @@ if TYPE_CHECKING:
 BLOCK = 8000
 """Positions evaluated at a time, measured: fewer pay for calls, more leave the cache. Of 8192 an array of complex
 numbers is a little more than the C library hands out again without asking the system for fresh pages, and from 10 000
-on OpenBLAS starts threads for the squares by which `is_finite` looks for what is no number."""
+on OpenBLAS starts threads for the squares by which `is_finite` looks for what is no number.
+"""
 UNDECIDED = 32.0 * U
 """A factor of Heron's formula smaller than this times its terms is evaluated in many digits: in doubles it is wrong
-by at most about 12 U times them."""
+by at most about 12 U times them.
+"""
 A_PERTURBATION = 1e-3
 """Part of the sum of the lengths: a member of a study that misses a change point of the nominal linkage by more is a
-linkage of its own."""
+linkage of its own.
+"""
 NO_POSITIONS = np.empty(0, dtype=np.intp)
 NO_MOTION = Coefficients(*[np.nan] * 8)
 """Coefficients of NaN, used where only positions are evaluated."""
@@ -116,8 +119,9 @@ class Case(NamedTuple):
     def beside(self, nominal: Scene) -> "Case":
         """Return the case of members near a nominal linkage, in the assembly nearest to its own at each position.
 
-        Of a nominal linkage with a change point a root changes its sign there. A member that misses this change point
-        by less than a perturbation keeps that sign, so that it lies beside the nominal one on either side.
+        Of a nominal linkage with a change point a root changes its sign there. A member
+        that misses this change point by less than a perturbation keeps that sign, so
+        that it lies beside the nominal one on either side.
         """
         root = prepare_path(
             Loop(*nominal.linkage.lengths, 0.0, 0.0), 0.0, self.path.bar
@@ -294,7 +298,8 @@ class Case(NamedTuple):
     ) -> "_Inertia":
         """Compute d'Alembert's forces and moments, and what they add to the generalized force.
 
-        `sine`: of theta_3 - theta_2 if the moment about pin B is wanted, otherwise None.
+        `sine`: of theta_3 - theta_2 if the moment about pin B is wanted, otherwise
+        None.
         """
         a, position, k, square = (
             self.lengths.a,
@@ -348,9 +353,10 @@ class Case(NamedTuple):
     ) -> tuple[Any, Any, Any]:
         """Compute the least and greatest torque or force of the drive; equal unless dry friction holds a pin at rest.
 
-        The third is where one of them is NaN because friction jams the motion that would begin; None: nowhere.
-        The ends are those at which the linkage would begin to move forwards or backwards, or, where only a
-        pin comes to rest while the linkage moves, those just before and after its reversal.
+        The third is where one of them is NaN because friction jams the motion that
+        would begin; None: nowhere. The ends are those at which the linkage would begin
+        to move forwards or backwards, or, where only a pin comes to rest while the
+        linkage moves, those just before and after its reversal.
         """
         actions = Actions(state, self.bodies)
         pins = {pin for term in self.terms for pin in term.dry_pins}
@@ -406,9 +412,10 @@ class _FreeBodies(NamedTuple):
     ) -> PinForces:
         """Solve for the pin forces under some actions and the drive that balances them.
 
-        A couple on one bar leaves the moments of the other two alone, which give the force between them. A force along
-        a line is found first, by virtual work, and then is one more load; where it acts on two moving bars or on bar 3,
-        of the three pairs of bars that whose directions differ most has the digits.
+        A couple on one bar leaves the moments of the other two alone, which give the
+        force between them. A force along a line is found first, by virtual work, and
+        then is one more load; where it acts on two moving bars or on bar 3, of the
+        three pairs of bars that whose directions differ most has the digits.
         """
         inertia = self.inertia if with_inertia else _Inertia()
         if self.drive is not None:

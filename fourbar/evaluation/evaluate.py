@@ -1,8 +1,9 @@
 """Positions of a case evaluated stage by stage: kinematics, forces, error bars, and what has no value.
 
-The error bar of a force is its distance to the value that the same formulas give in longer numbers, or what these
-resolve there, if that is more. The stated numbers of bars, loads, effects and command are taken as exact; everything
-else is computed again, in numbers that round at most a thousandth as much as doubles.
+The error bar of a force is its distance to the value that the same formulas give in
+longer numbers, or what these resolve there, if that is more. The stated numbers of
+bars, loads, effects and command are taken as exact; everything else is computed again,
+in numbers that round at most a thousandth as much as doubles.
 """
 
 import cmath
@@ -241,7 +242,8 @@ def compute_error_bars(
     Parameters
     ----------
     state, dynamics : evaluation in doubles, to which the error bars belong.
-    refined_rows : indices of the positions whose half angle is evaluated in many digits.
+    refined_rows : indices of the positions whose half angle is evaluated in many
+    digits.
     """
     longer, branch = case.lengthened(), find_sign(command.branch)
     lost, remainder = command.lost, command.remainder
@@ -299,11 +301,12 @@ def _compute_unresolved(
 ) -> tuple[Any, Any]:
     """Compute what long doubles do not resolve of the pin forces and of the drive, N and N m or N.
 
-    Near a limit, or beside a spring's free length, their own rounding shows in a double's digits. Where a double is
-    as far off by coincidence, its distance to the long double is no bound. What rounding does follows from the slope:
+    Near a limit, or beside a spring's free length, their own rounding shows in a
+    double's digits. Where a double is as far off by coincidence, its distance to the
+    long double is no bound. What rounding does follows from the slope:
         dF = (dF/dq) max(|q|, 1) LONG_EPS ROUNDINGS,
-    dF/dq by a step that is short against the distance to the limit, which is some s^2 (s the sine of the command).
-    NaN where no double lies a step away.
+    dF/dq by a step that is short against the distance to the limit, which is some s^2
+    (s the sine of the command). NaN where no double lies a step away.
     """
     step = STEP * np.square(np.abs(state.sine))
     moved = state.q + step
@@ -336,7 +339,8 @@ def _compute_unresolved(
 def compute_error_bar(gap: Any, size: Any) -> Any:
     """Compute the error bar from the distance to the longer number and the size of the value.
 
-    The error bar is the size of the value, so that no digit is left, where the longer number is not finite as a double.
+    The error bar is the size of the value, so that no digit is left, where the longer
+    number is not finite as a double.
     """
     width = np.maximum(gap, U * size)  # the value itself was rounded by as much
     return select(np.isfinite(width), width, size)
@@ -367,8 +371,8 @@ def withhold(
 ) -> None:
     """Set the status of each position at which a promised quantity is not finite, and NaN from that stage on.
 
-    `code`: status of each position, changed in place. `in_line`: True where the two bars that are not driven are in
-    line, so that no finite forces hold them in balance.
+    `code`: status of each position, changed in place. `in_line`: True where the two
+    bars that are not driven are in line, so that no finite forces hold them in balance.
     """
     gone = np.zeros(code.shape, dtype=bool)
     for stage in STAGES:

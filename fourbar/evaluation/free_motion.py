@@ -1,10 +1,11 @@
 """Free motion: the linkage released and moved by loads and effects alone, integrated by SciPy.
 
-The reduced equation J q'' + J'/2 q'^2 = Q is integrated with q = theta_2 or q = theta_4, whichever
-is further from its limit position: bars 3, 4 collinear stop theta_2, bars 2, 3 collinear stop
-theta_4, and both at once happen at a change point alone, where an assembly is regular. The
-loop therefore closes to round-off at every instant, and nothing drifts off it. The motion runs on
-through limit positions, and through change points on its assembly, where another motion is possible.
+The reduced equation J q'' + J'/2 q'^2 = Q is integrated with q = theta_2 or q =
+theta_4, whichever is further from its limit position: bars 3, 4 collinear stop theta_2,
+bars 2, 3 collinear stop theta_4, and both at once happen at a change point alone, where
+an assembly is regular. The loop therefore closes to round-off at every instant, and
+nothing drifts off it. The motion runs on through limit positions, and through change
+points on its assembly, where another motion is possible.
 """
 
 import cmath
@@ -44,7 +45,8 @@ CHANGE_OVER = 0.5
 """The angle is changed when its sine falls below this times the sine of the other one."""
 STEPS = 200_000
 """A motion that needs more steps than this is given up, after a few minutes: some hundred turns of the fastest bar
-take a thousand, so it is thousands of turns long, or something makes it infinitely fast."""
+take a thousand, so it is thousands of turns long, or something makes it infinitely fast.
+"""
 VANISHING = 2.0**-300
 """A speed at which a couple of viscous damping is nothing and dry friction has its sense."""
 
@@ -87,8 +89,9 @@ def release(scene: Scene) -> Released:
 
     Raises
     ------
-    InputError : the scene says nothing of a release, or names more than one angle; and as of `integrate`.
-    LimitError : it winds a spring beyond half a turn from its rest; and as of `integrate`.
+    InputError : the scene says nothing of a release, or names more than one angle; and
+    as of `integrate`. LimitError : it winds a spring beyond half a turn from its rest;
+    and as of `integrate`.
 
     >>> import fourbar
     >>> free = fourbar.Free(duration=0.2, steps=2)
@@ -129,8 +132,9 @@ def release(scene: Scene) -> Released:
                 codes = term.status(state, motion.branch) if term.counts_turns else None
                 if codes is not None and codes.any():
                     raise LimitError(
-                        f"effects.{term.key}: at {released.time[np.argmax(codes)]:.6g} s the free motion has turned a "
-                        "pin by more than half a turn from the rest of its spring, which is not modelled"
+                        f"effects.{term.key}: at {released.time[np.argmax(codes)]:.6g}"
+                        " s the free motion has turned a pin by more than half a turn"
+                        " from the rest of its spring, which is not modelled"
                     )
     return released
 
@@ -171,8 +175,8 @@ class _Reading:
             return self._by(q, half)
 
     def _by(self, q: float, half: HalfAngle) -> tuple[Position, Coefficients]:
-        # a motion may start at a limit of the bar that it is read from: coefficients are
-        # then infinite, and another bar is taken
+        # a motion may start at a limit of the bar that it is read from: coefficients
+        # are then infinite, and another bar is taken
         position, k, _ = self.path.close(q, half, self.branch, margin=-1.0)
         return (
             (_make_plain(position), _make_plain(k))
@@ -198,21 +202,21 @@ def integrate(
 ) -> Released:
     """Integrate the motion from theta_2 with omega_2 under the effects, with no driving torque.
 
-    To 1e-9 rad over 5 s wherever the motion itself does not amplify errors by more than 1000.
+    To 1e-9 rad over 5 s wherever the motion itself does not amplify errors by more than
+    1000.
 
     Parameters
     ----------
-    terms : loads and effects.
-    theta, omega, branch : of the bar that is released, at the start; its assembly is +1 or -1.
-    times : (n,) rising from 0, s.
-    bar : 2, or 3 or 4.
+    terms : loads and effects. theta, omega, branch : of the bar that is released, at
+    the start; its assembly is +1 or -1. times : (n,) rising from 0, s. bar : 2, or 3 or
+    4.
 
     Raises
     ------
-    InputError : the linkage does not assemble at theta_2, or the motion takes more than STEPS steps.
-    LimitError : friction that depends on the pin forces acts.
-    FourBarError : nothing that moves has inertia, or the motion cannot be continued.
-    DependencyError : SciPy is not installed.
+    InputError : the linkage does not assemble at theta_2, or the motion takes more than
+    STEPS steps. LimitError : friction that depends on the pin forces acts. FourBarError
+    : nothing that moves has inertia, or the motion cannot be continued. DependencyError
+    : SciPy is not installed.
     """
     terms = tuple(terms)
     if any(term.loaded_pins for term in terms):
@@ -422,10 +426,14 @@ class _Run:
             message = solver.step()
             if solver.status == "failed":
                 raise FourBarError(
-                    f"the free motion cannot be continued beyond {self.t:.9g} s: {message}"
+                    f"the free motion cannot be continued beyond {self.t:.9g} s:"
+                    f" {message}"
                 )
             if self.steps > STEPS:
-                allowed = f"this motion is followed for {STEPS} steps, here to {self.t:.6g} s; make it shorter"
+                allowed = (
+                    f"this motion is followed for {STEPS} steps, here to {self.t:.6g}"
+                    " s; make it shorter"
+                )
                 raise InputError("motion.free.duration", float(self.times[-1]), allowed)
             dense, t, new = _interpolate(solver), solver.t, solver.y
             rested = bool(self.side and self.side * new[1] < 0.0)

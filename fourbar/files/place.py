@@ -12,8 +12,10 @@ PLACES_OF_ENDS = (*STATED_PLACES, "point")
 PLACES_OF_A_LOAD = (*PLACES_OF_ENDS, "arm")
 AT_OF_A_LOAD = {
     "bar": "write from_centre, with the same numbers, or from_pin, or point",
-    "world": "write from_pin or from_centre = [distance, angle from the bar's line], or "
-    "point; an arm from G that keeps its direction is now written arm",
+    "world": (
+        "write from_pin or from_centre = [distance, angle from the bar's line], or "
+        "point; an arm from G that keeps its direction is now written arm"
+    ),
 }
 """What replaces `at` in a load of an old file, by the load's frame."""
 

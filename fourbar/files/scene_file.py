@@ -106,8 +106,9 @@ MOST_POINTS = 1000
 def load(path: str | Path | IO[str] | IO[bytes]) -> Scene:
     """Read the scene of a TOML file, of standard input for `-`, of a pipe, or of an open file.
 
-    Raises InputError, in one line with file, key, value and what is allowed, for a file that is
-    missing, not a file, too large, not text or not TOML, and for every entry that is wrong.
+    Raises InputError, in one line with file, key, value and what is allowed, for a file
+    that is missing, not a file, too large, not text or not TOML, and for every entry
+    that is wrong.
     """
     if isinstance(path, str | Path):
         return loads(read_text(path), str(path))
@@ -182,7 +183,10 @@ def _explain_unreadable(text: str, reason: str, shown: str) -> InputError:
     why = " ".join(reason[: place.start()].split())[:120]
     for bare in UNQUOTED.finditer(lines[line - 1]):
         if bare.start(1) < column <= bare.end(1) + 1:
-            why = f'a number with a unit stands in quotes, like "{bare[1].strip()[:LONGEST_LINE]}"'
+            why = (
+                "a number with a unit stands in quotes, like"
+                f' "{bare[1].strip()[:LONGEST_LINE]}"'
+            )
     return InputError(
         f"line {line}, column {column}", value, f"cannot be read as TOML: {why}", shown
     )
@@ -438,7 +442,8 @@ def _read_places(
     if from_limit and value.keys() & {"limit", "offset"}:
         near = read.table(key, value, ("limit", "offset"))
         offset = read.quantity(f"{key}.offset", near.get("offset"), "rad", default=0.0)
-        # four bars have at most four limit positions of a bar; how many these have is not known here
+        # four bars have at most four limit positions of a bar; how many these have is
+        # not known here
         return FromLimit(read.whole(f"{key}.limit", near.get("limit"), 1, 4), offset)
     sweep = read.table(key, value, ("from", "to", "steps"))
     start, stop = (
@@ -583,7 +588,8 @@ def _read_tolerances(
             raise read.refuse(
                 name,
                 stated,
-                "a commanded value has no tolerance; its speed and acceleration may have one",
+                "a commanded value has no tolerance; its speed and acceleration may"
+                " have one",
             )
         if key not in entries:
             raise read.refuse(

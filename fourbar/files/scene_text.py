@@ -48,7 +48,8 @@ BARS = {BAR_NAMES[number]: number for number in MOVING_BARS}
 def save(scene: Scene, path: str | Path) -> None:
     """Write a scene to a TOML file, whole or not at all.
 
-    Raises InputError as `dump` does, and for a picture that lies outside the file's folder.
+    Raises InputError as `dump` does, and for a picture that lies outside the file's
+    folder.
     """
     expect("scene", scene, Scene)
     expect("path", path, str, Path)
@@ -59,8 +60,9 @@ def save(scene: Scene, path: str | Path) -> None:
 def dump(scene: Scene) -> str:
     """Write the scene as TOML text, in SI and radians; `loads` gives the same numbers back, bit for bit.
 
-    Raises InputError for a scene that a file cannot hold: two effects of one kind, a title that is
-    no valid text, a tolerance of a number that the scene leaves out or that exceeds it.
+    Raises InputError for a scene that a file cannot hold: two effects of one kind, a
+    title that is no valid text, a tolerance of a number that the scene leaves out or
+    that exceeds it.
     """
     expect("scene", scene, Scene)
     top = {
@@ -185,18 +187,20 @@ def _write_motion(motion: Motion) -> dict[str, Any]:
         angles = write_quantity(stated, unit)
     entry = {
         theta: angles,
-        omega: None
-        if motion.speed is None
-        else write_quantity(motion.speed, f"{unit}/s"),
-        alpha: write_quantity(motion.acceleration, f"{unit}/s^2")
-        if law is None
-        else None,
+        omega: (
+            None if motion.speed is None else write_quantity(motion.speed, f"{unit}/s")
+        ),
+        alpha: (
+            write_quantity(motion.acceleration, f"{unit}/s^2") if law is None else None
+        ),
         "law": None if law is None else _write_law(law),
         "branch": BRANCH_NAMES[motion.branch],
         "side": motion.side,
-        "free": None
-        if free is None
-        else {"duration": write_quantity(free.duration, "s"), "steps": free.steps},
+        "free": (
+            None
+            if free is None
+            else {"duration": write_quantity(free.duration, "s"), "steps": free.steps}
+        ),
     }
     return {key: value for key, value in entry.items() if value is not None}
 

@@ -33,8 +33,8 @@ def half_angle(
 
     Parameters
     ----------
-    theta_2 : rad.
-    offset : what theta_2 as a double leaves out of the angle meant (rad, mpmath), where that is known. A position
+    theta_2 : rad. offset : what theta_2 as a double leaves out of the angle meant (rad,
+    mpmath), where that is known. A position
         beyond the limit then does not assemble, however near.
     unit : of the lengths, m.
     member : index into numbers of the linkage that are arrays.
@@ -86,7 +86,8 @@ def decide_half_angles(
 ) -> HalfAngle:
     """Replace the half angles of some positions (an index), each number rounded once to the kind that it has.
 
-    `lost`: what a theta_2 that was computed leaves out as a double, rad; for the others see `half_angle`.
+    `lost`: what a theta_2 that was computed leaves out as a double, rad; for the others
+    see `half_angle`.
     """
     flat, shape = np.ravel(theta_2), np.shape(theta_2)
     left_out = np.broadcast_to(lost, shape).ravel().tolist()
@@ -117,8 +118,8 @@ def limit_remainder(
 ) -> Any:
     """Compute (limit position + offset) - theta_2 in many digits, for the limit position whose double is `limit`.
 
-    Where bars 3, 4 are collinear cos(theta_2 - theta_1) = (a^2 + d^2 - (b +- c)^2)/(2 a d); likewise as the loop is
-    read from another bar, whose angle theta_2 then is.
+    Where bars 3, 4 are collinear cos(theta_2 - theta_1) = (a^2 + d^2 - (b +- c)^2)/(2 a
+    d); likewise as the loop is read from another bar, whose angle theta_2 then is.
     """
     from mpmath import mp, mpf
 

@@ -1,10 +1,12 @@
 """Mobility: limit positions of each moving bar, ranges, change points, swing, time ratio.
 
-Let bar k (length l) close the loop with the ground (d) and the other two moving bars (x, y). With e
-the distance from the bar's free end to the far end of the ground, the loop closes where
+Let bar k (length l) close the loop with the ground (d) and the other two moving bars
+(x, y). With e the distance from the bar's free end to the far end of the ground, the
+loop closes where
 |x - y| <= e <= x + y, while e runs from |d - l| to d + l. Where e = x + y the other two bars are
-stretched, where e = |x - y| they are folded: a limit of bar k. Where an end of e meets an end of the
-allowed range all four bars are collinear: a change point. All sums of lengths are exact, rounded once.
+stretched, where e = |x - y| they are folded: a limit of bar k. Where an end of e meets
+an end of the allowed range all four bars are collinear: a change point. All sums of
+lengths are exact, rounded once.
 """
 
 import math
@@ -73,7 +75,8 @@ class Reach(NamedTuple):
     def triangle(self, stretched: bool) -> tuple[float, float]:
         """Compute the angles of the triangle d, l, e at both ends of the ground, rad, from its Heron factors.
 
-        tan^2(psi/2) = (e + l - d)(e + d - l)/((d + l - e)(d + l + e)), and with d, e for d, l.
+        tan^2(psi/2) = (e + l - d)(e + d - l)/((d + l - e)(d + l + e)), and with d, e
+        for d, l.
         """
         x, y = (1, 1) if stretched else (1, -1) if self.x >= self.y else (-1, 1)
         short_d, short_l = self.sum(-1, 1, x, y), self.sum(1, -1, x, y)
@@ -115,16 +118,19 @@ def _wrap(angle: float) -> float:
 def limit_positions(linkage: FourBar, bar: int = 2) -> tuple[LimitPosition, ...]:
     """Find the positions in which a bar reverses, all mirror solutions, counter-clockwise in theta_2 from theta_1.
 
-    cos psi = (d^2 + l^2 - (x +- y)^2)/(2 d l), psi the angle between the ground and the bar.
+    cos psi = (d^2 + l^2 - (x +- y)^2)/(2 d l), psi the angle between the ground and the
+    bar.
 
-    They are the limits of the input for bar 2 (bars 3, 4 collinear) and of the output for bar 4
-    (bars 2, 3 collinear), and the dead centres of a drive on that bar. A change point is none.
+    They are the limits of the input for bar 2 (bars 3, 4 collinear) and of the output
+    for bar 4 (bars 2, 3 collinear), and the dead centres of a drive on that bar. A
+    change point is none.
 
     Parameters
     ----------
     bar : 2, 3 or 4; InputError otherwise.
 
-    Source: R. L. Norton, Design of Machinery; Linares Mendoza, eqs 3.7-3.15 (one of each mirror pair).
+    Source: R. L. Norton, Design of Machinery; Linares Mendoza, eqs 3.7-3.15 (one of
+    each mirror pair).
     """
     reach = reach_of(linkage, bar)
     theta_1 = linkage.ground_angle
@@ -138,7 +144,8 @@ def limit_positions(linkage: FourBar, bar: int = 2) -> tuple[LimitPosition, ...]
             continue
         psi, eta = reach.triangle(stretched)
         straight = psi in (0.0, math.pi)
-        # the loop as a sum of vectors: bar 4 runs from B back to O4, so its vector is -c u4
+        # the loop as a sum of vectors: bar 4 runs from B back to O4, so its vector is
+        # -c u4
         for side in (1.0,) if straight else (1.0, -1.0):
             vectors = {bar: side * psi, others[0]: -side * eta, others[1]: -side * eta}
             if not stretched:
@@ -161,9 +168,10 @@ def limit_positions(linkage: FourBar, bar: int = 2) -> tuple[LimitPosition, ...]
 def find_intervals(linkage: FourBar, bar: int = 2) -> tuple[tuple[float, float], ...]:
     """Find the ranges [from, to] of a bar's angle in which the linkage assembles, rad; `to` may exceed 2 pi.
 
-    One range where the bar turns fully (a whole turn from the ground's line) or has one pair of
-    limits, two mirror images where it has two pairs; the range that contains the ground's
-    direction (for bar 4: its opposite) or lies first counter-clockwise from it comes first.
+    One range where the bar turns fully (a whole turn from the ground's line) or has one
+    pair of limits, two mirror images where it has two pairs; the range that contains
+    the ground's direction (for bar 4: its opposite) or lies first counter-clockwise
+    from it comes first.
     """
     reach = reach_of(linkage, bar)
     start = linkage.ground_angle + (math.pi if bar == 4 else 0.0)
@@ -194,8 +202,8 @@ def choose_range(
 ) -> tuple[float, float]:
     """Choose the range of a commanded bar's angle that is swept where a scene names none, rad.
 
-    0..2 pi where the bar turns fully; otherwise the first of `find_intervals`, or the one that holds an angle,
-    shrunk by MARGIN at each end.
+    0..2 pi where the bar turns fully; otherwise the first of `find_intervals`, or the
+    one that holds an angle, shrunk by MARGIN at each end.
     """
     if turns_fully(linkage, bar):
         return 0.0, TURN
@@ -227,8 +235,9 @@ def find_limit_angles(linkage: FourBar, bar: int = 2) -> tuple[float, ...]:
 def change_points(linkage: FourBar, bar: int = 2) -> tuple[float, ...]:
     """Find the angles of a bar (theta_2 if none is named) at which all bars are collinear and both branches cross, rad.
 
-    theta_1 where |a - d| = |b - c|, theta_1 + pi where a + d = b + c, within the rounding of the lengths; likewise of
-    the lengths as they are read from another bar, from bar 4 with the ground reversed.
+    theta_1 where |a - d| = |b - c|, theta_1 + pi where a + d = b + c, within the
+    rounding of the lengths; likewise of the lengths as they are read from another bar,
+    from bar 4 with the ground reversed.
     """
     reach, theta_1 = reach_of(linkage, bar), linkage.ground_angle
     folded, stretched = reach.beyond_folded == 0.0, reach.beyond_stretched == 0.0
@@ -246,9 +255,9 @@ def swing(linkage: FourBar, bar: int = 4) -> float:
 def time_ratio(linkage: FourBar) -> float | None:
     """Compute the quick return of a crank-rocker: time of the slower stroke over the faster, at constant omega_2.
 
-    (2 pi - delta)/delta, delta <= pi the input's angle between the two limits of the output
-    (R. L. Norton, Design of Machinery). None where the input does not turn fully or the output has no
-    stroke of its own.
+    (2 pi - delta)/delta, delta <= pi the input's angle between the two limits of the
+    output (R. L. Norton, Design of Machinery). None where the input does not turn fully
+    or the output has no stroke of its own.
     """
     if not turns_fully(linkage) or change_points(linkage):
         return None
@@ -277,11 +286,12 @@ class Circuit(NamedTuple):
 def circuits(linkage: FourBar) -> tuple[Circuit, ...]:
     """List the circuits of a linkage, with the range of theta_2 on each and the branches that belong to it.
 
-    A Grashof linkage has two: the branches, where the input turns fully, else the two ranges of
-    theta_2. Every other linkage has one; at a change point both branches count as reachable.
+    A Grashof linkage has two: the branches, where the input turns fully, else the two
+    ranges of theta_2. Every other linkage has one; at a change point both branches
+    count as reachable.
 
-    Source: T. R. Chase, J. A. Mirth, Circuits and branches of single-degree-of-freedom planar linkages,
-    J. Mechanical Design 115 (1993) 223-230.
+    Source: T. R. Chase, J. A. Mirth, Circuits and branches of single-degree-of-freedom
+    planar linkages, J. Mechanical Design 115 (1993) 223-230.
     """
     ranges = find_intervals(linkage)
     if turns_fully(linkage) and not change_points(linkage):
@@ -327,7 +337,8 @@ NEARLY = 1e-3
 """Part of the sum of the lengths by which a linkage that nearly has a change point misses it, so that it is said."""
 DIGITS_STATED = 1e-4
 """Part of the sum of the lengths up to which the last decimal of a length is a rounding; a coarser one is meant as it
-stands."""
+stands.
+"""
 EQUALITIES = ((-1, -1, 1, 1), (1, -1, -1, 1), (1, -1, 1, -1))
 """Signs of ground, input, coupler and output in the sums that vanish at change points: of E1, and both of E2."""
 
@@ -353,15 +364,16 @@ class LinkageType(NamedTuple):
 def classify(linkage: FourBar, within: float = TOUCHING) -> LinkageType:
     """Classify a linkage by the Grashof condition s + l < p + q and by which bar is shortest or longest.
 
-    s, l are the shortest and longest lengths, p, q the other two. The sums are exact; equality is
-    decided within the rounding of the four lengths. Which of the three sums of two bars and the
-    other two are equal tells the change-point types apart: one equality 9-12, two 13 (opposite
-    bars equal: parallelogram; adjacent bars equal: kite, also deltoid or Galloway), three 14 (rhombus).
+    s, l are the shortest and longest lengths, p, q the other two. The sums are exact;
+    equality is decided within the rounding of the four lengths. Which of the three sums
+    of two bars and the other two are equal tells the change-point types apart: one
+    equality 9-12, two 13 (opposite bars equal: parallelogram; adjacent bars equal:
+    kite, also deltoid or Galloway), three 14 (rhombus).
 
     `within`: part of the sum of the lengths within which sums count as equal.
 
-    Source: C. R. Barker, A complete classification of planar four-bar linkages, Mechanism and
-    Machine Theory 20 (1985).
+    Source: C. R. Barker, A complete classification of planar four-bar linkages,
+    Mechanism and Machine Theory 20 (1985).
     """
     unit = choose_unit(linkage)
     lengths = dict(
@@ -407,7 +419,8 @@ def classify(linkage: FourBar, within: float = TOUCHING) -> LinkageType:
     if opposite + with_input + with_output == 2:
         if not opposite:
             return found(13, "S2X", PARALLELOGRAM)
-        # d + b = a + c and d + c = a + b give d = a; d + b = a + c and d + a = b + c give d = c
+        # d + b = a + c and d + c = a + b give d = a; d + b = a + c and d + a = b + c
+        # give d = c
         pairs = (
             ("ground and input", "coupler and output")
             if with_output
@@ -422,8 +435,9 @@ def classify(linkage: FourBar, within: float = TOUCHING) -> LinkageType:
 def name_assembly(linkage: FourBar, bar: int = 2, branch: int = 1) -> str:
     """Name a linkage in the assembly that a command of a bar and its branch state.
 
-    A parallelogram's other assembly, and both that a command of its coupler can have, are the antiparallelogram. In
-    one assembly of a kite or a rhombus two bars lie on each other and turn together, and one bar stands still.
+    A parallelogram's other assembly, and both that a command of its coupler can have,
+    are the antiparallelogram. In one assembly of a kite or a rhombus two bars lie on
+    each other and turn together, and one bar stands still.
 
     >>> from fourbar import uniform
     >>> name_assembly(uniform(3, 1, 3, 1)), name_assembly(uniform(3, 1, 3, 1), branch=-1)
@@ -463,14 +477,15 @@ def meet_change_points(
 ) -> tuple[float, float, float, float]:
     """Return the lengths of ground, input, coupler and output with the equalities that they miss by rounding.
 
-    The equalities b + c = a + d, d + c = a + b, d + b = a + c of change points hold within the sum of the roundings
-    or not; the lengths nearest to the stated ones that fulfil those which hold are returned, the stated ones if none.
+    The equalities b + c = a + d, d + c = a + b, d + b = a + c of change points hold
+    within the sum of the roundings or not; the lengths nearest to the stated ones that
+    fulfil those which hold are returned, the stated ones if none.
 
     Parameters
     ----------
-    lengths : as stated, m.
-    roundings : largest error of each length by the rounding of what was stated, m.
-    decimals : half of the last decimals of what was stated, if not the roundings; too coarse
+    lengths : as stated, m. roundings : largest error of each length by the rounding of
+    what was stated, m. decimals : half of the last decimals of what was stated, if not
+    the roundings; too coarse
         ones round nothing.
     """
     largest = DIGITS_STATED * math.fsum(lengths)

@@ -1,10 +1,11 @@
 """Motion: kinematic coefficients, speeds and accelerations of bars and points.
 
-A coefficient is a derivative by the independent angle q (theta_2 where the input is commanded), so
-every motion follows from it:
+A coefficient is a derivative by the independent angle q (theta_2 where the input is
+commanded), so every motion follows from it:
     omega_k = h_k q',   alpha_k = h_k q'' + h_k' q'^2.
 
-Source: R. L. Norton, Design of Machinery, ch. 6 and 7; B. Paul, Kinematics and Dynamics of Planar Machinery (1979).
+Source: R. L. Norton, Design of Machinery, ch. 6 and 7; B. Paul, Kinematics and Dynamics
+of Planar Machinery (1979).
 """
 
 from typing import NamedTuple
@@ -37,11 +38,12 @@ class Coefficients(NamedTuple):
 def coefficients(lengths: Loop, position: Position) -> Coefficients:
     """Compute the coefficients by theta_2 from the triangle A, B, O4: side e turns by t, the angle at B opens by 2 g.
 
-        h3 = n - g,   h4 = n + g,   n = t + (x/e^2) g = 1/2 + w,
-        t = (a (a - d) + 2 a d sin^2 h)/e^2,   g = 2 a d sin h cos h/root,   x = b^2 - c^2.
+        h3 = n - g,   h4 = n + g,   n = t + (x/e^2) g = 1/2 + w, t = (a (a - d) + 2 a d
+        sin^2 h)/e^2,   g = 2 a d sin h cos h/root,   x = b^2 - c^2.
 
-    Where e is short its sides turn fast and the bars do not; there w comes without e, from Heron's formula
-    for both triangles on e, with S = 4 a d sin h cos h, y = d^2 - a^2:
+    Where e is short its sides turn fast and the bars do not; there w comes without e,
+    from Heron's formula for both triangles on e, with S = 4 a d sin h cos h, y = d^2 -
+    a^2:
         w = -(E2 (d + a)^2 outer + E1 (b - c)^2 4 a d sin^2 h)/(2 root (x S + y root)).
 
     >>> from math import radians

@@ -1,15 +1,17 @@
 """The path of a linkage in one independent angle: theta_2, or that of another bar which is commanded or free.
 
-The loop is a sum of four vectors, in any order. Read from bar 3 or from bar 4 it is one of the same kind, whose input
-is that bar, and every formula of position and motion holds as it stands:
+The loop is a sum of four vectors, in any order. Read from bar 3 or from bar 4 it is one
+of the same kind, whose input is that bar, and every formula of position and motion
+holds as it stands:
     b e^{i theta_3} + a e^{i theta_2} = d e^{i theta_1} + c e^{i theta_4},
     c e^{i theta_4} + b e^{i (theta_3 + pi)} = d e^{i (theta_1 + pi)} + a e^{i theta_2}.
-The sine between its coupler and its output is sin(theta_4 - theta_2) read from bar 3 and sin(theta_3 - theta_2) read
-from bar 4: the sign of the root, zero at the limits of that bar, and by it what is singular at the limits of theta_2 is
-not.
+The sine between its coupler and its output is sin(theta_4 - theta_2) read from bar 3
+and sin(theta_3 - theta_2) read from bar 4: the sign of the root, zero at the limits of
+that bar, and by it what is singular at the limits of theta_2 is not.
 
-The branch of a path is an assembly: its root keeps its formula, and with it the motion is smooth through change points.
-The sign of the sine at a position follows from the lengths and the angle alone, `Path.sign`.
+The branch of a path is an assembly: its root keeps its formula, and with it the motion
+is smooth through change points. The sign of the sine at a position follows from the
+lengths and the angle alone, `Path.sign`.
 """
 
 from typing import NamedTuple
@@ -84,7 +86,8 @@ class Path(NamedTuple):
     def sign(self, q: Number, branch: Number) -> Number:
         """Compute the sign of the bar's own sine at an angle in an assembly.
 
-        Twice applied it returns its argument: of that sign at the angle it is the assembly.
+        Twice applied it returns its argument: of that sign at the angle it is the
+        assembly.
         """
         if not is_any(self.passing.outer | self.passing.inner):
             return branch
@@ -110,8 +113,9 @@ class Path(NamedTuple):
     def position(self, q: Number, half: HalfAngle, branch: Number) -> Position:
         """Compute positions with the bars in the order of the path.
 
-        `branch`: assembly, the sign of `drive_sine` for a drive on the bar itself while the bar turns through the first
-        half turn from the ground (for bar 4 from its opposite).
+        `branch`: assembly, the sign of `drive_sine` for a drive on the bar itself while
+        the bar turns through the first half turn from the ground (for bar 4 from its
+        opposite).
         """
         u2 = self.input_direction(q, half)
         position = close_loop(self.lengths, self.u1, u2, half, branch, self.unit)
@@ -154,8 +158,8 @@ class Path(NamedTuple):
         """Close the loop at a half angle; return positions, coefficients by q, and the sine.
 
         The sine is that between the two other moving bars. Coefficients are NaN where
-        they are 0/0: where it, or the condition of the command, is no larger than `margin`;
-        nowhere if that is negative, and on a change point they are limits.
+        they are 0/0: where it, or the condition of the command, is no larger than
+        `margin`; nowhere if that is negative, and on a change point they are limits.
         """
         position = self.position(q, half, branch)
         singular = abs(position.sin_mu) <= margin
@@ -271,7 +275,8 @@ def compute_state(
 ) -> State:
     """Compute positions and motion for a motion of the input; NaN where the loop does not close, or speeds are 0/0.
 
-    With omega_2 and alpha_2 left out speeds are first coefficients and accelerations second ones.
+    With omega_2 and alpha_2 left out speeds are first coefficients and accelerations
+    second ones.
     """
     with np.errstate(all="ignore"):
         lengths = loop(*linkage.lengths)
@@ -299,8 +304,9 @@ def drive_sine(position: Position, drive_bar: int) -> Number:
 def drive_sine_of_triangle(lengths: Loop, position: Position, drive_bar: int) -> Number:
     """Compute the drive's sine from the triangle A, B, O4: nearly equal directions of a short ground lose digits.
 
-        sin(theta_4 - theta_2) = ((d cos psi - a) root + d sin psi (e^2 - b^2 + c^2))/(2 c e^2),
-        sin(theta_3 - theta_2) = ((d cos psi - a) root - d sin psi (e^2 + b^2 - c^2))/(2 b e^2).
+        sin(theta_4 - theta_2) = ((d cos psi - a) root + d sin psi (e^2 - b^2 + c^2))/(2
+        c e^2), sin(theta_3 - theta_2) = ((d cos psi - a) root - d sin psi (e^2 + b^2 -
+        c^2))/(2 b e^2).
 
     `lengths`: of the loop that the position was closed with.
     """

@@ -1,13 +1,15 @@
 """Pin forces: the equations of the free bodies, eliminated to one 2x2 system.
 
-F_ij is the force of bar i on bar j. The moments of the two bars that are not driven, about their outer
-pins, give the force between them; sums of forces give the rest:
+F_ij is the force of bar i on bar j. The moments of the two bars that are not driven,
+about their outer pins, give the force between them; sums of forces give the rest:
     bar 2:  F12 + F32 + R2 = 0,            a u2 x F32 + M2 + T2 = 0   (about O2),
     bar 3:  F43 - F32 + R3 = 0,            b u3 x F43 + M3 - C + T3 = 0   (about A),
     bar 4:  F14 - F43 + R4 = 0,           -c u4 x F43 + M4 + C + T4 = 0   (about O4),
-with R, M the resultant and the moment of everything else on the bar: loads, effects and -m a_G, -I alpha.
+with R, M the resultant and the moment of everything else on the bar: loads, effects and
+-m a_G, -I alpha.
 
-Source: Linares Mendoza, section 5.7 (the thirteen equations); R. L. Norton, Design of Machinery, ch. 11.
+Source: Linares Mendoza, section 5.7 (the thirteen equations); R. L. Norton, Design of
+Machinery, ch. 11.
 """
 
 from typing import NamedTuple
@@ -70,8 +72,8 @@ def inertia_wrenches(
 ) -> tuple[Wrenches, Number]:
     """Compute d'Alembert's -m a_G on each bar, and -(I + m r^2) alpha - m r_G x a_pin about its first pin.
 
-    The force -m a_A of the coupler's mass at pin A is no part of R3; it is returned apart, in the frame of bar 2:
-    m_3 a (omega_2^2 - i alpha_2).
+    The force -m a_A of the coupler's mass at pin A is no part of R3; it is returned
+    apart, in the frame of bar 2: m_3 a (omega_2^2 - i alpha_2).
 
     `a`: length of the input, m.
     """
@@ -80,14 +82,17 @@ def inertia_wrenches(
     of_2 = vector(w2 * w2, -alpha_2)
     turned = of_2 * position.u2
     to_G = (three.m * three.z) * position.u3  # m (G - A)
-    return Wrenches(
-        (two.m * two.z) * turned,
-        vector(w3 * w3, -alpha_3) * to_G,
-        vector(w4 * w4, -alpha_4) * ((four.m * four.z) * position.u4),
-        -about_first_pin(two) * alpha_2,
-        cross(to_G, a * turned) - about_first_pin(three) * alpha_3,
-        -about_first_pin(four) * alpha_4,
-    ), (three.m * a) * of_2
+    return (
+        Wrenches(
+            (two.m * two.z) * turned,
+            vector(w3 * w3, -alpha_3) * to_G,
+            vector(w4 * w4, -alpha_4) * ((four.m * four.z) * position.u4),
+            -about_first_pin(two) * alpha_2,
+            cross(to_G, a * turned) - about_first_pin(three) * alpha_3,
+            -about_first_pin(four) * alpha_4,
+        ),
+        (three.m * a) * of_2,
+    )
 
 
 def coupler_about_B(
@@ -124,16 +129,17 @@ def pin_forces(
 ) -> PinForces:
     """Compute the four pin forces; inf or NaN where the two bars that are not driven lie in one line.
 
-    With the drive on bar 2 the force at B is written with the diagonal D from A to O4, which closes the
-    triangle of bars 3 and 4, so that a couple between them keeps its digits:
+    With the drive on bar 2 the force at B is written with the diagonal D from A to O4,
+    which closes the triangle of bars 3 and 4, so that a couple between them keeps its
+    digits:
         F43 = ((M3 - C) D - (M3 + M4) b u3)/(b c sin(theta_4 - theta_3)).
 
     Parameters
     ----------
-    drive_bar : 2, 3 or 4.
-    sine : between the two bars that are not driven, of theta_4 - theta_3, theta_4 - theta_2, theta_3 - theta_2.
-    w, mass_at_A : everything that acts, as from `inertia_wrenches`.
-    moment_of_F32 : with the drive on bar 2: a u2 x F32 (N m), which the virtual work of bars 3 and 4 knows; on bar 4:
+    drive_bar : 2, 3 or 4. sine : between the two bars that are not driven, of theta_4 -
+    theta_3, theta_4 - theta_2, theta_3 - theta_2. w, mass_at_A : everything that acts,
+    as from `inertia_wrenches`. moment_of_F32 : with the drive on bar 2: a u2 x F32 (N
+    m), which the virtual work of bars 3 and 4 knows; on bar 4:
         b u3 x F32, the opposite of the coupler's moment about B.
 
     >>> from math import pi

@@ -2,16 +2,19 @@
 
     a e^{i theta_2} + b e^{i theta_3} = d e^{i theta_1} + c e^{i theta_4}
 
-With h = (theta_2 - theta_1)/2 and e the diagonal from A to O4, the loop closes where both factors of
-Heron's formula are >= 0; their product is the square of four times the area of the triangle:
+With h = (theta_2 - theta_1)/2 and e the diagonal from A to O4, the loop closes where
+both factors of Heron's formula are >= 0; their product is the square of four times the
+area of the triangle:
     outer = (b + c)^2 - e^2 = E1 + 4 a d cos^2 h,   E1 = (b + c - a - d)(a + b + c + d),
     inner = e^2 - (b - c)^2 = E2 + 4 a d sin^2 h,   E2 = (d - a - b + c)(d - a + b - c).
 outer = 0 is bars 3, 4 stretched, inner = 0 is bars 3, 4 folded.
 
-A linkage with E1 = 0 or E2 = 0 has a change point at h = 90 deg or h = 0, where a factor is a square
-and its root passes through zero:
-    sqrt(outer) = 2 sqrt(a d) cos h if E1 = 0,   sqrt(inner) = 2 sqrt(a d) sin h if E2 = 0,
-with their signs. With these roots a branch is an assembly, which moves smoothly through change points.
+A linkage with E1 = 0 or E2 = 0 has a change point at h = 90 deg or h = 0, where a
+factor is a square and its root passes through zero:
+    sqrt(outer) = 2 sqrt(a d) cos h if E1 = 0,   sqrt(inner) = 2 sqrt(a d) sin h if E2 =
+    0,
+with their signs. With these roots a branch is an assembly, which moves smoothly through
+change points.
 
 Source: R. L. Norton, Design of Machinery, ch. 4 (the loop and its two branches).
 """
@@ -35,7 +38,8 @@ from fourbar.formulas.arithmetic import (
 
 TOUCHING = 4.0 * U
 """Bars that miss each other, or a change point, by up to this times the sum of the lengths count as touching: lengths
-that are computed, as distances of points are, are rounded by a few U each."""
+that are computed, as distances of points are, are rounded by a few U each.
+"""
 VISIBLE = 1e-9
 """Part of a length that is no rounding of it."""
 VISIBLE_AT_A = 1e-11
@@ -105,8 +109,8 @@ def reorder_lengths(
 def loop(d: Number, a: Number, b: Number, c: Number) -> Loop:
     """Return the lengths with E1 = (b + c - a - d)(a + b + c + d) and E2 = (d - a - b + c)(d - a + b - c).
 
-    A difference within the rounding of the lengths is zero. Where two of them vanish the lengths are equal in
-    pairs, and are returned so.
+    A difference within the rounding of the lengths is zero. Where two of them vanish
+    the lengths are equal in pairs, and are returned so.
 
     >>> loop(0.3, 0.1, 0.3, 0.1).E1  # a parallelogram, whose bars come to lie in one line
     0.0
@@ -141,7 +145,8 @@ def _vanish(
 ) -> Number:
     """Return a difference of lengths, zero if it is within the rounding of their sum; its slopes stay.
 
-    It stays where it is a visible part of a bar, or of the least length of the diagonal, d - a.
+    It stays where it is a visible part of a bar, or of the least length of the
+    diagonal, d - a.
     """
     d, a, b, c = lengths
     square, rounding = difference * difference, TOUCHING * (d + a + b + c)
@@ -177,8 +182,9 @@ def half_angle(
 ) -> HalfAngle:
     """Compute the half angle h of psi = theta_2 - theta_1 (rad, not reduced), and the factors of Heron's formula.
 
-    `opposite`: h of psi - pi, from the same tangent: there the ground is read from O4 to O2. `passing`: roots that
-    pass through zero with their sign; left out: those of the lengths.
+    `opposite`: h of psi - pi, from the same tangent: there the ground is read from O4
+    to O2. `passing`: roots that pass through zero with their sign; left out: those of
+    the lengths.
     """
     passing = find_passing(lengths) if passing is None else passing
     t = tangent(0.5 * psi)
@@ -233,16 +239,16 @@ def close_loop(
 ) -> Position:
     """Compute the directions of coupler and output.
 
-        u3 = (O4 - A) ((e^2 + b^2 - c^2) + i root)/(2 b e^2),   e^2 = (d - a)^2 + 4 a d sin^2 h,
-        u4 = (O4 - A) ((b^2 - e^2 - c^2) + i root)/(2 c e^2),   sin(theta_4 - theta_3) = root/(2 b c).
+        u3 = (O4 - A) ((e^2 + b^2 - c^2) + i root)/(2 b e^2),   e^2 = (d - a)^2 + 4 a d
+        sin^2 h, u4 = (O4 - A) ((b^2 - e^2 - c^2) + i root)/(2 c e^2),   sin(theta_4 -
+        theta_3) = root/(2 b c).
 
     Parameters
     ----------
-    lengths : of the loop, m.
-    u1, u2 : e^{i theta_1} and e^{i theta_2}.
-    half : of theta_2 - theta_1.
-    branch : assembly, +1 (B lies left of the diagonal from A to O4 for 0 < theta_2 - theta_1 < 180 deg) or -1.
-    unit : of the lengths, m; the diagonal is found in m.
+    lengths : of the loop, m. u1, u2 : e^{i theta_1} and e^{i theta_2}. half : of
+    theta_2 - theta_1. branch : assembly, +1 (B lies left of the diagonal from A to O4
+    for 0 < theta_2 - theta_1 < 180 deg) or -1. unit : of the lengths, m; the diagonal
+    is found in m.
 
     >>> lengths, theta_2 = loop(100, 40, 120, 80), np.radians(40)  # mm; Norton, example 4-1
     >>> position = close_loop(lengths, 1.0, direction(theta_2), half_angle(lengths, theta_2), 1)
@@ -254,7 +260,8 @@ def close_loop(
     root = signed_root(half, branch)
     twice_a = 2.0 * a * unit
     diagonal = vector((d - a) * unit + twice_a * half.ss, -twice_a * half.sk) * u1
-    # e^2 + b^2 - c^2 and b^2 - e^2 - c^2 use the factor in the root, so that u3 and u4 keep their length
+    # e^2 + b^2 - c^2 and b^2 - e^2 - c^2 use the factor in the root, so that u3 and u4
+    # keep their length
     at_A, at_O4 = half.inner + 2.0 * b * (b - c), 2.0 * c * (b - c) - half.inner
     part = (0.5 / unit) / e2
     to_3, to_4 = (1.0 / b) * part, (1.0 / c) * part
@@ -266,8 +273,9 @@ def close_loop(
 def find_parallel_pairs(lengths: Loop, branch: Number) -> tuple[Number, Number]:
     """Mark assemblies in which two pairs of bars stay parallel: E1 = E2 = 0, root = +- 4 a d sin h cos h.
 
-    First: the coupler keeps the ground's direction and bars 2, 4 turn together (a = c, b = d).
-    Second: B stays on O2, bars 2, 3 turn together and bar 4 rests (a = b, c = d).
+    First: the coupler keeps the ground's direction and bars 2, 4 turn together (a = c,
+    b = d). Second: B stays on O2, bars 2, 3 turn together and bar 4 rests (a = b, c =
+    d).
     """
     d, a, b, c, _, _ = lengths
     return (a == c) & (b == d) & (branch > 0), (a == b) & (c == d) & (branch < 0)

@@ -2,12 +2,13 @@
 
     T_k h_k = J q'' + J'/2 q'^2 - Q
 
-J is the equivalent inertia, sum of m |dG/dq|^2 + I h_k^2, J' its derivative by the independent angle q
-(theta_2 where the input is commanded) and Q the generalised force of loads and effects, their power over
-q'. Nothing is lost here where the moments about a pin are differences of large numbers. T3 has poles where
-h3 = 0, T4 where h4 = 0.
+J is the equivalent inertia, sum of m |dG/dq|^2 + I h_k^2, J' its derivative by the
+independent angle q (theta_2 where the input is commanded) and Q the generalised force
+of loads and effects, their power over q'. Nothing is lost here where the moments about
+a pin are differences of large numbers. T3 has poles where h3 = 0, T4 where h4 = 0.
 
-Source: R. L. Norton, Design of Machinery, ch. 11 (virtual work); M. Eksergian, Dynamical analysis of machines (1930).
+Source: R. L. Norton, Design of Machinery, ch. 11 (virtual work); M. Eksergian,
+Dynamical analysis of machines (1930).
 """
 
 from fourbar.formulas.arithmetic import Number, dot, is_any
@@ -38,8 +39,10 @@ def half_slope(
 ) -> Number:
     """Compute J'/2 = sum of m G'.G'' + I h_k h_k', kg m^2/rad; bar 2 has no part of it where q = theta_2.
 
-    About the pins O2, O4 of bars 2, 4 that is (I + m r^2) h_k h_k'; of the coupler, with G = A + R,
-        G'.G'' = a^2 h2 h2' + r^2 h3 h3' + (h2 h3' + h3 h2') A.R + h2 h3 (h2 - h3) A x R.
+    About the pins O2, O4 of bars 2, 4 that is (I + m r^2) h_k h_k'; of the coupler,
+    with G = A + R,
+        G'.G'' = a^2 h2 h2' + r^2 h3 h3' + (h2 h3' + h3 h2') A.R + h2 h3 (h2 - h3) A x
+        R.
     """
     two, three, four = bodies
     # m h2 (A.R + i A x R)

@@ -24,8 +24,9 @@ from fourbar.linkage import FourBar
 def transmission_angle(state: State) -> Array:
     """Compute mu, the acute angle between coupler and output, rad, in [0, pi/2], (n,); NaN where not assembled.
 
-    tan mu = |sin(theta_4 - theta_3)| / |cos(theta_4 - theta_3)|, so mu keeps eps-accuracy near 0 and
-    pi/2 as far as the position itself does: |error| about eps/|sin mu|.
+    tan mu = |sin(theta_4 - theta_3)| / |cos(theta_4 - theta_3)|, so mu keeps
+    eps-accuracy near 0 and pi/2 as far as the position itself does: |error| about
+    eps/|sin mu|.
 
     Source: R. L. Norton, Design of Machinery.
     """
@@ -58,7 +59,8 @@ class TransmissionExtremes(NamedTuple):
 def transmission_extremes(linkage: FourBar) -> TransmissionExtremes:
     """Find the extremes of the angle at B: bars 1, 2 collinear, or a limit of the input; the same on both branches.
 
-    tan^2(mu/2) = (e + b - c)(e - b + c)/((b + c - e)(b + c + e)) at e = |d - a| and e = d + a.
+    tan^2(mu/2) = (e + b - c)(e - b + c)/((b + c - e)(b + c + e)) at e = |d - a| and e =
+    d + a.
     """
     reach, theta_1 = reach_of(linkage), linkage.ground_angle
     sign = 1 if reach.d >= reach.own else -1
@@ -93,8 +95,8 @@ def mechanical_advantage(
 ) -> Array:
     """Compute F_out/F_in = (omega_2/omega_4)(r_in/r_out) of a linkage without losses, (n,).
 
-    The signed ratio of torques where the radii are equal; +-inf where the output stands still (bars
-    2, 3 collinear), NaN at a singular position.
+    The signed ratio of torques where the radii are equal; +-inf where the output stands
+    still (bars 2, 3 collinear), NaN at a singular position.
 
     Parameters
     ----------
@@ -114,16 +116,16 @@ def distance_to_singular(
 ) -> Array:
     """Compute the angle of the input to the nearest singular position, rad, in [0, pi], (n,); inf where there is none.
 
-    Singular are the limits of theta_2 and the change points (speeds are 0/0), and for a drive on bar 3
-    or 4 its dead centres, where no torque on it holds the linkage. Error at most about
-    eps (|theta_2| + |theta_1| + 2 pi). Not counted is the kite whose input and coupler coincide: there
-    a drive on bar 4 is dead at every position of that motion.
+    Singular are the limits of theta_2 and the change points (speeds are 0/0), and for a
+    drive on bar 3 or 4 its dead centres, where no torque on it holds the linkage. Error
+    at most about eps (|theta_2| + |theta_1| + 2 pi). Not counted is the kite whose
+    input and coupler coincide: there a drive on bar 4 is dead at every position of that
+    motion.
 
     Parameters
     ----------
-    theta_2 : (n,), rad.
-    drive_bar : 2, 3 or 4.
-    branch : assembly, +1 or -1, or one for each position; left out: dead centres of both count.
+    theta_2 : (n,), rad. drive_bar : 2, 3 or 4. branch : assembly, +1 or -1, or one for
+    each position; left out: dead centres of both count.
     """
     theta_2 = np.asarray(theta_2, dtype=float)
     path = prepare_path(Loop(*linkage.lengths, 0.0, 0.0), linkage.ground_angle)

@@ -47,12 +47,13 @@ def assemble(
 
     Parameters
     ----------
-    form : the file's, for errors.
-    reader : whose joints state what acts at the pins, as in `Effect.joint_elements`; None: they state nothing.
-    without_loads : leave the loads out, instead of refusing them.
+    form : the file's, for errors. reader : whose joints state what acts at the pins, as
+    in `Effect.joint_elements`; None: they state nothing. without_loads : leave the
+    loads out, instead of refusing them.
 
-    Raises LimitError for a load, a motion law or an effect without a counterpart there, InputError for a bar without
-    mass or inertia, NotAssembledError where the linkage closes at none of the scene's positions.
+    Raises LimitError for a load, a motion law or an effect without a counterpart there,
+    InputError for a bar without mass or inertia, NotAssembledError where the linkage
+    closes at none of the scene's positions.
     """
     require_input(scene, "the drive of an SDF or a USD")
     if scene.motion.law is not None:
@@ -62,7 +63,8 @@ def assemble(
     if scene.loads and not without_loads:
         on = ", ".join(sorted({f"bar {load.bar}" for load in scene.loads}))
         raise LimitError(
-            f"loads (here on {on}) have no counterpart in {form}; --without-loads leaves them out"
+            f"loads (here on {on}) have no counterpart in {form}; --without-loads"
+            " leaves them out"
         )
     if scene.drive is not None:
         raise LimitError(f"a drive that exerts a force has no counterpart in {form}")
@@ -139,10 +141,11 @@ def write_sdf(
 
     Parameters
     ----------
-    reader : who closes the loop how: "gazebo" by a fourth joint, "drake" by its own ball constraint.
-    start : the assembled state to stand in; None: that of `find_start`.
-    without_loads : leave the scene's loads out, for the program to apply; otherwise they are refused.
-    plane : where the linkage, or the drawing that states its pins, stands in the world.
+    reader : who closes the loop how: "gazebo" by a fourth joint, "drake" by its own
+    ball constraint. start : the assembled state to stand in; None: that of
+    `find_start`. without_loads : leave the scene's loads out, for the program to apply;
+    otherwise they are refused. plane : where the linkage, or the drawing that states
+    its pins, stands in the world.
 
     Raises
     ------
@@ -284,8 +287,7 @@ def write_usd(
     bodies = []
     for number in MOVING_BARS:
         bar = linkage.bar(number)
-        bodies.append(
-            f"""    def Xform "{BAR_NAMES[number]}" (
+        bodies.append(f"""    def Xform "{BAR_NAMES[number]}" (
         prepend apiSchemas = ["PhysicsRigidBodyAPI", "PhysicsMassAPI"]
     )
     {{
@@ -297,8 +299,7 @@ def write_usd(
         quatd xformOp:orient = {_write(plane.turn_on(turn[number]))}
         uniform token[] xformOpOrder = ["xformOp:translate", "xformOp:orient"]
     }}
-"""
-        )
+""")
     joints = []
     length = {number: linkage.bar(number).length for number in MOVING_BARS}
     places = {
@@ -316,8 +317,7 @@ def write_usd(
         if one == 1:  # the world, whose axes are not the plane's
             on_first = plane.place(*_split(on_one))
             turn_on_first = plane.turn_on(relative)
-        joints.append(
-            f"""    def PhysicsRevoluteJoint "{pin}"
+        joints.append(f"""    def PhysicsRevoluteJoint "{pin}"
     {{
         uniform token physics:axis = "Z"
         {"" if one == 1 else f"rel physics:body0 = </four_bar/{BAR_NAMES[one]}>"}
@@ -328,8 +328,7 @@ def write_usd(
         quatf physics:localRot1 = (1, 0, 0, 0)
         bool physics:excludeFromArticulation = {"true" if pin == "B" else "false"}
     }}
-"""
-        )
+""")
     comment = write_comment(scene, "USD", "newton", assembled, plane=plane)
     notes = json.dumps(comment)
     down = plane.turn(x / pull, y / pull) if pull else (0.0, -1.0, 0.0)

@@ -49,13 +49,16 @@ STIFF_PAD, SOFT_PAD = 1e-4, 2e-3
 """Pads of `Settings.pad`. Stiff: the closure's softness matters less than 1e-9. Soft: 7 digits after one iteration."""
 QUICK = 1.0
 """rad/s^2. MuJoCo's Newton solver stops where an iteration changes the accelerations by less than 1e-15 rad/s^2
-(mjMINVAL): below about this acceleration there is no second one, and stiff pads leave errors of up to 1e-3."""
+(mjMINVAL): below about this acceleration there is no second one, and stiff pads leave errors of up to 1e-3.
+"""
 LIGHT = 100.0
 """Mass ratio of coupler and output above which `fit_pad` makes the pad smaller. The closure then softens by the ratio
-more than by the loads: the error of the inertial torque was 3e-5 for 10 g against 14.5 kg, and 3e-3 for 1 g."""
+more than by the loads: the error of the inertial torque was 3e-5 for 10 g against 14.5 kg, and 3e-3 for 1 g.
+"""
 Drive = Literal["flywheel", "motor", "none"]
 """Kind of drive: a flywheel that keeps omega_2 or alpha_2; a motor on the driven bar whose control is its couple;
-none. A free motion has none."""
+none. A free motion has none.
+"""
 
 
 def write_mjcf(
@@ -73,26 +76,29 @@ def write_mjcf(
 
     Parameters
     ----------
-    settings : of MuJoCo; the default ones carry every linkage above MuJoCo's floor of mass.
-    reader : one of `SIMULATORS`: the comments say where torque and pin force are read there.
-    keyframe : False leaves it out, and with it the assembled pose and the servo that starts it from rest; then
+    settings : of MuJoCo; the default ones carry every linkage above MuJoCo's floor of
+    mass. reader : one of `SIMULATORS`: the comments say where torque and pin force are
+    read there. keyframe : False leaves it out, and with it the assembled pose and the
+    servo that starts it from rest; then
         `settings.timestep` must be given and no position is computed.
-    start : the assembled state to open with; None: that of `find_start`.
-    drive : "flywheel" keeps the input at omega_2; "motor" leaves the driven bar to a controller, "none" likewise
+    start : the assembled state to open with; None: that of `find_start`. drive :
+    "flywheel" keeps the input at omega_2; "motor" leaves the driven bar to a
+    controller, "none" likewise
         without an actuator: then nothing is added to the linkage's inertia.
     plane : where the linkage stands in the world.
     origin : place of O2 in the linkage's plane, m.
 
     Raises
     ------
-    InputError : a bar has less mass or inertia than MuJoCo carries, or nothing sets the timestep.
-    LimitError : an effect or the motion has no counterpart in MJCF.
+    InputError : a bar has less mass or inertia than MuJoCo carries, or nothing sets the
+    timestep. LimitError : an effect or the motion has no counterpart in MJCF.
     NotAssembledError : the linkage closes at none of the scene's positions.
     """
     require_input(scene, "the drive of an MJCF")
     if scene.motion.law is not None:
         raise LimitError(
-            "a motion law has no counterpart in MJCF: its drive keeps omega_2 or alpha_2"
+            "a motion law has no counterpart in MJCF: its drive keeps omega_2 or"
+            " alpha_2"
         )
     require_carriable(scene.linkage)
     scene = scene.in_pairs_from_pins()
@@ -223,11 +229,13 @@ def _write_comments(
         kinds += (
             ["cylinder_flywheel"]
             if linear
-            else ["pushed"]
-            if scene.drive is not None
-            else ["elsewhere"]
-            if bar != 2
-            else []
+            else (
+                ["pushed"]
+                if scene.drive is not None
+                else ["elsewhere"]
+                if bar != 2
+                else []
+            )
         )
     lines: list[str] = [
         notes.get(f"{reader}_{kind}", notes[kind]).format(bar=bar)
@@ -270,8 +278,8 @@ def _list_left_out_by_genesis(scene: Scene) -> list[str]:
 def size_flywheel(scene: Scene, settings: Settings = RECIPE) -> float:
     """Compute the armature of pin O2, kg m^2: `settings.flywheel` times the sum of m L^2 + I + (m g L + F L + M)/q.
 
-    L is the longest lever arm, and q the greater of omega_2^2 and |alpha_2|. The work of weights and loads in a
-    revolution is then a small part of the flywheel's energy.
+    L is the longest lever arm, and q the greater of omega_2^2 and |alpha_2|. The work
+    of weights and loads in a revolution is then a small part of the flywheel's energy.
     """
     return float(
         f"{settings.flywheel * (_sum_inertia(scene.linkage) + _sum_load_inertia(scene)):.3g}"
@@ -301,8 +309,8 @@ def _leave_out_flywheel(scene: Scene, settings: Settings) -> Settings:
 def fit_pad(scene: Scene) -> float:
     """Choose the pad that leaves the closure stiff enough for the loads, and soft enough for one iteration.
 
-    The sag of the closure grows as pad^2 times the loads, the rounding of one iteration of MuJoCo's Newton solver as
-    1/(pad^2 times the loads).
+    The sag of the closure grows as pad^2 times the loads, the rounding of one iteration
+    of MuJoCo's Newton solver as 1/(pad^2 times the loads).
     """
     _, a, b, c = scene.linkage.lengths
     least_sag = SOFT_PAD / math.sqrt(
@@ -357,7 +365,8 @@ FULL_TURN = 2.0 * math.pi * (1.0 - 1e-9)
 class WindowMotion:
     """The input's motion through a window of theta_2, in time.
 
-    theta_2 = start + omega t + alpha t^2/2 from `start` to `stop`, at the speed `omega` at the start.
+    theta_2 = start + omega t + alpha t^2/2 from `start` to `stop`, at the speed `omega`
+    at the start.
     """
 
     def __init__(self, start: float, stop: float, omega: float, alpha: float) -> None:
@@ -395,7 +404,8 @@ class WindowMotion:
         per_revolution = (
             duration * self.fastest / (2.0 * math.pi) * settings.steps_per_revolution
         )
-        # at the greatest speed throughout: an input that speeds up covers the end of its window in few steps
+        # at the greatest speed throughout: an input that speeds up covers the end of
+        # its window in few steps
         width = abs(self.stop - self.start)
         window = (
             settings.steps_per_window * duration * self.fastest / width
@@ -436,7 +446,8 @@ def find_start(scene: Scene) -> Start:
     usable = np.flatnonzero(solution.status_code == OK)
     if not len(usable):
         raise NotAssembledError(
-            "the linkage closes at none of the scene's positions: there is no keyframe to write"
+            "the linkage closes at none of the scene's positions: there is no keyframe"
+            " to write"
         )
     theta_2 = commanded.theta_2[usable]
     first = int(usable[np.argmin(theta_2) if speed >= 0.0 else np.argmax(theta_2)])
@@ -487,7 +498,8 @@ def write_mjcf_for(
 ) -> str:
     """Write the MJCF text of a scene for one simulator, its comments naming where torque and pin force are read.
 
-    Raises InputError for no such simulator, or a motor for one that does not take it, and as `write_mjcf` does.
+    Raises InputError for no such simulator, or a motor for one that does not take it,
+    and as `write_mjcf` does.
     """
     if simulator not in SIMULATORS:
         raise InputError(

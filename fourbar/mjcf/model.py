@@ -25,19 +25,23 @@ class Settings:
 
     Parameters
     ----------
-    timestep : s; None: from the two numbers of steps.
-    steps_per_window : at least so many where the input does not turn fully: towards a limit position
-        bars 3 and 4 speed up without bound, and 628 steps per revolution are too few there.
-    timestep_scale : factor on the timestep.
-    integrator : "RK4", "Euler", "implicit" or "implicitfast".
-    time_constant_steps : solref's time constant of the loop's closure, in timesteps.
-    impedance : solimp's impedance d; MuJoCo clamps it at 0.9999.
-    pad : where the inertial frame of the massless pads that carry the closure lies, as a part of
-        the bar's length: the softness of the closure goes as its square. None: no pads; "fitted": to
-        the speed and the loads (`fit_pad`).
-    solver, tolerance, iterations : of the constraint solver. MuJoCo divides the tolerance by the
-        flywheel's inertia, so only 0 is tight, and the number of iterations is then what stops it.
-    flywheel : inertia on pin O2 relative to the linkage's own; the speed ripples by about its inverse.
+    timestep : s; None: from the two numbers of steps. steps_per_window : at least so
+    many where the input does not turn fully: towards a limit position
+        bars 3 and 4 speed up without bound, and 628 steps per revolution are too few
+        there.
+    timestep_scale : factor on the timestep. integrator : "RK4", "Euler", "implicit" or
+    "implicitfast". time_constant_steps : solref's time constant of the loop's closure,
+    in timesteps. impedance : solimp's impedance d; MuJoCo clamps it at 0.9999. pad :
+    where the inertial frame of the massless pads that carry the closure lies, as a part
+    of
+        the bar's length: the softness of the closure goes as its square. None: no pads;
+        "fitted": to the speed and the loads (`fit_pad`).
+    solver, tolerance, iterations : of the constraint solver. MuJoCo divides the
+    tolerance by the
+        flywheel's inertia, so only 0 is tight, and the number of iterations is then
+        what stops it.
+    flywheel : inertia on pin O2 relative to the linkage's own; the speed ripples by
+    about its inverse.
     """
 
     timestep: float | None = None
@@ -103,7 +107,8 @@ def add_appearance(root: ET.Element, linkage: FourBar) -> None:
         center=write_rounded(seen.x, seen.y, 0),
     )
     visual = ET.SubElement(root, "visual")
-    # the viewer's free camera starts at 1.5 extents from the centre; -90 deg looks straight down on the plane
+    # the viewer's free camera starts at 1.5 extents from the centre; -90 deg looks
+    # straight down on the plane
     ET.SubElement(
         visual,
         "global",
@@ -154,10 +159,12 @@ COLOURS = {
 }
 SLIP_DAMPING = 1e6
 """Damping of dry friction, per timestep: the greater, the slower the slip that it still softens. The drive prescribes
-the slip itself, so it makes nothing stiff; measured, a reversal is then as exact as any other position."""
+the slip itself, so it makes nothing stiff; measured, a reversal is then as exact as any other position.
+"""
 NEVER_NEEDED = ("contact", "limit", "island", "sensor")
 """Features that a closed loop of bars never uses; without contacts there is no midphase, and MuJoCo Warp does not load
-a file that switches it off."""
+a file that switches it off.
+"""
 THICKNESS = 0.02
 """Radius of a bar's capsule, as a part of the longest bar."""
 
@@ -179,7 +186,8 @@ UNCONTROLLED = {"gaintype": "fixed", "gainprm": "0", "biastype": "affine"}
 
 PASSIVE = {"input": "none", "motorconst": "0", "resistance": "1"}
 """A motor without a control and without back-EMF: what is left is its cogging, which here does not depend on the angle.
-To MuJoCo, and so to Gymnasium, it is no control."""
+To MuJoCo, and so to Gymnasium, it is no control.
+"""
 
 
 def make_passive(force: float) -> dict[str, str]:
@@ -204,7 +212,8 @@ def make_servo(gain: float, omega: float) -> dict[str, str]:
 def make_motor(bar: int | None, most: float) -> dict[str, str]:
     """Make the drive a motor whose control is the couple of ground on a bar, N m, or the push of the cylinder, N.
 
-    `most`: its `ctrlrange` reaches from -most to most; it bounds no control, and tells others the size of one.
+    `most`: its `ctrlrange` reaches from -most to most; it bounds no control, and tells
+    others the size of one.
     """
     placed = {"tendon": CYLINDER}
     if bar is not None:
@@ -332,7 +341,8 @@ class Model:
             angle = self.rest[number - 2]
             body.set("axisangle", join(0.0, 0.0, 1.0, angle))
             drive["ref"] = angle
-        # only the z-component acts in the plane; three equal ones satisfy the triangle inequality
+        # only the z-component acts in the plane; three equal ones satisfy the triangle
+        # inequality
         ET.SubElement(
             body,
             "inertial",
@@ -354,7 +364,8 @@ class Model:
         end = body
         if self.settings.pad is not None:
             assert not isinstance(self.settings.pad, str)  # the document has fitted it
-            # massless and welded: it only moves the point at which MuJoCo measures how soft the closure may be
+            # massless and welded: it only moves the point at which MuJoCo measures how
+            # soft the closure may be
             end = ET.SubElement(body, "body", name=f"{BAR_NAMES[number]}_pad")
             place = join(self.settings.pad * bar.length, 0.0, 0.0)
             ET.SubElement(end, "inertial", pos=place, mass="0", diaginertia="0 0 0")

@@ -22,7 +22,8 @@ class Quantity(NamedTuple):
     meaning: str
     group: str = ""
     """unknown: of the equations of a position, which an engine can be held to; dry friction, pin loads, linear drive:
-    exists only where the scene has dry friction, friction that depends on the pin forces, a drive along a line."""
+    exists only where the scene has dry friction, friction that depends on the pin forces, a drive along a line.
+    """
 
 
 def _scalar(*line: str | None) -> Any:
@@ -39,7 +40,8 @@ def _vector(*line: str | None) -> Any:
 class Quantities:
     """The quantities, one line each; `Solution` inherits them as fields, tables have them in this order.
 
-    The positions are None only where `out` of `solve` named other quantities, which then are all that is wanted.
+    The positions are None only where `out` of `solve` named other quantities, which
+    then are all that is wanted.
     """
 
     theta_2: Array = _scalar("rad", None, "angle of the input")

@@ -1,7 +1,8 @@
 """Quantities as text, "48 cm" or "0.01 N m s/rad", to SI numbers: converted exactly, rounded once.
 
-The units are a short list rather than all that the units library knows, because the angle is a
-dimension here: rad/s is not 1/s, so neither Hz nor a forgotten "deg" slips through.
+The units are a short list rather than all that the units library knows, because the
+angle is a dimension here: rad/s is not 1/s, so neither Hz nor a forgotten "deg" slips
+through.
 """
 
 import difflib
@@ -72,7 +73,8 @@ UNIT = re.compile(
     r"(?:[A-Za-zµμ°_]++(?:0(?![0-9]))?(?:(?:\^|\*\*)-?[1-9](?![0-9])|[²³])?|[·*/()]|\s)++"
 )
 """Names, each with at most one small exponent, and operators: nothing else reaches the parser, no tower of powers.
-Names are taken whole (`++`), so that a text which does not fit is refused in one pass."""
+Names are taken whole (`++`), so that a text which does not fit is refused in one pass.
+"""
 LONGEST_UNIT = 60
 UNIT_MISSING = "the unit is missing"
 """Reason of the error for a number alone."""
@@ -85,8 +87,8 @@ class UnitError(ValueError):
 def to_si(text: str, unit: str) -> float:
     """Convert the number in `text` to `unit`, as the nearest double.
 
-    Raises UnitError where the text has no number, no unit, an unknown unit, or a unit of another
-    dimension than `unit`, and where the number does not fit into a double.
+    Raises UnitError where the text has no number, no unit, an unknown unit, or a unit
+    of another dimension than `unit`, and where the number does not fit into a double.
     """
     text = text.strip()
     feet = FEET.match(text)
@@ -143,8 +145,8 @@ def to_si(text: str, unit: str) -> float:
 def write_quantity(quantity: Any) -> Any:
     """Write a quantity of the units library as text like "48 cm", an array of numbers as a list of such texts.
 
-    The text is read as any other is: an angle is a dimension here, which it is not in the library, so that
-    10 Hz stay no speed.
+    The text is read as any other is: an angle is a dimension here, which it is not in
+    the library, so that 10 Hz stay no speed.
     """
     unit = f"{quantity.units:~C}"
     numbers = np.asarray(quantity.magnitude, dtype=float).tolist()
@@ -214,9 +216,11 @@ def _suggest(number: str, name: str, unit: str) -> str:
     candidates = [words.sub(lambda match, by=by: by[match[0]], name) for by in swapped]  # type: ignore[misc]
     candidates += [
         f"{name}/rad",
-        f"rev{name.removeprefix('1')}"
-        if name.endswith("min")
-        else f"rad{name.removeprefix('1')}",
+        (
+            f"rev{name.removeprefix('1')}"
+            if name.endswith("min")
+            else f"rad{name.removeprefix('1')}"
+        ),
         re.sub(r"(?<=[A-Za-z])([23])(?![0-9])", r"^\1", name),
     ]
     for candidate in candidates:

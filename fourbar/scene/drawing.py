@@ -17,8 +17,8 @@ Place = tuple[float, float]
 class DrawnPins:
     """Places of the pins, each (x, y), m or texts with units.
 
-    Raises InputError where two pins of a bar lie in one place, and where all four lie in one line:
-    on a change point a drawing does not tell one assembly from the other.
+    Raises InputError where two pins of a bar lie in one place, and where all four lie
+    in one line: on a change point a drawing does not tell one assembly from the other.
     """
 
     O2: Place

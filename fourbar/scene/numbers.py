@@ -34,9 +34,9 @@ class Point:
     Parameters
     ----------
     name : letters, digits and underlines; no name of a quantity, as v_ and a_ with it.
-    bar : 1, 2, 3 or 4.
-    from_pin : (distance, angle), from the bar's first pin (O2, O2, A, O4), the angle from its line, m and rad.
-    from_centre : likewise from the bar's mass centre, in place of `from_pin`.
+    bar : 1, 2, 3 or 4. from_pin : (distance, angle), from the bar's first pin (O2, O2,
+    A, O4), the angle from its line, m and rad. from_centre : likewise from the bar's
+    mass centre, in place of `from_pin`.
     """
 
     name: str
@@ -56,7 +56,10 @@ class Point:
             or self.name.startswith(("v_", "a_"))
             or len(self.name) > LONGEST_NAME
         ):
-            allowed = "must be a word of letters, digits and _, not beginning with a digit, v_ or a_"
+            allowed = (
+                "must be a word of letters, digits and _, not beginning with a digit,"
+                " v_ or a_"
+            )
             raise InputError("points", self.name, allowed)
         if {self.name, f"{self.name}_x", f"{self.name}_y"} & COLUMNS:
             raise InputError(
@@ -141,8 +144,9 @@ class Tolerance:
 
     Parameters
     ----------
-    key : of the number, as in the scene file, pairs and lists by index.
-    width : in its SI unit or a text like "0.1 mm", > 0: plus or minus, evenly distributed, or the standard deviation
+    key : of the number, as in the scene file, pairs and lists by index. width : in its
+    SI unit or a text like "0.1 mm", > 0: plus or minus, evenly distributed, or the
+    standard deviation
         of a normal distribution.
     sigma : whether it is that.
     """

@@ -1,7 +1,7 @@
 """Pictures of the bars: named in a scene file, laid along the bar by `fourbar animate`.
 
-A scene file may be a stranger's: it can name a file in its own folder or below, no other, and what
-is read there must be a PNG or JPEG of moderate size.
+A scene file may be a stranger's: it can name a file in its own folder or below, no
+other, and what is read there must be a PNG or JPEG of moderate size.
 """
 
 import base64
@@ -18,7 +18,10 @@ LARGEST = 2_000_000
 LONGEST_NAME = 200
 RASTER = {b"\x89PNG\r\n\x1a\n": "image/png", b"\xff\xd8\xff": "image/jpeg"}
 """First bytes of the formats that may be attached; SVG may not, because it can carry scripts."""
-ALLOWED = 'must be the name of a PNG or JPEG file next to the scene file or below its folder, like "coupler.png"'
+ALLOWED = (
+    "must be the name of a PNG or JPEG file next to the scene file or below its folder,"
+    ' like "coupler.png"'
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +34,8 @@ class Picture:
     name : path relative to the scene file, parts joined by "/", none of them "..".
     folder : where the scene file is.
 
-    Raises InputError for a bar that does not move and for a name that leads out of the folder.
+    Raises InputError for a bar that does not move and for a name that leads out of the
+    folder.
     """
 
     bar: int
@@ -62,7 +66,8 @@ class Picture:
     def data_uri(self) -> str:
         """Encode the picture as it is embedded in a page.
 
-        Raises InputError where a link leads out of the folder, and as `encode_picture` does.
+        Raises InputError where a link leads out of the folder, and as `encode_picture`
+        does.
         """
         folder = Path(self.folder).resolve()
         file = (folder / self.name).resolve()
@@ -94,7 +99,8 @@ class Picture:
 def encode_picture(key: str, path: str | Path, shown: str | None = None) -> str:
     """Encode a PNG or JPEG file as a data URI.
 
-    Raises InputError, in one line, as `read_bytes` does, and for a file that begins as neither.
+    Raises InputError, in one line, as `read_bytes` does, and for a file that begins as
+    neither.
     """
     name = str(path) if shown is None else shown
     content = read_bytes(path, key, LARGEST, shown=name)

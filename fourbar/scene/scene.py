@@ -61,18 +61,16 @@ class Scene:
 
     Parameters
     ----------
-    linkage : bars and ground, as `uniform` or `FourBar` make them.
-    motion : what the commanded bar does: angles, speed, branch.
-    drive_bar : 2, 3 or 4, on which the drive's torque acts; left out: 2.
-    loads : forces and couples, `Load`.
-    effects : `Gravity`, `Viscous`, `Friction`, ...: only what acts, each kind once.
-    title, source : words.
-    pictures : of bars, as a scene file names them.
-    points : points of bars whose paths are wanted, `Point`.
-    tolerances : of numbers by their keys in a scene file, `Tolerance`.
-    drive : a force in place of a torque on a bar: `LinearDrive` or `PointDrive`.
-    drawing : the pins as they are drawn, `DrawnPins`: places are shown in its coordinates.
-    coordinates : keys of the places that a scene file states by x and y, with these, m; a file is written likewise.
+    linkage : bars and ground, as `uniform` or `FourBar` make them. motion : what the
+    commanded bar does: angles, speed, branch. drive_bar : 2, 3 or 4, on which the
+    drive's torque acts; left out: 2. loads : forces and couples, `Load`. effects :
+    `Gravity`, `Viscous`, `Friction`, ...: only what acts, each kind once. title, source
+    : words. pictures : of bars, as a scene file names them. points : points of bars
+    whose paths are wanted, `Point`. tolerances : of numbers by their keys in a scene
+    file, `Tolerance`. drive : a force in place of a torque on a bar: `LinearDrive` or
+    `PointDrive`. drawing : the pins as they are drawn, `DrawnPins`: places are shown in
+    its coordinates. coordinates : keys of the places that a scene file states by x and
+    y, with these, m; a file is written likewise.
     """
 
     linkage: FourBar
@@ -153,16 +151,19 @@ class Scene:
 
         Parameters
         ----------
-        figure : "overview", "linkage", "coupler", "kinematics", "points", "torque", "stroke", "forces", "hodograph",
+        figure : "overview", "linkage", "coupler", "kinematics", "points", "torque",
+        "stroke", "forces", "hodograph",
             "energy", "transmission", "freebody", "bars" or "sensitivity".
-        position : what is commanded where linkage and free bodies are drawn, rad or m; left out: the scene's own.
-        branches : "one" (the scene's) or "both" (open and crossed, to the same scales).
-        units : in which numbers are drawn, as `fourbar.units` makes them; left out: SI with the prefix that suits, deg.
+        position : what is commanded where linkage and free bodies are drawn, rad or m;
+        left out: the scene's own. branches : "one" (the scene's) or "both" (open and
+        crossed, to the same scales). units : in which numbers are drawn, as
+        `fourbar.units` makes them; left out: SI with the prefix that suits, deg.
         dimensions : write the lengths of the bars at them.
 
         Raises
         ------
-        InputError : unknown figure or choice of branches; a figure of forces without omega_2; a position or dimensions
+        InputError : unknown figure or choice of branches; a figure of forces without
+        omega_2; a position or dimensions
             for a figure that shows none.
         NotAssembledError : there is no position to draw.
         DependencyError : matplotlib is missing.
@@ -239,7 +240,8 @@ class Scene:
 class Independent(NamedTuple):
     """The angle in which a released motion is read at each of n instants, that of bar 2 or 4, whichever does not stop.
 
-    At a limit of theta_2 bar 4's alone holds the forces, and dry friction at a standstill has a side of its own.
+    At a limit of theta_2 bar 4's alone holds the forces, and dry friction at a
+    standstill has a side of its own.
     """
 
     bar: NDArray[np.int8]
@@ -357,8 +359,10 @@ def require_input(scene: Scene, what: str) -> None:
 class Triangle(NamedTuple):
     """Triangle of a cylinder: pivot of its bar, end on the bar, end on the ground; with the stroke it gives the angle.
 
-    With l from the pivot to the end on the bar, r to the end on the ground, beta the angle between them, s the stroke,
-        s^2 = l^2 + r^2 - 2 l r cos beta,   ds/dbeta = l r sin beta/s = the lever from the pivot to the line.
+    With l from the pivot to the end on the bar, r to the end on the ground, beta the
+    angle between them, s the stroke,
+        s^2 = l^2 + r^2 - 2 l r cos beta,   ds/dbeta = l r sin beta/s = the lever from
+        the pivot to the line.
     """
 
     bar: int
@@ -374,7 +378,8 @@ class Triangle(NamedTuple):
     ) -> tuple[Any, Any, Any, Any]:
         """Compute angle, speed and acceleration of the bar, and the condition: the lever over the longer of l and r.
 
-        NaN where the cylinder cannot have the stroke. All may be arrays, and numbers with slopes.
+        NaN where the cylinder cannot have the stroke. All may be arrays, and numbers
+        with slopes.
         """
         assert side is not None
         length, reach, zero = self.length, self.reach, 0.0 * self.length
@@ -462,8 +467,8 @@ def compute_bar_motion(
 ) -> tuple[Any, Any, Any, Any]:
     """Compute angle, speed and acceleration of the commanded bar, and the condition of the command (None: 1).
 
-    A stroke and its rates become those of the bar here, angles stay. All may be arrays of any library, and numbers that
-    carry their derivatives.
+    A stroke and its rates become those of the bar here, angles stay. All may be arrays
+    of any library, and numbers that carry their derivatives.
     """
     if scene.motion.stroke is None:
         return place, speed, acceleration, None
@@ -540,7 +545,8 @@ def command_at(scene: Scene, places: Array) -> Command:
 def with_signs(linkage: FourBar, commanded: Command) -> Command:
     """Return a command whose branch is the sign of the bar's own sine at each position, as engines are told.
 
-    It follows from the lengths and the angle alone. Of a command with signs this returns the one with assemblies.
+    It follows from the lengths and the angle alone. Of a command with signs this
+    returns the one with assemblies.
     """
     path = prepare_path(
         Loop(*linkage.lengths, 0.0, 0.0), linkage.ground_angle, commanded.bar

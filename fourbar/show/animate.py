@@ -1,7 +1,8 @@
 """A scene that moves: one self-contained web page, or a film (GIF, MP4).
 
-The page needs nothing but a browser: no network, no library. It replays the numbers that `collect_page_data` collects
-of `fourbar.solve`, and computes none of its own; to change a length there is `fourbar edit`.
+The page needs nothing but a browser: no network, no library. It replays the numbers
+that `collect_page_data` collects of `fourbar.solve`, and computes none of its own; to
+change a length there is `fourbar edit`.
 """
 
 import base64
@@ -114,7 +115,8 @@ def collect_live_data(
 ) -> dict[str, Any]:
     """Collect what the page's script draws, columns as arrays, without tolerances, pictures and the file.
 
-    `signs`: the branches of a sweep; left out: the scene's. `stage`: the last one evaluated; left out: as of `solve`.
+    `signs`: the branches of a sweep; left out: the scene's. `stage`: the last one
+    evaluated; left out: as of `solve`.
     """
     linkage, motion = scene.linkage, scene.motion
     shown = (
@@ -138,9 +140,11 @@ def collect_live_data(
         "unit": {"factor": factor, "name": unit},
         "units": {unit: list(entry) for unit, entry in units.items()},
         "centres": {
-            str(number): [(z := linkage.bar(number).to_centre).real, z.imag]
-            if linkage.bar(number).mass > 0.0
-            else None
+            str(number): (
+                [(z := linkage.bar(number).to_centre).real, z.imag]
+                if linkage.bar(number).mass > 0.0
+                else None
+            )
             for number in MOVING_BARS
         },
         "drive_bar": scene.drive_bar,
@@ -351,18 +355,19 @@ def write(
 
     Parameters
     ----------
-    path : the file; its ending says which of html, gif and mp4 is meant.
-    pictures : for bars "input", "coupler", "output", in place of the scene's own: a PNG or JPEG file
-        that is laid along the bar, its left edge at the bar's first pin (O2, A, O4) and its right
-        edge at the second. Pages only.
-    units : in which numbers are shown; left out: SI. Angles are in degrees.
-    vectors : with arrows of velocity and acceleration at the points; a page can show and hide them.
-    seconds : duration of a film; left out: 6 s for a sweep, of a motion through time its own.
+    path : the file; its ending says which of html, gif and mp4 is meant. pictures : for
+    bars "input", "coupler", "output", in place of the scene's own: a PNG or JPEG file
+        that is laid along the bar, its left edge at the bar's first pin (O2, A, O4) and
+        its right edge at the second. Pages only.
+    units : in which numbers are shown; left out: SI. Angles are in degrees. vectors :
+    with arrows of velocity and acceleration at the points; a page can show and hide
+    them. seconds : duration of a film; left out: 6 s for a sweep, of a motion through
+    time its own.
 
     Raises
     ------
-    InputError : unknown format; a picture that cannot be read, is too large or no PNG or JPEG.
-    NotAssembledError : the linkage assembles at none of the scene's positions.
+    InputError : unknown format; a picture that cannot be read, is too large or no PNG
+    or JPEG. NotAssembledError : the linkage assembles at none of the scene's positions.
     DependencyError : a film without matplotlib, or MP4 without ffmpeg.
     """
     target, kind = Path(path), format_of(path, FORMATS)

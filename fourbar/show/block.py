@@ -193,7 +193,10 @@ class _Block:
         least = facts.transmission
         return [
             self._write_ranges(),
-            f"transmission angle: at least {self._angle(least.value)}, at {self._place(least.place)}",
+            (
+                f"transmission angle: at least {self._angle(least.value)}, at"
+                f" {self._place(least.place)}"
+            ),
             *self._write_statuses(),
             *self._write_stretches(),
             *self._write_static_hint(),
@@ -208,7 +211,8 @@ class _Block:
             f"{count} {name.replace('_', ' ')}" for name, count in facts.counts.items()
         )
         return [
-            f"{len(facts.solution)} position{'s' if len(facts.solution) > 1 else ''}: {counts}"
+            f"{len(facts.solution)} position{'s' if len(facts.solution) > 1 else ''}:"
+            f" {counts}"
         ]
 
     def _is_acted_on(self) -> bool:
@@ -242,7 +246,10 @@ class _Block:
                 "no theta_3 moves the parallelogram, whose coupler does not turn"
             )
         angles = " and ".join(self._angle(angle) for angle in points)
-        line = f"change point{'s' if len(points) > 1 else ''} at theta_{motion.bar} = {angles}"
+        line = (
+            f"change point{'s' if len(points) > 1 else ''} at theta_{motion.bar} ="
+            f" {angles}"
+        )
         if len(points) == 1 and turns_fully(linkage, motion.bar):
             line += (
                 ": the assembly repeats after two turns, open and crossed are one "
@@ -257,14 +264,23 @@ class _Block:
         if facts.kind == "turn":
             begin = f"{BAR_NAMES[bar]} turns fully"
         elif facts.kind == "list":
-            begin = f"{len(facts.solution)} positions from {self._place(first)} to {self._place(last, named=False)}"
+            begin = (
+                f"{len(facts.solution)} positions from {self._place(first)} to"
+                f" {self._place(last, named=False)}"
+            )
         elif facts.kind == "released":
             begin = self._write_release()
         elif facts.kind == "law":
-            begin = f"{BAR_NAMES[bar]} {self._write_swing(bar)} by a law over {write_digits(last - first)} s"
+            begin = (
+                f"{BAR_NAMES[bar]} {self._write_swing(bar)} by a law over"
+                f" {write_digits(last - first)} s"
+            )
         else:
             name = "stroke" if self.unit == "m" else BAR_NAMES[bar]
-            begin = f"{name} from {self._place(first, named=False)} to {self._place(last, named=False)}"
+            begin = (
+                f"{name} from {self._place(first, named=False)} to"
+                f" {self._place(last, named=False)}"
+            )
         following = [2, 4] if facts.kind == "released" else [4 if bar != 4 else 2]
         return "; ".join(
             [
@@ -289,7 +305,10 @@ class _Block:
             self._angle(angle)
             for angle in (high.value - low.value, low.value, high.value)
         )
-        return f"swings {width}, from {start} ({self.symbol}{TIED}={TIED}{places[0]}) to {stop} ({places[1]})"
+        return (
+            f"swings {width}, from {start} ({self.symbol}{TIED}={TIED}{places[0]}) to"
+            f" {stop} ({places[1]})"
+        )
 
     def _write_release(self) -> str:
         free, solution = self.facts.scene.motion.free, self.facts.solution
@@ -298,7 +317,10 @@ class _Block:
         if not solution.change_points:
             return begin
         times = " and ".join(f"{write_digits(t)} s" for t in solution.change_points)
-        return f"{begin}; at t = {times} all bars are in line, where another motion is possible"
+        return (
+            f"{begin}; at t = {times} all bars are in line, where another motion is"
+            " possible"
+        )
 
     def _write_stretches(self) -> list[str]:
         """Write where the assembly ends, and what grows without bound there."""
@@ -320,7 +342,10 @@ class _Block:
             parts.append(f"{start} {stop}".strip())
         grows = ""
         if facts.drive is not None and facts.drive.keys.value in facts.between.growing:
-            grows = f"; the {facts.drive.name.removeprefix('drive ')} grows without bound there"
+            grows = (
+                f"; the {facts.drive.name.removeprefix('drive ')} grows without bound"
+                " there"
+            )
         elif facts.between.growing.intersection(PIN_FORCES) and facts.pins:
             grows = "; pin forces grow without bound there"
         return [f"assembles {', and '.join(parts)}{grows}"]
@@ -337,7 +362,10 @@ class _Block:
         if duty is not None:
             rms = duty.rms_force if facts.linear else duty.rms_torque
             beyond = self._beyond(drive.keys.value)
-            row = f"peak {row} at {self._place(facts.peak.place)}{beyond}, RMS {self._value(rms or 0.0, drive.unit)}"
+            row = (
+                f"peak {row} at {self._place(facts.peak.place)}{beyond}, RMS"
+                f" {self._value(rms or 0.0, drive.unit)}"
+            )
         lines.append(self._row(word, row))
         if facts.held is not None:
             low, high = (
@@ -435,7 +463,10 @@ class _Block:
         )
         speed = "at rest" if motion.speed == 0.0 else self._value(motion.speed, si)
         if not drives:
-            speed = f"the {BAR_NAMES[motion.bar]} {'' if motion.speed == 0.0 else 'at '}{speed}"
+            speed = (
+                f"the {BAR_NAMES[motion.bar]}"
+                f" {'' if motion.speed == 0.0 else 'at '}{speed}"
+            )
         if motion.acceleration:
             speed += (
                 f", {motion.names[2]} = {self._value(motion.acceleration, f'{si}^2')}"
@@ -484,7 +515,8 @@ class _Block:
         if pull:
             bore = math.sqrt(4.0 * pull / (math.pi * pressure))
             parts.append(
-                f"{self._value(bore, 'm')}, and the rod's area besides, to pull {self._value(pull, 'N')}"
+                f"{self._value(bore, 'm')}, and the rod's area besides, to pull"
+                f" {self._value(pull, 'N')}"
             )
         return [self._row("bore", f"at least {'; '.join(parts)}")] if parts else []
 
@@ -586,7 +618,8 @@ class _Block:
         if facts.between.reversals:
             unit = "rad" if facts.solution.at.stroke is None else "m"
             places = ", ".join(  # of a motion law too by its angle, not by its time
-                f"{self._value(place, unit, self.longest if unit == 'm' else None)} ({pin})"
+                f"{self._value(place, unit, self.longest if unit == 'm' else None)}"
+                f" ({pin})"
                 for place, pin in facts.between.reversals
             )
             name = facts.solution.commanded
@@ -603,7 +636,8 @@ class _Block:
             limit = HALF_OF_LAST * 10.0 ** (1 - self.digits) / 10.0
             changed = "none of these" if facts.error < limit else "some"
             lines.append(
-                f"rounding changes {changed} digits (worst error bar {below} of the value)"
+                f"rounding changes {changed} digits (worst error bar {below} of the"
+                " value)"
             )
         return lines
 
@@ -617,7 +651,8 @@ class _Block:
             or drive.values is None
         ):
             return []
-        # of those that matter: one that passes through zero has no digits, and needs none
+        # of those that matter: one that passes through zero has no digits, and needs
+        # none
         with np.errstate(invalid="ignore"):
             share = drive.error / np.maximum(
                 np.abs(drive.values), np.nanmedian(np.abs(drive.values))
@@ -630,13 +665,17 @@ class _Block:
         worst = int(np.nanargmax(share))
         digits = max(math.floor(-math.log10(share[worst])), 0)
         place = solution.at.places if solution.time is None else solution.time
-        start = f"{digits} digits left of {drive.symbol} at {self._place(float(place[worst]))}"
+        start = (
+            f"{digits} digits left of {drive.symbol} at"
+            f" {self._place(float(place[worst]))}"
+        )
         commanded = LOST[solution.at.bar]
         sines = {commanded: solution.condition[worst]}
         if solution.drive is not None:
             lever, sine = solution.drive_condition[worst], sines[commanded]
             return [
-                f"{start}: of its lever {lever:.2g}, of the sine of bars {commanded} {sine:.2g} is left"
+                f"{start}: of its lever {lever:.2g}, of the sine of bars {commanded}"
+                f" {sine:.2g} is left"
             ]
         sines[LOST[solution.drive_bar]] = solution.drive_condition[worst]
         bars = min(sines, key=lambda pair: sines[pair])

@@ -1,7 +1,7 @@
 """Quantities by the names that the command line takes: sizes, components, ratios of any two.
 
-`torque` and `omega_4` are numbers, `F12` and `v_B` the sizes of vectors, `F12_x` a component,
-`A` a place with two coordinates, `omega_4/omega_2` a ratio.
+`torque` and `omega_4` are numbers, `F12` and `v_B` the sizes of vectors, `F12_x` a
+component, `A` a place with two coordinates, `omega_4/omega_2` a ratio.
 """
 
 from dataclasses import replace
@@ -63,7 +63,8 @@ class Column(NamedTuple):
 def read_columns(scene: Scene, solution: Solution, names: str) -> list[Column]:
     """Read the columns of a list like "theta_2,torque,F12,omega_4/omega_2".
 
-    Raises InputError for a name that no quantity has, and for one that was not evaluated.
+    Raises InputError for a name that no quantity has, and for one that was not
+    evaluated.
     """
     columns: list[Column] = []
     for name in (word.strip() for word in names.split(",")):

@@ -1,6 +1,7 @@
 """Quantities that follow from those of a solution: shaking, ratios of speeds, instant centres.
 
-`fourbar.quantities.DERIVED` declares them; tables, CSV, plots and the workbench show them.
+`fourbar.quantities.DERIVED` declares them; tables, CSV, plots and the workbench show
+them.
 """
 
 from collections.abc import Callable
@@ -24,8 +25,8 @@ from fourbar.studies.points import instant_centres
 def derive(solution: Solution, name: str) -> Array | None:
     """Compute a quantity of `DERIVED`, (n,) or (n, 2); None where its stage was not evaluated.
 
-    NaN marks a position where it has no value: a ratio at a dead centre of bar 2, a centre at
-    infinity.
+    NaN marks a position where it has no value: a ratio at a dead centre of bar 2, a
+    centre at infinity.
     """
     if DERIVED_NAMES[name].stage == "force" and read_drive(solution).values is None:
         return None

@@ -85,8 +85,8 @@ def shaking_moment(solution: Solution) -> Array:
 
     The moment of a linear drive with an end on the ground takes the place of -T.
 
-    Couples that effects exert between the bars and ground (pin damping or friction at O2, O4)
-    are not part of it.
+    Couples that effects exert between the bars and ground (pin damping or friction at
+    O2, O4) are not part of it.
     """
 
     def moment(distance: Any, angle: Any, force: Array) -> Array:
@@ -137,15 +137,17 @@ def bearing_load(solution: Solution, pin: str) -> BearingLoad:
 def motor_duty(solution: Solution) -> MotorDuty | None:
     """Return peak and RMS torque and power, peak speed, and the energy in and out by the trapezoidal rule.
 
-    E = integral of P dt, dt = d theta/omega of the commanded bar, or ds/speed of the stroke, in a sweep; E_in of the
-    positive part of P, E_out of the negative.
-    Positions without a value are left out, and so are the steps from and to them.
+    E = integral of P dt, dt = d theta/omega of the commanded bar, or ds/speed of the
+    stroke, in a sweep; E_in of the positive part of P, E_out of the negative. Positions
+    without a value are left out, and so are the steps from and to them.
 
-    Returns None where no position has a torque or force of the drive: a released linkage, or positions alone.
+    Returns None where no position has a torque or force of the drive: a released
+    linkage, or positions alone.
 
     Parameters
     ----------
-    solution : positions of a sweep or of a motion law, to the stage "force"; or of a study of one.
+    solution : positions of a sweep or of a motion law, to the stage "force"; or of a
+    study of one.
     """
     expect("solution", solution, Solution)
     drive = read_drive(solution)
@@ -178,8 +180,9 @@ def motor_duty(solution: Solution) -> MotorDuty | None:
 def is_once_round(solution: Solution) -> Any:
     """Return True if a motion covers whole turns, so that its last position repeats the first; for a study (m,).
 
-    An assembly with a single change point repeats after two turns. Speed and acceleration
-    must repeat too: a motion law may end at another speed than it begins with.
+    An assembly with a single change point repeats after two turns. Speed and
+    acceleration must repeat too: a motion law may end at another speed than it begins
+    with.
     """
     angle, bar = solution.at.angle, solution.at.bar
     if angle.shape[-1] == 1:
@@ -308,7 +311,10 @@ def describe_drive(scene: Scene) -> str:
         if not others:
             return f"at a point of bar {start} ({BAR_NAMES[start]})"
         end = others[0]
-        return f"along a line from bar {start} ({BAR_NAMES[start]}) to bar {end} ({BAR_NAMES[end]})"
+        return (
+            f"along a line from bar {start} ({BAR_NAMES[start]}) to bar {end}"
+            f" ({BAR_NAMES[end]})"
+        )
     return f"bar {scene.drive_bar} ({BAR_NAMES[scene.drive_bar]})"
 
 
@@ -324,7 +330,8 @@ class Energies(NamedTuple):
 def compute_energies(scene: Scene, motion: Solution) -> Energies:
     """Compute the kinetic energy, and the work of each effect and of the loads.
 
-    T = sum of m v_G^2/2 + I omega^2/2;   W(t) = integral of the power, by a cubic spline through the instants.
+    T = sum of m v_G^2/2 + I omega^2/2;   W(t) = integral of the power, by a cubic
+    spline through the instants.
 
     Raises DependencyError where SciPy is not installed.
     """

@@ -25,11 +25,15 @@ def show_scene(scene: Scene, units: Conversion = SI) -> str:
         drawn = b64encode(
             draw_figure(scene, "linkage", units=units)._repr_svg_().encode()
         ).decode()
-        picture = f'<img alt="The linkage" style="width:100%" src="data:image/svg+xml;base64,{drawn}">'
+        picture = (
+            '<img alt="The linkage" style="width:100%"'
+            f' src="data:image/svg+xml;base64,{drawn}">'
+        )
     except FourBarError as error:  # a notebook shows the reason, not a traceback
         picture = f"<p>{escape(str(error))}</p>"
     rows = "".join(
-        f'<tr><th style="text-align:left">{escape(name)}</th><td style="text-align:left">{escape(text)}</td></tr>'
+        f'<tr><th style="text-align:left">{escape(name)}</th><td'
+        f' style="text-align:left">{escape(text)}</td></tr>'
         for name, text in _list_facts(scene, units)
     )
     return (
@@ -74,7 +78,10 @@ def _list_facts(scene: Scene, units: Conversion) -> list[tuple[str, str]]:
 def show_solution(solution: Solution, units: Conversion = DEGREES) -> str:
     """Show the first and last positions as a table; angles in degrees by default."""
     if solution.theta_2.ndim == 2:
-        return f"<div><b>{escape(solution.title or 'Study')}</b>: {describe_extent(solution.theta_2)}</div>"
+        return (
+            f"<div><b>{escape(solution.title or 'Study')}</b>:"
+            f" {describe_extent(solution.theta_2)}</div>"
+        )
     cells = list_columns(solution, units)
     count = len(solution)
     places = (
@@ -90,7 +97,8 @@ def show_solution(solution: Solution, units: Conversion = DEGREES) -> str:
         if count > 2 * SHOWN and place == count - SHOWN:
             more = f"… {count - 2 * SHOWN} more …"
             lines.append(
-                f'<tr><td colspan="{len(cells)}" style="text-align:center">{more}</td></tr>'
+                f'<tr><td colspan="{len(cells)}"'
+                f' style="text-align:center">{more}</td></tr>'
             )
         lines.append(
             "<tr>"

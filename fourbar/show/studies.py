@@ -40,7 +40,8 @@ def write_type(
 ) -> Iterator[str]:
     """Write the type of a linkage, the condition that decides it, what turns, how far, and between which limits.
 
-    `units`: of the lengths; None where they are ratios. `everything`: the limits of all bars, not of the output alone.
+    `units`: of the lengths; None where they are ratios. `everything`: the limits of all
+    bars, not of the output alone.
     """
     mobility = classify(linkage)
     relation = "<" if mobility.surplus > 0.0 else ">" if mobility.surplus < 0.0 else "="
@@ -53,7 +54,10 @@ def write_type(
         return f"{factor * length:.6g} {unit}".rstrip()
 
     yield mobility.name
-    yield f"s + l = {write(outer)} {relation} p + q = {write(sum(linkage.lengths) - outer)}"
+    yield (
+        f"s + l = {write(outer)} {relation} p + q ="
+        f" {write(sum(linkage.lengths) - outer)}"
+    )
     yield "bars that turn fully: " + (
         ", ".join(BAR_NAMES[number] for number in mobility.turning) or "none"
     )
@@ -105,20 +109,29 @@ def _write_mobility(
         in_line = ", ".join(
             BAR_NAMES[number] for number in MOVING_BARS if number != bar
         )
-        what = f"  {BAR_NAMES[bar]}: {in_line} {'stretched' if limit.stretched else 'folded'}"
+        what = (
+            f"  {BAR_NAMES[bar]}: {in_line}"
+            f" {'stretched' if limit.stretched else 'folded'}"
+        )
         angles = "".join(f"{math.degrees(angle):10.4f}" for angle in limit[:3])
         yield f"{what:<34}{angles}  {BRANCH_NAMES.get(limit.branch, 'both')}"
     for bar in MOVING_BARS:
         if turns_fully(linkage, bar):
             yield from _explain_turning(linkage, bar, write)
     if points := change_points(linkage):
-        yield f"change points: theta_2 = {' and '.join(_write_angle(point) for point in points)}"
+        yield (
+            "change points: theta_2 ="
+            f" {' and '.join(_write_angle(point) for point in points)}"
+        )
     transmission = transmission_extremes(linkage)
     yield (
         f"angle between coupler and output: {_write_angle(transmission.least)} "
         f"at theta_2 = {_write_angle(transmission.theta_2_least)}"
     )
-    yield f"    to {_write_angle(transmission.greatest)} at {_write_angle(transmission.theta_2_greatest)}"
+    yield (
+        f"    to {_write_angle(transmission.greatest)} at"
+        f" {_write_angle(transmission.theta_2_greatest)}"
+    )
     if transmission.worst > 0.0:
         yield f"smallest transmission angle: {_write_angle(transmission.worst)}"
     if (ratio := time_ratio(linkage)) is not None:
@@ -140,9 +153,15 @@ def _explain_turning(
     when = "are in line at change points alone" if touches else "are never in line"
     yield f"{name}: no limits, {one} and {two} {when}:"
     relation = "=" if reach.beyond_stretched == 0.0 else "<"
-    yield f"    ground + {name} = {write(d + length)} {relation} {one} + {two} = {write(x + y)}"
+    yield (
+        f"    ground + {name} = {write(d + length)} {relation} {one} + {two} ="
+        f" {write(x + y)}"
+    )
     relation = "=" if reach.beyond_folded == 0.0 else ">"
-    yield f"    |ground - {name}| = {write(abs(d - length))} {relation} |{one} - {two}| = {write(abs(x - y))}"
+    yield (
+        f"    |ground - {name}| = {write(abs(d - length))} {relation} |{one} - {two}| ="
+        f" {write(abs(x - y))}"
+    )
 
 
 def _write_angle(angle: float) -> str:
@@ -171,7 +190,8 @@ def write_sensitivity(derivatives: Sensitivity) -> str:
     names = list_shown(derivatives)
     influences = {name: derivatives.influences(name) for name in names}
     lines = [
-        "largest change over the positions by 1 % of a number, of an angle by 1 deg; pin forces by their magnitude"
+        "largest change over the positions by 1 % of a number, of an angle by 1 deg;"
+        " pin forces by their magnitude"
     ]
     for name in names:
         angles = [
@@ -284,7 +304,8 @@ def _count_equilibria(rest: Equilibria) -> list[str]:
             f"theta_2 = {_write_degrees(place.theta_2)}" for place in rest.not_decided
         )
         lines.append(
-            f"at the change point {angles} deg nothing is decided: there the linkage has two ways to move"
+            f"at the change point {angles} deg nothing is decided: there the linkage"
+            " has two ways to move"
         )
     lines += [
         f"indifferent (Q = 0 throughout): {_write_range(ends)}"
@@ -331,7 +352,8 @@ def _write_holding(rest: Equilibria) -> tuple[list[str], Any]:
         most = int(np.nanargmax(np.abs(values)))
         largest = "largest" if low is None else "largest without friction"
         lines.append(
-            f"{largest}: {values[most]:.6g} {drive.unit} at theta_2 = {_write_degrees(positions.theta_2[most])} deg"
+            f"{largest}: {values[most]:.6g} {drive.unit} at theta_2 ="
+            f" {_write_degrees(positions.theta_2[most])} deg"
         )
     return lines, make_plain_table([*heads, "released"], rows, left=("released",))
 

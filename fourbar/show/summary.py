@@ -1,7 +1,8 @@
 """Summary of a solved scene: ranges, peaks and their places, needs of the drive, ends of the motion.
 
-`locate_between` finds what the steps of a sweep pass over: reversals of dry friction, and the largest torque and pin
-forces; `locate_bending` the largest bending moments. `summarize` computes the facts; `fourbar.show.block` prints them.
+`locate_between` finds what the steps of a sweep pass over: reversals of dry friction,
+and the largest torque and pin forces; `locate_bending` the largest bending moments.
+`summarize` computes the facts; `fourbar.show.block` prints them.
 """
 
 import math
@@ -114,9 +115,11 @@ def list_sizes(solution: Solution) -> dict[str, Array]:
 def locate_between(scene: Scene, solution: Solution) -> Between:
     """Locate reversals and largest values between the positions of a sweep or motion law, by solving finer positions.
 
-    Nothing is searched for a released motion, a list of angles, or a scene without a speed.
+    Nothing is searched for a released motion, a list of angles, or a scene without a
+    speed.
 
-    `solution`: of the scene's positions, or of its sweep in rising order, to the stage "force".
+    `solution`: of the scene's positions, or of its sweep in rising order, to the stage
+    "force".
     """
     if not _has_between(scene, solution):
         return Between(solution, solution, [], {COUPLE.value, LINE.value, *PIN_FORCES})
@@ -467,9 +470,9 @@ def summarize(scene: Scene, solution: Solution) -> Facts:
         bending=bending,
         stresses=_list_stresses(scene, bending),
         stroke_range=None if fine.stroke is None else find_range(fine.stroke),
-        stroke_limits=None
-        if solution.stroke is None
-        else _find_stroke_limits(scene, solution),
+        stroke_limits=(
+            None if solution.stroke is None else _find_stroke_limits(scene, solution)
+        ),
         between=between,
         error=_find_error(solution, drive),
     )

@@ -92,9 +92,9 @@ def print_positions(
 
     Parameters
     ----------
-    columns : the columns; left out: all of them, most wanted first.
-    width : columns of a terminal, where the positions are thinned out; None: a file or a pipe, which gets them all.
-    every : show every so many positions; left out: as `width` says.
+    columns : the columns; left out: all of them, most wanted first. width : columns of
+    a terminal, where the positions are thinned out; None: a file or a pipe, which gets
+    them all. every : show every so many positions; left out: as `width` says.
     """
     step = every or (1 if width is None else _choose_step(len(solution)))
     cells = None
@@ -110,11 +110,13 @@ def print_positions(
     if step > 1:
         more = "; --all shows each" if every is None else ""
         notes.append(
-            f"shown: every {step}{_write_ordinal(step)} of the {len(solution)} positions{more}"
+            f"shown: every {step}{_write_ordinal(step)} of the {len(solution)}"
+            f" positions{more}"
         )
     if left_out:
         notes.append(
-            f"not shown: {', '.join(left_out)} (a wider terminal, --csv or --json has them)"
+            f"not shown: {', '.join(left_out)} (a wider terminal, --csv or --json has"
+            " them)"
         )
     return write_table(solution.title, [], shown, notes, width)
 
@@ -225,7 +227,8 @@ def make_table(
 ) -> "tuple[Table, list[str]]":
     """Make the table for a terminal of the given width (None: as wide as it needs), and name the columns left out.
 
-    Every so many positions are shown, the last one always. `cells`: by heading; left out: all columns.
+    Every so many positions are shown, the last one always. `cells`: by heading; left
+    out: all columns.
     """
     if cells is None:
         cells = list_columns(solution, units)
@@ -272,7 +275,8 @@ def _count_digits(torque: Array, error: Array) -> list[str]:
 def show_running(text: str) -> Iterator[Callable[[float], None] | None]:
     """Move a line on standard error while the body runs; nothing where that is no terminal.
 
-    Yields what the body may report the share that is done to; None where there is no terminal.
+    Yields what the body may report the share that is done to; None where there is no
+    terminal.
     """
     from rich.console import Console
 

@@ -49,7 +49,10 @@ def write_text(spreads: Tolerances, units: Conversion = DEGREES) -> str:
     """Write one row for each quantity, below what was tried and what the variance of each is due to."""
     lines = [
         *describe_counts(spreads, units),
-        "each quantity at the position where its first-order worst case (worst) is largest; sigma is the standard",
+        (
+            "each quantity at the position where its first-order worst case (worst) is"
+            " largest; sigma is the standard"
+        ),
         "deviation of the samples; the variance there is due to",
     ]
     rows, (angle_unit, of_angle) = [], find_unit_in("rad", units)
@@ -100,11 +103,13 @@ def describe_counts(spreads: Tolerances, units: Conversion = DEGREES) -> list[st
     lines = [f"{count}, {drawn}, {n} positions"]
     if spreads.invalid:
         lines.append(
-            f"{_write_share(spreads.invalid, spreads)} have an impossible dimension, such as a length below 0"
+            f"{_write_share(spreads.invalid, spreads)} have an impossible dimension,"
+            " such as a length below 0"
         )
     if spreads.apart:
         lines.append(
-            f"{_write_share(spreads.apart, spreads)} do not assemble at some position at which the nominal linkage does"
+            f"{_write_share(spreads.apart, spreads)} do not assemble at some position"
+            " at which the nominal linkage does"
         )
     lines += [
         line
@@ -115,7 +120,10 @@ def describe_counts(spreads: Tolerances, units: Conversion = DEGREES) -> list[st
 
 
 def _write_share(count: int, spreads: Tolerances) -> str:
-    return f"{count} of {spreads.samples} samples ({100.0 * count / spreads.samples:.3g} %)"
+    return (
+        f"{count} of {spreads.samples} samples"
+        f" ({100.0 * count / spreads.samples:.3g} %)"
+    )
 
 
 def describe_parted(spreads: Tolerances, part: str, units: Conversion = DEGREES) -> str:
@@ -135,8 +143,9 @@ def describe_parted(spreads: Tolerances, part: str, units: Conversion = DEGREES)
     ]
     places = ", ".join(ends[:MOST_RUNS]) + (", ..." if len(ends) > MOST_RUNS else "")
     return (
-        f"{part}: the samples spread by more than {100.0 * PARTED:g} % more or less than first order says at "
-        f"{rows.size} of {len(spreads.theta_2)} positions (theta_2 = {places} {unit}): trust the samples there"
+        f"{part}: the samples spread by more than {100.0 * PARTED:g} % more or less"
+        f" than first order says at {rows.size} of {len(spreads.theta_2)} positions"
+        f" (theta_2 = {places} {unit}): trust the samples there"
     )
 
 
@@ -157,8 +166,9 @@ def collect_tolerances(
 ) -> dict[str, Any]:
     """Collect what a page shows of them at places of its axis: deviations from the nominal, shares of the variance.
 
-    A scene that has none of this (a free motion, SciPy not installed) gives the sentence that says so. `progress` is
-    that of `tolerances`; left out, a line in the terminal.
+    A scene that has none of this (a free motion, SciPy not installed) gives the
+    sentence that says so. `progress` is that of `tolerances`; left out, a line in the
+    terminal.
     """
     positions = (
         scene

@@ -39,8 +39,9 @@ PREFIXES = (
 def units(text: str) -> Conversion:
     """Read the units of a list, or of "SI" or "imperial" (in, lbf, lbf in, lb, deg, rpm, hp).
 
-    A product is joined by dots ("N.mm"). What the list leaves out stays SI, but for speeds and accelerations of
-    points, which follow the length, and the energy, which follows the torque.
+    A product is joined by dots ("N.mm"). What the list leaves out stays SI, but for
+    speeds and accelerations of points, which follow the length, and the energy, which
+    follows the torque.
 
     Raises InputError for what is no unit of a result, and for two of one dimension.
     """
@@ -105,8 +106,9 @@ def suit_units(length: str) -> Conversion:
 def units_of_scene(document: Mapping[str, Any]) -> Conversion:
     """Return the units that suit the tables of a scene file.
 
-    They are imperial where the lengths are in inches or feet; otherwise lengths have the unit of
-    lengths.ground, and speeds and accelerations of bars those that the motion is stated in.
+    They are imperial where the lengths are in inches or feet; otherwise lengths have
+    the unit of lengths.ground, and speeds and accelerations of bars those that the
+    motion is stated in.
     """
     motion = document.get("motion", {})
     rates = (

@@ -75,7 +75,8 @@ class Sensitivity:
     """Values of the numbers, (p,); of motion.theta_2 and of what a motion law varies NaN."""
     status: list[str]
     """Status of each position, as in `Solution.status`; "at_rest": dry friction holds a pin, torque and pin forces have
-    no derivative there. Quantities that a status other than ok concerns are NaN."""
+    no derivative there. Quantities that a status other than ok concerns are NaN.
+    """
     by: dict[str, Array]
     """Derivatives by quantity, (p, n) or (p, n, 2)."""
 
@@ -197,13 +198,15 @@ class Sensitivity:
 def sensitivity(scene: Scene) -> Sensitivity:
     """Differentiate every quantity at each position of a scene by each of its numbers.
 
-    d(quantity)/d(key), the other numbers held; what the scene leaves out (the inertia of a uniform bar, its centre
-    at mid-bar) follows the length. What is commanded is held too, and "motion.theta_2" (or theta_3, theta_4, stroke) is
-    the derivative by it.
+    d(quantity)/d(key), the other numbers held; what the scene leaves out (the inertia
+    of a uniform bar, its centre at mid-bar) follows the length. What is commanded is
+    held too, and "motion.theta_2" (or theta_3, theta_4, stroke) is the derivative by
+    it.
 
     Raises
     ------
-    InputError : a free motion, or a position that is described by its distance from a limit.
+    InputError : a free motion, or a position that is described by its distance from a
+    limit.
 
     >>> from fourbar import Motion, Scene, uniform
     >>> found = sensitivity(Scene(uniform(0.3, 0.1, 0.25, 0.22), Motion(1.0, 10.0)))
@@ -303,7 +306,8 @@ def sensitivity(scene: Scene) -> Sensitivity:
 class _SlopedPath(Path):
     """The same path by sine and cosine.
 
-    Near 180 deg a tangent is large, and slopes through it are differences of large numbers.
+    Near 180 deg a tangent is large, and slopes through it are differences of large
+    numbers.
     """
 
     __slots__ = ()

@@ -1,11 +1,13 @@
 """Equilibria: where a linkage stays by itself under weights, springs and loads, and what holds it elsewhere.
 
-With Q the generalised force (its power over q') and J the equivalent inertia, at rest and with no drive,
+With Q the generalised force (its power over q') and J the equivalent inertia, at rest
+and with no drive,
     J q'' = Q,   stable where Q = 0 and dQ/dq < 0,   frequency sqrt(-Q'/J)/(2 pi).
-Dry friction holds wherever it takes Q: from the position in which it gives way forwards to that in which it gives way
-backwards.
+Dry friction holds wherever it takes Q: from the position in which it gives way forwards
+to that in which it gives way backwards.
 
-Source: R. L. Norton, Design of Machinery, ch. 11 (virtual work); L. Meirovitch, Fundamentals of Vibrations, ch. 2.
+Source: R. L. Norton, Design of Machinery, ch. 11 (virtual work); L. Meirovitch,
+Fundamentals of Vibrations, ch. 2.
 """
 
 import math
@@ -91,7 +93,8 @@ class Equilibria(NamedTuple):
     samples: int
     """Number of positions of the grid. Every zero of Q at which its sign differs between
     two neighbours is found, and every one at which Q touches zero or passes it twice
-    between two neighbours whose slopes differ in sign; there may be others between."""
+    between two neighbours whose slopes differ in sign; there may be others between.
+    """
     not_decided: tuple[RestPosition, ...]
     """Change points, nearer than 1e-4 rad to which nothing is decided."""
     held: tuple[tuple[RestPosition, RestPosition], ...]
@@ -105,10 +108,12 @@ class Equilibria(NamedTuple):
 def equilibrium(scene: Scene) -> Equilibria:
     """Find the positions in which a linkage stays by itself, whether they are stable, and what holds the others.
 
-    On the circuit of the scene's first position that assembles, on both branches where it has both, within the sweep
-    of theta_2 if one is stated (or that of its motion law, or of the command of another bar or a stroke). Speed,
-    acceleration and drive of the scene play no part, viscous damping none either. Zeros of Q are sought between the
-    positions of a grid, 3600 a turn and the ends of the sweep: where Q changes its sign, and where its size is least.
+    On the circuit of the scene's first position that assembles, on both branches where
+    it has both, within the sweep of theta_2 if one is stated (or that of its motion
+    law, or of the command of another bar or a stroke). Speed, acceleration and drive of
+    the scene play no part, viscous damping none either. Zeros of Q are sought between
+    the positions of a grid, 3600 a turn and the ends of the sweep: where Q changes its
+    sign, and where its size is least.
 
     Raises
     ------
@@ -255,8 +260,8 @@ def _make_grid(curve: CircuitCurve, points: Array) -> _Grid:
 def _find_zeros(curve: CircuitCurve, points: Array) -> _Zeros:
     """Find the zeros of Q between samples: where its sign changes or its size is least.
 
-    A sample without Q may itself be a zero; with another one beside it, it is in a range
-    where Q is nothing.
+    A sample without Q may itself be a zero; with another one beside it, it is in a
+    range where Q is nothing.
     """
     grid = _make_grid(curve, points)
     idle_beside = np.zeros(len(points), dtype=bool)

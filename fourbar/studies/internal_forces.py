@@ -1,11 +1,13 @@
 """Internal forces of a bar: normal force, shear force and bending moment along the line between its two pins.
 
-With x from the first pin (O2, A, O4) towards the second and y to the left of it, over all that acts at or before x,
-inertia (d'Alembert) and weight included:
+With x from the first pin (O2, A, O4) towards the second and y to the left of it, over
+all that acts at or before x, inertia (d'Alembert) and weight included:
 
-    N(x) = -sum F_x  (tension > 0),   V(x) = sum F_y,   M(x) = sum (F_y (x - x_i)) - sum of the couples (ccw > 0).
+    N(x) = -sum F_x  (tension > 0),   V(x) = sum F_y,   M(x) = sum (F_y (x - x_i)) - sum
+    of the couples (ccw > 0).
 
-A force beside the line acts at its foot on it, together with its couple about that foot.
+A force beside the line acts at its foot on it, together with its couple about that
+foot.
 """
 
 from typing import Any, NamedTuple
@@ -60,9 +62,10 @@ def internal_forces(
 ) -> InternalForces:
     """Compute the internal forces of a moving bar.
 
-    A bar counts as uniform where its inertia and centre are left out; the weight and inertia of any other act at G,
-    its rotary inertia as a couple there. A load's couple acts at its place, the drive's at the bar's ground pin (of
-    bar 3 at A), the couples of effects at their pins.
+    A bar counts as uniform where its inertia and centre are left out; the weight and
+    inertia of any other act at G, its rotary inertia as a couple there. A load's couple
+    acts at its place, the drive's at the bar's ground pin (of bar 3 at A), the couples
+    of effects at their pins.
 
     Parameters
     ----------

@@ -204,7 +204,8 @@ def refuse_key(key: str, value: object, keys: list[str]) -> InputError:
         return InputError(
             key,
             value,
-            "is the same for every member of a study: only numbers vary, theta_2 as angles",
+            "is the same for every member of a study: only numbers vary, theta_2 as"
+            " angles",
         )
     close = get_close_matches(key, keys, 1, 0.0)
     return InputError(key, value, f'unknown key; did you mean "{close[0]}"?')

@@ -34,9 +34,10 @@ def find_positions(scene: Scene, wanted: list[tuple[str, float]]) -> Command:
 
     Parameters
     ----------
-    wanted : names among `PLACES` and values, rad, m or s. Each gives the positions of the scene's
-        assembly that have it, of a motion over time those that it passes, of a released one the
-        first.
+    wanted : names among `PLACES` and values, rad, m or s. Each gives the positions of
+    the scene's
+        assembly that have it, of a motion over time those that it passes, of a released
+        one the first.
 
     Raises
     ------
@@ -104,7 +105,8 @@ def _list_candidates(scene: Scene, name: str, value: float) -> list[float]:
                 candidates.append(float(place[0]))
     if commanded not in ANGLES:
         return candidates
-    # with one change point an assembly repeats after two turns; the sweep's own turn first
+    # with one change point an assembly repeats after two turns; the sweep's own turn
+    # first
     turned = [place + turns * TURN for place in candidates for turns in (0, 1, -1)]
     sweep = command(scene).angle
     low, high = float(sweep.min()) - SAME, float(sweep.max()) + SAME

@@ -40,7 +40,8 @@ AT_ONCE = 200_000
 """Members times positions: about 40 quantities of them are 70 MB."""
 PARTED = 0.1
 """First order and samples part where their standard deviations differ by more than this share of the larger: the
-quantity is no longer straight over the tolerances, and a share of a variance is that of a straight one."""
+quantity is no longer straight over the tolerances, and a share of a variance is that of a straight one.
+"""
 NEGLIGIBLE = 1e-9
 """A deviation below this share of the quantity's largest value is rounding and decides nothing."""
 
@@ -164,8 +165,8 @@ def tolerances(
 ) -> Tolerances:
     """Compute the spread of every quantity at each position, from quasi-random samples of the toleranced numbers.
 
-    With the samples come first-order figures, from s_i = d(quantity)/d(number i): the worst case sum |s_i| t_i and
-    the shares (s_i sigma_i)^2 of the variance.
+    With the samples come first-order figures, from s_i = d(quantity)/d(number i): the
+    worst case sum |s_i| t_i and the shares (s_i sigma_i)^2 of the variance.
 
     Parameters
     ----------
@@ -175,10 +176,11 @@ def tolerances(
 
     Raises
     ------
-    InputError : no tolerances, a key that the scene does not have, a number that it leaves out, a free motion.
-    DependencyError : SciPy is not installed.
+    InputError : no tolerances, a key that the scene does not have, a number that it
+    leaves out, a free motion. DependencyError : SciPy is not installed.
 
-    Source: I. M. Sobol', USSR Comput. Math. Math. Phys. 7 (1967) 86; error propagation: JCGM 100:2008, 5.1.2.
+    Source: I. M. Sobol', USSR Comput. Math. Math. Phys. 7 (1967) 86; error propagation:
+    JCGM 100:2008, 5.1.2.
     """
     expect("scene", scene, Scene)
     if (

@@ -246,8 +246,8 @@ def measure(seed: int, count: int, out: Path) -> Iterator[AdviceCase]:
 def study(count: int, seed: int, out: Path) -> int:
     """Measure the advice on random linkages; exit 1 where it is not met or not cheap often enough.
 
-    That it is met often enough is a statement on all linkages, which few of them cannot prove: the count that it
-    needs is stated.
+    That it is met often enough is a statement on all linkages, which few of them cannot
+    prove: the count that it needs is stated.
     """
     from rich.console import Console
     from rich.progress import track
@@ -269,11 +269,13 @@ def study(count: int, seed: int, out: Path) -> int:
     )
     bound = compute_wilson(met, len(cases))
     click.echo(
-        f"met: {met} of {len(cases)}, lower Wilson bound {bound:.3f} (needed {NEEDED_MET})"
+        f"met: {met} of {len(cases)}, lower Wilson bound {bound:.3f} (needed"
+        f" {NEEDED_MET})"
     )
     if bound < NEEDED_MET and (more := find_enough(len(cases) - met)) > len(cases):
         click.echo(
-            f"undecided: with {len(cases) - met} not met the bound is reached from --count {more} on"
+            f"undecided: with {len(cases) - met} not met the bound is reached from"
+            f" --count {more} on"
         )
     wrongly = sum(not case.met for case in cases if not case.reached)
     click.echo(
@@ -281,11 +283,13 @@ def study(count: int, seed: int, out: Path) -> int:
     )
     share = cheap / len(cases)
     click.echo(
-        f"within {CHEAP:g} times the cheapest: {cheap} of {len(cases)}, {share:.3f} (needed {NEEDED_CHEAP})"
+        f"within {CHEAP:g} times the cheapest: {cheap} of {len(cases)}, {share:.3f}"
+        f" (needed {NEEDED_CHEAP})"
     )
     if ratios:
         median, high = ratios[len(ratios) // 2], ratios[int(0.95 * (len(ratios) - 1))]
         click.echo(
-            f"cost over the cheapest: median {median:.2f}, 95 % below {high:.2f}, most {ratios[-1]:.2f}"
+            f"cost over the cheapest: median {median:.2f}, 95 % below {high:.2f}, most"
+            f" {ratios[-1]:.2f}"
         )
     return 0 if bound >= NEEDED_MET and share >= NEEDED_CHEAP else 1

@@ -136,7 +136,8 @@ LIMITS = {
     "solve with error bars / to forces": SpeedLimit(
         "<=",
         10.0,
-        "the same formulas once more, in longer numbers, which the processor takes one by one",
+        "the same formulas once more, in longer numbers, which the processor takes one"
+        " by one",
         BARS,
         FORCES,
     ),
@@ -197,7 +198,10 @@ class Measured(NamedTuple):
 def import_cost() -> float:
     """Compare the CPU time that `import fourbar` adds with that of `import numpy`: median over fresh interpreters."""
     clock = "time.process_time()"
-    code = f"import time; a = {clock}; import numpy; b = {clock}; import fourbar; print(({clock} - b) / (b - a))"
+    code = (
+        f"import time; a = {clock}; import numpy; b = {clock}; import fourbar;"
+        f" print(({clock} - b) / (b - a))"
+    )
     kept = {
         name: value
         for name, value in os.environ.items()
@@ -283,9 +287,11 @@ def bench(positions: int, rounds: int, largest: int, picture: Path | None) -> in
             rows.append(
                 (
                     what,
-                    f"{1e-6 * measured:.1f} ms"
-                    if what == JUDGED
-                    else f"{measured:.1f} ns/position",
+                    (
+                        f"{1e-6 * measured:.1f} ms"
+                        if what == JUDGED
+                        else f"{measured:.1f} ns/position"
+                    ),
                 )
             )
             continue
@@ -300,7 +306,10 @@ def bench(positions: int, rounds: int, largest: int, picture: Path | None) -> in
         )
         broken += [] if holds else [f"{what}: {limit.reason}"]
     console = Console()
-    title = f"{positions} positions, one core, medians of {rounds} interleaved rounds; {name_machine()}"
+    title = (
+        f"{positions} positions, one core, medians of {rounds} interleaved rounds;"
+        f" {name_machine()}"
+    )
     console.print(make_table(("what", "measured", "needed", ""), rows, title=title))
     for title, times in (
         (OVER_POSITIONS, measurement.over_positions),
@@ -381,8 +390,9 @@ def measure(positions: int, rounds: int, largest: int) -> Measured:
         if {row.of, row.over} <= rows.keys()
     }
     rows |= {
-        "study of linkages / positions": by_linkages[STUDY][most]
-        / by_linkages[POSITIONS][most],
+        "study of linkages / positions": (
+            by_linkages[STUDY][most] / by_linkages[POSITIONS][most]
+        ),
         "growth from 1000 positions on": max(cost.values()) / cost[min(cost)],
         "memory beyond the result, MB": measure_memory(min(positions, 1_000_000)),
         "import fourbar / import numpy": import_cost(),
@@ -401,8 +411,9 @@ def compare_adapters(rounds: int) -> dict[str, float]:
         actions[library] = partial(read_plainly, make_loop(scene), command)
     times = time_interleaved(actions, rounds)
     return {
-        f"{library}'s adapter / a plain loop": times[f"{library}'s adapter"]
-        / times[library]
+        f"{library}'s adapter / a plain loop": (
+            times[f"{library}'s adapter"] / times[library]
+        )
         for library in PLAIN_LOOPS
     }
 

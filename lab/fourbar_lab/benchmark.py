@@ -447,9 +447,11 @@ def compare_slopes(
                     for key, theirs in way["by"].items()
                 }
                 errors = {
-                    key: "zero"
-                    if theirs == 0.0
-                    else f"{abs(theirs / float(np.ravel(value)[0]) - 1.0):.1e}"
+                    key: (
+                        "zero"
+                        if theirs == 0.0
+                        else f"{abs(theirs / float(np.ravel(value)[0]) - 1.0):.1e}"
+                    )
                     for key, (theirs, value) in pairs.items()
                 }
             compared.append((write_one_line(str(way["how"])), errors))
@@ -502,8 +504,9 @@ def command(
 ) -> None:
     """Ask every engine every problem of models/problems, and write benchmark.csv and one page.
 
-    Each engine runs in its environment, which pip makes once. An engine that runs through time is asked at each of its
-    numbers of steps. What was answered before is not asked again.
+    Each engine runs in its environment, which pip makes once. An engine that runs
+    through time is asked at each of its numbers of steps. What was answered before is
+    not asked again.
     """
     find_checkout("benchmark")
     for name in problems:
@@ -522,5 +525,6 @@ def command(
     benchmark.run(time_limit)
     benchmark.write()
     click.echo(
-        f"wrote {out}/benchmark.csv, .html: {len(benchmark.rows)} engines, {len(benchmark.problems)} problems"
+        f"wrote {out}/benchmark.csv, .html: {len(benchmark.rows)} engines,"
+        f" {len(benchmark.problems)} problems"
     )

@@ -36,8 +36,8 @@ COMMANDS = {
 def group(context: click.Context) -> None:
     """Study the formulas, the harness that checks them, and the engines.
 
-    Exit status: 0 all holds, 1 something does not hold, 2 the input is bad, 3 the environment or the
-    program failed, 130 interrupted.
+    Exit status: 0 all holds, 1 something does not hold, 2 the input is bad, 3 the
+    environment or the program failed, 130 interrupted.
     """
     if context.invoked_subcommand is None:
         click.echo(context.get_help())

@@ -30,7 +30,8 @@ Times = dict[str, dict[int, float]]
 """ns for each, by who and by how many."""
 Loop = Callable[[Array, Array], None]
 """Writes theta_3, theta_4, omega_3, omega_4, alpha_3, alpha_4, F12, F32, F43, F14 (two rows each) and the torque at n
-angles into an array (15, n)."""
+angles into an array (15, n).
+"""
 SOURCE = Path(__file__).with_name("bench_loop.c")
 FLAGS = ("-O3", "-march=native")
 LOOKS = (
@@ -139,7 +140,10 @@ def compile_loop() -> Loop | str:
             line, capture_output=True, encoding="utf-8", errors="replace", check=False
         )
         if made.returncode != 0:
-            return f"{compiler} fails: {(made.stderr.strip().splitlines() or ['without a word'])[0]}"
+            return (
+                f"{compiler} fails:"
+                f" {(made.stderr.strip().splitlines() or ['without a word'])[0]}"
+            )
         loop = ctypes.CDLL(str(library)).loop
     pointer = ctypes.POINTER(ctypes.c_double)
 

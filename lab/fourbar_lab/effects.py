@@ -86,8 +86,9 @@ AMOUNTS = {
 }
 """Units of work of one run: 10 to 20 ms, long against the clock's resolution and short against what disturbs it."""
 ABOUT = (
-    "Processor time of a position, of a step of the simulation (RK4), in us without effects; with an effect relative "
-    "to that: the median of the ratios of neighbouring runs and their middle half."
+    "Processor time of a position, of a step of the simulation (RK4), in us without"
+    " effects; with an effect relative to that: the median of the ratios of"
+    " neighbouring runs and their middle half."
 )
 
 

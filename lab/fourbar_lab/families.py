@@ -226,8 +226,9 @@ def springs(rng: np.random.Generator) -> Scene:
 def torsion(rng: np.random.Generator) -> Scene:
     """Draw a torsion spring near the angle at which its couple is zero, its rest some turns away or none.
 
-    Not at O2: its angle, given in doubles, comes back from the directions to the last digit more often than not, and
-    an error that is zero by chance says nothing of the bar.
+    Not at O2: its angle, given in doubles, comes back from the directions to the last
+    digit more often than not, and an error that is zero by chance says nothing of the
+    bar.
     """
     scene = massless(rng)
     solution, pin = solve(scene, "position"), str(rng.choice(["A", "B", "O4"]))
@@ -254,7 +255,8 @@ def torsion(rng: np.random.Generator) -> Scene:
 def tables(rng: np.random.Generator) -> Scene:
     """Draw a load over a table, many turns from its angles or none, every other near where its factor is zero.
 
-    The ground is level: against another theta_2 loses digits of all directions after many turns.
+    The ground is level: against another theta_2 loses digits of all directions after
+    many turns.
     """
     scene = massless(rng)
     linkage = scene.linkage
@@ -354,7 +356,8 @@ def pushes(rng: np.random.Generator) -> Scene:
 def near_pins(rng: np.random.Generator) -> Scene:
     """Draw a spring or a cylinder with an end at 1e-1 to 1e-11 m from the pin that joins its two bars, or a load there.
 
-    The line of the force then passes the pin at that distance, though its other end lies far off.
+    The line of the force then passes the pin at that distance, though its other end
+    lies far off.
     """
     scene, pin = massless(rng), str(rng.choice(list(PINS)))
     near = {"O2": 1, "A": 3, "B": 3, "O4": 4}[pin]

@@ -69,7 +69,10 @@ def explain_survival(entry: dict[str, Any], failing: Failing | str) -> str | Non
         if not rows:
             return f"nothing fails on {scene!r}"
         if not set(quantities) & set(entry["caught_by"]):
-            return f"on {scene!r} {', '.join(sorted(set(quantities)))} fail, none of {', '.join(entry['caught_by'])}"
+            return (
+                f"on {scene!r} {', '.join(sorted(set(quantities)))} fail, none of"
+                f" {', '.join(entry['caught_by'])}"
+            )
     return None
 
 
@@ -116,8 +119,8 @@ def command(workers: int) -> int:
     """Make each fault of faults.toml, one at a time; each must be caught.
 
     Those in formulas, effects, MJCF and engines must fail a comparison, those in what
-    judges (comparison, tolerance, rows, report, regression, store, cost, advice) the quick
-    tests of their folder.
+    judges (comparison, tolerance, rows, report, regression, store, cost, advice) the
+    quick tests of their folder.
     """
     from rich.console import Console
     from rich.progress import track
@@ -134,6 +137,7 @@ def command(workers: int) -> int:
     for fault, why in survivors:
         click.echo(f"{fault}: {why}")
     click.echo(
-        f"{len(results) - 1} faults, {len(survivors)} of them survive without a reason on record"
+        f"{len(results) - 1} faults, {len(survivors)} of them survive without a reason"
+        " on record"
     )
     return FAILED if survivors else HOLDS

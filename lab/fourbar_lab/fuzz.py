@@ -1,6 +1,7 @@
 """Random scenes through files, formulas and exact engines; what fails is made smaller and kept.
 
-Even numbers are ordinary scenes, odd ones adversarial; scene i depends on the seed and i alone.
+Even numbers are ordinary scenes, odd ones adversarial; scene i depends on the seed and
+i alone.
 """
 
 import json
@@ -279,12 +280,14 @@ def _check_assembly(scene: Scene, commanded: Command, solution: Solution) -> lis
         closes = closure(make_balls(scene, float(theta_2)), int(signs[i])) is not None
         if closes != bool(solution.assembled[i]) and margin[i] > TOUCHING_MARGIN:
             problems.append(
-                f"assembled: the formulas say {bool(solution.assembled[i])} at theta_2 = {theta_2!r}"
+                f"assembled: the formulas say {bool(solution.assembled[i])} at theta_2"
+                f" = {theta_2!r}"
             )
         angles = (solution.theta_3[i], solution.theta_4[i])
         if np.isfinite(angles).any() and not solution.assembled[i]:
             problems.append(
-                f"assembled: angles where the loop does not close, theta_2 = {theta_2!r}"
+                "assembled: angles where the loop does not close, theta_2 ="
+                f" {theta_2!r}"
             )
     return problems
 
@@ -306,7 +309,8 @@ def _check_engines(question: Question) -> list[str]:
             rows += check_statements(
                 "", scene, engine.start(), answer, predicted=held.predicted
             )
-    # half of the scenes are drawn where doubles have few digits: that they are undecided is no fault
+    # half of the scenes are drawn where doubles have few digits: that they are
+    # undecided is no fault
     failed = [
         row for row in rows if row.verdict == FAILS and row.quantity != "undecided"
     ]

@@ -1,9 +1,10 @@
 """Inject faults, one after another: a module is loaded with another text, then the harness checks the test scenes.
 
-Run by its path, with the packages on PYTHONPATH: `python -P injection.py NUMBER...` prints what failed as JSON, a line
-for each fault; without a number nothing is injected and every test scene must hold. `injection.py --tests NUMBER` runs
-the tests that an entry of what judges names, and prints how they ended. As a module it would import the project before
-the fault stands.
+Run by its path, with the packages on PYTHONPATH: `python -P injection.py NUMBER...`
+prints what failed as JSON, a line for each fault; without a number nothing is injected
+and every test scene must hold. `injection.py --tests NUMBER` runs the tests that an
+entry of what judges names, and prints how they ended. As a module it would import the
+project before the fault stands.
 """
 
 import importlib.abc
@@ -24,8 +25,9 @@ PACKAGES = ("fourbar", "fourbar_validation")
 def read_faults(table: str = "injected") -> list[dict[str, Any]]:
     """Read a table of the list.
 
-    The keys of an entry are fault, file, old and new; of what is "injected" into formulas
-    and engines also scenes, caught_by and perhaps harmless, of what is "judging" tests.
+    The keys of an entry are fault, file, old and new; of what is "injected" into
+    formulas and engines also scenes, caught_by and perhaps harmless, of what is
+    "judging" tests.
     """
     entries: list[dict[str, Any]] = tomllib.loads(FAULTS.read_text(encoding="utf-8"))[
         table
@@ -41,7 +43,8 @@ def inject_fault(entry: dict[str, Any]) -> dict[str, str]:
         if text.count(change["old"]) != 1:
             count = text.count(change["old"])
             raise ValueError(
-                f"{entry['fault']}: {count} places in {change['file']} read {change['old']!r}"
+                f"{entry['fault']}: {count} places in {change['file']} read"
+                f" {change['old']!r}"
             )
         name = (
             change["file"]

@@ -1,8 +1,9 @@
 """The harness against mutants of the formulas: no unit test takes part.
 
-A mutant changes one operator or one number in one function of a module while the program runs. It counts where it
-changes a number that `solve` returns, or that is specified of the linkage, by more than 1e-9 of its scale (or what
-assembles, or which numbers exist, or raises); it is caught where a comparison then fails.
+A mutant changes one operator or one number in one function of a module while the
+program runs. It counts where it changes a number that `solve` returns, or that is
+specified of the linkage, by more than 1e-9 of its scale (or what assembles, or which
+numbers exist, or raises); it is caught where a comparison then fails.
 """
 
 import ast
@@ -322,7 +323,8 @@ def judge_mutant(mutant: Mutant, tried: Sequence[Baseline]) -> bool | None:
 def command(module: str | None, most: int) -> int:
     """Change operators and numbers of the formulas, one at a time; 95 % of those that matter must fail the harness.
 
-    A change matters that alters a number by more than 1e-9. Those that are not caught are listed.
+    A change matters that alters a number by more than 1e-9. Those that are not caught
+    are listed.
     """
     from rich.console import Console
     from rich.progress import track
@@ -357,13 +359,15 @@ def command(module: str | None, most: int) -> int:
         ]
         count = sum(verdict is not None for verdict in verdicts)
         click.echo(
-            f"{name}: {count - len(survivors)} of {count} caught, of {len(chosen)} mutants tried"
+            f"{name}: {count - len(survivors)} of {count} caught, of {len(chosen)}"
+            " mutants tried"
         )
         changing, missed = changing + count, missed + survivors
     signal.signal(signal.SIGALRM, before)
     for line in missed:
         click.echo(f"not caught: {line}")
     click.echo(
-        f"the harness catches {changing - len(missed)} of {changing} mutants that change a number"
+        f"the harness catches {changing - len(missed)} of {changing} mutants that"
+        " change a number"
     )
     return HOLDS if changing and len(missed) <= (1.0 - LEAST) * changing else FAILED

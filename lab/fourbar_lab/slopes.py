@@ -1,7 +1,8 @@
 """Derivatives of every output by every number of a scene: of `sensitivity` against those of balls.
 
-The error allowed of a derivative s_i = dy/dx_i is 8 eps (|s_i| + sum |x_j ds_i/dx_j| + sum |x_j s_j| / |x_i|): that of
-a value, and of what all numbers do to y, or to the vector, together: what cancels leaves a last digit of that.
+The error allowed of a derivative s_i = dy/dx_i is 8 eps (|s_i| + sum |x_j ds_i/dx_j| +
+sum |x_j s_j| / |x_i|): that of a value, and of what all numbers do to y, or to the
+vector, together: what cancels leaves a last digit of that.
 """
 
 import math
@@ -43,7 +44,8 @@ def list_numbers(scene: Scene) -> dict[str, float]:
 def compute_exact_slopes(scene: Scene) -> tuple[Values, Slopes]:
     """Return every output, and its derivatives and theirs by every number, by differences in balls.
 
-    No output where the loop does not close, no derivative where the drive has no torque.
+    No output where the loop does not close, no derivative where the drive has no
+    torque.
     """
     numbers, angle = list_numbers(scene), command_key(scene)
     make_balls(scene, numbers[angle])  # sets the precision

@@ -276,7 +276,10 @@ def stability(
     ):  # in a file the columns of all families keep their width
         console.width = WIDE
     of = ", of derivatives by every number" if derivatives else ""
-    title = f"largest error / (8 eps (|y| + sum |x dy/dx|)), {samples} samples each, seed {seed}{of}"
+    title = (
+        f"largest error / (8 eps (|y| + sum |x dy/dx|)), {samples} samples each, seed"
+        f" {seed}{of}"
+    )
     console.print(make_table(("output", *chosen), rows, title=title))
     for family, tally in tallies.items():
         for name, (part, sample) in tally.worst.items():

@@ -1,7 +1,8 @@
 """Count what samples showed: the largest errors over what is allowed, and whether error bars hold.
 
-The error allowed is 8 eps (|y| + sum |x_i dy/dx_i|) with y the value (1 rad for angles) and x_i the stored inputs:
-what a change of the inputs in their last digits does to y, and nothing more.
+The error allowed is 8 eps (|y| + sum |x_i dy/dx_i|) with y the value (1 rad for angles)
+and x_i the stored inputs: what a change of the inputs in their last digits does to y,
+and nothing more.
 """
 
 import math
@@ -21,7 +22,8 @@ CHANCE = 1e-6
 """Least probability, with a share of USELESS, of so many samples or more by chance. One of 60 samples is."""
 HALF_A_DIGIT = 2.0**-53
 """Half a digit of a result: a smaller error is chance, for no double need be nearer to the truth. A bar is called too
-large only against at least this error."""
+large only against at least this error.
+"""
 UNTOLD = 0.125
 """Part of |sin mu| that may be wrong with it if doubles do not tell whether the loop closes."""
 
@@ -94,9 +96,11 @@ def compute_ratio(
     size = abs(float(value.mid()))
     if name.startswith("theta"):
         error, size = (
-            math.remainder(float(error), 2.0 * math.pi)
-            if math.isfinite(ours)
-            else error,
+            (
+                math.remainder(float(error), 2.0 * math.pi)
+                if math.isfinite(ours)
+                else error
+            ),
             1.0,
         )
     wrong = abs(float(error)) if value.rad() < abs(error) else 0.0

@@ -371,9 +371,13 @@ def test_length_mass_and_time_scale(
             for load in scene.loads
         ),
         effects=tuple(
-            replace(e, magnitude=e.magnitude * L / T**2)
-            if isinstance(e, Gravity)
-            else Viscous(tuple((pin, k * M * L * L / T) for pin, k in e.coefficients))
+            (
+                replace(e, magnitude=e.magnitude * L / T**2)
+                if isinstance(e, Gravity)
+                else Viscous(
+                    tuple((pin, k * M * L * L / T) for pin, k in e.coefficients)
+                )
+            )
             for e in scene.effects
         ),
     )
@@ -416,12 +420,14 @@ def test_frame_rotation(scene: Scene, turn: float) -> None:
         linkage=replace(link, ground_angle=link.ground_angle + turn),
         motion=m.replace(angle=float(m.theta_2) + turn),
         loads=tuple(
-            load
-            if load.frame == "bar"
-            else replace(
-                load,
-                force=(load.force[0], load.force[1] + turn),
-                arm=load.arm and (load.arm[0], load.arm[1] + turn),
+            (
+                load
+                if load.frame == "bar"
+                else replace(
+                    load,
+                    force=(load.force[0], load.force[1] + turn),
+                    arm=load.arm and (load.arm[0], load.arm[1] + turn),
+                )
             )
             for load in scene.loads
         ),
@@ -489,9 +495,11 @@ def test_relabelled_from_the_other_end(scene: Scene) -> None:
         names[scene.drive_bar],
         tuple(relabelled(load) for load in scene.loads),
         tuple(
-            Viscous.at(**{pins[pin]: k for pin, k in e.coefficients})
-            if isinstance(e, Viscous)
-            else e
+            (
+                Viscous.at(**{pins[pin]: k for pin, k in e.coefficients})
+                if isinstance(e, Viscous)
+                else e
+            )
             for e in scene.effects
         ),
     )
@@ -501,7 +509,8 @@ def test_relabelled_from_the_other_end(scene: Scene) -> None:
     o = fourbar.solve(other_end)
     # F32 at A is now F34 = -F43, F43 at B is F23 = -F32
     exchanged = {"F12": o.F14[0], "F14": o.F12[0], "F32": -o.F43[0], "F43": -o.F32[0]}
-    # omega_4 and alpha_4 were rounded before, and lose what the shape of the linkage makes of it
+    # omega_4 and alpha_4 were rounded before, and lose what the shape of the linkage
+    # makes of it
     same_forces(
         scene,
         s,

@@ -213,7 +213,8 @@ def test_on_a_change_point_the_pin_forces_alone_have_no_value() -> None:
     assert solution.status == ["ok", "change_point", "ok"]
     assert solution.torque is not None and np.isfinite(solution.torque).all()
     assert solution.F12 is not None and np.isnan(solution.F12[1]).all()
-    # the drive on 3: bars 2 and 4 of the parallelogram are parallel, those of the antiparallelogram are not
+    # the drive on 3: bars 2 and 4 of the parallelogram are parallel, those of the
+    # antiparallelogram are not
     statuses = {1: "no_torque", -1: "ok"}
     for branch, expected in statuses.items():
         motion = motion.replace(branch=branch)

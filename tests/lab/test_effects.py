@@ -62,8 +62,8 @@ def test_the_table_has_a_row_for_each_effect_and_flag(
     text = (tmp_path / "effects.md").read_text().replace("\\", "")
     assert "| none | 2 us | 2 us | 2 us | 2 us |" in text
     assert (
-        "| pin_friction | +20 % [+10, +25] | no counterpart | +20 % [+10, +25] | +20 % [+10, +25] |"
-        in text
+        "| pin_friction | +20 % [+10, +25] | no counterpart | +20 % [+10, +25] | +20 %"
+        " [+10, +25] |" in text
     )
     assert (
         "| none, island left on |  | +20 % [+10, +25] |  |  |" in text

@@ -84,7 +84,10 @@ def test_every_operator_and_number_of_functions_methods_and_properties_is_change
     source = (
         "A = 3\ndef f(x):\n    return -x if 0 < x <= 1.5 and x is not None else x**2\n"
     )
-    source += "class C:\n    @property\n    def p(self):\n        return [self + k for k in (True,)]\n"
+    source += (
+        "class C:\n    @property\n    def p(self):\n        return [self + k for k in"
+        " (True,)]\n"
+    )
     (tmp_path / "small.py").write_text(source)
     spec = importlib.util.spec_from_file_location("small", tmp_path / "small.py")
     assert spec is not None and spec.loader is not None

@@ -99,11 +99,9 @@ def _loaded(ratio: float) -> bool:
 def compile_body(mass: float, inertia: float) -> mujoco.MjModel:
     """Compile one moving body."""
     inertias = " ".join([repr(inertia)] * 3)
-    return mujoco.MjModel.from_xml_string(
-        f"""<mujoco><worldbody><body><joint/>
+    return mujoco.MjModel.from_xml_string(f"""<mujoco><worldbody><body><joint/>
         <inertial pos="0 0 0" mass="{mass!r}" diaginertia="{inertias}"/>
-        </body></worldbody></mujoco>"""
-    )
+        </body></worldbody></mujoco>""")
 
 
 def _compiles(inertia: float) -> bool:

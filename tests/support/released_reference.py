@@ -1,11 +1,12 @@
 """A released linkage by Taylor series in 77 digits: the reference of the free motions.
 
-Shares nothing with the formulas. The coordinates are the three angles themselves, the equations
-d'Alembert's: with P the derivative of the loop's closure and t = P_x x P_y, the one motion it can make,
+Shares nothing with the formulas. The coordinates are the three angles themselves, the
+equations d'Alembert's: with P the derivative of the loop's closure and t = P_x x P_y,
+the one motion it can make,
     P alpha = gamma,   t . (M alpha - f) = 0,   so
     alpha = ((gamma_x P_y - gamma_y P_x) x M t + (t . f) t)/(t . M t).
-Nothing happens to them at a limit position. At a change point t = 0 and the quotient is 0/0, but the
-motion is analytic there, and a Taylor step passes over the point.
+Nothing happens to them at a limit position. At a change point t = 0 and the quotient is
+0/0, but the motion is analytic there, and a Taylor step passes over the point.
 """
 
 import math

@@ -147,7 +147,7 @@ class Planar:
         return (
             f'<body name="{name}" pos="{x!r} {y!r} 0">'
             f'<joint name="{pin}" axis="{axis}" {self.joint}/>'
-            f'<inertial pos="0.01 0.02 0.003" mass="0.3" diaginertia="1e-3 1e-3 1e-3"/>'
+            '<inertial pos="0.01 0.02 0.003" mass="0.3" diaginertia="1e-3 1e-3 1e-3"/>'
             f"{inside}</body>"
         )
 
@@ -188,8 +188,10 @@ class Planar:
         closed = (
             f'<connect site1="one" site2="two" {self.equality}/>'
             if self.by == "site"
-            else f'<connect body1="{first}" body2="{second}" anchor="{x!r} {y!r} 0" '
-            f"{self.equality}/>"
+            else (
+                f'<connect body1="{first}" body2="{second}" anchor="{x!r} {y!r} 0" '
+                f"{self.equality}/>"
+            )
         )
         return self._wrap(bodies, closed)
 

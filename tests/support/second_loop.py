@@ -1,7 +1,8 @@
 """Simulate a four-bar a second time, from MuJoCo's documentation alone, and judge it by Newton's law.
 
-Nothing of `fourbar_validation` is used: not its MJCF, its assembly, its stepping, its reading of forces, or its
-comparison. Of `fourbar` only the description of a scene is read, none of its formulas.
+Nothing of `fourbar_validation` is used: not its MJCF, its assembly, its stepping, its
+reading of forces, or its comparison. Of `fourbar` only the description of a scene is
+read, none of its formulas.
 """
 
 import math
@@ -307,8 +308,8 @@ class Simulation:
         self.timestep = 2.0 * math.pi / settings.steps_per_revolution / abs(self.omega)
         self.model = self.compile(settings.wheel)
         self.data = mujoco.MjData(self.model)
-        # a linkage that is driven elsewhere has no flywheel on its crank; pads stiffen the
-        # closure next to one alone
+        # a linkage that is driven elsewhere has no flywheel on its crank; pads stiffen
+        # the closure next to one alone
         self.wheel_read = settings.wheel
         if self.loop.drive != 2 and settings.pad is None:
             self.wheel_read = 0.0
@@ -391,7 +392,8 @@ class Simulation:
         """Return the forces on the three joints by which the drive of size one acts, by virtual work."""
         pushes, couples = self.loop.drive_direction(angles)
         crank = self.loop.a * np.exp(1j * angles[0])
-        # bar 3 turns with both joints and is carried by A; a force on it acts on the crank through A
+        # bar 3 turns with both joints and is carried by A; a force on it acts on the
+        # crank through A
         on_crank = couples[0] + couples[1] + _cross(crank, pushes[1])
         return np.array([on_crank, couples[1], couples[2]])
 

@@ -129,7 +129,7 @@ def test_the_pictures_are_those_that_few_points_draw(
     two, four = curves["recommended"]
     assert 1.0 < four.seconds_per_second / two.seconds_per_second < 4.0
     assert max(two.errors.worst, 100.0 * four.errors.worst) < 1e-2
-    (formulas, *_) = curves["formulas"]
+    formulas, *_ = curves["formulas"]
     assert formulas.seconds_per_second < four.seconds_per_second * 3.0
 
 

@@ -185,10 +185,13 @@ def test_the_engine_of_the_guide_agrees(
     (program,) = blocks("python", read("docs/guide-simulator.md"))
     (checkout / "closure.py").write_text(program, encoding="utf-8")
     monkeypatch.syspath_prepend(str(checkout))
-    scenes = (
-        "models/crank_rocker.toml models/double_rocker.toml"  # which begins at a limit
+    scenes = (  # which begins at a limit
+        "models/crank_rocker.toml models/double_rocker.toml"
     )
-    line = f"run {scenes} --guest closure:Closure --engines free-body --no-pictures --out out"
+    line = (
+        f"run {scenes} --guest closure:Closure --engines free-body --no-pictures"
+        " --out out"
+    )
     assert harness(line.split()) == HOLDS
     rows = [
         row
@@ -205,7 +208,8 @@ def test_the_engine_of_the_guide_agrees(
 
 
 def test_the_scene_file_is_one(checkout: Path) -> None:
-    # a scene; a bar by its material; pins in place of the lengths; an example of each effect
+    # a scene; a bar by its material; pins in place of the lengths; an example of each
+    # effect
     text, material, pins, _ = blocks("toml", read("docs/scene-file.md"))
     fourbar.files.loads(pins)
     lengths = text[text.index("[lengths]") : text.index("[bars.input]")]
@@ -222,7 +226,8 @@ def test_every_other_command_line_is_one_that_its_program_takes(page: Path) -> N
     """Parse the command lines in running text and shell blocks, which run for minutes or name a SCENE."""
     text = page.read_text(encoding="utf-8")
     lines = re.findall(
-        r"`((?:fourbar|python -m validation|python -m fourbar_lab|fourbar-validation) [^`]+)`",
+        r"`((?:fourbar|python -m validation|python -m fourbar_lab|fourbar-validation)"
+        r" [^`]+)`",
         text,
     )
     lines += re.findall(
@@ -461,7 +466,8 @@ def test_the_gallery_is_a_suite_with_pictures_and_sources() -> None:
         assert (
             DOCS / "gallery" / f"{name}.svg"
         ).is_file() and f"gallery/{name}.svg" in read("docs/gallery.md")
-    # what the sources state of them: a stroke of 54 in, 60 deg to and fro in the same time, 450 mm straight to 1.5 mm
+    # what the sources state of them: a stroke of 54 in, 60 deg to and fro in the same
+    # time, 450 mm straight to 1.5 mm
     pump = load(GALLERY / "pump_jack.toml").linkage
     assert fourbar.swing(pump) * 72.0 == pytest.approx(54.0, rel=0.03)
     stroke = fourbar.solve(load(GALLERY / "excavator_bucket.toml")).stroke

@@ -238,8 +238,10 @@ def test_the_places_that_the_guide_to_a_quantity_names_are_there() -> None:
     )
     texts = {
         name: (
-            root / ("validation" if name.startswith("fourbar_v") else ".") / name
-        ).read_text()
+            (
+                root / ("validation" if name.startswith("fourbar_v") else ".") / name
+            ).read_text()
+        )
         for name in files
     }
     for name, word in (("__init__", "_scalar("), ("evaluate", "SCALAR_F"), ("loop", "NOT_ANSWERED"), ("scales", "v_A"),

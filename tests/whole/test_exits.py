@@ -372,7 +372,10 @@ PROCESSES = [
     ("validation", f"accept {NO_FILE}", BAD_INPUT),
     (
         "validation",
-        f"compare accepted {ROOT / 'validation/fourbar_validation/regression/accepted'}",
+        (
+            "compare accepted"
+            f" {ROOT / 'validation/fourbar_validation/regression/accepted'}"
+        ),
         HOLDS,
     ),
     ("validation", f"check {NO_FILE} {NO_FILE}", BAD_INPUT),
@@ -402,9 +405,10 @@ def test_each_command_in_a_process_of_its_own(
     program: str, line: str, status: int, tmp_path: Path
 ) -> None:
     ended, complained = alone(program, line.split(), tmp_path)
-    assert (ended, bool(complained.strip())) == (status, status == BAD_INPUT), (
-        complained
-    )
+    assert (ended, bool(complained.strip())) == (
+        status,
+        status == BAD_INPUT,
+    ), complained
 
 
 def test_every_command_is_in_the_table_of_processes() -> None:

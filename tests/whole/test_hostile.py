@@ -34,7 +34,9 @@ HOSTILE = {
     "html": "<script>alert(1)</script><img src=x onerror=alert(2)>",
     "attribute": '" onmouseover="alert(3)" x="',
     "xml": "</testcase></mujoco>]]><!--",
-    "markdown": "| [x](javascript:alert(4)) `![y](http://example.invalid/z)` |\n# heading",
+    "markdown": (
+        "| [x](javascript:alert(4)) `![y](http://example.invalid/z)` |\n# heading"
+    ),
     "ansi": "\x1b[2J\x1b]0;owned\x07\x9b31m",
     "rich": "[bold red]not ours[/] [link=http://example.invalid]x[/link]",
     "null": "before\x00after",

@@ -96,7 +96,10 @@ def imported(path: Path, *, types: bool = False) -> set[str]:
 
 
 def test_import_fourbar_loads_numpy_alone() -> None:
-    code = "import sys, fourbar; print(*sorted({name.partition('.')[0] for name in sys.modules}))"
+    code = (
+        "import sys, fourbar; print(*sorted({name.partition('.')[0] for name in"
+        " sys.modules}))"
+    )
     out = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
     ).stdout.split()

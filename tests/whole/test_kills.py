@@ -59,7 +59,10 @@ KILLS_OF_BLAME = 4
 """Kills of one scene that an engine is blamed for: twice with the others, twice alone."""
 COUNT, IN_A_CHUNK = (220, 20) if FULL else (30, 3)
 """Scenes of a run, none of them drawn, so that the work is the judging alone; and as many chunks in a small run."""
-SMALL = f"import fourbar_validation.run.plan as plan; plan.CHUNK = {{False: {IN_A_CHUNK}}}; "
+SMALL = (
+    "import fourbar_validation.run.plan as plan; plan.CHUNK = {False:"
+    f" {IN_A_CHUNK}}}; "
+)
 HARNESS = (
     "import runpy; runpy.run_module('validation', run_name='__main__', alter_sys=True)"
 )
@@ -281,7 +284,10 @@ def test_damaged_swapped_and_foreign_parts_are_made_again_and_named(
             store.read(5)
 
 
-LIMIT = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, resource.RLIM_INFINITY)); "
+LIMIT = (
+    "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (60_000,"
+    " resource.RLIM_INFINITY)); "
+)
 LIMITED = LIMIT + ("" if FULL else SMALL) + HARNESS
 """The harness on a disk that takes no file of more than 60 kB: the parts fit, the results do not."""
 
@@ -499,7 +505,10 @@ def test_a_read_only_folder_is_reported(tmp_path: Path) -> None:
     [
         ('theta_2 = { from = "0 deg", to = "9 deg", steps = %d }', "motion.theta_2"),
         (
-            'law = { time = ["0 s", "1 s"], theta_2 = ["0 deg", "9 deg"], ends = "rest", steps = %d }',
+            (
+                'law = { time = ["0 s", "1 s"], theta_2 = ["0 deg", "9 deg"], ends ='
+                ' "rest", steps = %d }'
+            ),
             "motion.law",
         ),
         ('theta_2 = "1 deg"\nfree = { duration = "1 s", steps = %d }', "motion.free"),
@@ -511,7 +520,10 @@ def test_a_scene_of_too_many_positions_is_refused_before_anything_runs(
     lengths = (
         '[lengths]\nground = "4 m"\ninput = "1 m"\ncoupler = "3 m"\noutput = "3 m"\n'
     )
-    masses = '[bars.input]\nmass = "1 kg"\n[bars.coupler]\nmass = "1 kg"\n[bars.output]\nmass = "1 kg"\n'
+    masses = (
+        '[bars.input]\nmass = "1 kg"\n[bars.coupler]\nmass = "1'
+        ' kg"\n[bars.output]\nmass = "1 kg"\n'
+    )
     path = tmp_path / "long.toml"
     path.write_text(f"{lengths}{masses}[motion]\n{motion % (MOST_POSITIONS - 1)}\n")
     a_second = AS_LONG_AS if key == "motion.free" else 0
@@ -519,7 +531,9 @@ def test_a_scene_of_too_many_positions_is_refused_before_anything_runs(
     path.write_text(f"{lengths}{masses}[motion]\n{motion % MOST_POSITIONS}\n")
     with pytest.raises(
         InputError,
-        match=rf"{key}.steps = {MOST_POSITIONS}: must be below {MOST_POSITIONS} in a run",
+        match=(
+            rf"{key}.steps = {MOST_POSITIONS}: must be below {MOST_POSITIONS} in a run"
+        ),
     ):
         read_scene_files([path])
 

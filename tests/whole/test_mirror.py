@@ -1,7 +1,8 @@
 """Whoever opens a module knows its test: tests/ mirrors the tree, and what has no test of its name stands below.
 
-`tests/fourbar/formulas/test_position.py` is of `fourbar/formulas/position.py`, as is `test_position_more.py`; a test
-may have the name of its folder. `whole/` is of no module alone, `support/` holds what tests share.
+`tests/fourbar/formulas/test_position.py` is of `fourbar/formulas/position.py`, as is
+`test_position_more.py`; a test may have the name of its folder. `whole/` is of no
+module alone, `support/` holds what tests share.
 """
 
 from pathlib import Path
@@ -18,8 +19,12 @@ SOURCES = {
 """Folder of tests, and folder of the modules that it mirrors."""
 JUDGED_BY = {
     # what a command reads, does and prints is tested through the command
-    "fourbar/cli/test_cli.py": "fourbar/cli: evaluate export given; fourbar/show: tables",
-    "whole/test_exits.py": "validation: cli; validation/report: terminal; lab: cli fuzz_files",
+    "fourbar/cli/test_cli.py": (
+        "fourbar/cli: evaluate export given; fourbar/show: tables"
+    ),
+    "whole/test_exits.py": (
+        "validation: cli; validation/report: terminal; lab: cli fuzz_files"
+    ),
     "whole/test_kills.py": "validation/run: pool",
     "whole/test_results_format.py": "validation/compare: columns",
     "whole/test_package.py": "validation: places",
@@ -29,58 +34,96 @@ JUDGED_BY = {
     "fourbar/edit/test_session.py": "fourbar/edit: document dragging exports",
     "fourbar/edit/test_server.py": "fourbar/edit: redirect",
     "fourbar/files/test_files.py": "fourbar/files: fields scene_text",
-    "fourbar/formulas/test_formulas.py": "fourbar/formulas: arithmetic many_digits path",
-    "fourbar/studies/test_equilibrium.py": "fourbar/studies: circuit_curve; fourbar/show: studies",
+    "fourbar/formulas/test_formulas.py": (
+        "fourbar/formulas: arithmetic many_digits path"
+    ),
+    "fourbar/studies/test_equilibrium.py": (
+        "fourbar/studies: circuit_curve; fourbar/show: studies"
+    ),
     "fourbar/test_solving.py": "fourbar/scene: motion; fourbar/evaluation: case",
     "fourbar/studies/test_study.py": "fourbar/scene: motion; fourbar/studies: keys",
     # parts of one document or picture
     "fourbar/mjcf/test_mjcf.py": "fourbar/mjcf: document model",
     "fourbar/show/test_animate.py": "fourbar/show/plot: film",
     "fourbar/show/test_page.py": "fourbar/show: tolerances",
-    "fourbar/show/plot/test_plot.py": "fourbar/show/plot: curves figures freebody labels linkage studies style view",
+    "fourbar/show/plot/test_plot.py": (
+        "fourbar/show/plot: curves figures freebody labels linkage studies style view"
+    ),
     # a comparison is tested by engines with given answers
-    "validation/run/test_judge.py": "validation/compare: answer effects; "
-    "validation/run: answers command identities question",
+    "validation/run/test_judge.py": (
+        "validation/compare: answer effects; "
+        "validation/run: answers command identities question"
+    ),
     "validation/run/test_parts.py": "validation/run: plan progress request",
-    "validation/compare/statements/test_statements.py": "validation/compare/statements: limit_positions transmission",
-    # adapters: judged against printed figures, each other, and faults put in front of them
-    "validation/engines/test_engines.py": "validation/engines: balls description "
-    "limits loaded loop prediction tree; lab/engines: drake exudyn exudyn_elements opensim; "
-    "validation/scenes: random; validation/engines/mujoco: closed_loop inverse",
-    "validation/engines/test_guests.py": "validation: engine; validation/engines: processes workers",
+    "validation/compare/statements/test_statements.py": (
+        "validation/compare/statements: limit_positions transmission"
+    ),
+    # adapters: judged against printed figures, each other, and faults put in front of
+    # them
+    "validation/engines/test_engines.py": (
+        "validation/engines: balls description limits loaded loop prediction tree;"
+        " lab/engines: drake exudyn exudyn_elements opensim; validation/scenes: random;"
+        " validation/engines/mujoco: closed_loop inverse"
+    ),
+    "validation/engines/test_guests.py": (
+        "validation: engine; validation/engines: processes workers"
+    ),
     "validation/engines/test_environments.py": "validation/engines: table",
-    "validation/engines/test_free_body.py": "validation/engines: free_body_closure free_body_effects",
-    "validation/scenes/test_hard_families.py": "validation/engines: exact; validation/engines/mujoco: shipped",
+    "validation/engines/test_free_body.py": (
+        "validation/engines: free_body_closure free_body_effects"
+    ),
+    "validation/scenes/test_hard_families.py": (
+        "validation/engines: exact; validation/engines/mujoco: shipped"
+    ),
     "validation/report/test_sections.py": "validation/report: hard_picture",
-    "validation/engines/mujoco/test_simulate.py": "validation/engines/mujoco: drives monitor",
-    "validation/run/derived/test_derived.py": "validation/run/derived: cuts sensitivities equilibria "
-    "files variants",
+    "validation/engines/mujoco/test_simulate.py": (
+        "validation/engines/mujoco: drives monitor"
+    ),
+    "validation/run/derived/test_derived.py": (
+        "validation/run/derived: cuts sensitivities equilibria files variants"
+    ),
     "validation/run/test_released.py": "validation/engines/mujoco: forward",
-    "validation/check/test_check.py": "validation/check: calculated fitted judge "
-    "mistakes theirs; validation/run: printed",
-    "validation/check/test_mjcf.py": "validation/check: differences; validation/robots: guard; "
-    "validation/engines/mujoco: describe theirs topology",
-    "validation/engines/mujoco/robots/test_closures.py": "validation/engines/mujoco/robots: ancestry loop",
+    "validation/check/test_check.py": (
+        "validation/check: calculated fitted judge "
+        "mistakes theirs; validation/run: printed"
+    ),
+    "validation/check/test_mjcf.py": (
+        "validation/check: differences; validation/robots: guard; "
+        "validation/engines/mujoco: describe theirs topology"
+    ),
+    "validation/engines/mujoco/robots/test_closures.py": (
+        "validation/engines/mujoco/robots: ancestry loop"
+    ),
     "validation/robots/test_files.py": "validation/engines/mujoco/robots: compiled",
     "validation/robots/test_command.py": "validation/robots: options",
-    "validation/published/test_published.py": "validation/published: comparison figures program textbook "
-    "thesis thirteen",
-    "validation/regression/test_regression.py": "validation/regression: accept changes fault "
-    "record render rules scenes",
-    "validation/report/test_report.py": "validation/report: figures machine overview record "
-    "summary svg templating thumbnail words",
+    "validation/published/test_published.py": (
+        "validation/published: comparison figures program textbook thesis thirteen"
+    ),
+    "validation/regression/test_regression.py": (
+        "validation/regression: accept changes fault record render rules scenes"
+    ),
+    "validation/report/test_report.py": (
+        "validation/report: figures machine overview record "
+        "summary svg templating thumbnail words"
+    ),
     # studies: each through its command
     "lab/test_bench.py": "lab: contenders",
     "lab/test_stability.py": "lab: families slopes tally",
     "lab/test_faults.py": "lab: fault_scenes injection",
     "validation/cost/test_cost.py": "validation/cost: series formulas pictures study",
     "validation/advise/test_advise.py": "validation/advise: matters",
-    "lab/test_benchmark.py": "lab/simulators: slider_engines slider_mujoco slider_pinocchio",
-    "lab/simulators/test_problems.py": "lab/simulators: slider_crank; validation/check: problem",
+    "lab/test_benchmark.py": (
+        "lab/simulators: slider_engines slider_mujoco slider_pinocchio"
+    ),
+    "lab/simulators/test_problems.py": (
+        "lab/simulators: slider_crank; validation/check: problem"
+    ),
     # simulators that need not be there: their scripts run where they are installed
-    "lab/simulators/test_simulators.py": "lab/simulators: dart drake_sap exudyn_simulated "
-    "genesis_rigid gradients motion mujoco_c mujoco_mjx mujoco_warp newton_kamino newton_mujoco "
-    "pinocchio_simulated pybullet",
+    "lab/simulators/test_simulators.py": (
+        "lab/simulators: dart drake_sap exudyn_simulated genesis_rigid gradients motion"
+        " mujoco_c mujoco_mjx mujoco_warp newton_kamino newton_mujoco"
+        " pinocchio_simulated pybullet"
+    ),
 }
 """Modules without a test of their name, folder by folder, and the test that says when one of them is wrong."""
 

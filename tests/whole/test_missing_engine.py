@@ -116,6 +116,7 @@ def test_an_engine_that_is_there_and_does_not_load_is_one_line(tmp_path: Path) -
     what = "ImportError: libboost.so: cannot open shared object file"
     assert (
         done.stderr.strip()
-        == f"error: pinocchio-inverse: pinocchio is installed, but does not load: {what}"
+        == "error: pinocchio-inverse: pinocchio is installed, but does not load:"
+        f" {what}"
     )
     assert done.returncode == 3 and not (tmp_path / "out").exists()

@@ -1,7 +1,7 @@
 """Other systems: no `fork`, an ASCII locale, names with blanks and accents, line ends of Windows.
 
-Workers are started by `spawn` everywhere; here nothing else can be had. What opens a text without saying its
-encoding makes Python warn.
+Workers are started by `spawn` everywhere; here nothing else can be had. What opens a
+text without saying its encoding makes Python warn.
 """
 
 import os
@@ -26,7 +26,10 @@ HOSTILE = {
     "PYTHONIOENCODING": "",
 }
 OURS = [str(ROOT / "fourbar"), str(ROOT / "validation")]
-BEGIN = "import os, sys; vars(os).pop('fork', None); from {module} import status; sys.exit(status(sys.argv[1:]))"
+BEGIN = (
+    "import os, sys; vars(os).pop('fork', None); from {module} import status;"
+    " sys.exit(status(sys.argv[1:]))"
+)
 
 
 @pytest.fixture

@@ -1,7 +1,8 @@
 """What is installed: every file goes along, every library is declared, and one that is missing is one line.
 
-`PACKAGE=all` (of `make long-test`) builds the wheel and the source archive and installs them afresh on each Python that
-the machine has, and once more with the lowest versions that pyproject.toml allows.
+`PACKAGE=all` (of `make long-test`) builds the wheel and the source archive and installs
+them afresh on each Python that the machine has, and once more with the lowest versions
+that pyproject.toml allows.
 """
 
 import ast

@@ -1,8 +1,8 @@
 """What people ask, from what they have to their answer in three steps at most.
 
-The right values were derived apart from this program (circle intersection, 2x2 systems of
-velocities and accelerations, a 9x9 system of free bodies, virtual work), or are printed in the
-source of the task.
+The right values were derived apart from this program (circle intersection, 2x2 systems
+of velocities and accelerations, a 9x9 system of free bodies, virtual work), or are
+printed in the source of the task.
 """
 
 import re

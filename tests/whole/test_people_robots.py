@@ -1,7 +1,7 @@
 """What roboticists ask, from their files to the answer in three steps at most.
 
-The right values were derived apart from this program: by virtual work on free bodies, by MuJoCo
-asked by bisection on the couple, and from the loop's own angles.
+The right values were derived apart from this program: by virtual work on free bodies,
+by MuJoCo asked by bisection on the couple, and from the loop's own angles.
 """
 
 import math
@@ -170,7 +170,7 @@ def test_torques_of_the_open_tree_are_named(ask: Steps, columns: int) -> None:
     rows = [row.split(",")[:columns] for row in INVERSE_DYNAMICS.splitlines()]
     write("inv.csv", "\n".join(",".join(row) for row in rows))
     told = ask("fourbar-validation check statics.toml inv.csv", code=1)
-    (first, *_) = re.findall("looks like: (.*?)\\)", told)
+    first, *_ = re.findall("looks like: (.*?)\\)", told)
     assert "torque of the open tree" in first and "mj_inverse" in first
     assert "explains everything that differs: torque" in first
     right = ask("fourbar analyze statics.toml --csv")

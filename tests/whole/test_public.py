@@ -35,7 +35,10 @@ def of_commands() -> Iterator[str]:
                     if isinstance(option.type, click.Choice)
                     else ""
                 )
-                yield f"{program} {name}: {' '.join(sorted([*option.opts, *option.secondary_opts]))}{chosen}"
+                yield (
+                    f"{program} {name}:"
+                    f" {' '.join(sorted([*option.opts, *option.secondary_opts]))}{chosen}"
+                )
 
 
 def of_python() -> Iterator[str]:

@@ -72,8 +72,8 @@ def _stand_in(name: str, missing: ModuleNotFoundError) -> click.Command:
 def group(context: click.Context) -> None:
     """Check the closed formulas of the planar four-bar linkage against independent engines.
 
-    Exit status: 0 all holds, 1 a comparison fails or nothing was compared, 2 the input is bad,
-    3 the environment or the program failed, 130 interrupted.
+    Exit status: 0 all holds, 1 a comparison fails or nothing was compared, 2 the input
+    is bad, 3 the environment or the program failed, 130 interrupted.
     """
     if context.invoked_subcommand is None:
         click.echo(context.get_help())

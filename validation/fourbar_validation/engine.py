@@ -73,7 +73,8 @@ def _apply_setting(engine: Any, setting: dict[str, Any], names: Sequence[str]) -
     """Return the engine with a setting; one that knows none has no timestep, and no error but round-off."""
     if "name" in setting and setting["name"] not in names:
         raise LimitError(
-            f"it has no setting {setting['name']!r}; it has: {', '.join(names) or 'none'}"
+            f"it has no setting {setting['name']!r}; it has:"
+            f" {', '.join(names) or 'none'}"
         )
     return (
         engine.at_setting(**setting)

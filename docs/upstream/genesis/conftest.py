@@ -16,6 +16,10 @@ def show_viewer():
 
 @pytest.fixture(autouse=True)
 def initialize(request, backend):
-    gs.init(backend=backend, precision=request.node.get_closest_marker("precision").args[0], logging_level="error")
+    gs.init(
+        backend=backend,
+        precision=request.node.get_closest_marker("precision").args[0],
+        logging_level="error",
+    )
     yield
     gs.destroy()

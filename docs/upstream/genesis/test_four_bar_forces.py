@@ -1,7 +1,8 @@
 """Forces of a closed four-bar against closed-form values: for tests/rigid of Genesis.
 
-A crank that turns at 10 rad/s under its weight; its joint bears an armature of 1e3 kg m^2, so that the torque is what the
-armature would have to take. The values come from Newton's equations of each bar, to some 1e-13 (problem crank_rocker).
+A crank that turns at 10 rad/s under its weight; its joint bears an armature of 1e3 kg
+m^2, so that the torque is what the armature would have to take. The values come from
+Newton's equations of each bar, to some 1e-13 (problem crank_rocker).
 """
 
 import numpy as np
@@ -9,7 +10,8 @@ import pytest
 
 import genesis as gs
 
-# theta_2 (deg): theta_3, theta_4 (rad), torque on the crank (N m), force of the rocker on the coupler (N)
+# theta_2 (deg): theta_3, theta_4 (rad), torque on the crank (N m), force of the rocker
+# on the coupler (N)
 COLUMNS = ("theta_3", "theta_4", "torque", "F43")
 EXPECTED = {
     30.0: (0.7377637735, 1.700265985, 0.09545978615, (1.795785204, 7.456613859)),
@@ -51,14 +53,17 @@ XML = """
 def test_four_bar_forces(backend, n_envs, show_viewer, tmp_path):
     """Verify torque and closing force at single states against Newton-Euler values of each bar.
 
-    Reference: m a_G = sum(F), I_G alpha = sum(r x F) + tau. The forces are those with which the step begins, so that
-    the step does not matter; the closure's impedance of .9999 leaves 1e-3 of the largest force, 8 N.
+    Reference: m a_G = sum(F), I_G alpha = sum(r x F) + tau. The forces are those with
+    which the step begins, so that the step does not matter; the closure's impedance of
+    .9999 leaves 1e-3 of the largest force, 8 N.
     """
     file = tmp_path / "four_bar.xml"
     file.write_text(XML)
     scene = gs.Scene(
         sim_options=gs.options.SimOptions(dt=1e-5, gravity=GRAVITY),
-        rigid_options=gs.options.RigidOptions(dt=1e-5, gravity=GRAVITY, enable_mujoco_compatibility=True),
+        rigid_options=gs.options.RigidOptions(
+            dt=1e-5, gravity=GRAVITY, enable_mujoco_compatibility=True
+        ),
         show_viewer=show_viewer,
     )
     robot = scene.add_entity(gs.morphs.MJCF(file=str(file)))
@@ -71,10 +76,20 @@ def test_four_bar_forces(backend, n_envs, show_viewer, tmp_path):
         omega_4 = A * OMEGA * np.sin(theta_2 - theta_3) / (C * sine)
         shape = (n_envs, 3) if n_envs else (3,)
         scene.reset()
-        robot.set_dofs_position(np.tile([theta_2, theta_3 - theta_2, theta_4], (*shape[:-1], 1)).reshape(shape), joints)
-        robot.set_dofs_velocity(np.tile([OMEGA, omega_3 - OMEGA, omega_4], (*shape[:-1], 1)).reshape(shape), joints)
+        robot.set_dofs_position(
+            np.tile([theta_2, theta_3 - theta_2, theta_4], (*shape[:-1], 1)).reshape(
+                shape
+            ),
+            joints,
+        )
+        robot.set_dofs_velocity(
+            np.tile([OMEGA, omega_3 - OMEGA, omega_4], (*shape[:-1], 1)).reshape(shape),
+            joints,
+        )
         scene.step()  # acceleration and force are those with which it begins
         alpha = solver.get_dofs_acc().cpu().numpy().reshape(-1, 3)[:, joints[0]]
         closing = solver.constraint_solver.efc_force.to_numpy()[:2].reshape(2, -1)
         np.testing.assert_allclose(-ARMATURE * alpha, torque, atol=1e-3)
-        np.testing.assert_allclose(closing.T, np.broadcast_to(force, closing.T.shape), atol=8e-3)
+        np.testing.assert_allclose(
+            closing.T, np.broadcast_to(force, closing.T.shape), atol=8e-3
+        )

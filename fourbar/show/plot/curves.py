@@ -161,7 +161,8 @@ def clip(
         edge, largest = (text.removesuffix(" 1") for text in (edge, largest))
     note(
         view,
-        f"{what} clipped at {edge}; the largest evaluated, {name} = {largest}, is at {words}.",
+        f"{what} clipped at {edge}; the largest evaluated, {name} = {largest}, is at"
+        f" {words}.",
     )
 
 
@@ -433,7 +434,8 @@ def draw_energy(axes: "Axes", view: View) -> None:
     place_legend(axes, 3)
     note(
         view,
-        "The kinetic energy has grown by the work that loads and effects have done since the release.",
+        "The kinetic energy has grown by the work that loads and effects have done"
+        " since the release.",
     )
 
 
@@ -572,7 +574,8 @@ def draw_hodograph(axes: "PolarAxes", view: View, name: str) -> None:
     every, apart = _choose_spacing(view)
     marks = np.unique(np.round((over - over[0]) / every).astype(int))
     dots = [int(np.argmin(np.abs(over - over[0] - every * k))) for k in marks]
-    # drawn as a polyline in x, y: unwrapped angles keep matplotlib from going round by the longer arc
+    # drawn as a polyline in x, y: unwrapped angles keep matplotlib from going round by
+    # the longer arc
     finite = np.isfinite(direction)
     free = _find_free_direction(direction[finite])
     direction[finite] = np.unwrap(direction[finite])
@@ -615,7 +618,8 @@ def draw_hodograph(axes: "PolarAxes", view: View, name: str) -> None:
     axes.set_title(f"{look['label']} ({unit})", pad=12)
     note(
         view,
-        f"Hodographs: open dot at the start, dots every {apart}; angles are directions in the x-y plane.",
+        f"Hodographs: open dot at the start, dots every {apart}; angles are directions"
+        " in the x-y plane.",
     )
 
 

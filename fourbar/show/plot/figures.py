@@ -63,7 +63,8 @@ def _draw_overview(figure: "SubFigure", shown: View, labels: Labels) -> None:
     curves.draw_angles(panels["angles"], shown)
     curves.draw_velocities(panels["omega"], shown)
     curves.draw_accelerations(panels["alpha"], shown)
-    # what drives: torque or force, and power, or in a free motion the work of loads and effects
+    # what drives: torque or force, and power, or in a free motion the work of loads and
+    # effects
     (curves.draw_energy if free else curves.draw_drive)(panels["torque"], shown)
     if not free:
         curves.draw_power(panels["power"], shown)
@@ -245,9 +246,8 @@ def _look_between(shown: View) -> None:
             for place, pin in between.reversals
         )
         shown.notes.append(
-            f"Dry friction reverses, and the pin forces jump, at {axis.symbol} = {places}.".replace(
-                "-", "−"
-            )
+            f"Dry friction reverses, and the pin forces jump, at {axis.symbol} ="
+            f" {places}.".replace("-", "−")
         )
 
 

@@ -66,7 +66,8 @@ def write_film(
 ) -> None:
     """Film one sweep; where the input does not turn fully, there and back. A motion through time is shown as it is.
 
-    Raises DependencyError where matplotlib or, for MP4, ffmpeg with its H.264 encoder is missing.
+    Raises DependencyError where matplotlib or, for MP4, ffmpeg with its H.264 encoder
+    is missing.
     """
     if seconds is not None and not (
         math.isfinite(seconds) and 0.0 < seconds * FRAMES_PER_SECOND <= MAX_FRAMES
@@ -114,7 +115,8 @@ def write_film(
                     )
             except (subprocess.CalledProcessError, BrokenPipeError):
                 raise DependencyError(
-                    "this ffmpeg cannot encode H.264 (libx264); .gif and .html need none"
+                    "this ffmpeg cannot encode H.264 (libx264); .gif and .html need"
+                    " none"
                 ) from None
             write_bytes(path, draft.read_bytes())
 

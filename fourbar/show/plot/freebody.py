@@ -181,7 +181,10 @@ def _record_actions(view: View) -> Recorder:
 def draw_free_bodies(figure: "SubFigure", view: View, labels: Labels) -> None:
     """Draw the three bars, each freed from its pins, with arrows to one scale, over the couples."""
     if not np.isfinite(view.here.F12).all():  # type: ignore[arg-type]
-        reason = f"needs forces, which have no value at {where_in_words(view.here)}: {view.here.status[0]}"
+        reason = (
+            f"needs forces, which have no value at {where_in_words(view.here)}:"
+            f" {view.here.status[0]}"
+        )
         raise InputError("figure", "freebody", reason)
     freed = [
         (v, bar, *list_actions(v, bar)) for v in view.alike for bar in MOVING_BARS
@@ -208,8 +211,9 @@ def draw_free_bodies(figure: "SubFigure", view: View, labels: Labels) -> None:
     _scale_bar(panels[0], scale, biggest, view.units)
     note(
         view,
-        "Bars and forces each to one scale, in world axes; dashed: inertia forces −m a at G "
-        "(d'Alembert), with which the forces and the moments on each bar add up to zero.",
+        "Bars and forces each to one scale, in world axes; dashed: inertia forces −m a"
+        " at G (d'Alembert), with which the forces and the moments on each bar add up"
+        " to zero.",
     )
 
 

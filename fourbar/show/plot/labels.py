@@ -51,7 +51,8 @@ class Labels:
     def keep_off(self, axes: "Axes", *points: Point, width: float = 1.0) -> None:
         """Keep labels off lines, given by their points; twice the same point is a mark.
 
-        A broad line (`width` in typographic points) counts by what of it would be covered.
+        A broad line (`width` in typographic points) counts by what of it would be
+        covered.
         """
         self.lines.append((axes, list(points), width))
 

@@ -36,9 +36,9 @@ class Trace(NamedTuple):
 def trace(view: View) -> Trace:
     """Solve the positions that the paths of a view run through.
 
-    A motion of the input that names no sweep has the circuit of the position drawn; a sweep and
-    the command of another bar have their own range; a motion through time and a list of angles
-    have their own positions.
+    A motion of the input that names no sweep has the circuit of the position drawn; a
+    sweep and the command of another bar have their own range; a motion through time and
+    a list of angles have their own positions.
     """
     motion = view.scene.motion
     listed = isinstance(motion.angle, np.ndarray)

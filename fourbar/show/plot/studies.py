@@ -54,8 +54,8 @@ def draw_tolerances(
 ) -> None:
     """Draw the deviations from the nominal with their bands into a file, whole or not at all.
 
-    Raises InputError for another ending than of svg, png, pdf, or a single position; DependencyError without
-    matplotlib.
+    Raises InputError for another ending than of svg, png, pdf, or a single position;
+    DependencyError without matplotlib.
     """
     format_of(path)
     if len(spreads.theta_2) < 2:
@@ -81,8 +81,9 @@ def draw_tolerances(
             f"{title}: what the tolerances do ({spreads.samples} samples)", **TITLE
         )
         caption = (
-            f"Deviation from the nominal. Filled: {BAND[0]:g} to {BAND[1]:g} % of the samples; thin: least and "
-            "greatest sampled; dashed: first-order worst case."
+            f"Deviation from the nominal. Filled: {BAND[0]:g} to {BAND[1]:g} % of the"
+            " samples; thin: least and greatest sampled; dashed: first-order worst"
+            " case."
         )
         lines = [
             caption,
@@ -195,5 +196,6 @@ def draw_influences(figure: "SubFigure", shown: View, labels: Labels) -> None:
             size=6.8,
         )
     shown.notes.append(
-        "Bars: the largest change over the sweep by 1 % of a number, of an angle by 1°; pin forces by their magnitude."
+        "Bars: the largest change over the sweep by 1 % of a number, of an angle by 1°;"
+        " pin forces by their magnitude."
     )

@@ -23,7 +23,8 @@ if TYPE_CHECKING:
 INK, MUTED, FAINT = "#1a1a1a", "#6b6b6b", "#d9d9d9"
 POINT = "#8A3B78"
 """Colour of the scene's own points."""
-# Okabe and Ito's palette: distinguished by colour-blind readers, and by lightness and dashes in grey
+# Okabe and Ito's palette: distinguished by colour-blind readers, and by lightness and
+# dashes in grey
 BAR_COLOURS = {2: "#0072B2", 3: "#D55E00", 4: "#007A5A"}
 BAR_DASHES: dict[int, Any] = {2: "-", 3: (0, (5, 1.6)), 4: (0, (7, 1.6, 1.4, 1.6))}
 FORCE_COLOURS = dict(

@@ -1,7 +1,8 @@
 """Symbols of everything that acts in a scene: springs, loads, gravity, drive, flywheel, and effects in the pins.
 
-Each symbol knows its bar and its points in that bar's frame: plot, film and page place it at any position. Here
-they are drawn with matplotlib, and so are arrows of velocity and acceleration at points.
+Each symbol knows its bar and its points in that bar's frame: plot, film and page place
+it at any position. Here they are drawn with matplotlib, and so are arrows of velocity
+and acceleration at points.
 """
 
 import cmath
@@ -435,9 +436,11 @@ def draw_vectors(
             continue
         vectors = collect_point_vectors(view.scene, solution, letter)
         feet = [
-            solution.points[name]
-            if name in solution.points
-            else getattr(solution, name)
+            (
+                solution.points[name]
+                if name in solution.points
+                else getattr(solution, name)
+            )
             for name in vectors
         ]
         shafts = [

@@ -26,8 +26,8 @@ LEAD = math.radians(60.0)
 class View:
     """A scene on one branch.
 
-    `sweep` runs over what is commanded in rising order, `here` is the one position drawn to scale, `notes`
-    collects what a caption has to say about the panels.
+    `sweep` runs over what is commanded in rising order, `here` is the one position
+    drawn to scale, `notes` collects what a caption has to say about the panels.
     """
 
     scene: Scene
@@ -121,7 +121,10 @@ def axis_of(scene: Scene, positions: Command, units: Conversion) -> Axis:
 def where_in_words(solution: Solution) -> str:
     """Say the first position of a solution as the scene's file has it."""
     angle, stroke = math.degrees(solution.at.angle[0]), solution.at.stroke
-    return f"{solution.commanded} = {f'{angle:.6g} deg' if stroke is None else f'{stroke[0]:.6g} m'}"
+    return (
+        f"{solution.commanded} ="
+        f" {f'{angle:.6g} deg' if stroke is None else f'{stroke[0]:.6g} m'}"
+    )
 
 
 def collect_point_vectors(
@@ -204,9 +207,10 @@ def make_view(scene: Scene, position: float | None = None) -> View:
 
     Parameters
     ----------
-    position : what is commanded where the linkage is drawn to scale, rad or m; left out: the scene's own where it
-        names one (the start of a motion through time), else 60 deg into the longest stretch that assembles, clear of
-        poles.
+    position : what is commanded where the linkage is drawn to scale, rad or m; left
+    out: the scene's own where it
+        names one (the start of a motion through time), else 60 deg into the longest
+        stretch that assembles, clear of poles.
 
     Raises
     ------
@@ -251,8 +255,8 @@ def _view_motion(scene: Scene, position: float | None) -> View:
         low, high = math.degrees(np.min(angle)), math.degrees(np.max(angle))
         if not low <= math.degrees(position) <= high:
             raise NotAssembledError(
-                f"the motion does not pass {name} = {math.degrees(position):.6g} deg: it stays within "
-                f"{low:.6g} and {high:.6g} deg"
+                f"the motion does not pass {name} = {math.degrees(position):.6g} deg:"
+                f" it stays within {low:.6g} and {high:.6g} deg"
             )
         index = int(np.argmin(np.abs(angle - position)))
     shown = View(scene, sweep, solve(scene, at=sweep.at.part(slice(index, index + 1))))

@@ -46,7 +46,10 @@ def find_refusal(scene: Scene) -> str:
         if bar.mass == 0.0:
             return f"bar {number} has no mass; the reaction port of Drake divides by it"
         if number != 2 and about_first_pin(bar) == 0.0:
-            return f"bar {number} has no inertia about its pin; the reaction port of Drake divides by it"
+            return (
+                f"bar {number} has no inertia about its pin; the reaction port of Drake"
+                " divides by it"
+            )
     return ""
 
 

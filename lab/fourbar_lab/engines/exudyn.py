@@ -1,10 +1,12 @@
 """Exudyn: nine absolute coordinates, the multipliers of four pins and a drive; springs and dampers are its own.
 
-A bar is `ObjectRigidBody2D` with coordinates (x, y of its first pin, direction). With g = 0 the nine
-constraints (two of each pin, and the drive: a bar's direction, or the distance of a cylinder's ends), J = dg/dq,
-J_c the pins' rows above that of the commanded bar's direction, M the mass matrix and f what acts,
+A bar is `ObjectRigidBody2D` with coordinates (x, y of its first pin, direction). With g
+= 0 the nine constraints (two of each pin, and the drive: a bar's direction, or the
+distance of a cylinder's ends), J = dg/dq, J_c the pins' rows above that of the
+commanded bar's direction, M the mass matrix and f what acts,
 
-    J_c v = e omega,   J_c a = e alpha - (dJ_c/dt) v,   J^T [F12 F32 F43 F14 drive] = M a - f.
+    J_c v = e omega,   J_c a = e alpha - (dJ_c/dt) v,   J^T [F12 F32 F43 F14 drive] = M
+    a - f.
 
 g, J, (dJ/dt) v, M and f are Exudyn's; the three linear systems are solved here.
 """
@@ -56,9 +58,10 @@ class ExudynBars(Loaded):
     """The bars, built from the description."""
 
     own = (
-        "nine absolute coordinates, constraint equations, their Jacobian and (dJ/dt) v, mass matrix, springs and "
-        "dampers by elements of its own, other effects from its own state; Newton's method on its gap and the linear "
-        "solves are the harness's"
+        "nine absolute coordinates, constraint equations, their Jacobian and (dJ/dt) v,"
+        " mass matrix, springs and dampers by elements of its own, other effects from"
+        " its own state; Newton's method on its gap and the linear solves are the"
+        " harness's"
     )
 
     def __init__(self, scene: Scene) -> None:

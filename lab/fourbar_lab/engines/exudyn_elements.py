@@ -1,7 +1,8 @@
 """Bodies of a linkage in Exudyn, and its own springs and dampers upon them.
 
-They are what no other engine gives: the force laws of somebody else's program, to round-off. MuJoCo's own hold to
-the error of its steps; every other engine is given the wrenches of `effects.TERM_OF`, as Exudyn is of all the rest.
+They are what no other engine gives: the force laws of somebody else's program, to
+round-off. MuJoCo's own hold to the error of its steps; every other engine is given the
+wrenches of `effects.TERM_OF`, as Exudyn is of all the rest.
 """
 
 import math

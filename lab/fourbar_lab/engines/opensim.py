@@ -1,8 +1,9 @@
 """OpenSim (Simbody): bars 2 and 4 on the ground, bar 3 on bar 4, closed at pin A by its own constraint and solve.
 
-Coordinates are the direction of bar 2, that of bar 4, and that of bar 3 against bar 4. The closing force, the joint
-reactions, the accelerations and the couple that moves bar 2 or 4 as commanded come from Simbody's constrained dynamics.
-No coordinate is the direction of bar 3, whose command is refused.
+Coordinates are the direction of bar 2, that of bar 4, and that of bar 3 against bar 4.
+The closing force, the joint reactions, the accelerations and the couple that moves bar
+2 or 4 as commanded come from Simbody's constrained dynamics. No coordinate is the
+direction of bar 3, whose command is refused.
 """
 
 import math
@@ -60,7 +61,10 @@ def find_refusal(scene: Scene) -> str:
         return "a force at a point has no element here"
     for number in MOVING_BARS:
         if scene.linkage.bar(number).mass == 0.0:
-            return f"bar {number} has no mass; OpenSim takes no such body at the end of a chain, and drops its inertia"
+            return (
+                f"bar {number} has no mass; OpenSim takes no such body at the end of a"
+                " chain, and drops its inertia"
+            )
     return (
         ""
         if about_first_pin(scene.linkage.input)
@@ -72,9 +76,10 @@ class OpenSimBars(Loaded):
     """The bars, built from the description."""
 
     own = (
-        "constraint equations with the loop cut at A, joint reactions, closing force and torque by Simbody's "
-        "constrained dynamics, effects from its own state; Newton's method on its gap, and the linear solve for speeds "
-        "and accelerations, are the harness's"
+        "constraint equations with the loop cut at A, joint reactions, closing force"
+        " and torque by Simbody's constrained dynamics, effects from its own state;"
+        " Newton's method on its gap, and the linear solve for speeds and"
+        " accelerations, are the harness's"
     )
 
     def __init__(self, scene: Scene) -> None:
@@ -140,8 +145,9 @@ class OpenSimBars(Loaded):
         if self.least_conditioned >= LEAST_CONDITIONED:
             return ""
         return (
-            f"the matrix of Simbody's multipliers is conditioned by {self.least_conditioned:.1e} at the worst; "
-            f"below {LEAST_CONDITIONED:g} it takes constraints for dependent, and drops them"
+            "the matrix of Simbody's multipliers is conditioned by"
+            f" {self.least_conditioned:.1e} at the worst; below {LEAST_CONDITIONED:g}"
+            " it takes constraints for dependent, and drops them"
         )
 
     def _make_joint(
@@ -247,9 +253,11 @@ class OpenSimBars(Loaded):
         if self.linear is None:
             return PER_COORDINATE[self.drive_bar]
         start, end = (
-            np.zeros((2, 3))
-            if spring_end.bar == 1
-            else self._compute_station_jacobian(name)
+            (
+                np.zeros((2, 3))
+                if spring_end.bar == 1
+                else self._compute_station_jacobian(name)
+            )
             for name, spring_end in self.ends
         )
         return np.asarray(self.line()[2] @ (end - start))
@@ -290,8 +298,9 @@ class OpenSimBars(Loaded):
     def _forces(self, leverage: float) -> dict[str, Any]:
         """Return joint reactions, closing force and torque of the constrained dynamics.
 
-        Simbody holds the commanded bar to its motion by a couple: over the leverage it is what the drive gives. What it
-        finds is given back as forces and found anew, until its multipliers hold nothing but rounding.
+        Simbody holds the commanded bar to its motion by a couple: over the leverage it
+        is what the drive gives. What it finds is given back as forces and found anew,
+        until its multipliers hold nothing but rounding.
         """
         self.act()
         pin_a, drive, closing, before = (

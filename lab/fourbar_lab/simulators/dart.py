@@ -25,7 +25,10 @@ class Dart(Simulator):
     """DART's own time stepping; its closing constraint offers no force."""
 
     name, version = "DART", version("dartpy")
-    changed = "built in Python; the input carries a light flywheel as an inertia about its own pin"
+    changed = (
+        "built in Python; the input carries a light flywheel as an inertia about its"
+        " own pin"
+    )
     quantities = ("theta_3", "theta_4", "torque", "F12", "F32", "F14")
     settings: ClassVar[dict[str, None]] = {"its defaults": None}
 

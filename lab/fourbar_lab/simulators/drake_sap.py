@@ -29,9 +29,10 @@ class DrakeSap(Simulator):
 
     name, version = "Drake, SAP", version("drake")
     changed = (
-        "a flywheel is the rotor of an actuator; by default a loop of four joints is refused, so a ball constraint "
-        "stands in for the fourth (its force is not offered in Python); SetEnableLoopTopology(True), from 1.57 on, "
-        "takes the SDF of four joints"
+        "a flywheel is the rotor of an actuator; by default a loop of four joints is"
+        " refused, so a ball constraint stands in for the fourth (its force is not"
+        " offered in Python); SetEnableLoopTopology(True), from 1.57 on, takes the SDF"
+        " of four joints"
     )
     quantities = (
         "theta_3",

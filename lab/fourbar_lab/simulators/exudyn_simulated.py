@@ -18,7 +18,10 @@ class ExudynIntegrators(Simulator):
     """Exudyn's implicit integrators."""
 
     name, version = "Exudyn", version("exudyn")
-    changed = "built with its Python interface; the drive is a coordinate constraint whose offset follows the time"
+    changed = (
+        "built with its Python interface; the drive is a coordinate constraint whose"
+        " offset follows the time"
+    )
     effects = ("gravity", "viscous", "torsion", "springs")
     settings: ClassVar[dict[str, Any]] = {
         "generalized alpha": exu.DynamicSolverType.GeneralizedAlpha,

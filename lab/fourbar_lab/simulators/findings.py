@@ -18,7 +18,10 @@ from fourbar_validation.places import CHECKOUT
 FOLDER = None if CHECKOUT is None else CHECKOUT / "docs" / "findings"
 FIELDS = ("Engine", "With", "Expected", "Found", "Since", "Until", "Reported")
 """Fields of a script's docstring, after its first sentence; Engine: the name for pip, in brackets what is imported."""
-LOOK = "import importlib.metadata, importlib.util as u, sys; u.find_spec({0!r}) or sys.exit(1)"
+LOOK = (
+    "import importlib.metadata, importlib.util as u, sys; u.find_spec({0!r}) or"
+    " sys.exit(1)"
+)
 """Program for a Python interpreter that fails if a module is not installed."""
 FIXED = "fixed"
 """Word that a script prints at its end, with exit status 1, if the finding no longer holds."""
@@ -72,7 +75,10 @@ def find_interpreter(finding: Reproduction) -> tuple[str, str] | None:
     """Find the first interpreter that has the engine, and its version there."""
     name, module = finding.engine
     for python in _list_interpreters(name):
-        look = f"{LOOK.format(module)}; print(importlib.metadata.version({name!r}), sys.version.split()[0])"
+        look = (
+            f"{LOOK.format(module)}; print(importlib.metadata.version({name!r}),"
+            " sys.version.split()[0])"
+        )
         done = run_to_end([python, "-c", look])
         if not done.failed:
             version, of_python = done.out.split()
@@ -105,7 +111,10 @@ def run_findings(
             outcomes.append(
                 (
                     finding,
-                    f"not run: {finding.engine[0]} is not installed, and no engine requires it",
+                    (
+                        f"not run: {finding.engine[0]} is not installed, and no engine"
+                        " requires it"
+                    ),
                 )
             )
         else:
@@ -137,5 +146,6 @@ def command(scripts: tuple[Path, ...], time_limit: float) -> None:
         click.echo(f"{finding.script.name}: {state}")
     if all(state.startswith("not run") for _, state in outcomes):
         raise DependencyError(
-            "no finding's simulator is installed here or required by an engine of engines.toml"
+            "no finding's simulator is installed here or required by an engine of"
+            " engines.toml"
         )

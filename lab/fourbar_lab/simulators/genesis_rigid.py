@@ -22,7 +22,8 @@ from fourbar_lab.simulators.mujoco_c import text
 
 FLYWHEEL = 1e5
 """Inertia of the flywheel relative to the linkage's; beside 1e8 its solver leaves gravity to itself unless it is set to
-MuJoCo's tolerance."""
+MuJoCo's tolerance.
+"""
 genesis.init(
     backend=genesis.gpu if torch.cuda.is_available() else genesis.cpu,
     precision="64",
@@ -35,7 +36,10 @@ class GenesisRigid(Simulator):
 
     name, version = "Genesis", version("genesis-world")
     device = torch.cuda.get_device_name() if torch.cuda.is_available() else "CPU"
-    changed = "precision 64; timestep, gravity and the keyframe's speeds are set by hand; a lighter flywheel"
+    changed = (
+        "precision 64; timestep, gravity and the keyframe's speeds are set by hand; a"
+        " lighter flywheel"
+    )
     quantities = ("theta_3", "theta_4", "torque", "F43")
     settings: ClassVar[dict[str, tuple[dict[str, Any], dict[str, Any]]]] = {
         "enable_mujoco_compatibility": ({}, {"enable_mujoco_compatibility": True}),

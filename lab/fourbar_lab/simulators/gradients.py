@@ -1,7 +1,8 @@
 """Differentiate the driving torque at a state by three numbers, with a simulator that can be differentiated.
 
-Assembling the loop and compiling a model are no part of what it differentiates: how its state and the numbers of its
-model change with a number of the scene is taken from two scenes to either side, each assembled by MuJoCo.
+Assembling the loop and compiling a model are no part of what it differentiates: how its
+state and the numbers of its model change with a number of the scene is taken from two
+scenes to either side, each assembled by MuJoCo.
 """
 
 from typing import Any, NamedTuple

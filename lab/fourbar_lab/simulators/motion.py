@@ -28,7 +28,8 @@ STEPS = 628
 """Steps in a turn where no setting states them."""
 LIGHT = replace(RECIPE, flywheel=30.0)
 """Recipe for accelerations that are differences of speeds: of a heavier flywheel's they keep no digits, and solvers
-that end at a part of all momentum leave the loop to itself beside it."""
+that end at a part of all momentum leave the loop to itself beside it.
+"""
 LEADS = tuple(np.pi / 2.0**power for power in range(1, 6))
 """rad; a run begins so far before its first position, where the linkage closes there, so that its closure settles."""
 FROM_TOGGLE = 0.1
@@ -153,7 +154,8 @@ class Simulator:
             return Answer(self.name, setting, refusal=str(limit))
         if len(readings.instants) != len(set(rows.tolist())):
             raise NotAssembledError(
-                f"{len(readings.instants)} of {len(set(rows.tolist()))} positions were read"
+                f"{len(readings.instants)} of {len(set(rows.tolist()))} positions were"
+                " read"
             )
         read = [readings.instants[row] for row in rows]
         theta = np.array([instant.theta for instant in read])
@@ -271,7 +273,8 @@ def start(scene: Scene) -> Start:
     usable = np.flatnonzero(closed.assembled)
     if not len(usable):
         raise NotAssembledError(
-            "the linkage closes at none of the scene's positions: there is nothing to start from"
+            "the linkage closes at none of the scene's positions: there is nothing to"
+            " start from"
         )
     theta_2 = commanded.theta_2[usable]
     first = usable[[np.argmin(theta_2) if omega_2 >= 0.0 else np.argmax(theta_2)]]

@@ -33,7 +33,8 @@ BY_DEFAULT = {
 def text(scene: Scene, steps: int, simulator: str | None, **settings: Any) -> str:
     """Write the MJCF, opening in the simulators' common start, with so many steps a turn.
 
-    Without a simulator's name all that the solver is set to goes; `settings`: others than those of the simulator.
+    Without a simulator's name all that the solver is set to goes; `settings`: others
+    than those of the simulator.
     """
     reader = simulator or "warp"  # without pads
     changed = replace(
@@ -48,7 +49,8 @@ def reading(
 ) -> Instant:
     """Read as the comment in the file says; q, v, a in the joints' coordinates.
 
-    `borne`: cfrc_int of input, coupler and output, whose last three numbers are the force of the parent on the body.
+    `borne`: cfrc_int of input, coupler and output, whose last three numbers are the
+    force of the parent on the body.
     """
     torque = drive - model.dof_armature[0] * a[0]
     F12, F23, F14 = (wrench[3:5] for wrench in borne)

@@ -31,7 +31,10 @@ class MujocoWarp(Simulator):
     name, version = "MuJoCo Warp", getattr(mjw, "__version__", "")
     device = str(warp.get_preferred_device().name)
     made_for = "many worlds at once on a GPU"
-    changed = "a light flywheel and no pads (--for warp): single precision; midphase may not be switched off"
+    changed = (
+        "a light flywheel and no pads (--for warp): single precision; midphase may not"
+        " be switched off"
+    )
     settings: ClassVar[dict[str, tuple[int, int]]] = {
         "forward twice": (2, 1),
         "forward once": (1, 1),
@@ -123,7 +126,8 @@ class MujocoWarp(Simulator):
         return [
             gradients.collect_answer(
                 scene,
-                "warp.Tape at a set state; it warns that its modules have no backward pass",
+                "warp.Tape at a set state; it warns that its modules have no backward"
+                " pass",
                 here,
                 by,
             )

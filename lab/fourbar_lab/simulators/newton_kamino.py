@@ -36,7 +36,10 @@ class NewtonKamino(Simulator):
     name, version = "Newton, Kamino", version("newton")
     device = str(warp.get_preferred_device().name)
     made_for = "many worlds at once on a GPU"
-    changed = "USD with a fourth revolute joint; a light flywheel on the input; multipliers from the solver's own data"
+    changed = (
+        "USD with a fourth revolute joint; a light flywheel on the input; multipliers"
+        " from the solver's own data"
+    )
     settings: ClassVar[dict[str, dict[str, Any]]] = {
         "its defaults": {},
         "PADMM to 1e-9 in 2000 iterations": {

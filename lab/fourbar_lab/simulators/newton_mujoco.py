@@ -27,7 +27,10 @@ class NewtonMujoco(Simulator):
     name, version = "Newton, MuJoCo solver", version("newton")
     device = str(warp.get_preferred_device().name)
     made_for = "many worlds at once on a GPU"
-    changed = "add_mjcf takes neither timestep, gravity nor keyframe: all three are set by hand; --for newton"
+    changed = (
+        "add_mjcf takes neither timestep, gravity nor keyframe: all three are set by"
+        " hand; --for newton"
+    )
     settings: ClassVar[dict[str, None]] = {"SolverMuJoCo": None}
 
     def through(self, scene: Scene, course: Course) -> Readings:

@@ -26,7 +26,8 @@ from fourbar_validation.engines.pinocchio import ClosedTree, PinocchioTree, make
 SOFTNESS_STEPS = 30.0
 """Time constant of Baumgarte's stabilisation, in steps of RK4."""
 PROXIMAL = 1e-10
-"""Added to the diagonal of the Delassus matrix, as in Pinocchio's example: one of its three rows depends on the rest.
+"""Added to the diagonal of the Delassus matrix, as in Pinocchio's example: one of
+its three rows depends on the rest.
 """
 ACCURATE = 1e-10
 """Accuracy asked of the impulse solvers in place of the example's 1e-6, absolute and relative."""
@@ -109,9 +110,10 @@ class Impulses:
                           self.settings, self.result)  # fmt: skip
         force = np.array(self.result.retrieveConstraintImpulses()) / h
         self.tree.place(q.tolist())
-        return v + h * pin.aba(
-            model, data, q, v, jacobian.T @ force
-        ), -self.tree.rotation(3) @ force[:2]
+        return (
+            v + h * pin.aba(model, data, q, v, jacobian.T @ force),
+            -self.tree.rotation(3) @ force[:2],
+        )
 
 
 class PinocchioSolvers(Simulator):
@@ -119,8 +121,9 @@ class PinocchioSolvers(Simulator):
 
     name, version = "Pinocchio", pin.__version__
     changed = (
-        "the tree is built in Python; around its acceleration solvers (proximal settings 1e-14, 1e-8, 10) stands RK4, "
-        "around its impulse solvers (tolerances 1e-10) the semi-implicit Euler of its own example"
+        "the tree is built in Python; around its acceleration solvers (proximal"
+        " settings 1e-14, 1e-8, 10) stands RK4, around its impulse solvers (tolerances"
+        " 1e-10) the semi-implicit Euler of its own example"
     )
     settings: ClassVar[dict[str, Any]] = {
         "constraintDynamics": ClosedTree,

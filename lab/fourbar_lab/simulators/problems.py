@@ -22,14 +22,17 @@ from fourbar_validation.places import MODELS, find_checkout
 
 PROBLEMS = MODELS / "problems"
 CONVENTIONS = (
-    "SI units, radians, world axes x and y, angles counter-clockwise from x. Pins: O2 at the origin, A, B, O4; bars: "
-    "1 ground O2-O4, 2 input O2-A, 3 coupler A-B, 4 output O4-B; theta_3 points from A to B, theta_4 from O4 to B. "
-    "Pairs are [size, angle]; centre: from the bar's first pin (O2, A, O4) and line, mid-bar if left out; inertia: "
-    "about the mass centre, m L^2/12 if left out. Fij: force of bar i on bar j. torque: the couple that the ground "
-    "exerts on bar 2; drive_force: of a drive along a line, positive where it pushes its ends apart. branch 1: B "
-    "left of the line from A to O4, -1: right; through a change point a released motion keeps its smooth path "
-    "(follow) or its branch (sign). error: how far off the value may be, besides the rounding of its last digit; of "
-    "a vector, its Euclidean norm. The rest is the protocol's: docs/protocol.md."
+    "SI units, radians, world axes x and y, angles counter-clockwise from x. Pins: O2"
+    " at the origin, A, B, O4; bars: 1 ground O2-O4, 2 input O2-A, 3 coupler A-B, 4"
+    " output O4-B; theta_3 points from A to B, theta_4 from O4 to B. Pairs are [size,"
+    " angle]; centre: from the bar's first pin (O2, A, O4) and line, mid-bar if left"
+    " out; inertia: about the mass centre, m L^2/12 if left out. Fij: force of bar i on"
+    " bar j. torque: the couple that the ground exerts on bar 2; drive_force: of a"
+    " drive along a line, positive where it pushes its ends apart. branch 1: B left of"
+    " the line from A to O4, -1: right; through a change point a released motion keeps"
+    " its smooth path (follow) or its branch (sign). error: how far off the value may"
+    " be, besides the rounding of its last digit; of a vector, its Euclidean norm. The"
+    " rest is the protocol's: docs/protocol.md."
 )
 ARCHIVE = "fourbar-problems-1.0"
 PROMISED = 1e-9

@@ -1,7 +1,8 @@
 """Two slider-cranks of the set of problems, as data, and their answers by free bodies in fifty digits.
 
-Crank O2-A of length a, rod A-B of length b, slider with its pin and mass centre at B on the line y = offset. The
-product knows four-bars alone: these answers share nothing with its formulas.
+Crank O2-A of length a, rod A-B of length b, slider with its pin and mass centre at B on
+the line y = offset. The product knows four-bars alone: these answers share nothing with
+its formulas.
 """
 
 import math
@@ -11,20 +12,25 @@ import numpy as np
 
 DIGITS = 50
 CONVENTIONS = (
-    "SI units, radians, world axes x and y, angles counter-clockwise from x. Pins: O2 at the origin, A, B; bars: 1 "
-    "the ground with the guide y = offset, 2 crank O2-A, 3 rod A-B, 4 slider, whose pin and mass centre are B; "
-    "theta_3 points from A to B. branch 1: B right of A, -1: left. stroke: x of B. What a bar leaves out is as in a "
-    "four-bar's scene: inertia m L^2/12 about the mass centre, centre [r, angle] from the first pin and line "
-    "mid-bar. Loads act at the mass centre. Fij: force of bar i on bar j. torque: the couple that the ground exerts "
-    "on the crank. guide_force: of the guide on the slider, along y; the guide has no friction. error: how far off "
-    "the value may be; of a vector, its Euclidean norm."
+    "SI units, radians, world axes x and y, angles counter-clockwise from x. Pins: O2"
+    " at the origin, A, B; bars: 1 the ground with the guide y = offset, 2 crank O2-A,"
+    " 3 rod A-B, 4 slider, whose pin and mass centre are B; theta_3 points from A to B."
+    " branch 1: B right of A, -1: left. stroke: x of B. What a bar leaves out is as in"
+    " a four-bar's scene: inertia m L^2/12 about the mass centre, centre [r, angle]"
+    " from the first pin and line mid-bar. Loads act at the mass centre. Fij: force of"
+    " bar i on bar j. torque: the couple that the ground exerts on the crank."
+    " guide_force: of the guide on the slider, along y; the guide has no friction."
+    " error: how far off the value may be; of a vector, its Euclidean norm."
 )
 TURN = [math.radians(15.0 * step) for step in range(25)]
 SLIDER_CRANKS: dict[str, dict[str, Any]] = {
     "slider_crank": {
         "title": "A slider-crank in line",
-        "source": "this project, after public questions about loops with a slider: Genesis issues 1911 and 1993, "
-        "PMKSWeb issue 42, mujoco_warp issue 1487, newton issue 3745.",
+        "source": (
+            "this project, after public questions about loops with a slider: Genesis"
+            " issues 1911 and 1993, PMKSWeb issue 42, mujoco_warp issue 1487, newton"
+            " issue 3745."
+        ),
         "scene": {
             "lengths": {"crank": 0.05, "rod": 0.2, "offset": 0.0},
             "bars": {
@@ -38,8 +44,11 @@ SLIDER_CRANKS: dict[str, dict[str, Any]] = {
     },
     "slider_crank_offset": {
         "title": "A slider-crank with an offset and a load on the slider",
-        "source": "this project: slider_crank with its guide 20 mm above the crank's pin, a rod whose mass centre lies "
-        "off its line, an accelerating crank and a force of 100 N on the slider.",
+        "source": (
+            "this project: slider_crank with its guide 20 mm above the crank's pin, a"
+            " rod whose mass centre lies off its line, an accelerating crank and a"
+            " force of 100 N on the slider."
+        ),
         "scene": {
             "lengths": {"crank": 0.05, "rod": 0.2, "offset": 0.02},
             "bars": {
@@ -115,7 +124,8 @@ def solve(
             y[row] = forces[row // 2].imag if row % 2 else forces[row // 2].real
             for column, factor in terms.items():
                 A[row, column] = factor
-        # moments about each mass centre: the forces at A on the crank and at O2, those at A and B on the rod
+        # moments about each mass centre: the forces at A on the crank and at O2, those
+        # at A and B on the rod
         for column, arm, factor in ((0, -arms[0], 1), (2, crank - arms[0], 1)):
             A[6, column], A[6, column + 1] = -factor * arm.imag, factor * arm.real
         A[6, 7], y[6] = 1, moments[0]

@@ -1,7 +1,8 @@
 """`python -m fourbar_lab.simulators.slider_engines mujoco | pinocchio`: serve slider-cranks by the protocol.
 
-The loop is cut at B: crank and rod in series, the slider on its guide. Each engine finds its own position, speeds and
-accelerations, and the closing force and the torque by its inverse dynamics; what each bar bears it reads itself.
+The loop is cut at B: crank and rod in series, the slider on its guide. Each engine
+finds its own position, speeds and accelerations, and the closing force and the torque
+by its inverse dynamics; what each bar bears it reads itself.
 """
 
 import json

@@ -21,18 +21,21 @@ class MujocoSlider:
     ) -> None:
         crank, rod, offset = lengths
         inertials = [
-            f'<inertial pos="{b.centre[0]!r} {b.centre[1]!r} 0" mass="{b.mass!r}" diaginertia="{i!r} {i!r} {i!r}"/>'
+            f'<inertial pos="{b.centre[0]!r} {b.centre[1]!r} 0" mass="{b.mass!r}"'
+            f' diaginertia="{i!r} {i!r} {i!r}"/>'
             for b, i in (
                 (body, body.inertia or 1e-12) for body in bodies
             )  # the slider does not turn
         ]
         hinge = '<joint type="hinge" axis="0 0 1"/>'
         self.model = mujoco.MjModel.from_xml_string(
-            f'<mujoco><option gravity="{float(field[0])!r} {float(field[1])!r} 0"><flag constraint="disable"/></option>'
-            f"<worldbody>"
-            f'<body name="crank">{hinge}{inertials[0]}<body name="rod" pos="{crank!r} 0 0">{hinge}{inertials[1]}'
-            f'<site name="end" pos="{rod!r} 0 0"/></body></body><body name="slider" pos="0 {offset!r} 0">'
-            f'<joint type="slide" axis="1 0 0"/>{inertials[2]}<site name="slider"/></body></worldbody></mujoco>'
+            f'<mujoco><option gravity="{float(field[0])!r} {float(field[1])!r} 0"><flag'
+            ' constraint="disable"/></option><worldbody><body'
+            f' name="crank">{hinge}{inertials[0]}<body name="rod" pos="{crank!r} 0'
+            f' 0">{hinge}{inertials[1]}<site name="end" pos="{rod!r} 0'
+            f' 0"/></body></body><body name="slider" pos="0 {offset!r} 0"><joint'
+            f' type="slide" axis="1 0 0"/>{inertials[2]}<site'
+            ' name="slider"/></body></worldbody></mujoco>'
         )
         self.data, self.push = mujoco.MjData(self.model), push
         self.bodies = [self.model.body(name).id for name in ("crank", "rod", "slider")]

@@ -510,7 +510,10 @@ def test_classify_says_what_turns_and_how_far(run: Fourbar) -> None:
         "    ground + input = 0.4 < coupler + output = 0.47",
         "    |ground - input| = 0.2 > |coupler - output| = 0.03",
         f"smallest transmission angle: {least:.4f} deg",
-        f"time ratio of the output strokes at constant omega_2: {one_stroke / (360.0 - one_stroke):.4f}",
+        (
+            "time ratio of the output strokes at constant omega_2:"
+            f" {one_stroke / (360.0 - one_stroke):.4f}"
+        ),
     ):
         assert line in lines
     assert f"output {abs(swung):.4f} deg" in lines[3]
@@ -755,7 +758,10 @@ def child(*arguments: str) -> "subprocess.CompletedProcess[str]":
 @pytest.mark.slow
 def test_the_command_line_starts_light() -> None:
     heavy = "pint rich matplotlib scipy mujoco pinocchio jinja2"
-    code = f"import sys, fourbar.cli; print([m for m in {heavy.split()!r} if m in sys.modules])"
+    code = (
+        f"import sys, fourbar.cli; print([m for m in {heavy.split()!r} if m in"
+        " sys.modules])"
+    )
     assert child("-c", code).stdout == "[]\n"
     done = child("-m", "fourbar", "--version")
     assert (done.returncode, done.stdout) == (

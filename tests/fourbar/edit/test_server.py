@@ -202,7 +202,8 @@ def test_a_request_of_a_hundred_megabytes_is_not_read(bench) -> None:
         reader, writer = await asyncio.open_connection(host, int(port))
         path = "/" + address.split("/", 3)[3]
         writer.write(
-            f"POST {path} HTTP/1.1\r\nHost: {host}:{port}\r\nContent-Length: {HUGE}\r\n\r\n".encode()
+            f"POST {path} HTTP/1.1\r\nHost: {host}:{port}\r\nContent-Length:"
+            f" {HUGE}\r\n\r\n".encode()
         )
         assert (await asyncio.wait_for(reader.read(), 5.0)).startswith(
             (b"HTTP/1.1 400", b"HTTP/1.1 413")
@@ -325,7 +326,10 @@ def test_it_ends_when_the_last_page_has_gone_and_not_before(bench) -> None:
 def test_the_check_runs_in_a_process_of_its_own_reports_and_can_be_stopped(
     bench, monkeypatch
 ) -> None:
-    program = "import sys, time, pathlib; print('agrees', flush=True); out = pathlib.Path(sys.argv[-1]); "
+    program = (
+        "import sys, time, pathlib; print('agrees', flush=True); out ="
+        " pathlib.Path(sys.argv[-1]); "
+    )
     program += "(out / 'report.html').write_text('<p>report'); "
     program += "time.sleep(float(out.parent.joinpath('wait').read_text()))"
     monkeypatch.setattr(
@@ -415,8 +419,14 @@ def test_a_page_that_closes_while_answers_wait_leaves_no_trace(bench, caplog) ->
                 "127.0.0.1", int(port_of(address))
             )
             host, path = address.split("/")[2], "/" + address.split("/", 3)[3] + "live"
-            head = f"GET {path} HTTP/1.1\r\nHost: {host}\r\nOrigin: http://{host}\r\nUpgrade: websocket\r\n"
-            head += f"Connection: Upgrade\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: {'A' * 22}==\r\n\r\n"
+            head = (
+                f"GET {path} HTTP/1.1\r\nHost: {host}\r\nOrigin:"
+                f" http://{host}\r\nUpgrade: websocket\r\n"
+            )
+            head += (
+                "Connection: Upgrade\r\nSec-WebSocket-Version:"
+                f" 13\r\nSec-WebSocket-Key: {'A' * 22}==\r\n\r\n"
+            )
             writer.write(head.encode())
             await reader.readuntil(b"\r\n\r\n")
             for number in range(60):

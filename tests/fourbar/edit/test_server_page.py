@@ -176,7 +176,8 @@ def test_a_designer_goes_from_an_empty_scene_to_a_saved_file(
     # the keys before the last one are refused too, each with a line of its own
     wait_for(
         driver,
-        "document.getElementById('field:lengths/input!').textContent.includes('does not convert to m')",
+        "document.getElementById('field:lengths/input!').textContent.includes('does not"
+        " convert to m')",
     )
     assert (
         driver.find_element("id", "field:lengths/input").get_attribute("aria-invalid")
@@ -331,7 +332,8 @@ def test_a_designer_draws_a_cylinder_drive_and_analyze_gives_the_same(
     driver.find_element("css selector", "#command option[value=stroke]").click()
     wait_for(
         driver,
-        "plain.motion.stroke && data.over.name === 'stroke' && 'drive_force_error' in table()",
+        "plain.motion.stroke && data.over.name === 'stroke' && 'drive_force_error' in"
+        " table()",
     )
     driver.execute_script("go(17)")
     force = float(driver.find_element("id", "drive_force").text.replace("−", "-"))
@@ -415,11 +417,13 @@ def test_the_keyboard_alone_draws_types_drags_undoes_and_saves(
             )
         )
         if driver.execute_script(
-            "return document.activeElement === document.querySelector('.editor summary')"
+            "return document.activeElement === document.querySelector('.editor"
+            " summary')"
         ):
             break
     missing = driver.execute_script(
-        f"return {SHOWN_FIELDS}.filter(e => !e.disabled && e.id !== 'file-text').map(e => e.id || e.textContent)"
+        f"return {SHOWN_FIELDS}.filter(e => !e.disabled && e.id !== 'file-text').map(e"
+        " => e.id || e.textContent)"
     )
     assert set(missing) - reached == {""} - reached
     driver.execute_script("document.activeElement.blur()")
@@ -516,12 +520,13 @@ def test_it_opens_in_the_middle_with_a_linkage_that_fills_half_and_labels_apart(
         assert abs(rows[0] - rows[1] / 2) <= 1, model
         assert driver.find_element("id", "compared").text == ""  # nothing has changed
         share = driver.execute_script(
-            "const own = p => [2, 3, 4].filter(k => data.centres[k]).map(k => barPoint(p, k, data.centres[k]));"
-            "const points = p => data.points.map(point => framed(p, point.bar, point.at));"
-            "const P = grid.map((_, i) => at(i)).filter(p => p)"
-            ".flatMap(p => [[0, 0], p.A, p.B, p.O4, ...actingPoints(p), ...own(p), ...points(p)]);"
-            "const [wide, high] = [0, 1].map(j => Math.max(...P.map(q => q[j])) - Math.min(...P.map(q => q[j])));"
-            "return view.k * Math.max(wide / view.width, high / view.height);"
+            "const own = p => [2, 3, 4].filter(k => data.centres[k]).map(k =>"
+            " barPoint(p, k, data.centres[k]));const points = p =>"
+            " data.points.map(point => framed(p, point.bar, point.at));const P ="
+            " grid.map((_, i) => at(i)).filter(p => p).flatMap(p => [[0, 0], p.A, p.B,"
+            " p.O4, ...actingPoints(p), ...own(p), ...points(p)]);const [wide, high] ="
+            " [0, 1].map(j => Math.max(...P.map(q => q[j])) - Math.min(...P.map(q =>"
+            " q[j])));return view.k * Math.max(wide / view.width, high / view.height);"
         )
         assert share >= 0.5, model
         for row in range(0, rows[1], rows[1] // 8):
@@ -550,7 +555,8 @@ def test_undo_takes_a_refused_entry_back_and_leaves_the_last_good_state(
     entry = "document.getElementById('field:lengths/input')"
     wait_for(
         driver,
-        f"{entry}.value === '110 mm' && {entry}.getAttribute('aria-invalid') !== 'true'",
+        f"{entry}.value === '110 mm' && {entry}.getAttribute('aria-invalid') !=="
+        " 'true'",
     )
     assert driver.execute_script("return data.lengths.slice(1, 3)") == [0.11, 0.24]
     driver.find_element("id", "field:lengths/input").send_keys(Keys.CONTROL, "z")
@@ -582,7 +588,8 @@ def test_a_page_finds_its_server_again_and_a_new_one_goes_on_from_the_state(
     opened.end()
     wait_for(
         driver,
-        "document.getElementById('bench').textContent.includes('The server has stopped')",
+        "document.getElementById('bench').textContent.includes('The server has"
+        " stopped')",
     )
     again = opened(path, server.split("/")[2].partition(":")[2])
     assert again != server  # the token is another one, and the old page is told nothing

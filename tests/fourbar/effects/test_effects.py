@@ -29,7 +29,8 @@ from tests.support.scenes import crank_rocker
 
 SECOND_ORDER = 1e-8
 """A central difference with a step of 1e-5 rad: 1e-10 from its third derivative, 1e-11 from rounding, times the
-derivatives of these springs, which are some tens of N m."""
+derivatives of these springs, which are some tens of N m.
+"""
 STEP = 1e-5
 LAST_DIGITS = 64 * 2.0**-52
 """The roundings of one evaluation."""
@@ -151,7 +152,8 @@ def test_a_flywheel_is_inertia_of_the_bar(bar: int, name: str) -> None:
 def test_one_cone_has_one_none_or_two_solutions() -> None:
     """x = k |F + C x| on a line: F = 1, C = c: x = k (1 + c x), x = k |1 - c x| ...
 
-    Its distance from jamming is the slope 1 - k e.C of x - k |F + C x|, e along F + C x, and at most 1.
+    Its distance from jamming is the slope 1 - k e.C of x - k |F + C x|, e along F + C
+    x, and at most 1.
     """
     cases = {  # (F, C): solutions of x = |F + C x| with k = 1, and how far from jamming
         ((1.0, 0.0), (0.5, 0.0)): (ONE, 2.0, 0.5),

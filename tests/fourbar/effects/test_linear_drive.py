@@ -255,7 +255,8 @@ def test_where_it_has_no_lever_or_no_direction_there_are_no_forces() -> None:
         "no_direction",
         "ok",
     ]
-    # the parallelogram's cranks keep their distance while they are parallel, and only then
+    # the parallelogram's cranks keep their distance while they are parallel, and only
+    # then
     parallel = fourbar.LinearDrive(Place(2, (0.05, 0.3)), Place(4, (0.05, 0.3)))
     for branch, status in ((1, "no_lever"), (-1, "ok")):
         scene = fourbar.Scene(

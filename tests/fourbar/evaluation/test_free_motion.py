@@ -47,7 +47,8 @@ def test_one_window_of_iftomm_a02() -> None:
 def test_needs_no_driving_torque() -> None:
     terms = (fourbar.Gravity(), fourbar.Viscous.at(O2=0.002, B=0.001))
     m = integrate(HANGING, terms, 0.3, 2.0, -1, np.linspace(0.0, 2.0, 41))
-    # told to move so, not released: of a released motion the torque is zero whatever it is
+    # told to move so, not released: of a released motion the torque is zero whatever it
+    # is
     s = solve(
         fourbar.Scene(HANGING, effects=terms),
         "force",
@@ -73,7 +74,8 @@ def test_runs_on_through_limits_and_names_its_change_points(coupler: float) -> N
     motion = fourbar.Motion(1.0, 0.0, free=fourbar.Free(1.0, 20))
     solution = solve(fourbar.Scene(linkage, motion, effects=(fourbar.Gravity(),)))
     assert set(solution.branch) == {1, -1}
-    # on an assembly with a change point theta_2 passes the ground's line, where its sine changes sign
+    # on an assembly with a change point theta_2 passes the ground's line, where its
+    # sine changes sign
     assert bool(passed.change_points) == (coupler == 0.12)
     for time in passed.change_points:
         at_it = integrate(
@@ -151,8 +153,9 @@ STEEPER = 2.0
 def forces_by_energy(theta: np.ndarray, start: np.ndarray) -> np.ndarray:
     """Pin forces F12, F32, F43, F14 of ROCKER, (4, 2), at the angles of its bars 2, 3, 4 if it is released at others.
 
-    Speeds by the conservation of energy, along the one direction that the loop allows. Accelerations of the three
-    mass centres and the four pin forces together are 17 linear equations, regular where any two bars are in line.
+    Speeds by the conservation of energy, along the one direction that the loop allows.
+    Accelerations of the three mass centres and the four pin forces together are 17
+    linear equations, regular where any two bars are in line.
     """
     _, a, b, c = ROCKER.lengths
     half = 0.5 * np.array([a, b, c])
@@ -170,7 +173,8 @@ def forces_by_energy(theta: np.ndarray, start: np.ndarray) -> np.ndarray:
     speed[:, 1] += across[:, 0] * a * moves[0]
     of_moves = float(m @ (speed * speed).sum(axis=0) + inertia @ (moves * moves))
     squared = moves * moves * (2.0 * 9.81 * (height(start) - height(theta)) / of_moves)
-    # unknown: a_G2, alpha_2, a_G3, alpha_3, a_G4, alpha_4, then the forces; row by row Newton and Euler ...
+    # unknown: a_G2, alpha_2, a_G3, alpha_3, a_G4, alpha_4, then the forces; row by row
+    # Newton and Euler ...
     left, right = np.zeros((17, 17)), np.zeros(17)
     pins = (
         (0, -1, 9, 1),

@@ -57,7 +57,8 @@ PRODUCTS = 8.0 * U
 """Relative, of E1 and E2: two such differences, or one and a sum of four, and their product."""
 TANGENT = 10.0 * U
 """Relative, of sin^2 h, cos^2 h and sin h cos h from a tangent that a library gives to 2 U: two or three of it, a
-square, a sum, a quotient and a product; of a factor of Heron's formula likewise, relative to its terms."""
+square, a sum, a quotient and a product; of a factor of Heron's formula likewise, relative to its terms.
+"""
 FROM_EITHER_END = 64.0 * 2.0**-52
 """Roundings of two methods for one position; for the n-th derivative magnified as those of the coefficients are."""
 DIGITS_LEFT = 1e-40
@@ -223,7 +224,8 @@ def read_from_the_output(drawn: Drawn) -> tuple[State, Any, Any]:
         prepare_path(loop(*drawn.bars.lengths), drawn.bars.ground_angle, 4),
     )
     theta_4 = np.angle(moving.position.u4)
-    # of the triangle B, A, O2: bars 3 and 2 there are as bars 4 and 3 in the order of theta_2
+    # of the triangle B, A, O2: bars 3 and 2 there are as bars 4 and 3 in the order of
+    # theta_2
     sign = -np.sign((moving.position.u2 * moving.position.u3.conjugate()).imag)
     return moving, *from_output.motion(
         from_output.position(theta_4, from_output.half_angle(theta_4), sign), sign
@@ -563,7 +565,8 @@ def test_the_half_angle_in_doubles_keeps_the_digits_of_the_angle() -> None:
                 for ours, exact in ((half.ss, ss), (half.kk, kk), (half.sk, sk)):
                     assert abs(ours[i] - exact) <= TANGENT * abs(exact)
                 of_outer, of_inner = abs(E1) + 4 * a * d * kk, abs(E2) + 4 * a * d * ss
-                # one is what the other leaves of 4 b c, where that has fewer digits to lose
+                # one is what the other leaves of 4 b c, where that has fewer digits to
+                # lose
                 for ours, exact, terms, of_other in (
                     (half.outer, outer, of_outer, of_inner),
                     (half.inner, inner, of_inner, of_outer),
@@ -620,7 +623,8 @@ def test_an_offset_from_a_limit_in_many_digits(
             half = exact_half_angle(bars, theta_2, remainder)
             for ours, exact in zip(half[:5], expected, strict=True):
                 assert abs(ours - exact) <= (1.0 + DIGITS_LEFT) * U * abs(exact)
-            # beyond the limit nothing closes, however near: stretched bars stop it going on, folded ones going back
+            # beyond the limit nothing closes, however near: stretched bars stop it
+            # going on, folded ones going back
             assert (half.outer if stretched else half.inner) * (
                 -offset if stretched else offset
             ) > 0.0

@@ -38,12 +38,14 @@ def intersect_circles(
 ) -> tuple[np.ndarray, np.ndarray]:
     """The two places of the free pin at each angle of a bar, complex (n, 2), and the angles of the other two bars.
 
-    The bar's far end P and the far end of the others' common chain are the centres of two circles.
+    The bar's far end P and the far end of the others' common chain are the centres of
+    two circles.
     """
     d, a, b, c = linkage.lengths
     O4 = d * np.exp(1j * np.longdouble(linkage.ground_angle))
     unit = np.exp(1j * q.astype(np.longdouble))
-    # centre and radius of both circles, and the angles that follow from the pin where they meet
+    # centre and radius of both circles, and the angles that follow from the pin where
+    # they meet
     if bar == 2:
         first, r, second, s = a * unit, b, O4 + 0 * unit, c
     elif bar == 3:

@@ -28,7 +28,8 @@ from fourbar.linkage import Bar, FourBar, uniform
 EPS = 2.0**-52
 ANGLE = 8.0 * EPS
 """Rounding of a limit's angle: exact sums, then four roots, two products and an arc tangent, each 1/2 eps of
-the angle, and the sum with theta_1 and pi, 2 pi: 1/2 eps of at most 4 pi."""
+the angle, and the sum with theta_1 and pi, 2 pi: 1/2 eps of at most 4 pi.
+"""
 PRINTED_8 = 0.5e-8
 """Half a unit in the last digit of an angle printed to eight decimals of a degree, deg."""
 SCAN = 20_000
@@ -81,8 +82,9 @@ def inside(angle: np.ndarray, ranges: tuple[tuple[float, float], ...]) -> np.nda
     )
 
 
-# the thesis's model mechanism: 20, 48, 55, 20 cm, theta_1 = 45 deg; Linares Mendoza, table 3.2 (rows 2 and 4),
-# with the mirror positions that it leaves out: 145.078..., 5.3819... deg
+# the thesis's model mechanism: 20, 48, 55, 20 cm, theta_1 = 45 deg; Linares Mendoza,
+# table 3.2 (rows 2 and 4), with the mirror positions that it leaves out: 145.078...,
+# 5.3819... deg
 THESIS = linkage(0.20, 0.48, 0.55, 0.20, math.radians(45.0))
 
 
@@ -188,7 +190,8 @@ def test_ranges_and_circuits_agree_with_a_scan(bars: FourBar) -> None:
     assert (inside(theta_2, find_intervals(bars))[sure] == (margin >= 0.0)[sure]).all()
     assert turns_fully(bars) == bool((margin[sure] >= 0.0).all())
 
-    # positions as a graph: neighbours on a branch, both branches next to a gap or across a change point
+    # positions as a graph: neighbours on a branch, both branches next to a gap or
+    # across a change point
     place, ahead, closed = np.arange(GRID), np.roll(np.arange(GRID), -1), margin >= 0.0
     joined = closed & closed[ahead]
     meets = closed & ~(joined & np.roll(closed, 1))
@@ -266,7 +269,8 @@ def test_limits_keep_their_digits_near_special_linkages() -> None:
                     error = min(
                         abs(_mod(mp.mpf(value) - theta_1 - s * psi)) for s in (1, -1)
                     )
-                    # theta_1 = 0, first of the pair: nothing is added, so the angle is good relative to itself
+                    # theta_1 = 0, first of the pair: nothing is added, so the angle is
+                    # good relative to itself
                     size = (
                         psi
                         if bar == 2 and theta_1 == 0.0 and 0.0 < value < math.pi
@@ -304,7 +308,8 @@ def test_limits_close_the_loop_with_two_bars_collinear() -> None:
                     abs(math.sin(angles[pair[0]] - angles[pair[1]]))
                     <= ANGLE * 2 * math.pi
                 )
-                # bars 2, 3 lie along each other where stretched; the output runs from its far end
+                # bars 2, 3 lie along each other where stretched; the output runs from
+                # its far end
                 along = math.cos(angles[pair[0]] - angles[pair[1]]) > 0.0
                 assert along == (limit.stretched == (bar == 4))
                 assert limit.branch == (
@@ -352,12 +357,14 @@ def test_ranges_of_coupler_and_output_hold_every_position_and_no_more() -> None:
                 axis=0,
             )
             assert inside(reached[clear > 1e-6], find_intervals(bars, bar)).all()
-            # the first range holds the ground's direction (bar 4: its opposite) or begins less than pi after it
+            # the first range holds the ground's direction (bar 4: its opposite) or
+            # begins less than pi after it
             first, half = find_intervals(bars, bar)[0][0], math.pi if bar == 4 else 0.0
             assert abs(first - (bars.ground_angle + half)) <= math.pi * (1.0 + EPS)
             for start, stop in find_intervals(bars, bar):
                 for end in (start, stop) if not turns_fully(bars, bar) else ():
-                    # theta_k goes as a square root near its limit's theta_2, or is tangent to it
+                    # theta_k goes as a square root near its limit's theta_2, or is
+                    # tangent to it
                     assert (
                         np.abs(np.sin(0.5 * (reached - end))).min()
                         < 20.0 * math.pi / GRID
@@ -378,7 +385,8 @@ def test_time_ratio_is_the_time_of_both_strokes() -> None:
     )  # both ends counted to one step
     assert time_ratio(uniform(1, 3, 2.5, 3.2)) is None
     assert time_ratio(THESIS) is None
-    # limits of the output alone are not enough: there are change points, or the input does not turn
+    # limits of the output alone are not enough: there are change points, or the input
+    # does not turn
     assert (
         time_ratio(uniform(3, 1, 2, 2)) is None
         and len(limit_positions(linkage(3, 1, 2, 2), 4)) == 2

@@ -23,10 +23,12 @@ from fourbar.scene import Command, with_signs
 EPS = 2.0**-52
 FIRST, SECOND = 32.0, 128.0
 """Roundings in a first and a second coefficient; each is magnified by 1/sin^2 mu and 1/sin^4 mu at most:
-one power of 1/sin^2 mu from the angles, one from the division by the root of the area."""
+one power of 1/sin^2 mu from the angles, one from the division by the root of the area.
+"""
 COLLINEAR = 64.0 * EPS
 """Rounding of the determinant of three instant centres, relative to the product of their magnitudes and
-magnified by 1/|sin mu|."""
+magnified by 1/|sin mu|.
+"""
 
 
 class Drawn(NamedTuple):
@@ -200,13 +202,13 @@ def test_the_coupler_turns_about_I13_and_bars_2_and_4_share_I24() -> None:
     for drawn in random_positions(16, 200):
         moving, sine = drawn.moving(), drawn.sine
         O4 = drawn.bars.ground * moving.position.u1
-        (x, y) = instant_centres(*drawn)[1, 3].point
+        x, y = instant_centres(*drawn)[1, 3].point
         spin = float(moving.omega(3)[0])
         pin, speed = moving.foot(3)[0], moving.velocity(3, 0.0)[0]
         still = abs(speed + 1j * spin * (complex(x[0], y[0]) - pin))
         reach = abs(spin) * math.hypot(x[0], y[0]) + 1.0
         assert still <= 1e3 * EPS * reach / sine**3
-        (x, y) = instant_centres(*drawn)[2, 4].point
+        x, y = instant_centres(*drawn)[2, 4].point
         spin_4 = float(moving.omega(4)[0])
         # both bars give the same velocity there: x r_2 = omega_4 (r_2 - O4)
         here = complex(x[0], y[0])
@@ -253,7 +255,8 @@ def test_coupler_curves_are_closed_and_lie_on_the_sextic(
         assert np.isfinite(point).all()
         assert point[0] == point[-1] and curve.branch[0] == curve.branch[-1]
         steps = np.abs(np.diff(point))
-        # a jump to another branch or circuit is as long as a bar; a step of the curve is not
+        # a jump to another branch or circuit is as long as a bar; a step of the curve
+        # is not
         assert steps.max() < 0.1 * min(lengths)
         assert (curve.branch == 1).any() == (1 in circuits(bars)[circuit].branches)
         assert _off_sextic(bars, point, along, across) < 1e-9
@@ -262,8 +265,9 @@ def test_coupler_curves_are_closed_and_lie_on_the_sextic(
 def _off_sextic(bars: FourBar, point: np.ndarray, along: float, across: float) -> float:
     """How far the points are from the coupler curve's own equation, free of theta_2.
 
-    A lies on the circle a about O2 and at the distance |(along, across)| of the point P; B follows from A
-    and P alone and must lie on the circle c about O4: one of the two possible A fulfils it.
+    A lies on the circle a about O2 and at the distance |(along, across)| of the point
+    P; B follows from A and P alone and must lie on the circle c about O4: one of the
+    two possible A fulfils it.
     """
     d, a, b, c = bars.lengths
     arm = complex(along, across)

@@ -30,7 +30,8 @@ FEW_ROUNDINGS = 8.0 * 2.0**-52
 STEP = 30
 """Digits of the step: differences of angles with 90 digits keep 30."""
 SHORT = (
-    # (d, a, b, c), psi, sign of the root: d - a = +-(b - c) exactly, so the diagonal turns fast and the bars do not
+    # (d, a, b, c), psi, sign of the root: d - a = +-(b - c) exactly, so the diagonal
+    # turns fast and the bars do not
     ((0.859375, 0.853515625, 0.58984375, 0.583984375), -0.0018, -1),
     ((0.859375, 0.853515625, 0.58984375, 0.583984375), 0.0018, 1),
     ((0.859375, 0.853515625, 0.583984375, 0.58984375), 0.0018, -1),

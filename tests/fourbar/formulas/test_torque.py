@@ -92,7 +92,8 @@ def test_torque_and_pin_forces_agree_with_the_thirteen_equations(drive: int) -> 
         assert s.torque is not None and s.drive_condition is not None
         force = sum(np.hypot(*theirs[name].T) for name in PINS)
         worth = K * EPS / (s.condition**2 * s.drive_condition)
-        # the moments of the thirteen equations are those of forces at the arm of the longest bar
+        # the moments of the thirteen equations are those of forces at the arm of the
+        # longest bar
         size = force * max(linkage.lengths) + np.abs(s.torque)
         assert np.all(np.abs(theirs["torque"] - s.torque) <= worth * size)
         for name in PINS:

@@ -78,7 +78,8 @@ def test_extremes_are_those_of_a_scan() -> None:
             (extremes.least, angle.min()),
             (extremes.greatest, angle.max()),
         ):
-            # mu^2/2 = steep sin psi delta at a limit; else mu'' = steep/sin mu, a whole step away at most
+            # mu^2/2 = steep sin psi delta at a limit; else mu'' = steep/sin mu, a whole
+            # step away at most
             at_limit = end in (0.0, math.pi)
             miss = (
                 math.sqrt(2.0 * steep * step)
@@ -115,7 +116,8 @@ def test_extremes_keep_their_digits_near_a_change_point() -> None:
 
 
 def test_speed_ratio_follows_from_the_centres_of_rotation() -> None:
-    # the velocity of B along the coupler equals that of A: a sin(theta_2 - theta_3) = (omega_4/omega_2) c sin(...)
+    # the velocity of B along the coupler equals that of A: a sin(theta_2 - theta_3) =
+    # (omega_4/omega_2) c sin(...)
     for drawn in random_positions(23, 100):
         _, a, _, c = drawn.bars.lengths
         moving = drawn.moving()
@@ -134,7 +136,8 @@ def test_power_in_is_power_out() -> None:
         force_out = mechanical_advantage(moving, r_in, r_out) * force_in
         power_out = force_out * r_out * moving.omega(4)
         assert power_out == pytest.approx(force_in * r_in * 3.0, rel=16 * EPS)
-        # at equal distances, which is what is taken where none are given, it is the ratio of torques
+        # at equal distances, which is what is taken where none are given, it is the
+        # ratio of torques
         assert mechanical_advantage(moving) == pytest.approx(
             mechanical_advantage(moving, 0.7, 0.7), rel=4 * EPS
         )
@@ -191,7 +194,8 @@ def test_distance_counts_change_points_and_the_dead_centres_of_the_drive() -> No
         np.isfinite(dead).all()
         and (dead >= distance_to_singular(crank, theta_2, 4)).all()
     )
-    # at a dead centre of a drive on bar 4 the output stands: the speed ratio changes its sign there
+    # at a dead centre of a drive on bar 4 the output stands: the speed ratio changes
+    # its sign there
     angles = (
         theta_2 + dead * 0.999,
         theta_2 + dead * 1.001,

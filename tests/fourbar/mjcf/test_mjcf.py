@@ -150,7 +150,8 @@ def test_opens_assembled_and_moves_without_keyframe_or_control() -> None:
         assert gap(data) < OPEN and (model.qpos0 == model.key_qpos[0]).all()
         omega = scene.motion.omega_2
         assert omega and not data.qvel.any() and not data.ctrl.any()
-        # a second, or what is left of the range where it ends before; longer than the drive settles
+        # a second, or what is left of the range where it ends before; longer than the
+        # drive settles
         travel, settling = scene.motion.theta_2, 20.0 * SETTLING * model.opt.timestep
         travelled = (
             0.9 * (travel.stop - travel.start)

@@ -403,7 +403,9 @@ SAID: dict[str, Callable[[Opened], None]] = {
     "ctrl[cylinder] is the cylinder's force": pushes_as_controlled,
     "No drive: the force along the tendon cylinder": pushes_as_applied,
     "Released: no drive": is_released,
-    "After mj_step, qacc, actuator_force and efc_force": is_of_the_instant_after_forward,
+    "After mj_step, qacc, actuator_force and efc_force": (
+        is_of_the_instant_after_forward
+    ),
     "T2 = actuator_force[drive] - dof_armature[O2] qacc[O2]": gives_torque,
     "efc_force[0], efc_force[1]: force of bar 4 on bar 3": gives_force_at_B,
     "cfrc_int[bar][3:5]": gives_forces_at_pins,

@@ -32,7 +32,8 @@ def test_the_frame_turns_z_to_the_axis_by_the_shortest_way(
     assert np.allclose(turn @ turn.T, np.eye(3), atol=1e-15)
     assert np.linalg.det(turn) == pytest.approx(1.0)
     assert np.allclose(rotation(plane.quaternion), turn, atol=1e-15)
-    # the trace of a rotation is 1 + 2 cos of its angle, which is that between z and the axis
+    # the trace of a rotation is 1 + 2 cos of its angle, which is that between z and the
+    # axis
     assert np.trace(turn) == pytest.approx(1.0 + 2.0 * unit[2])
     roll, pitch, yaw = plane.roll_pitch_yaw
     parts = [
@@ -68,7 +69,8 @@ def test_mujoco_moves_and_loads_a_tilted_linkage_alike(
         mujoco.mj_rnePostConstraint(model, data)
         turn = place.rotation
         bodies = [model.body(name).id for name in ("input", "coupler", "output")]
-        # back into the linkage's axes; across the plane a loop of hinges is overdetermined
+        # back into the linkage's axes; across the plane a loop of hinges is
+        # overdetermined
         forces = (data.cfrc_int[bodies, 3:] @ turn)[:, :2]
         tip = turn.T @ (data.site("B3").xpos - place.origin)
         closing = (turn.T @ data.efc_force[:3])[:2]

@@ -23,7 +23,8 @@ STEP = 1e-5
 """rad, of a central difference."""
 OF_A_DIFFERENCE = 1e-8
 """m/s: STEP^2 = 1e-10 of its third derivatives is left out, and rounding 1e-16/STEP = 1e-11 m is added, times 10 rad/s.
-Accelerations are ten times larger again, and their derivatives too."""
+Accelerations are ten times larger again, and their derivatives too.
+"""
 
 
 def scene(*points: Point, **changes: Any) -> Scene:

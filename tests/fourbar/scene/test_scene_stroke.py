@@ -93,7 +93,8 @@ def test_error_bars_hold_what_the_angle_of_a_stroke_loses(
 ) -> None:
     """The ground turned with all that is on it: the same force, every number of which rounds otherwise.
 
-    Against balls, and not the median of the doubles, which all lose the same in what does not turn.
+    Against balls, and not the median of the doubles, which all lose the same in what
+    does not turn.
     """
     by_stroke = replace(
         scene(bar, np.array(strokes), stroke_speed=0.2, stroke_acceleration=0.1),

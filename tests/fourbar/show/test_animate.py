@@ -26,7 +26,10 @@ from fourbar.show.plot.film import choose_frames
 from fourbar.show.plot.view import make_view
 from tests.support.scenes import crank_rocker, thesis
 
-HOSTILE = "</script><script>alert(1)</script> \"'><img src=x onerror=alert(2)> $style ${data} {{x}} \u2028 \x00 é"
+HOSTILE = (
+    "</script><script>alert(1)</script> \"'><img src=x onerror=alert(2)> $style ${data}"
+    " {{x}} \u2028 \x00 é"
+)
 PNG = base64.b64decode(
     "iVBORw0KGgoAAAANSUhEUgAAAAIAAAABCAIAAAB7QOjdAAAAD0lEQVR4nGP4z8DwHwYBABv2A/0Fj9VPAAAAAElFTkSuQmCC"
 )

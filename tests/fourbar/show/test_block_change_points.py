@@ -215,7 +215,8 @@ def test_members_beside_a_change_point_keep_the_nominal_assembly() -> None:
         torque = fourbar.solve(fourbar.vary(scene, {"lengths.output": values})).torque
         nominal = fourbar.solve(scene).torque
         assert torque is not None and nominal is not None
-        # the change grows towards the change points; a jump to the other assembly would be of the size of the torque
+        # the change grows towards the change points; a jump to the other assembly would
+        # be of the size of the torque
         assert np.abs(torque - nominal).max() < 0.02 * np.abs(nominal).max()
     # a linkage of its own keeps its own assembly
     study = fourbar.vary(scene, {"lengths.output": np.array([0.2])})
@@ -236,7 +237,8 @@ def test_the_tolerance_band_of_a_parallelogram_holds_its_nominal_value() -> None
         tolerances=(fourbar.Tolerance("lengths.output", 1e-5),),
     )
     spread = fourbar.tolerances(scene, samples=64).spreads["torque"]
-    # samples in the other assembly would make the band as wide as the torque, or leave the nominal value outside
+    # samples in the other assembly would make the band as wide as the torque, or leave
+    # the nominal value outside
     width = spread.high - spread.low
     assert (width < 0.02 * np.abs(spread.nominal).max()).all()
     middle = 0.5 * (spread.low + spread.high)

@@ -90,8 +90,9 @@ def test_without_pandas_one_line_says_what_to_install(
 
 def test_showing_needs_numpy_alone() -> None:
     code = (
-        "import sys, fourbar as f; s = f.Scene(f.FourBar(4.0, f.Bar(2.0), f.Bar(5.0), f.Bar(5.0)), f.Motion(1.0, 1.0));"
-        "sys.modules['matplotlib'] = None; s._repr_html_(); f.solve(s)._repr_html_(); del sys.modules['matplotlib'];"
+        "import sys, fourbar as f; s = f.Scene(f.FourBar(4.0, f.Bar(2.0), f.Bar(5.0),"
+        " f.Bar(5.0)), f.Motion(1.0, 1.0));sys.modules['matplotlib'] = None;"
+        " s._repr_html_(); f.solve(s)._repr_html_(); del sys.modules['matplotlib'];"
         " print(*{n.partition('.')[0] for n in sys.modules})"
     )
     loaded = subprocess.run(

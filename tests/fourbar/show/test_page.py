@@ -273,12 +273,14 @@ def test_the_numbers_of_an_axis_stand_clear_of_each_other_and_a_stroke_stays_in_
     scene = fourbar.Scene(fourbar.uniform(0.9, 0.3, 0.75, 0.66), motion, drive=drive)
     driver = browse(animate.write_page(scene), width)
     wide, room = driver.execute_script(
-        "const box = document.querySelector('.slider output'); return [box.scrollWidth, box.clientWidth]"
+        "const box = document.querySelector('.slider output'); return [box.scrollWidth,"
+        " box.clientWidth]"
     )
     assert wide <= room
     boxes = driver.execute_script(
-        "return [...chart.querySelectorAll('text')].filter(t => t.textContent.endsWith('mm'))"
-        ".map(t => t.getBoundingClientRect()).map(box => [box.left, box.right])"
+        "return [...chart.querySelectorAll('text')].filter(t =>"
+        " t.textContent.endsWith('mm')).map(t => t.getBoundingClientRect()).map(box =>"
+        " [box.left, box.right])"
     )
     assert len(boxes) > 2, boxes
     assert all(after - before > 3.0 for (_, before), (after, _) in pairwise(boxes))
@@ -307,7 +309,8 @@ def test_the_page_replays_the_positions_speeds_and_accelerations_of_fourbar(
         )
         moved = state_of(
             driver,
-            "grid.map((_, i) => pointMotion(i, POINTS.find(point => point[0] === 'G3')))",
+            "grid.map((_, i) => pointMotion(i, POINTS.find(point => point[0] ==="
+            " 'G3')))",
         )
         for k, vectors in enumerate((s.v_G3, s.a_G3)):
             np.testing.assert_allclose(
@@ -381,11 +384,16 @@ def test_what_acts_is_drawn_at_its_place_and_dimensions_on_request(browse) -> No
         s.theta_3[20] + 0.5, abs=0.01
     )
     assert acting.keys() >= {"act act-drive", "act act-gravity"}
-    names = 'return ["1", "3"].map(k => [parts.label[k].textContent, parts.label[k].style.display])'
+    names = (
+        'return ["1", "3"].map(k => [parts.label[k].textContent,'
+        " parts.label[k].style.display])"
+    )
     assert driver.execute_script(names) == [["1", "none"], ["3", ""]]
     driver.execute_script("toggle('show-v'); toggle('show-a')")
-    arrows = driver.execute_script("""return [...document.querySelectorAll("#motion path.act")].map(e =>
-        [...e.getAttribute("d").matchAll(/[ML]([^ ]+) ([^ML]+)/g)].map(m => [Number(m[1]), -Number(m[2])]))""")
+    arrows = driver.execute_script(
+        """return [...document.querySelectorAll("#motion path.act")].map(e =>
+        [...e.getAttribute("d").matchAll(/[ML]([^ ]+) ([^ML]+)/g)].map(m => [Number(m[1]), -Number(m[2])]))"""
+    )
     assert len(arrows) == 2 * 5
     shafts = np.diff(arrows, axis=1)[:, 0]
     for (x, y), expected in zip(shafts[[0, 5]], (s.v_A[20], s.a_A[20]), strict=True):

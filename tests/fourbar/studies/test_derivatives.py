@@ -140,7 +140,8 @@ def test_positions_alone_and_through_a_change_point() -> None:
         Scene(fourbar.uniform(0.3, 0.1, 0.3, 0.1), fourbar.Motion(np.array([1.0, 2.0])))
     )
     assert "torque" not in plain.by and "bars.input.mass" not in plain.keys
-    # a parallelogram: the output follows the input, and its angle feels each length by itself
+    # a parallelogram: the output follows the input, and its angle feels each length by
+    # itself
     np.testing.assert_allclose(plain.of("theta_4", "motion.theta_2"), 1.0, rtol=EXACT)
     np.testing.assert_allclose(
         plain.of("theta_4", "lengths.input"),
@@ -176,7 +177,8 @@ def test_the_command_ranks_the_numbers_and_writes_them_all(
     assert status(["analyze", str(models / "crank_rocker.toml"), "--sensitivity"]) == 0
     text = capsys.readouterr().out
     assert "torque depends most on lengths.ground (at theta_2 = " in text
-    # the torque of inertia grows with the square of the speed, that of weight and loads does not
+    # the torque of inertia grows with the square of the speed, that of weight and loads
+    # does not
     row = next(line for line in text.splitlines() if line.startswith("bars.input.mass"))
     assert row.split()[3:] == ["0", "0", "0"]
     assert (

@@ -46,7 +46,10 @@ def test_each_finding_is_a_report_and_stands_in_the_list() -> None:
     listed = (FOLDER.parent / "findings.md").read_text(encoding="utf-8")
     for finding in ALL:
         assert set(FIELDS) - {"With"} <= finding.fields.keys(), finding.script
-        entry = f"- **{finding.engine[0]}**: {finding.sentence}\n  - {finding.fields['Found']}\n"
+        entry = (
+            f"- **{finding.engine[0]}**: {finding.sentence}\n  -"
+            f" {finding.fields['Found']}\n"
+        )
         assert entry in listed, finding.script
     scripts = re.findall(r"\]\(findings/(\w+\.py)\)", listed)
     assert sorted(scripts) == sorted(finding.script.name for finding in ALL)
@@ -78,7 +81,8 @@ def test_the_command_says_what_could_not_run(
 ) -> None:
     script = tmp_path / "one.py"
     script.write_text(
-        '"""It is so.\n\nEngine: nothing-such (nothing_such)\nWith: also=={version}, more\n"""\n'
+        '"""It is so.\n\nEngine: nothing-such (nothing_such)\nWith: also=={version},'
+        ' more\n"""\n'
     )
     monkeypatch.setattr(module, "FOLDER", tmp_path)
     done = CliRunner().invoke(module.command)

@@ -154,8 +154,9 @@ def test_ninety_digits_answer_the_same(name: str) -> None:
 def slide(mp: Any, scene: Any, place: Any, omega: Any, alpha: Any) -> dict[str, Any]:
     """Answer a slider-crank by virtual work: the motion as functions of time, which are differentiated in many digits.
 
-    Each displacement tells one unknown: the crank's turn the torque, the rod's turn about A and the slider's along its
-    guide the force at B, the slider's across it the guide's, and those of a bar as a whole the forces at its first pin.
+    Each displacement tells one unknown: the crank's turn the torque, the rod's turn
+    about A and the slider's along its guide the force at B, the slider's across it the
+    guide's, and those of a bar as a whole the forces at its first pin.
     """
     a, b, e = (mp.mpf(scene["lengths"][name]) for name in ("crank", "rod", "offset"))
     weight = mp.mpc(0, -mp.mpf(scene["effects"]["gravity"][0]))
@@ -313,7 +314,8 @@ def solve_pin_forces(
 ) -> dict[str, list[list[float]]]:
     """Return the pin forces of a released parallelogram from the balances of its coupler, which does not turn.
 
-    Moments of the coupler about B give the part of F32 across it, moments of the input about O2 the part along it.
+    Moments of the coupler about B give the part of F32 across it, moments of the input
+    about O2 the part along it.
     """
     mp = pytest.importorskip("mpmath").mp
     scene, k = problem["scene"], pendulum(problem)[0]

@@ -873,7 +873,10 @@ def test_a_stated_tolerance_decides_and_the_exact_count_stands_next_to_it(
     ] == ["torque"]
     capsys.readouterr()
     assert status(["check", model, path, "--rtol", "1e-3", *reports]) == HOLDS
-    sentence = f"{count} of {count} numbers agree within rtol 0.001, atol 0; {count - rows} to round-off"
+    sentence = (
+        f"{count} of {count} numbers agree within rtol 0.001, atol 0; {count - rows} to"
+        " round-off"
+    )
     assert sentence in capsys.readouterr().out
     assert (
         json.loads((tmp_path / "out.json").read_text())["agree_to_round_off"]
@@ -1123,8 +1126,7 @@ def test_a_column_without_information_is_an_error_and_zeros_that_are_right_are_n
 
 def test_the_table_of_a_drawing_agrees_in_its_coordinates(tmp_path: Path) -> None:
     scene = tmp_path / "drawn.toml"
-    scene.write_text(
-        """\
+    scene.write_text("""\
 [pins]
 O2 = ["41 mm", "37.5 mm"]
 A = ["41 mm", "137.5 mm"]
@@ -1135,8 +1137,7 @@ mass = "1 kg"
 [motion]
 theta_2 = { from = "0 deg", to = "90 deg", steps = 9 }
 omega_2 = "1 rad/s"
-"""
-    )
+""")
     table = tmp_path / "theirs.csv"
     assert fourbar.cli.status(["analyze", str(scene), "-o", str(table)]) == HOLDS
     assert status(["check", str(scene), str(table)]) == HOLDS

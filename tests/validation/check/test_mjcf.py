@@ -144,7 +144,10 @@ def test_the_description_is_that_of_the_scene() -> None:
 
 def test_what_is_welded_to_a_bar_is_part_of_it() -> None:
     """Two masses m at distance s of each other: G in the middle, inertia 2 I + m s^2/2."""
-    half = '<body pos="{} 0 0"><inertial pos="0 0 0" mass="0.2" diaginertia="1e-3 1e-3 1e-3"/></body>'
+    half = (
+        '<body pos="{} 0 0"><inertial pos="0 0 0" mass="0.2" diaginertia="1e-3 1e-3'
+        ' 1e-3"/></body>'
+    )
     text = re.sub(
         '(name="rocker"[^>]*><joint/>)<inertial[^>]*>',
         r"\1" + half.format(0.05) + half.format(0.15),
@@ -284,7 +287,10 @@ def other_plane(
         r, phi = bar.mass_centre or (0.0, 0.0)
         x, z = r * math.cos(phi), r * math.sin(phi)
         moments = " ".join([repr(bar.moment_of_inertia)] * 3)
-        return f'<inertial pos="{x!r} 0 {z!r}" mass="{bar.mass!r}" diaginertia="{moments}"/>'
+        return (
+            f'<inertial pos="{x!r} 0 {z!r}" mass="{bar.mass!r}"'
+            f' diaginertia="{moments}"/>'
+        )
 
     return f"""<mujoco><option gravity="0 0 -9.81" {option}/><default><joint axis="{axis}"/></default><worldbody>
     <body name="crank" pos="1 2 3"><joint/>{inertial(2)}
@@ -502,7 +508,10 @@ def test_a_cylinder_of_ones_own_is_what_the_force_is_solved_for() -> None:
     drive = fourbar.LinearDrive(Place(2, (0.17, -1.1)), Place(4, (0.09, 0.7)))
     scene = replace(CRANK_ROCKER, drive_bar=None, drive=drive)
     text, driven = write_mjcf(scene), '<general name="cylinder" tendon="cylinder" />'
-    servo = '<position name="ram" tendon="cylinder" kp="400" kv="3" gear="2" ctrlrange="-1 1" forcerange="-1 1"/>'
+    servo = (
+        '<position name="ram" tendon="cylinder" kp="400" kv="3" gear="2" ctrlrange="-1'
+        ' 1" forcerange="-1 1"/>'
+    )
     for mine in (text, text.replace(driven, servo)):
         examined = examine(scene, mine, {})
         assert any("gives the cylinder's force" in note for note in examined.notes)
@@ -603,7 +612,10 @@ def test_a_ratio_beyond_the_range_of_doubles_has_its_remark() -> None:
     )
 
 
-FIFTH = '<body name="fan"><joint/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body>'
+FIFTH = (
+    '<body name="fan"><joint/><inertial pos="0 0 0" mass="1" diaginertia="1 1'
+    ' 1"/></body>'
+)
 REFUSED = [
     ("no such body", other_plane(), {"input": "wheel"}, "the file has: crank, rod, rocker"),
     ("no guess", other_plane().replace("</worldbody>", FIFTH + "</worldbody>"), {},

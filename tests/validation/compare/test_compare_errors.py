@@ -111,7 +111,7 @@ def test_an_engine_that_closes_elsewhere_fails_either_way() -> None:
     assert not solution.assembled.all() and solution.assembled.any()
     answer = Answer("other", "exact", solution.at, np.ones(len(solution), dtype=bool))
     held = Demands(EQUIVALENCE, ())
-    (row, *_) = Comparison("", longer, answer, solution, held).rows()
+    row, *_ = Comparison("", longer, answer, solution, held).rows()
     assert row.quantity == "assembled" and row.failed
 
 

@@ -116,12 +116,18 @@ IDENTITY = replace(ROW, engine="formulas", quantity="closure")
         (rows(agree=2), "All 2 comparisons hold: 2 agree", HOLDS),
         (
             rows(agree=1, degraded=2, undecided=1, refuse=3),
-            "All 3 comparisons hold: 1 agrees, 2 degraded as predicted; not compared: 1 undecided, 3 refuse",
+            (
+                "All 3 comparisons hold: 1 agrees, 2 degraded as predicted; not"
+                " compared: 1 undecided, 3 refuse"
+            ),
             HOLDS,
         ),
         (
             rows(agree=1, fail=2, refuse=1),
-            "FAILS: 2 of 3 comparisons do not hold: 1 agrees, 2 fail; not compared: 1 refuses",
+            (
+                "FAILS: 2 of 3 comparisons do not hold: 1 agrees, 2 fail; not compared:"
+                " 1 refuses"
+            ),
             FAILED,
         ),
         (rows(refuse=2), "Nothing was compared: 2 refuse", FAILED),
@@ -317,7 +323,8 @@ def test_every_form_of_a_report_says_the_same_counts() -> None:
         for name, engines in (("good", (exact, refused)), ("refused", (refused,)))
     )
     summary = summary_of([good, bad])
-    # the rows of the formulas themselves stand on both scenes; the others are of the free bodies
+    # the rows of the formulas themselves stand on both scenes; the others are of the
+    # free bodies
     sentence = (
         "All 54 comparisons on 1 of 2 scenes hold: 54 agree; not compared: 2 refuse"
     )
@@ -348,7 +355,10 @@ def test_a_free_motion_that_every_engine_refuses_is_not_held(
     )
     scene = crank_rocker(motion=fourbar.Motion(1.0, 0.0, free=fourbar.Free(0.2, 20)))
     page = judge_for_report("free", scene, (), draw=False)
-    sentence = "Nothing was compared on 1 scene: 1 of the formulas' own identities hold; 2 refuse"
+    sentence = (
+        "Nothing was compared on 1 scene: 1 of the formulas' own identities hold; 2"
+        " refuse"
+    )
     assert summary_of([page]).verdict == sentence
 
 
@@ -454,7 +464,8 @@ def test_of_two_rows_of_one_name_the_worse_one_counts() -> None:
 def test_numbers_without_a_digit_do_not_agree(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    # 1e-13 rad from a limit of theta_2 the condition of the accelerations is about 1e-13
+    # 1e-13 rad from a limit of theta_2 the condition of the accelerations is about
+    # 1e-13
     rocker = fourbar.uniform(0.3, 0.25, 0.1, 0.22)
     limit = limit_positions(rocker)[0].theta_2
     near = (

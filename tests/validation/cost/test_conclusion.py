@@ -14,8 +14,9 @@ def test_statement_and_conclusion_have_one_criterion() -> None:
         "d": [replace(point(300, 4e-3), setting=conclusion.DEFAULT)],
         "RK4": [replace(point(10, 0.1), at_steps=WorstErrors(*[1e-9] * 5))],
     }
-    assert pictures.write_statement(curves, "torque") == (
-        "Four digits of torque cost 0.06 ms a simulated second;\n"
+    assert (
+        pictures.write_statement(curves, "torque")
+        == "Four digits of torque cost 0.06 ms a simulated second;\n"
         "the defaults pay 0.6 ms for an error of 4e-3"
     )
     lines = conclusion.conclude(curves, [], [])

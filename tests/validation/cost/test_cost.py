@@ -143,7 +143,8 @@ def test_only_tolerance_0_is_tight_with_a_heavy_flywheel() -> None:
 @pytest.mark.parametrize(
     ("build", "settings", "allowed"),
     [
-        # an explicit step, a drive without flywheel: the pads do not help, the plain closure's softness is left
+        # an explicit step, a drive without flywheel: the pads do not help, the plain
+        # closure's softness is left
         (drives.GentleVelocityActuator, replace(BEST, flywheel=1.0), 2e-4),
         (drives.GentleServo, replace(BEST, flywheel=1.0), 2e-4),
         (drives.WheelEquality, replace(BEST, flywheel=1.0), 2e-4),
@@ -210,9 +211,11 @@ def test_formulas_in_four_precisions() -> None:
         commanded = formulas.choose_few(command(scene))
         exact = formulas.evaluate_balls(scene, commanded, 2 * formulas.FIFTY_DIGITS)
         wrong = {
-            name: formulas.compare_with_reference(
-                scene, commanded, method(scene, commanded), exact
-            ).worst
+            name: (
+                formulas.compare_with_reference(
+                    scene, commanded, method(scene, commanded), exact
+                ).worst
+            )
             for name, method in formulas.METHODS.items()
         }
         assert wrong["formulas, double"] < 1e-13 and wrong["13x13"] < 1e-12
@@ -449,7 +452,7 @@ def test_a_study_is_resumed_where_it_was_interrupted(tmp_path: Path) -> None:
             done.append(name)
             return [point(10, 1e-3, name)]
 
-        made.units = {name: (lambda name=name: unit(name)) for name in ("a", "b", "c")}  # type: ignore[misc]
+        made.units = {name: lambda name=name: unit(name) for name in ("a", "b", "c")}  # type: ignore[misc]
         return made
 
     with pytest.raises(KeyboardInterrupt):

@@ -51,8 +51,13 @@ def write_wheel(folder: Path, version: str, factor: str) -> str:
     info = f"toy_engine-{version}.dist-info"
     files = {
         "toy_engine.py": CLASS.replace("VERSION", version).replace("FACTOR", factor),
-        f"{info}/METADATA": f"Metadata-Version: 2.1\nName: toy-engine\nVersion: {version}\n",
-        f"{info}/WHEEL": "Wheel-Version: 1.0\nGenerator: test\nRoot-Is-Purelib: true\nTag: py3-none-any\n",
+        f"{info}/METADATA": (
+            f"Metadata-Version: 2.1\nName: toy-engine\nVersion: {version}\n"
+        ),
+        f"{info}/WHEEL": (
+            "Wheel-Version: 1.0\nGenerator: test\nRoot-Is-Purelib: true\nTag:"
+            " py3-none-any\n"
+        ),
     }
     files[f"{info}/RECORD"] = "".join(
         f"{name},,\n" for name in (*files, f"{info}/RECORD")
@@ -92,7 +97,8 @@ def test_two_versions_are_judged_side_by_side(
         if row.verdict != AGREES
     }
     assert failed == {("toy 1.1", "torque")}
-    # an environment that is there is not made again; one that pip cannot make is one line
+    # an environment that is there is not made again; one that pip cannot make is one
+    # line
     monkeypatch.setattr(environments, "run_to_end", None)
     assert made(read_engines([tmp_path])["toy 1.0"], tmp_path / "cache").startswith(
         str(tmp_path / "cache")

@@ -149,7 +149,10 @@ PROGRAMS: dict[str, tuple[str, str, str]] = {
     ),
     "another code": (
         LAST,
-        f"{AFTER_HELLO}    sys.stdout.buffer.write(b'\\xff\\n')\n    sys.stdout.flush()\n",
+        (
+            f"{AFTER_HELLO}    sys.stdout.buffer.write(b'\\xff\\n')\n   "
+            " sys.stdout.flush()\n"
+        ),
         NO_JSON,
     ),
     "empty refusal": (
@@ -218,24 +221,32 @@ FINE: dict[str, tuple[str, str]] = {
     ("errors", "line"),
     [
         (
-            "node:internal/modules/cjs/loader:1145\n  throw err;\n  ^\n\n"
-            "Error: Cannot find module '/x.js'\n    at Module._load (node:1)\n"
-            "  code: 'MODULE_NOT_FOUND'\n}\n\nNode.js v20.11.0\n",
+            (
+                "node:internal/modules/cjs/loader:1145\n  throw err;\n  ^\n\n"
+                "Error: Cannot find module '/x.js'\n    at Module._load (node:1)\n"
+                "  code: 'MODULE_NOT_FOUND'\n}\n\nNode.js v20.11.0\n"
+            ),
             "Error: Cannot find module '/x.js'",
         ),
         (
-            "Traceback (most recent call last):\n  File 'x', line 1\n"
-            "ModuleNotFoundError: No module named 'sim'\n",
+            (
+                "Traceback (most recent call last):\n  File 'x', line 1\n"
+                "ModuleNotFoundError: No module named 'sim'\n"
+            ),
             "ModuleNotFoundError: No module named 'sim'",
         ),
         (
-            'Exception in thread "main" java.lang.IllegalStateException: no licence\n'
-            "\tat Main.main(Main.java:5)\n",
+            (
+                'Exception in thread "main" java.lang.IllegalStateException: no'
+                " licence\n\tat Main.main(Main.java:5)\n"
+            ),
             'Exception in thread "main" java.lang.IllegalStateException: no licence',
         ),
         (
-            "terminate called after throwing an instance of 'std::runtime_error'\n"
-            "  what():  model not found\nAborted\n",
+            (
+                "terminate called after throwing an instance of 'std::runtime_error'\n"
+                "  what():  model not found\nAborted\n"
+            ),
             "what():  model not found",
         ),
         ("loading\nsh: 1: simulate: not found\n", "sh: 1: simulate: not found"),

@@ -95,9 +95,11 @@ def test_every_scene_and_command_comes_back_bit_for_bit():
                 condition=None,
             )
             commanded = commanded._replace(
-                speed=None
-                if commanded.speed is None
-                else np.full_like(commanded.angle, np.nan),
+                speed=(
+                    None
+                    if commanded.speed is None
+                    else np.full_like(commanded.angle, np.nan)
+                ),
                 lost=None,
             )
             assert told.motion.side == scene.motion.side

@@ -184,8 +184,8 @@ def damaged(folder: Path) -> Iterator[tuple[Path, str]]:
         f"{rows - 1} rows of {rows}": b"".join(
             line for line in lines if b"engine 1" not in line
         ),
-        f"{rows} rows of {rows}, and not the SHA-256": files[table].replace(
-            b"1e-15", b"1e-16"
+        f"{rows} rows of {rows}, and not the SHA-256": (
+            files[table].replace(b"1e-15", b"1e-16")
         ),
         "no rows that can be read": b"\xff",
     }.items():
@@ -512,9 +512,13 @@ def disagreeing(worse: set[tuple[str, str]]) -> tuple[list[Row], list[Row]]:
     old = [replace(row, scene=scene) for scene in "abc" for row in rows]
     fails = {"verdict": FAILS, "error": 1e-6}
     return old, [
-        replace(row, **fails, reason=f"{ord(row.scene)}e-6 where 1e-9 was predicted")  # type: ignore[arg-type]
-        if (row.engine, row.quantity) in worse
-        else row
+        (
+            replace(
+                row, **fails, reason=f"{ord(row.scene)}e-6 where 1e-9 was predicted"
+            )  # type: ignore[arg-type]
+            if (row.engine, row.quantity) in worse
+            else row
+        )
         for row in old
     ]
 
@@ -531,11 +535,17 @@ def disagreeing(worse: set[tuple[str, str]]) -> tuple[list[Row], list[Row]]:
         ),
         (
             {(engine, "F12") for engine in ("one", "two", "three")},
-            "all engines disagree, and the identities hold: the formulas, or what all engines are given, 3 of 3 scenes",
+            (
+                "all engines disagree, and the identities hold: the formulas, or what"
+                " all engines are given, 3 of 3 scenes"
+            ),
         ),
         (
             {("formulas", "power")},
-            "only the identities: the formulas, or what is stated of them, 3 of 3 scenes",
+            (
+                "only the identities: the formulas, or what is stated of them, 3 of 3"
+                " scenes"
+            ),
         ),
     ],
 )
@@ -553,9 +563,11 @@ def test_rows_that_changed_are_grouped_by_engine_and_cause_the_worst_first() -> 
     old, new = disagreeing({("sim", "F12"), ("sim", "torque"), ("one", "torque")})
     better = [replace(row, error=1e-9) if row.engine == "two" else row for row in old]
     new = [
-        replace(row, error=1.0)
-        if row.failed and row.engine == "one" and row.scene == "b"
-        else row
+        (
+            replace(row, error=1.0)
+            if row.failed and row.engine == "one" and row.scene == "b"
+            else row
+        )
         for row in new
     ]
     changes_from_better = compare_rows((HERE, better), (HERE, new))
@@ -585,9 +597,14 @@ def made(
     engines: tuple[str, ...] = ("engine",),
 ) -> WithRows:
     free_bodies = [Engine(engine, FreeBody, EQUIVALENCE) for engine in engines]
-    return describe_run(
-        free_bodies, "suite", {name: describe_changes(s) for name, s in scenes.items()}
-    ), rows
+    return (
+        describe_run(
+            free_bodies,
+            "suite",
+            {name: describe_changes(s) for name, s in scenes.items()},
+        ),
+        rows,
+    )
 
 
 def test_a_scene_that_changed_comes_first_and_its_rows_are_not_compared() -> None:
@@ -682,7 +699,10 @@ def test_what_grew_within_its_allowance_is_shown_and_no_regression() -> None:
 @pytest.mark.slow
 def test_the_kernels_of_a_run_are_recorded_and_named_where_they_differ() -> None:
     """In two fresh processes, one of which takes this CPU for another."""
-    code = "from fourbar_validation.report.machine import find_kernels; print(find_kernels())"
+    code = (
+        "from fourbar_validation.report.machine import find_kernels;"
+        " print(find_kernels())"
+    )
     possible = [core for core in CORES if why_not(core) is None]
     if not possible:
         pytest.skip("this CPU can pass for no other")

@@ -271,7 +271,8 @@ def test_many_scenes_give_a_short_report_of_the_worst(
     for number, record in enumerate(pages):
         record.rows[0] = replace(record.rows[0], error=number * 8e-3, allowed=1.0)
         record.left_out = [
-            f"mujoco-simulated: falls to {number * 1e-3:.1e}; below 0.05 it is not simulated"
+            f"mujoco-simulated: falls to {number * 1e-3:.1e}; below 0.05 it is not"
+            " simulated"
         ]
         record.evidence = {
             "sim": {
@@ -394,8 +395,9 @@ def test_a_run_prints_one_row_an_engine_and_the_rest_on_demand(
     )
     text = write_markdown(summary)
     table = text[text.index("| largest") :].splitlines()
-    assert table[0] == (
-        "| largest error of allowed | torque | pin forces | motion | compared |"
+    assert (
+        table[0]
+        == "| largest error of allowed | torque | pin forces | motion | compared |"
     )
     assert table[2].startswith(f"| MuJoCo {version}, simulated | - | 2.5e-07 of 1e-05")
 
@@ -440,8 +442,10 @@ def test_failures_are_one_line_an_engine_and_cause(
     lines = [str(cause) for cause in summary.overview.causes]
     assert lines == [
         f"mine: {swapped}, all else agrees: 23 scenes; worst scene 00 120 deg",
-        "theirs: no answer: exit status 3: Cannot find module 'x': 1 scene; "
-        "worst scene 00",
+        (
+            "theirs: no answer: exit status 3: Cannot find module 'x': 1 scene; "
+            "worst scene 00"
+        ),
     ]
     assert [line.engine for line in summary.lines] == ["mine"]
     assert summary.headline.startswith(f"FAILS: mine is wrong: {swapped}")
@@ -460,8 +464,9 @@ def test_what_no_known_mistake_explains_is_told_by_what_differs_and_what_agrees(
         *(replace(OF_MINE, quantity=name) for name in ("F12", "theta_3")),
     ]
     (cause,) = summary_of([record_of("a", rows)]).overview.causes
-    assert cause.text == (
-        "torque differs, pin forces and motion agree; no known mistake explains it"
+    assert (
+        cause.text
+        == "torque differs, pin forces and motion agree; no known mistake explains it"
     )
     nothing = replace(OF_MINE, error=math.nan, verdict=FAILS)
     (cause,) = summary_of([record_of("a", [nothing])]).overview.causes
@@ -471,8 +476,9 @@ def test_what_no_known_mistake_explains_is_told_by_what_differs_and_what_agrees(
 def test_digits_that_are_missing_are_no_missing_term() -> None:
     rows = [fail(replace(OF_MINE, quantity=name), 3e-8) for name in ("torque", "F12")]
     (cause,) = summary_of([record_of("a", rows)]).overview.causes
-    assert cause.text == (
-        "torque and pin forces differ, motion agrees: from digit 7 on, as where "
+    assert (
+        cause.text
+        == "torque and pin forces differ, motion agrees: from digit 7 on, as where "
         "numbers are single precision or an iteration ends early"
     )
 
@@ -480,8 +486,9 @@ def test_digits_that_are_missing_are_no_missing_term() -> None:
 def test_an_engine_that_broke_down_alone_is_named_without_a_quantity() -> None:
     dead = Row.unmeasured("a", "theirs", "", "all", FAILS, "exit status 3: no licence")
     headline = summary_of([record_of("a", [dead])]).headline
-    assert headline == (
-        "FAILS: theirs is wrong: no answer: exit status 3: no licence, in 1 scene; a."
+    assert (
+        headline == "FAILS: theirs is wrong: no answer: exit status 3: no licence, in 1"
+        " scene; a."
     )
 
 

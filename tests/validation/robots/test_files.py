@@ -163,8 +163,8 @@ def test_a_file_with_more_than_three_joints_is_a_robot(tmp_path: Path) -> None:
 def test_height_fields_are_left_out_and_said(tmp_path: Path) -> None:
     path = tmp_path / "robot.xml"
     path.write_text(
-        "<mujoco><asset><hfield name='h' file='hills.png' size='1 1 1 1'/></asset><worldbody>"
-        "<geom type='hfield' hfield='h'/></worldbody></mujoco>"
+        "<mujoco><asset><hfield name='h' file='hills.png' size='1 1 1"
+        " 1'/></asset><worldbody><geom type='hfield' hfield='h'/></worldbody></mujoco>"
     )
     file = read_robot(path)
     assert file.notes == ("height fields are left out",)

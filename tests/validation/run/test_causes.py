@@ -123,8 +123,10 @@ BUGS: dict[str, tuple[type, str]] = {
     "dJ/dt v": (
         make_guest(
             (
-                "k = (alpha + 1j * omega**2) * r2 + 1j * omega_3**2 * r3 "
-                "- 1j * omega_4**2 * r4",
+                (
+                    "k = (alpha + 1j * omega**2) * r2 + 1j * omega_3**2 * r3 "
+                    "- 1j * omega_4**2 * r4"
+                ),
                 "k = alpha * r2",
             )
         ),
@@ -157,8 +159,10 @@ BUGS: dict[str, tuple[type, str]] = {
                 '"torque": moments[0] + moments[1] - cross(r2, F32)',
             ),
         ),
-        "forces and torque of the open tree, cut at B: the loop force is 0, as from "
-        "mj_inverse or rnea of a loop",
+        (
+            "forces and torque of the open tree, cut at B: the loop force is 0, as from"
+            " mj_inverse or rnea of a loop"
+        ),
     ),
     "gravity": (make_guest((" - field)", ")")), "gravity is missing"),
     "gravity reversed": (
@@ -224,16 +228,20 @@ DRIVEN: dict[int, tuple[tuple[str, str], ...]] = {
     3: (
         (
             "F43 = (moments[2] * r3 + moments[1] * r4) / det",
-            "moments[0] += cross(r2, forces[1])\n"
-            "    F43 = (moments[0] * r4 + moments[2] * r2) / cross(r2, r4)",
+            (
+                "moments[0] += cross(r2, forces[1])\n"
+                "    F43 = (moments[0] * r4 + moments[2] * r2) / cross(r2, r4)"
+            ),
         ),
         (TORQUE, '"torque": moments[1] - cross(r3, F43)'),
     ),
     4: (
         (
             "F43 = (moments[2] * r3 + moments[1] * r4) / det",
-            "moments[0] += cross(r2, forces[1])\n"
-            "    F43 = (moments[1] * r2 - moments[0] * r3) / cross(r3, r2)",
+            (
+                "moments[0] += cross(r2, forces[1])\n"
+                "    F43 = (moments[1] * r2 - moments[0] * r3) / cross(r3, r2)"
+            ),
         ),
         (TORQUE, '"torque": moments[2] + cross(r4, F43)'),
     ),

@@ -189,7 +189,8 @@ def test_where_dry_friction_reverses_forces_are_not_judged_and_the_motion_is() -
 
 
 def test_where_no_digit_is_left_nothing_is_judged() -> None:
-    # 1e-13 rad from a limit of theta_2 the condition of the accelerations is about 1e-13
+    # 1e-13 rad from a limit of theta_2 the condition of the accelerations is about
+    # 1e-13
     rocker = fourbar.uniform(0.3, 0.25, 0.1, 0.22)
     first = limit_positions(rocker)[0].theta_2
     for side in (1.0, -1.0):

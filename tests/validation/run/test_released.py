@@ -34,8 +34,8 @@ def find_spread_by_energy(
 ) -> float:
     """How far theta_2 goes apart, rad, where an engine's loss of energy happens at an instant.
 
-    The linkage has one freedom, so that its speed at an angle follows from its energy: an
-    engine that keeps its bars together errs by no more than what its energy does. It
+    The linkage has one freedom, so that its speed at an angle follows from its energy:
+    an engine that keeps its bars together errs by no more than what its energy does. It
     loses that where the bars come into line and the constraint forces are large.
     """
     start, step, _ = free.FORWARD[engine]

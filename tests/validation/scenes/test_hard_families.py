@@ -401,7 +401,8 @@ def test_a_golden_file_of_others_swept_through_its_change_point() -> None:
     s = fourbar.solve(scene)
     assert s.status == ["ok", "change_point", "ok"]
     assert s.torque is not None and s.omega_4 is not None
-    # the motion is its own mirror image in the ground's line, so that the torque is odd about the change point
+    # the motion is its own mirror image in the ground's line, so that the torque is odd
+    # about the change point
     assert s.torque[0] == pytest.approx(-s.torque[2], rel=1e-12)
     assert abs(s.torque[1]) < 1e-12 * abs(s.torque[0])
     assert s.omega_4[0] == pytest.approx(s.omega_4[2], rel=1e-12)

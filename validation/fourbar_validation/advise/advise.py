@@ -1,7 +1,8 @@
 """The cheapest settings of MuJoCo that keep torque and pin forces within a required error on a given scene.
 
-The laws of the study (`guess`) say where to look, and short runs of the scene itself decide. With fitted pads
-the softness of the closure plays no part above 1e-9 (1e-6 in a slow linkage), so that tc may be long.
+The laws of the study (`guess`) say where to look, and short runs of the scene itself
+decide. With fitted pads the softness of the closure plays no part above 1e-9 (1e-6 in a
+slow linkage), so that tc may be long.
 """
 
 from collections.abc import Callable, Sequence
@@ -166,9 +167,10 @@ class Advice:
         if self.reached:
             return f"{setting}. {errors}; required: {self.required:g}."
         return (
-            f"No setting of plain MJCF within {MOST_STEPS} steps was found to reach {self.required:g}. "
-            f"The best was {setting}. {errors}. "
-            "The formulas, and inverse dynamics of either engine with loop multipliers, reach round-off."
+            f"No setting of plain MJCF within {MOST_STEPS} steps was found to reach"
+            f" {self.required:g}. The best was {setting}. {errors}. The formulas, and"
+            " inverse dynamics of either engine with loop multipliers, reach"
+            " round-off."
         )
 
 
@@ -210,8 +212,8 @@ class _CheapestSearch:
     def advice(self) -> Advice:
         """Find the cheapest that serves.
 
-        By bisection in steps, then with shorter and longer time constants, then by cheaper
-        kinds of step.
+        By bisection in steps, then with shorter and longer time constants, then by
+        cheaper kinds of step.
         """
         first, tc = guess(self.error)
         self._bisect(tc, first)
@@ -421,8 +423,9 @@ def command(
 ) -> int:
     """Find the cheapest MuJoCo settings that keep SCENES within an error; exit 1 where none is found for one of them.
 
-    Of each scene it says which of the settings matters, and why; of several scenes a table is printed at the end.
-    Of a robot's FILE.xml, and SCENE before it or not, it tries settings in the file itself and prints what to type.
+    Of each scene it says which of the settings matters, and why; of several scenes a
+    table is printed at the end. Of a robot's FILE.xml, and SCENE before it or not, it
+    tries settings in the file itself and prints what to type.
     """
     if scenes[-1].suffix.lower() in ROBOTS:
         if output is not None or len(scenes) > 2:
@@ -446,7 +449,10 @@ def command(
             setup = TrialSetup(scene, choose_positions(scene))
             advice = advise(scene, wanted, setup)
         except LimitError as error:
-            reason = f"cannot be simulated: {error}; inverse dynamics with loop multipliers can answer it"
+            reason = (
+                f"cannot be simulated: {error}; inverse dynamics with loop multipliers"
+                " can answer it"
+            )
             click.echo(f"{file.name}: {reason}")
             rows.append((file.name, "-", "-", "-", "cannot be simulated"))
             reached = False
@@ -456,16 +462,19 @@ def command(
         click.echo(f"{write_sentence(influences)}")
         steps = sum(attempt.steps for attempt in advice.attempts)
         click.echo(
-            f"The search ran the scene {len(advice.attempts)} times, {steps} steps in all."
+            f"The search ran the scene {len(advice.attempts)} times, {steps} steps in"
+            " all."
         )
         reached &= advice.reached
         rows.append(
             (
                 file.name,
                 *advice.cells(),
-                influences[0].setting
-                if influences[0].times >= MATTERS
-                else "none by itself",
+                (
+                    influences[0].setting
+                    if influences[0].times >= MATTERS
+                    else "none by itself"
+                ),
             )
         )
         if output is not None and advice.reached:

@@ -54,7 +54,10 @@ class SettingInfluence:
         if math.isfinite(self.error):
             effect = f"the error is {self.error:.1e}, {self.times:.2g} times as large"
         setting = self.setting[0].upper() + self.setting[1:]
-        return f"{setting} matters most here. If it is {self.changed}, {effect}, because {self.why}."
+        return (
+            f"{setting} matters most here. If it is {self.changed}, {effect}, because"
+            f" {self.why}."
+        )
 
 
 def judge_trial(scene: Scene, trial: Trial) -> WorstErrors:
@@ -72,9 +75,9 @@ def compute_errors_between(
 ) -> Iterator[WorstErrors]:
     """Compute errors amid the steps of a segment, where they are fewer than its positions: by a spline.
 
-    A largest force that lies between two steps is not seen at either of them. A drive on bar 3
-    or 4, and a cylinder, has poles, through which no curve can be drawn: each stretch between
-    them has a spline of its own.
+    A largest force that lies between two steps is not seen at either of them. A drive
+    on bar 3 or 4, and a cylinder, has poles, through which no curve can be drawn: each
+    stretch between them has a spline of its own.
     """
     theta_2, first = np.unique(trial.at.theta_2[samples], return_index=True)
     n = samples.stop - samples.start
@@ -174,7 +177,10 @@ def write_sentence(influences: list[SettingInfluence]) -> str:
     """Name the setting that matters most, and why."""
     if influences and influences[0].times >= MATTERS:
         return str(influences[0])
-    return f"No setting matters by itself here: none, changed alone, makes the error {MATTERS:g} times as large."
+    return (
+        "No setting matters by itself here: none, changed alone, makes the error"
+        f" {MATTERS:g} times as large."
+    )
 
 
 def _describe_changes(
@@ -194,7 +200,8 @@ def _describe_changes(
             "half as long",
             stiff,
             lambda *_: (
-                "a closure of few steps is a spring that RK4 follows badly, in proportion to (h/tc)^4"
+                "a closure of few steps is a spring that RK4 follows badly, in"
+                " proportion to (h/tc)^4"
             ),
         )
     if 2.0 * tc <= LONGEST:
@@ -219,7 +226,8 @@ def _describe_changes(
             f"at MuJoCo's own {MUJOCO_TOLERANCE:g}",
             loose,
             lambda *_: (
-                "MuJoCo divides it by the inertia of the flywheel, next to which the linkage is small"
+                "MuJoCo divides it by the inertia of the flywheel, next to which the"
+                " linkage is small"
             ),
         )
 
@@ -234,10 +242,13 @@ def _explain_timestep(setup: TrialSetup, times: float, growth: float) -> str:
             math.degrees(x)
             for x in (math.asin(sines[nearest]), float(setup.command.theta_2[nearest]))
         )
-        return f"bars 3 and 4 come within {near:.2g} deg of one line at theta_2 = {angle:.4g} deg and speed up there"
+        return (
+            f"bars 3 and 4 come within {near:.2g} deg of one line at theta_2 ="
+            f" {angle:.4g} deg and speed up there"
+        )
     if times > MATTERS * growth:
         return (
-            f"between fewer steps a curve misses more: at the steps themselves the "
+            "between fewer steps a curve misses more: at the steps themselves the "
             f"error grows {growth:.2g} times"
         )
     return f"the error of the steps themselves grows {growth:.2g} times"
@@ -247,7 +258,13 @@ def _find_yielding(scene: Scene, what: str) -> str:
     """Describe what makes a soft closure yield in this scene."""
     loads, masses = compute_load_ratio(scene), compute_mass_ratio(scene.linkage)
     if masses > LIGHT:
-        return f"{what} is soft at the lighter of coupler and output, whose inertia is {masses:.1e} times smaller"
+        return (
+            f"{what} is soft at the lighter of coupler and output, whose inertia is"
+            f" {masses:.1e} times smaller"
+        )
     if loads > 1.0:
-        return f"{what} sags under loads and weights, which are {loads:.2g} times the inertial forces"
+        return (
+            f"{what} sags under loads and weights, which are {loads:.2g} times the"
+            " inertial forces"
+        )
     return f"{what} yields to the inertial forces"

@@ -48,10 +48,10 @@ def compute_errors(
 ) -> WorstErrors:
     """Compute the errors of an answer at the motion that its engine really made.
 
-    A drive on bar 3 or 4, and a cylinder, has a pole where that bar or the stroke stands
-    still, and the pin forces have it with the drive. As in the regression report they are
-    judged where it moves at more than a tenth of its greatest speed; their scale is that
-    of the same positions.
+    A drive on bar 3 or 4, and a cylinder, has a pole where that bar or the stroke
+    stands still, and the pin forces have it with the drive. As in the regression report
+    they are judged where it moves at more than a tenth of its greatest speed; their
+    scale is that of the same positions.
     """
     if not np.isfinite(command.theta_2).all():
         return NO_ANSWER

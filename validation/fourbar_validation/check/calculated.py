@@ -1,7 +1,7 @@
 """Mistakes in a calculation of forces, as hypotheses: what its free bodies would give.
 
-Of each bar, p is the mass times the acceleration of G less what acts from outside, and q
-the same for moments about G. The pins and the drive must give both:
+Of each bar, p is the mass times the acceleration of G less what acts from outside, and
+q the same for moments about G. The pins and the drive must give both:
 
     bar 2:  p2 = F12 + F32      bar 3:  p3 = F43 - F32      bar 4:  p4 = F14 - F43
 
@@ -34,7 +34,8 @@ PAIRS = {"F12": (1, 2), "F32": (3, 2), "F43": (4, 3), "F14": (1, 4)}
 """Bar that exerts each pin force, and bar on which it acts."""
 CHAINS = {"B": ((2, 3), (4,)), "A": ((2,), (4, 3)), "O4": ((2, 3, 4),)}
 """Pins at which a loop is cut into a tree, the commonest first: the chains of bars that are
-left, each from the ground on."""
+left, each from the ground on.
+"""
 ENOUGH = 3
 """Columns or positions that a hypothesis with a number in it needs."""
 SOFT = 1e-6
@@ -75,8 +76,8 @@ class BarWrenches(NamedTuple):
     def solve(self) -> Values:
         """Solve the three free bodies.
 
-        Moments about the first pins of bars 2, 3 and 4, where T_k is the drive's couple on
-        bar k:
+        Moments about the first pins of bars 2, 3 and 4, where T_k is the drive's couple
+        on bar k:
 
             a x F43 + T_2 = moment of bar 2 + a x p3
             b x F43 + T_3 = moment of bar 3
@@ -104,8 +105,8 @@ class BarWrenches(NamedTuple):
     def cut(self, pin: str) -> Values:
         """Solve the tree that a cut at a pin leaves: no force is passed there.
 
-        Its torque is that of the joint by which the driven bar hangs on the ground or on
-        the bar before it in its chain; the joint carries the bar and all behind it.
+        Its torque is that of the joint by which the driven bar hangs on the ground or
+        on the bar before it in its chain; the joint carries the bar and all behind it.
         """
         none = np.zeros_like(self.p[2])
         if pin == "A":

@@ -80,7 +80,10 @@ class Judgement:
             agreed = f"{self.agreeing} of {self.compared} numbers agree"
         else:
             within = f"rtol {self.tolerance.rtol:g}, atol {self.tolerance.atol:g}"
-            agreed = f"{self.agreeing} of {self.compared} numbers agree within {within}; {self.exact} to round-off"
+            agreed = (
+                f"{self.agreeing} of {self.compared} numbers agree within {within};"
+                f" {self.exact} to round-off"
+            )
         if self.compared and self.tolerance is None:
             agreed += f", compared to {self.digits}"
         if self.not_judged:
@@ -138,9 +141,9 @@ def require_information(judge: Judge) -> None:
             raise InputError(
                 f"column {judge.table.label(key)} [{unit.text}]",
                 None,
-                f"is printed to {2.0 * rounding / unit.factor:.2g} {unit.text}, and the "
-                f"largest right value is {largest / unit.factor:.2g} {unit.text}: every "
-                "number would agree; print more digits",
+                f"is printed to {2.0 * rounding / unit.factor:.2g} {unit.text}, and the"
+                f" largest right value is {largest / unit.factor:.2g} {unit.text}:"
+                " every number would agree; print more digits",
             )
 
 
@@ -205,8 +208,14 @@ def _list_cases(judgement: Judgement, name: str) -> Iterator[JunitCase]:
         differing = [finding for finding in judged if not finding.agrees]
         if differing:
             worst = max(differing, key=lambda finding: finding.error)
-            text = f"{len(differing)} of {len(judged)} differ; line {worst.line}: theirs {worst.theirs}, ours "
-            text += f"{worst.ours} in SI, error {worst.error:.2e}, allowed {worst.allowed:.2e}"
+            text = (
+                f"{len(differing)} of {len(judged)} differ; line {worst.line}: theirs"
+                f" {worst.theirs}, ours "
+            )
+            text += (
+                f"{worst.ours} in SI, error {worst.error:.2e}, allowed"
+                f" {worst.allowed:.2e}"
+            )
             yield JunitCase(name, name, quantity, "failure", "differs", text)
         else:
             skipped = "no digit is left to judge by"
@@ -285,13 +294,15 @@ def check(
 ) -> int:
     """Judge a table of torques and forces (THEIRS.csv) against the formulas, row by row.
 
-    `check PROBLEM.json RESULT.json` judges the answers to a problem of models/problems, by its levels of accuracy.
+    `check PROBLEM.json RESULT.json` judges the answers to a problem of models/problems,
+    by its levels of accuracy.
 
-    Columns are named as by `fourbar analyze --csv`, whose file is read as it is; a unit may follow in
-    brackets: theta_2 [deg], torque [lbf ft], F12_x, F12_y, F43 [kN] (a magnitude). A spreadsheet's
-    semicolons, blank cells, thousands separators and lines of comments are understood. Half a unit of the
-    last printed digit is allowed, and to how many digits is printed; with --rtol or --atol these decide,
-    and how many agree exactly is printed too. Where the scene states no omega_2 each row is judged at its
+    Columns are named as by `fourbar analyze --csv`, whose file is read as it is; a unit
+    may follow in brackets: theta_2 [deg], torque [lbf ft], F12_x, F12_y, F43 [kN] (a
+    magnitude). A spreadsheet's semicolons, blank cells, thousands separators and lines
+    of comments are understood. Half a unit of the last printed digit is allowed, and to
+    how many digits is printed; with --rtol or --atol these decide, and how many agree
+    exactly is printed too. Where the scene states no omega_2 each row is judged at its
     own omega_2 and alpha_2.
     """
     if scene.suffix == ".json":
@@ -342,7 +353,10 @@ def show(judgement: Judgement, table: TheirTable, name: str) -> None:
         console.print(f"left out ({why}): {escape(make_plain(headings))}")
     differing = judgement.differing
     if differing:
-        title = f"{escape(make_plain(name))}: what differs, the {SHOWN} worst of each quantity"
+        title = (
+            f"{escape(make_plain(name))}: what differs, the {SHOWN} worst of each"
+            " quantity"
+        )
         head = (
             "line",
             "theta_2\ndeg",
@@ -364,7 +378,8 @@ def show(judgement: Judgement, table: TheirTable, name: str) -> None:
         )
     for line in judgement.not_assembled:
         console.print(
-            f"line {line}: the linkage has no motion there (it does not assemble, or is singular)"
+            f"line {line}: the linkage has no motion there (it does not assemble, or is"
+            " singular)"
         )
     for explanation in judgement.explanations:
         console.print(

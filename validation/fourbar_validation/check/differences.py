@@ -41,7 +41,8 @@ class Difference:
     """Element and attribute in their file, where there is one."""
     cost: float | None = None
     """What this entry alone, as in theirs, adds to the error of the generated file: of torque and pin forces that which
-    grows most. None if it was not measured, or cannot be set alone."""
+    grows most. None if it was not measured, or cannot be set alone.
+    """
     quantity: str = ""
     """Quantity that has this error."""
 
@@ -52,7 +53,10 @@ class Difference:
 
     def line(self) -> str:
         """Write the entry with both values."""
-        return f"{self.key}: {write_value(self.theirs)}, generated {write_value(self.generated)}"
+        return (
+            f"{self.key}: {write_value(self.theirs)}, generated"
+            f" {write_value(self.generated)}"
+        )
 
     def cells(self) -> tuple[str, ...]:
         """Return the cells of a row of the page."""
@@ -106,7 +110,8 @@ def price(
 ) -> Difference:
     """Put the cost on a difference: what it adds to the worst error of a force.
 
-    `rows`: of a file that has it, none where there is no such file; `unchanged`: of the same file without it.
+    `rows`: of a file that has it, none where there is no such file; `unchanged`: of the
+    same file without it.
     """
     before = _collect_errors(unchanged)
     gains = [

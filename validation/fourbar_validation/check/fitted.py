@@ -104,7 +104,10 @@ def _name_ratio(
         ):
             reversed_too = ", and reversed" if near < 0.0 else ""
             return (
-                f"units: numbers in {unit_tried} where {announced} was announced ({ratio:.6g} times){reversed_too}",
+                (
+                    f"units: numbers in {unit_tried} where {announced} was announced"
+                    f" ({ratio:.6g} times){reversed_too}"
+                ),
                 ratio,
             )
     return None
@@ -230,9 +233,11 @@ def _scale_bars(
 
 def _scale_gravity(scene: Scene, f: float) -> Scene:
     scaled = (
-        replace(effect, magnitude=f * effect.magnitude)
-        if isinstance(effect, Gravity)
-        else effect
+        (
+            replace(effect, magnitude=f * effect.magnitude)
+            if isinstance(effect, Gravity)
+            else effect
+        )
         for effect in scene.effects
     )
     return replace(scene, effects=tuple(scaled))
@@ -305,7 +310,8 @@ def _try_offset(judge: Judge) -> Iterator[Mistake]:
         at=judge.at._replace(angle=judge.at.theta_2 + offset, remainder=None),
     )
     yield Mistake(
-        f"the crank angle is measured from another zero: theta_2 {math.degrees(offset):+.6g} deg is what they solved",
+        "the crank angle is measured from another zero: theta_2"
+        f" {math.degrees(offset):+.6g} deg is what they solved",
         lambda quantity, right: (
             None if quantity == "theta_2" else getattr(wrong, quantity, None)
         ),
@@ -343,7 +349,10 @@ def _try_order(judge: Judge) -> Iterator[Mistake]:
         rows = round(
             float(np.median(np.remainder(nearest - np.arange(n) + n / 2, n) - n / 2))
         )
-        text = f"the rows are shifted by {rows:+d}: each has the numbers of another theta_2"
+        text = (
+            f"the rows are shifted by {rows:+d}: each has the numbers of another"
+            " theta_2"
+        )
     else:
         text = "the rows are in another order than their theta_2"
     yield Mistake(text, lambda quantity, right: _take_rows(quantity, right, nearest))

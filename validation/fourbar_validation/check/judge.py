@@ -164,7 +164,8 @@ class Judge:
         )  # a component that their table does not have
         apart = compute_difference(quantity, ours, theirs)
         condition = find_condition(quantity, self.scene.linkage, self.right)
-        # the number a mistake would have printed is rounded at its own size, however much larger
+        # the number a mistake would have printed is rounded at its own size, however
+        # much larger
         unchanged = self.ours(key)
         larger: Array | float = 1.0
         if ours is not unchanged:
@@ -252,12 +253,16 @@ class Judge:
 def make_command(scene: Scene, table: TheirTable) -> Command:
     """Build the command at each row of the table: the scene's own where it has the same positions.
 
-    Where the scene states no speed it is that of the row, as in the log of a simulator or a test stand.
+    Where the scene states no speed it is that of the row, as in the log of a simulator
+    or a test stand.
     """
     require_input(scene, "a table of results")
     base = command(scene)
     if scene.motion.free is not None:
-        allowed = "not judged while released; without free and omega_2 each row is judged at its own omega_2"
+        allowed = (
+            "not judged while released; without free and omega_2 each row is judged at"
+            " its own omega_2"
+        )
         raise InputError("motion.free", scene.title, allowed)
     if _moves_itself(scene, table):
         base = base._replace(
@@ -270,7 +275,10 @@ def make_command(scene: Scene, table: TheirTable) -> Command:
     ):
         return base
     if scene.motion.law is not None:
-        allowed = "a table is judged along a law at the scene's own positions, all of them in its order"
+        allowed = (
+            "a table is judged along a law at the scene's own positions, all of them in"
+            " its order"
+        )
         raise InputError("motion.law", scene.title, allowed)
     branch = np.full(len(theta_2), scene.motion.branch, dtype=np.int8)
     return Command(theta_2, branch, base.omega_2, base.alpha_2)

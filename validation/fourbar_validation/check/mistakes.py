@@ -124,7 +124,8 @@ def _scale_inertial(scene: Scene, command: Command) -> Iterator[Mistake]:
     )
     yield Mistake("m a in kg mm/s^2 added to N: 1000 times too large", scaled(1e3, 1.0))
     yield Mistake(
-        "inertial forces with the wrong sign (d'Alembert's forces put on the side of m a)",
+        "inertial forces with the wrong sign (d'Alembert's forces put on the side of"
+        " m a)",
         scaled(-1.0, -1.0),
     )
     yield Mistake("I alpha with the wrong sign", scaled(1.0, -1.0))
@@ -313,7 +314,10 @@ COLUMN_MISTAKES: tuple[
     ),
     ("x and y exchanged", lambda values: values[:, ::-1], VECTORS.__contains__),
     (
-        "measured from the other end of the bar (half a turn off): theta_4 or theta_3 from B, theta_2 from A",
+        (
+            "measured from the other end of the bar (half a turn off): theta_4 or"
+            " theta_3 from B, theta_2 from A"
+        ),
         lambda values: values + np.pi,
         lambda quantity: quantity.startswith("theta"),
     ),

@@ -1,6 +1,7 @@
 """`python -m validation check-mjcf`: what differs from the generated MJCF, and what it costs in accuracy.
 
-The file is somebody's: it is compiled and run in a process of its own, with a limit on time and memory.
+The file is somebody's: it is compiled and run in a process of its own, with a limit on
+time and memory.
 """
 
 import math
@@ -65,9 +66,11 @@ from fourbar_validation.robots.report import report
 from fourbar_validation.scenes.suites import read_scene_files
 
 ABOUT_COSTS = (
-    "cost: what this one entry adds to the error of the file itself, if it is a setting, a weld, contacts, a range or "
-    "a motor; of the others what it adds, as in the file, to the error of the generated one. Of torque and pin forces "
-    "the one that grows most. A dash: this entry cannot be set by itself, or the file holds what it is held to"
+    "cost: what this one entry adds to the error of the file itself, if it is a"
+    " setting, a weld, contacts, a range or a motor; of the others what it adds, as in"
+    " the file, to the error of the generated one. Of torque and pin forces the one"
+    " that grows most. A dash: this entry cannot be set by itself, or the file holds"
+    " what it is held to"
 )
 ADVICE = (
     "What to type into the file for an error E, if its settings are the cause: "
@@ -75,7 +78,8 @@ ADVICE = (
 )
 JUDGED = tuple(name for name in UNKNOWNS if name not in ("alpha_3", "alpha_4"))
 """Quantities that a file is held to. A soft loop lets the bars accelerate by themselves for an instant; what that does
-to the torque and the pin forces is judged there."""
+to the torque and the pin forces is judged there.
+"""
 HEADINGS = ("quantity", "theirs", "generated", "allowed", "verdict")
 EXAMINE = "fourbar_validation.engines.mujoco.theirs:examine"
 CHANGED = "fourbar_validation.engines.mujoco.theirs:examine_changed"
@@ -191,7 +195,8 @@ def examine_model(
 
     Parameters
     ----------
-    wanted : relative error that theirs is held to; None: that of the generated file, and where its torque or pin forces
+    wanted : relative error that theirs is held to; None: that of the generated file,
+    and where its torque or pin forces
         exceed this, what MuJoCo's stiffest constraint leaves in it.
     """
     tolerance = SIMULATED
@@ -294,7 +299,8 @@ def show(report: ModelReport, mjcf: Path, out: Path) -> None:
         console.print("It differs in nothing from the generated MJCF.")
     else:
         console.print(
-            f"{escape(make_plain(mjcf.name))} against the generated MJCF, the dearest difference first"
+            f"{escape(make_plain(mjcf.name))} against the generated MJCF, the dearest"
+            " difference first"
         )
         console.print(f"[dim]{ABOUT_COSTS}[/]\n")
     for difference in report.differences:
@@ -350,8 +356,11 @@ def write_markdown(report: ModelReport, mjcf: Path) -> str:
     "names",
     metavar="ROLE=NAME",
     multiple=True,
-    help="The body that is the input, coupler or output; B3, B4: the sites of pin B on the coupler and the output, "
-    "where no connect or weld closes the loop. Left out: guessed from structure and lengths, and printed.",
+    help=(
+        "The body that is the input, coupler or output; B3, B4: the sites of pin B on"
+        " the coupler and the output, where no connect or weld closes the loop. Left"
+        " out: guessed from structure and lengths, and printed."
+    ),
 )
 @loop_option
 @pose_options
@@ -360,14 +369,20 @@ def write_markdown(report: ModelReport, mjcf: Path) -> str:
 @click.option(
     "--mimic",
     metavar="JOINT",
-    help="Joint whose equality, a polynomial, stands for the loop of SCENE: what it loses.",
+    help=(
+        "Joint whose equality, a polynomial, stands for the loop of SCENE: what it"
+        " loses."
+    ),
 )
 @click.option(
     "--error",
     "wanted",
     type=float,
     metavar="E",
-    help="The relative error that FILE.xml may have; of a loop in a robot also: what to type to reach it.",
+    help=(
+        "The relative error that FILE.xml may have; of a loop in a robot also: what to"
+        " type to reach it."
+    ),
 )
 @click.option(
     "-o",
@@ -375,7 +390,10 @@ def write_markdown(report: ModelReport, mjcf: Path) -> str:
     type=click.Path(path_type=Path, file_okay=False),
     default=Path("results"),
     show_default=True,
-    help="Folder for the report: theirs.md and results.csv of a four-bar alone, robot.md and robot.csv of loops.",
+    help=(
+        "Folder for the report: theirs.md and results.csv of a four-bar alone, robot.md"
+        " and robot.csv of loops."
+    ),
 )
 def command(
     files: tuple[Path, ...],
@@ -388,8 +406,9 @@ def command(
 ) -> int:
     """Compare your own MJCF with a scene: how wrong its torque and pin forces are, and why.
 
-    A four-bar alone is compared with the generated MJCF of SCENE, entry by entry. With --loop, without SCENE, or where
-    FILE.xml has more joints, loops are measured inside the whole robot; without SCENE it is taken from the file.
+    A four-bar alone is compared with the generated MJCF of SCENE, entry by entry. With
+    --loop, without SCENE, or where FILE.xml has more joints, loops are measured inside
+    the whole robot; without SCENE it is taken from the file.
     """
     if len(files) > 2:
         raise click.UsageError("give one FILE.xml, and SCENE before it or not")

@@ -1,6 +1,7 @@
 """Problems of models/problems and their results: how far each quantity is off, and which level that reaches.
 
-A problem is a question of the protocol with its answer, each value with an error bar; docs/benchmark.md has the format.
+A problem is a question of the protocol with its answer, each value with an error bar;
+docs/benchmark.md has the format.
 """
 
 import json

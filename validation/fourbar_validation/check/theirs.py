@@ -2,12 +2,13 @@
 
     theta_2 [deg], torque [N cm], F12_x, F12_y, F43 [kN]
 
-A vector under its own name is its magnitude; one of its components may stand alone. Units may also
-stand in a line of their own under the names; without a unit a column is SI (rad). Columns are parted
-by commas, by tabs, or by a spreadsheet's semicolons, with which a number may have a decimal comma.
-A blank cell states nothing, and a column that is no answer is left out by name. How many digits were
-printed decides how much rounding is theirs: half a unit of the last printed digit is always allowed,
-and what half a unit of a rounded theta_2 changes.
+A vector under its own name is its magnitude; one of its components may stand alone.
+Units may also stand in a line of their own under the names; without a unit a column is
+SI (rad). Columns are parted by commas, by tabs, or by a spreadsheet's semicolons, with
+which a number may have a decimal comma. A blank cell states nothing, and a column that
+is no answer is left out by name. How many digits were printed decides how much rounding
+is theirs: half a unit of the last printed digit is always allowed, and what half a unit
+of a rounded theta_2 changes.
 """
 
 import csv
@@ -100,7 +101,8 @@ MOST_DEGREES = 1e6
 LARGEST_FILE = 64 * 2**20
 """Bytes; a table larger than this is not a hand-made comparison."""
 HEADING = re.compile(
-    r"\|?(?P<name>\w[\w ]*?)\|?\s*(?:\[(?P<square>[^\]]*)\]|\((?P<round>.*)\))?(?P<letter>_[xy])?"
+    r"\|?(?P<name>\w[\w"
+    r" ]*?)\|?\s*(?:\[(?P<square>[^\]]*)\]|\((?P<round>.*)\))?(?P<letter>_[xy])?"
 )
 
 
@@ -121,7 +123,8 @@ class Unit:
 class TheirTable:
     """Somebody's numbers in SI: theta_2 (n,), and per quantity values (n,) or (n, 2) with their rounding.
 
-    Of a vector (n,) are its magnitudes, under |name|. What the table does not state is NaN.
+    Of a vector (n,) are its magnitudes, under |name|. What the table does not state is
+    NaN.
     """
 
     theta_2: Array
@@ -306,8 +309,10 @@ def _read_degrees(
     numbers["theta_2"], halves["theta_2"] = values * factor, halves["theta_2"] * factor
     units["theta_2"] = Unit("deg", factor)
     return (
-        f"theta_2 has no unit and goes to {largest:g}: it is read as degrees; "
-        "write theta_2 [deg], or theta_2 [rad] if it is not",
+        (
+            f"theta_2 has no unit and goes to {largest:g}: it is read as degrees; "
+            "write theta_2 [deg], or theta_2 [rad] if it is not"
+        ),
     )
 
 

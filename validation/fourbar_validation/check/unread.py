@@ -4,7 +4,10 @@ from collections.abc import Iterator
 from xml.etree import ElementTree as ET
 
 ANY = "*"
-HINGE = "name class type pos axis ref damping frictionloss stiffness springref springdamper armature range limited"
+HINGE = (
+    "name class type pos axis ref damping frictionloss stiffness springref springdamper"
+    " armature range limited"
+)
 LOOKED_AT = {
     **dict.fromkeys(
         (
@@ -37,27 +40,38 @@ LOOKED_AT = {
         ("visual", "asset", "camera", "light", "sensor", "keyframe", "custom", "size"),
         ANY,
     ),
-    "option": "timestep integrator solver tolerance iterations ls_iterations noslip_iterations gravity density "
-    "viscosity wind jacobian",
-    "flag": "contact gravity limit spring damper passive frictionloss island sensor energy fwdinv",
+    "option": (
+        "timestep integrator solver tolerance iterations ls_iterations"
+        " noslip_iterations gravity density viscosity wind jacobian"
+    ),
+    "flag": (
+        "contact gravity limit spring damper passive frictionloss island sensor energy"
+        " fwdinv"
+    ),
     "statistic": "extent center meansize meanmass",
     "body": "name childclass pos quat axisangle euler xyaxes zaxis",
-    "joint": HINGE
-    + " solreffriction solimpfriction group user joint coef joint1 joint2 polycoef",
+    "joint": (
+        HINGE
+        + " solreffriction solimpfriction group user joint coef joint1 joint2 polycoef"
+    ),
     **dict.fromkeys(
         ("fixed", "spatial"),
-        "name class stiffness damping frictionloss springlength solreffriction solimpfriction group width rgba "
-        "material user tendon1 tendon2 polycoef",
+        "name class stiffness damping frictionloss springlength solreffriction"
+        " solimpfriction group width rgba material user tendon1 tendon2 polycoef",
     ),
     **dict.fromkeys(
         ("general", "position", "velocity"),
-        "name class group user joint tendon site refsite gear gaintype gainprm biastype biasprm kp kv dampratio "
-        "ctrlrange ctrllimited",
+        "name class group user joint tendon site refsite gear gaintype gainprm biastype"
+        " biasprm kp kv dampratio ctrlrange ctrllimited",
     ),
-    "dcmotor": "name class group joint tendon site refsite gear input motorconst resistance cogging",
+    "dcmotor": (
+        "name class group joint tendon site refsite gear input motorconst resistance"
+        " cogging"
+    ),
 }
 """Elements and their attributes that the check compares, that enter what it compares, or that move nothing: of those
-that read and draw, of what collides only whether anything does, and of the drive nothing, for it is taken off."""
+that read and draw, of what collides only whether anything does, and of the drive nothing, for it is taken off.
+"""
 SKIPPED = ("visual", "asset", "sensor", "keyframe", "custom")
 """Elements whose whole content moves nothing."""
 

@@ -61,7 +61,10 @@ def explain_refusal(engine: Adapter, command: Command) -> str:
     takes = getattr(engine, "commands", ("theta_2",))
     if command.commanded in takes:
         return ""
-    return f"it takes a command of {', '.join(takes)}, and here {command.commanded} is commanded"
+    return (
+        f"it takes a command of {', '.join(takes)}, and here {command.commanded} is"
+        " commanded"
+    )
 
 
 @dataclass(slots=True, eq=False)

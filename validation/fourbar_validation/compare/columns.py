@@ -1,7 +1,7 @@
 """The results of a run as results.csv and, for pandas and DuckDB, results.parquet.
 
-Both hold the columns of `fourbar_validation.compare.rows.Row`, sorted by scene, engine, setting and quantity;
-both are written as the chunks are read.
+Both hold the columns of `fourbar_validation.compare.rows.Row`, sorted by scene, engine,
+setting and quantity; both are written as the chunks are read.
 """
 
 import math
@@ -128,9 +128,11 @@ def read_columns(path: Path) -> Iterator[Row]:
     for cells in _read_batches(path, list(MADE_OF)):
         words: dict[str, str] = {}
         columns = [
-            [math.nan if cell is None else cell for cell in column]
-            if kind is float
-            else _read_words(column, words)
+            (
+                [math.nan if cell is None else cell for cell in column]
+                if kind is float
+                else _read_words(column, words)
+            )
             for column, kind in zip(cells, MADE_OF.values(), strict=True)
         ]
         yield from map(Row, *columns)

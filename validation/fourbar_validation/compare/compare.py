@@ -94,7 +94,8 @@ MOST_UNDECIDED = 0.5
 """Share of the numbers of a scene that are undecided, beyond which it does not hold."""
 SLOW_DRIVE = 0.1
 """Part of the drive's greatest speed above which a simulation's forces are judged. The torque on bar 3 or 4, the force
-of a cylinder and the pin forces have poles where the speed of the drive vanishes."""
+of a cylinder and the pin forces have poles where the speed of the drive vanishes.
+"""
 CLOSURE = "a e^{i theta_2} + b e^{i theta_3} = d e^{i theta_1} + c e^{i theta_4}"
 NOWHERE = "no position at which it is demanded"
 NUMBERS = ("error", "allowed", "theta_2", "condition")
@@ -154,7 +155,8 @@ class Comparison:
     demands: Demands
     reference: Solution | None = None
     """Second derivation at the same positions; by default the answer itself. The stricter of its scale and condition
-    and those of the formulas sets the allowed error."""
+    and those of the formulas sets the allowed error.
+    """
     scales: Scales = field(default_factory=dict)
     """Scales of `formulas` and `reference`, if an earlier answer was compared with them."""
 
@@ -588,8 +590,9 @@ def _mark_stated(quantity: str, formulas: Solution, ours: Array) -> Mask:
     """Mark where the formulas have a single value. After an overflow these are the quantities computed before it."""
     code = formulas.status_code
     if quantity in OF_FORCES:
-        # A jam at rest concerns the motion that would begin, so its forces are stated. Forces with several solutions
-        # are not: an engine may find another one, or not converge.
+        # A jam at rest concerns the motion that would begin, so its forces are stated.
+        # Forces with several solutions are not: an engine may find another one, or not
+        # converge.
         jammed = code == JAMMED
         if jammed.any():
             jammed &= np.isfinite(magnitude(ours))

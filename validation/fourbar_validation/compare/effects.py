@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 def find_size(effect: "Effect", linkage: FourBar, formulas: Solution) -> Array | float:
     """Return the size of an effect's forces, N, (n,) or one for all positions.
 
-    An effect without one raises FourBarError: nothing is judged by another effect's scale.
+    An effect without one raises FourBarError: nothing is judged by another effect's
+    scale.
     """
     try:
         size: Array | float = effect.size(linkage, formulas)

@@ -1,6 +1,7 @@
 """Find where dry friction reverses: the sense of rotation at a pin changes, and the pin forces jump.
 
-The driving torque bends there and does not jump: the power f |omega_j - omega_i| is continuous.
+The driving torque bends there and does not jump: the power f |omega_j - omega_i| is
+continuous.
 """
 
 from collections.abc import Callable
@@ -48,7 +49,10 @@ class Reversal:
             for side in (self.before, self.after)
         ]
         place = f"pin {self.pin}, theta_2 = {np.degrees(self.theta_2):.6g} deg"
-        return f"dry friction reverses at {place}: {most} jumps from ({ends[0]}) to ({ends[1]}) N"
+        return (
+            f"dry friction reverses at {place}: {most} jumps from ({ends[0]}) to"
+            f" ({ends[1]}) N"
+        )
 
 
 def find_reversals(
@@ -89,9 +93,9 @@ def mark_reversing(
 ) -> NDArray[np.bool_]:
     """Mark where a dry pin of a moving linkage slips by at most this part of the two speeds over sin^2 mu, (n,).
 
-    There the sense of friction is undecided, and the forces on both sides of the jump are right. An engine
-    that runs through the motion `in_time` has no convention at rest either: 0 is as good as any couple up to the
-    friction's.
+    There the sense of friction is undecided, and the forces on both sides of the jump
+    are right. An engine that runs through the motion `in_time` has no convention at
+    rest either: 0 is as good as any couple up to the friction's.
     """
     mask = np.zeros(len(solution), dtype=bool)
     for pin in {pin for effect in scene.effects for pin in effect.dry_pins}:

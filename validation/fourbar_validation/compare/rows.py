@@ -127,8 +127,8 @@ class Row:
 
         Parameters
         ----------
-        who : scene, engine and setting.
-        error : each a number, or an array over the positions, (n,), as `allowed`, `theta_2` and `condition`; one that
+        who : scene, engine and setting. error : each a number, or an array over the
+        positions, (n,), as `allowed`, `theta_2` and `condition`; one that
             is no finite number fails.
         where : positions that are held to it; undecided where there are none.
         """
@@ -172,7 +172,10 @@ def make_breakdown(
     if isinstance(error, TimeoutError):
         reason = "the engine hung and was stopped"
     elif type(error).__name__ == "ProcessExpired":  # raised by Pebble
-        reason = f"the engine crashed its process (exit code {getattr(error, 'exitcode', None) or 0})"
+        reason = (
+            "the engine crashed its process (exit code"
+            f" {getattr(error, 'exitcode', None) or 0})"
+        )
     else:
         reason = str(error) if isinstance(error, EngineError) else say_error(error)
     return Row.unmeasured(scene, engine, part, "all", FAILS, reason)
@@ -355,7 +358,10 @@ class Counts:
         """Give the verdict in one sentence: "all hold" is stated only of what was compared."""
         total, failed = self.compared, self[FAILS]
         if failed:
-            verdict = f"FAILS: {failed} of {total} comparisons{self._write_where()} do not hold"
+            verdict = (
+                f"FAILS: {failed} of {total} comparisons{self._write_where()} do not"
+                " hold"
+            )
         elif self.nothing:
             verdict = f"Nothing was compared{self._write_where()}"
         else:

@@ -1,12 +1,14 @@
 """Compute the scale of a quantity's error and its condition, by the formulas and by another derivation.
 
-The scale of a quantity is its largest magnitude over the well-conditioned positions; a position
-below that is judged relative to its own magnitude, or the forces that diverge near a limit would
-excuse every other row. A quantity that (nearly) vanishes is judged against the sum of the
-absolute terms of its equation; if those vanish too, the answer must be exactly zero.
+The scale of a quantity is its largest magnitude over the well-conditioned positions; a
+position below that is judged relative to its own magnitude, or the forces that diverge
+near a limit would excuse every other row. A quantity that (nearly) vanishes is judged
+against the sum of the absolute terms of its equation; if those vanish too, the answer
+must be exactly zero.
 
-A wrong formula would widen what it is allowed: an angle between bars 3 and 4 that is too small, an acceleration that
-is too large. So another derivation, the reference, is asked too, and the stricter of the two decides.
+A wrong formula would widen what it is allowed: an angle between bars 3 and 4 that is
+too small, an acceleration that is too large. So another derivation, the reference, is
+asked too, and the stricter of the two decides.
 """
 
 from collections.abc import Callable
@@ -65,7 +67,8 @@ class Sizes:
     def sum_terms(self, quantity: str) -> Array:
         """Sum the absolute terms of the equation that a quantity is computed from, (n,), in its unit.
 
-        Raises KeyError for a quantity of a unit that has no such sum here: nothing is judged by another's scale.
+        Raises KeyError for a quantity of a unit that has no such sum here: nothing is
+        judged by another's scale.
         """
         unit = UNITS[quantity]
         key = quantity if unit in OF_EACH_BAR else unit
@@ -275,7 +278,8 @@ def make_reference(scene: Scene, answer: Answer) -> Solution | None:
     if "drive_condition" not in known:
         # an engine that knows how near friction is to jamming answers it
         one, second = (theta[bar] for bar in theta if bar != scene.drive_bar)
-        # not of their difference: of an angle many turns away that has fewer digits than its sine
+        # not of their difference: of an angle many turns away that has fewer digits
+        # than its sine
         known["drive_condition"] = np.abs(
             np.sin(second) * np.cos(one) - np.cos(second) * np.sin(one)
         )

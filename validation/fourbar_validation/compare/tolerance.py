@@ -1,8 +1,9 @@
 """Compute errors and allowed errors, with the reason for each: four classes of tolerance, each a named object.
 
-`condition` lies in (0, 1], 1 is best; an exact comparison is allowed K eps / condition. The motion
-condition is s = |sin(theta_4 - theta_3)|, the drive condition the sine between the two bars that
-are not driven, the lever the shorter of bars 3 and 4 over the longest bar.
+`condition` lies in (0, 1], 1 is best; an exact comparison is allowed K eps / condition.
+The motion condition is s = |sin(theta_4 - theta_3)|, the drive condition the sine
+between the two bars that are not driven, the lever the shorter of bars 3 and 4 over the
+longest bar.
 """
 
 import math
@@ -27,7 +28,8 @@ Angle = TypeVar("Angle", float, Array)
 EPS = 2.0**-52
 K = 50.0
 """One factor for every exact comparison. Two evaluations of about fifty roundings each differ by
-sqrt(2 * 50) = 10 of them as a random walk; 50 covers the tails of some 10^5 comparisons."""
+sqrt(2 * 50) = 10 of them as a random walk; 50 covers the tails of some 10^5 comparisons.
+"""
 ROUNDINGS = 8.0
 """A chain of some fifty roundings moves a result by sqrt(50) = 7 last digits, as a random walk."""
 NOTHING_TO_TELL = 1e-3
@@ -75,23 +77,25 @@ class ErrorBound:
 
 IDENTITY = ErrorBound(
     "identity",
-    "K eps of the sum of the absolute terms: an equation that holds in every position, whatever the condition",
+    "K eps of the sum of the absolute terms: an equation that holds in every position,"
+    " whatever the condition",
     K * EPS,
     conditioned=False,
     cause="round-off of the terms",
 )
 EQUIVALENCE = ErrorBound(
     "equivalence",
-    "K eps/condition: two exact derivations of one number differ by round-off alone; beyond that ten times the error "
-    "computed for the position, from moving every stored number and the closure by one rounding in 320-bit arithmetic",
+    "K eps/condition: two exact derivations of one number differ by round-off alone;"
+    " beyond that ten times the error computed for the position, from moving every"
+    " stored number and the closure by one rounding in 320-bit arithmetic",
     K * EPS,
     conditioned=True,
     cause="round-off of both sides",
 )
 SIMULATED = ErrorBound(
     "modelling + integration",
-    "1e-5 of the scale: the soft loop and the time step of the generated MJCF at about 628 RK4 steps per revolution, "
-    "two to ten times what was measured (1e-6 to 4e-6)",
+    "1e-5 of the scale: the soft loop and the time step of the generated MJCF at about"
+    " 628 RK4 steps per revolution, two to ten times what was measured (1e-6 to 4e-6)",
     1e-5,
     conditioned=False,
     in_time=True,
@@ -99,8 +103,9 @@ SIMULATED = ErrorBound(
 )
 FULL_ACCURACY = ErrorBound(
     "full accuracy",
-    "K eps whatever the condition; beyond that ten times the error computed for the position, quantity by quantity, "
-    "from moving every stored number and the closure by one rounding in 320-bit arithmetic",
+    "K eps whatever the condition; beyond that ten times the error computed for the"
+    " position, quantity by quantity, from moving every stored number and the closure"
+    " by one rounding in 320-bit arithmetic",
     K * EPS,
     conditioned=False,
     cause="round-off of both sides",
@@ -117,7 +122,8 @@ OF_THE_INPUT = frozenset(
 """Quantities that the input alone decides: they lose none."""
 TOUCHING_MARGIN = 32.0 * EPS
 """A loop that closes, or misses, by less than this part of the sum of its lengths does so by the
-rounding of the data, and the engines may differ on whether it closes."""
+rounding of the data, and the engines may differ on whether it closes.
+"""
 
 
 def hold_simulated(error: float, why: str) -> ErrorBound:
@@ -133,7 +139,8 @@ def hold_simulated(error: float, why: str) -> ErrorBound:
 
 OF_DIRECTION = frozenset(("drive_line", "stroke_speed", "drive_condition"))
 """Quantities that, like every force, follow from the direction of a linear drive: the places of its ends are rounded
-as the lengths are, and their direction by that over the stroke."""
+as the lengths are, and their direction by that over the stroke.
+"""
 
 
 def find_lever(linkage: FourBar, bar: int = 2) -> float:
@@ -141,7 +148,8 @@ def find_lever(linkage: FourBar, bar: int = 2) -> float:
 
     Of another commanded bar it is the shorter of the two moving bars besides it.
 
-    Without it 28 of 10 008 comparisons on 300 random linkages exceed K = 50 (at most 83); with it none exceeds 17.
+    Without it 28 of 10 008 comparisons on 300 random linkages exceed K = 50 (at most
+    83); with it none exceeds 17.
     """
     return min(
         linkage.bar(number).length for number in MOVING_BARS if number != bar
@@ -238,7 +246,8 @@ def compute_differences(
 ) -> Array:
     """Compute the differences of several quantities, (q, n).
 
-    Those of angles are modulo 2 pi, of vectors by Euclidean norm; NaN where the shapes differ.
+    Those of angles are modulo 2 pi, of vectors by Euclidean norm; NaN where the shapes
+    differ.
     """
     apart = np.full((len(quantities), len(ours[0])), np.nan)
     alike = [i for i in range(len(ours)) if theirs[i].shape == ours[i].shape]

@@ -93,9 +93,9 @@ def _write_defaults(curves: Curves) -> Iterator[str]:
         return
     errors = point.errors
     text = (
-        f"MuJoCo's defaults (Euler, 2 ms): {write_time(point)} for an error of "
-        f"{write_short(errors.torque)} in the torque, {write_short(errors.force)} in the "
-        "worst pin force"
+        f"MuJoCo's defaults (Euler, 2 ms): {write_time(point)} for an error of"
+        f" {write_short(errors.torque)} in the torque, {write_short(errors.force)} in"
+        " the worst pin force"
     )
     floors = [
         find_floor(curves.get(DEFAULT_LADDER, ()), quantity)
@@ -122,7 +122,9 @@ def _write_exact(curves: Curves) -> Iterator[str]:
         if exact:
             cheapest = min(exact, key=lambda point: point.seconds_per_second)
             error = write_short(cheapest.errors.worst)
-            yield f"{what}: {write_time(cheapest)}, error {error}, by {cheapest.setting}."
+            yield (
+                f"{what}: {write_time(cheapest)}, error {error}, by {cheapest.setting}."
+            )
 
 
 def _write_laws(laws: Sequence[ErrorLaw]) -> str:

@@ -52,8 +52,8 @@ HEAD = ("setting", "error", "ms per simulated second", "ms a revolution")
 def cost(scenes: tuple[Path, ...], out: Path, verbose: bool) -> int:
     """Measure what accuracy costs in time: every method, on SCENES (default: the crank-rocker).
 
-    An interrupted study is resumed where it stopped. Exit status 1 where the law of any quantity does not hold, or
-    none is decided.
+    An interrupted study is resumed where it stopped. Exit status 1 where the law of any
+    quantity does not hold, or none is decided.
     """
     from rich.console import Console
     from rich.progress import track

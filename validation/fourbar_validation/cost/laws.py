@@ -17,12 +17,14 @@ ABOVE_FLOOR = 3.0
 """Points within this factor of the floor carry part of it and are not fitted."""
 WITHIN = 0.35
 """An exponent may miss the expected one by this much, or by twice its own uncertainty: over two decades of
-a ladder the next order of the error's series moves a fitted slope by about a quarter."""
+a ladder the next order of the error's series moves a fitted slope by about a quarter.
+"""
 FEWEST = 3
 """Points of a fit."""
 JUMP = 10.0
 """An error so many times larger than at either of the two coarser settings is no part of a law, where it has met no
-floor: between neighbours of a ladder the laws here change it by 10 or less, and downwards."""
+floor: between neighbours of a ladder the laws here change it by 10 or less, and downwards.
+"""
 MIXES = 1.0 / 30.0
 """Part of the least error above which what does not depend on the setting flattens a slope."""
 FIRST_ORDER, FOURTH_ORDER = 1.0, 4.0
@@ -75,8 +77,9 @@ class ErrorLaw:
             return f"FAILS, {'; '.join(self.jumps)}"
         if self.mixed:
             return (
-                f"no order expected, {self.exponent:.2f}: sag and softness mix, of which "
-                f"softness alone makes {100.0 * self.constant:.0f} % of the least error"
+                f"no order expected, {self.exponent:.2f}: sag and softness mix, of"
+                f" which softness alone makes {100.0 * self.constant:.0f} % of the"
+                " least error"
             )
         if not self.decided:
             return (
@@ -100,7 +103,8 @@ def _group(pairs: Sequence[tuple[str, str]]) -> list[str]:
     """Group quantities with the same text."""
     texts = dict.fromkeys(text for _, text in pairs)
     return [
-        f"{', '.join(quantity for quantity, text_of in pairs if text_of == text)}: {text}"
+        f"{', '.join(quantity for quantity, text_of in pairs if text_of == text)}:"
+        f" {text}"
         for text in texts
     ]
 
@@ -154,7 +158,8 @@ def find_jumps(points: Sequence[CostPoint], quantity: str) -> list[CostPoint]:
                 for point_before in points[max(i - 2, 0) : i]
             ],
         )
-        # two sources that cancel make a dip, and its far side is no jump; a motion that is lost again is one
+        # two sources that cancel make a dip, and its far side is no jump; a motion that
+        # is lost again is one
         if before[-1] < TOO_LARGE and not value <= JUMP * (
             max(before) if value < TOO_LARGE else before[-1]
         ):
@@ -302,7 +307,8 @@ def list_warnings(curves: Mapping[str, Sequence[CostPoint]]) -> list[str]:
         ]
         if never:
             warnings.append(
-                f"{name}: no timestep of the ladder brings {', '.join(never)} below {TOO_LARGE:g}"
+                f"{name}: no timestep of the ladder brings {', '.join(never)} below"
+                f" {TOO_LARGE:g}"
             )
     return warnings
 

@@ -393,7 +393,8 @@ def draw_softness(curves: Curves, title: str) -> Any:
     figure, axes = _draw_single(
         curves,
         title,
-        "A soft closure is wrong in proportion to\n1 - d, and most where the linkage is slow",
+        "A soft closure is wrong in proportion to\n1 - d, and most where the linkage is"
+        " slow",
         SOFTNESS,
         lambda point: point.setting_value,
         "1 - d (d: impedance of solimp; MuJoCo's own 0.9)",

@@ -63,7 +63,8 @@ class Curve:
     """Run without gravity and loads."""
     settled: bool = False
     """Judged after a first turn, where the input turns fully: from an exact start a soft closure first sags, and its
-    worst error would be that of the start (three to four times as large) at every setting."""
+    worst error would be that of the start (three to four times as large) at every setting.
+    """
 
 
 BEST = Settings(
@@ -97,8 +98,9 @@ def trace_steps(
 ) -> Curve:
     """Make a curve over the timestep.
 
-    `held`: a part of a revolution at which the closure's time constant is held in seconds, so that the timestep alone
-    changes; None: it is so many steps as in the settings.
+    `held`: a part of a revolution at which the closure's time constant is held in
+    seconds, so that the timestep alone changes; None: it is so many steps as in the
+    settings.
     """
 
     def at(n: float) -> Settings:

@@ -1,8 +1,9 @@
 """The linkage in ball arithmetic: every output of `solve` to 50 digits with a rigorous radius.
 
-Shares nothing with the formulas: the loop is closed by the complex quadratic in e^{i theta_3}, the
-velocities and accelerations come from the linear systems of the differentiated loop, the pin forces
-and the torque from the full thirteen Newton-Euler equations about the mass centres.
+Shares nothing with the formulas: the loop is closed by the complex quadratic in e^{i
+theta_3}, the velocities and accelerations come from the linear systems of the
+differentiated loop, the pin forces and the torque from the full thirteen Newton-Euler
+equations about the mass centres.
 """
 
 import math
@@ -61,7 +62,8 @@ ENDS = ("from", "to")
 """Names of the points between which a linear drive acts."""
 STEP_BITS = 90
 """Sensitivities are difference quotients with a relative step of 2^-90: wrong by about 2^-90 / (distance to the
-nearest singular position), and the cancelled 90 bits are there to lose."""
+nearest singular position), and the cancelled 90 bits are there to lose.
+"""
 
 
 def collect_inputs(scene: Scene, angle: float) -> dict[str, float]:
@@ -167,16 +169,18 @@ def make_balls(scene: Scene, angle: float, **motion: float) -> Values:
 def closure(x: Values, branch: int) -> tuple[Complex, Complex, Complex] | None:
     """Return e^{i theta_2}, e^{i theta_3}, e^{i theta_4}; None if the loop does not close.
 
-    With D = d e^{i theta_1} - a e^{i theta_2}, |D - b w| = c is b conj(D) w^2 - K w + b D = 0, K = D^2 + b^2 - c^2.
-    Where bar 3 is commanded D = d e^{i theta_1} - b e^{i theta_3} is what bars 2 and 4 span, where bar 4 is it is
-    d e^{i theta_1} + c e^{i theta_4}, spanned by bars 3 and 2 with bar 2 reversed.
+    With D = d e^{i theta_1} - a e^{i theta_2}, |D - b w| = c is b conj(D) w^2 - K w + b
+    D = 0, K = D^2 + b^2 - c^2. Where bar 3 is commanded D = d e^{i theta_1} - b e^{i
+    theta_3} is what bars 2 and 4 span, where bar 4 is it is d e^{i theta_1} + c e^{i
+    theta_4}, spanned by bars 3 and 2 with bar 2 reversed.
     """
     bar, d = find_commanded(x), x["d"]
     held, b, c = {2: ("a", "b", "c"), 3: ("b", "a", "c"), 4: ("c", "b", "a")}[bar]
     held, b, c, side = x[held], x[b], x[c], 1 if bar == 4 else -1
     w = polar(arb(1), x[f"theta_{bar}"])
     D = polar(d, x["theta_1"]) + side * held * w
-    # |D|^2 by the angle between ground and input: where they are in line it is exact, and so is a loop that just closes
+    # |D|^2 by the angle between ground and input: where they are in line it is exact,
+    # and so is a loop that just closes
     squared = (
         d**2 + held**2 + side * 2 * d * held * (x[f"theta_{bar}"] - x["theta_1"]).cos()
     )
@@ -435,8 +439,9 @@ def _solve_thirteen(
 ) -> tuple[dict[str, Complex], Ball]:
     """Solve for the pin forces and the driving torque or force; ZeroDivisionError where they are singular.
 
-    Unknowns F12 F32 F23 F43 F34 F14 (x, y each) and the drive, whose force and moment on each bar, for one of it, are
-    `drives`. Equations: Newton and Euler about each mass centre, then action and reaction at A and B.
+    Unknowns F12 F32 F23 F43 F34 F14 (x, y each) and the drive, whose force and moment
+    on each bar, for one of it, are `drives`. Equations: Newton and Euler about each
+    mass centre, then action and reaction at A and B.
     """
     at_pin = {bar: -bars.centre[bar] for bar in MOVING_BARS}
     at_tip = {bar: bars.tip[bar] - bars.centre[bar] for bar in MOVING_BARS}
@@ -511,7 +516,8 @@ def _interpolate_factor(table: Table, theta_2: Ball, x: Values, k: int) -> Ball:
 def turn_by_stroke(scene: Scene, x: Values) -> Values | None:
     """Add angle, speed and acceleration of the bar that a commanded stroke turns; None where the triangle stays open.
 
-    With l and r from the pin to the ends: s^2 = l^2 + r^2 - 2 l r cos beta, twice differentiated.
+    With l and r from the pin to the ends: s^2 = l^2 + r^2 - 2 l r cos beta, twice
+    differentiated.
     """
     drive, motion = scene.drive, scene.motion
     assert isinstance(drive, LinearDrive) and motion.side is not None
@@ -602,7 +608,8 @@ def compute_condition(
 ) -> Ball:
     """Compute |P|/L, P the stroke's speed with (sin mu, (a/b) sin(theta_2 - theta_4), (a/c) sin(theta_2 - theta_3)).
 
-    L is the sum of what each end could move: r on bar 2, a + r a/b on bar 3, r a/c on bar 4, `tip` is A.
+    L is the sum of what each end could move: r on bar 2, a + r a/b on bar 3, r a/c on
+    bar 4, `tip` is A.
     """
     a, b, c = x["a"], x["b"], x["c"]
     turning = {1: arb(0), 2: sines[2], 3: -a / b * sines[3], 4: -a / c * sines[4]}

@@ -1,7 +1,8 @@
 """State a second time what a scene's numbers mean, so that no engine takes it from the formulas' side.
 
-Pins and the bars i, j that meet there; a bar's inertia and mass centre where they are left out; a field of gravity;
-a point of a bar; the bars as a tree that is open at pin B.
+Pins and the bars i, j that meet there; a bar's inertia and mass centre where they are
+left out; a field of gravity; a point of a bar; the bars as a tree that is open at pin
+B.
 """
 
 import math

@@ -1,6 +1,7 @@
 """Apply each load and effect to an engine's bars, from the engine's own numbers: one row of a table each.
 
-No engine is named here, and nothing of the formulas' `act` is used: this is the second derivation.
+No engine is named here, and nothing of the formulas' `act` is used: this is the second
+derivation.
 """
 
 import bisect

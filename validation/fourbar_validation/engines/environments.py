@@ -103,7 +103,10 @@ def _read_entry(file: Path, table: object) -> Entry:
         else:
             fits = key in texts and isinstance(value, str)
         if not fits:
-            allowed = f"allowed: {', '.join(texts)} (texts), {', '.join(lists)} (lists of texts), steps (whole numbers)"
+            allowed = (
+                f"allowed: {', '.join(texts)} (texts), {', '.join(lists)} (lists of"
+                " texts), steps (whole numbers)"
+            )
             raise InputError(f"engine.{key}", value, allowed, str(file))
     if bool(table.get("adapter")) == bool(table.get("command")):
         raise InputError(
@@ -119,8 +122,8 @@ def _read_entry(file: Path, table: object) -> Entry:
 def make_environment(entry: Entry, cache: Path = CACHE) -> str:
     """Return the interpreter of an engine's environment, which is made once; DependencyError where pip fails.
 
-    Engines with the same requirements share it. With this Python all else comes from the environment that runs here;
-    another gets what the harness needs as well.
+    Engines with the same requirements share it. With this Python all else comes from
+    the environment that runs here; another gets what the harness needs as well.
     """
     if not entry.requires and not entry.python:
         return sys.executable

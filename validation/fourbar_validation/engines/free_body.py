@@ -1,10 +1,11 @@
 """The four-bar as three free bodies, by numpy alone: no closed formula, no engine.
 
-Newton's method solves the two closure equations for the angles. Their first derivative is linear in b omega_3 and
-c omega_4, their second in b alpha_3 and c alpha_4. Forces and moments about the first pin of each bar and the two
-reactions at A and B are thirteen linear equations in F12, F32, F23, F43, F34, F14 and the torque, or the force of a
-linear drive (R. L. Norton, Design of Machinery, ch. 11, has them about the mass centres). Vectors of the plane are
-complex numbers, x + i y.
+Newton's method solves the two closure equations for the angles. Their first derivative
+is linear in b omega_3 and c omega_4, their second in b alpha_3 and c alpha_4. Forces
+and moments about the first pin of each bar and the two reactions at A and B are
+thirteen linear equations in F12, F32, F23, F43, F34, F14 and the torque, or the force
+of a linear drive (R. L. Norton, Design of Machinery, ch. 11, has them about the mass
+centres). Vectors of the plane are complex numbers, x + i y.
 """
 
 from dataclasses import replace
@@ -79,7 +80,10 @@ class FreeBody:
             return Answer(
                 NAME,
                 "exact",
-                refusal=f"it counts the turns of springs along theta_2, not {command.commanded}",
+                refusal=(
+                    "it counts the turns of springs along theta_2, not"
+                    f" {command.commanded}"
+                ),
             )
         asked = command
         if command.stroke is not None:
@@ -101,8 +105,11 @@ class FreeBody:
                 )
             },
             shared=SHARED,
-            own="assembly (Newton on the two closure equations), speeds and accelerations (own 2x2 Jacobian), every "
-            "effect from its definition, the thirteen equations of the free bodies as one system",
+            own=(
+                "assembly (Newton on the two closure equations), speeds and"
+                " accelerations (own 2x2 Jacobian), every effect from its definition,"
+                " the thirteen equations of the free bodies as one system"
+            ),
         )
         if command.speed is not None:
             commanded = (theta[0], *list_speeds(command), *theta[1:])
@@ -298,7 +305,8 @@ def _solve_unit_couples(
 ) -> tuple[Array, Complex, Array, float]:
     """Solve without sliding friction and per N m of it at each pin, (n, 13, 1 + p).
 
-    Returns also the loads of these pins as complex numbers (n, p, 1 + p), mu r of each (m), and the residual.
+    Returns also the loads of these pins as complex numbers (n, p, 1 + p), mu r of each
+    (m), and the residual.
     """
     pins, wrenches = list_sliding_pins(scene), sum_acting(scene, motion)
     _add_inertia(motion, wrenches)
@@ -378,8 +386,9 @@ def _add_inertia(motion: BodyMotion, wrenches: BodyWrenches) -> None:
 def _make_matrix(scene: Scene, motion: BodyMotion) -> Array:
     """Make the matrix of the equations, (n, 13, 13): forces and moments of bars 2, 3, 4, reactions at A and B.
 
-    Moments are divided by the bar's length, so that every entry is 0, 1 or a component of a unit vector. The last
-    column is that of the torque, or the effect of 1 N of a linear drive on the two bars that it joins.
+    Moments are divided by the bar's length, so that every entry is 0, 1 or a component
+    of a unit vector. The last column is that of the torque, or the effect of 1 N of a
+    linear drive on the two bars that it joins.
     """
     matrix = np.zeros((len(motion.theta_2), 13, 13))
     for bar, (row, first, second) in ROWS.items():
@@ -434,9 +443,9 @@ def continue_couples(F: Complex, C: Complex, k: Array) -> Array:
 
     Parameters
     ----------
-    F : pin forces without this friction, (n, p), N.
-    C : force that a couple of 1 N m against the rotation at pin q adds at pin p, (n, p, p), 1/m.
-    k : mu r of each pin, m.
+    F : pin forces without this friction, (n, p), N. C : force that a couple of 1 N m
+    against the rotation at pin q adds at pin p, (n, p, p), 1/m. k : mu r of each pin,
+    m.
     """
     x = np.full(F.shape, np.nan)
     remaining = np.flatnonzero(
@@ -447,7 +456,8 @@ def continue_couples(F: Complex, C: Complex, k: Array) -> Array:
         x[remaining], settled, det = _solve_couples(
             F[remaining], C[remaining], k * (stage / FRICTION_STAGES), x[remaining]
         )
-        # without friction the determinant is 1; a change of its sign means that the branch has turned back
+        # without friction the determinant is 1; a change of its sign means that the
+        # branch has turned back
         grown = settled & (det > 0.0) & (x[remaining] >= 0.0).all(axis=1)
         x[remaining[~grown]] = np.nan
         remaining = remaining[grown]

@@ -23,7 +23,8 @@ STARTS = (
     *((120, 5), (60, 60), (2, 150), (150, 2), (1, 1)),
 )
 """Degrees that bars 3 and 4 first make with the diagonal from A to O4, tried in turn where the triangle of the lengths
-is none to start from; they alone served 8000 of 8000 linkages, in four times as many steps."""
+is none to start from; they alone served 8000 of 8000 linkages, in four times as many steps.
+"""
 LONGEST_STEP = 0.5
 """rad; a longer Newton step leaves the region in which the gap is nearly linear."""
 HALVINGS = 40
@@ -50,8 +51,8 @@ def close(
 ) -> Closed:
     """Close the loop by Newton's method, from the next start where no earlier one converged.
 
-    Bar 2 commanded, bars 3 and 4 span the diagonal from A to O4; of bar 3 they are bars 2 and 4, of bar 4 bars 3 and 2,
-    bar 2 from A to O2.
+    Bar 2 commanded, bars 3 and 4 span the diagonal from A to O4; of bar 3 they are bars
+    2 and 4, of bar 4 bars 3 and 2, bar 2 from A to O2.
     """
     d, a, b, c = linkage.lengths
     ground = d * np.exp(1j * linkage.ground_angle)
@@ -80,7 +81,8 @@ def close(
     missed = possible & ~assembled & (np.maximum(e - (b + c), abs(b - c) - e) < -closed)
     if missed.any():
         raise ArithmeticError(
-            f"the loop closes at theta_{bar} = {theta[np.argmax(missed)]!r}, but Newton's method does not find it"
+            f"the loop closes at theta_{bar} = {theta[np.argmax(missed)]!r}, but"
+            " Newton's method does not find it"
         )
     if bar == 4:
         angles = np.array([angles[1] + np.pi, angles[0]])
@@ -109,8 +111,9 @@ def _solve_newton(
 ) -> tuple[Array, Array]:
     """Return theta_3, theta_4 (2, n) and the gap left (n,), NaN where it does not come down to `closed`.
 
-    The Jacobian's determinant is b c sin(theta_4 - theta_3), whose sign is the branch's. A step is
-    halved until the gap falls and that sign is kept; so it ends where no smaller gap is to be had.
+    The Jacobian's determinant is b c sin(theta_4 - theta_3), whose sign is the
+    branch's. A step is halved until the gap falls and that sign is kept; so it ends
+    where no smaller gap is to be had.
     """
 
     def look(
@@ -175,9 +178,10 @@ def measure_cylinder(scene: Scene) -> tuple[complex, complex]:
     )
     d, theta_1 = scene.linkage.ground, scene.linkage.ground_angle
     pivot = complex(*resolve(d, theta_1)) if on_bar.bar == 4 else 0.0j
-    return complex(*resolve(on_bar.distance, on_bar.angle)), complex(
-        *place(on_ground, theta_1)
-    ) - pivot
+    return (
+        complex(*resolve(on_bar.distance, on_bar.angle)),
+        complex(*place(on_ground, theta_1)) - pivot,
+    )
 
 
 def find_angle(

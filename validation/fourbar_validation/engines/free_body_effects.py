@@ -1,7 +1,7 @@
 """Compute the wrench of each load and effect on the free bodies of a four-bar: a table from its kind to its wrench.
 
-Definitions as in docs/scene-file.md, from the numbers of the description alone. Vectors of the plane are
-complex numbers, x + i y.
+Definitions as in docs/scene-file.md, from the numbers of the description alone. Vectors
+of the plane are complex numbers, x + i y.
 """
 
 import math

@@ -291,7 +291,10 @@ def _read_tolerance(stated: Any) -> ErrorBound:
         or not isinstance(reason, str)
         or not reason.strip()
     ):
-        allowed = f'must be "{EQUIVALENCE.name}", or [relative error above 0 and below 1, its reason]'
+        allowed = (
+            f'must be "{EQUIVALENCE.name}", or [relative error above 0 and below 1, its'
+            " reason]"
+        )
         raise InputError("tolerance", stated, allowed)
     reason = f"{error:g} of the scale: {write_one_line(reason)}"
     return ErrorBound(STATED, reason, error, conditioned=False)

@@ -1,7 +1,7 @@
 """List as data what the engines cannot do: the measured boundary and the reason.
 
-The limits of MuJoCo were measured with 4.0.0 and the default `Settings`; a test measures both sides of each again, so
-an engine that moves one is noticed.
+The limits of MuJoCo were measured with 4.0.0 and the default `Settings`; a test
+measures both sides of each again, so an engine that moves one is noticed.
 """
 
 import math
@@ -26,41 +26,44 @@ class Boundary(NamedTuple):
 
 
 NO_PUSH = (
-    "a force at a point drives, and the file that is simulated drives bar 2: the inverse "
-    "dynamics of the same program solve for the force"
+    "a force at a point drives, and the file that is simulated drives bar 2: the"
+    " inverse dynamics of the same program solve for the force"
 )
 """Reason of a simulation to refuse a `PointDrive`."""
 NEAREST_TOGGLE = Boundary(
     "|sin(theta_4 - theta_3)|, least",
     0.05,
     "",
-    "below 0.05 bars 3 and 4 speed up faster than the time step follows: torque 1e-5 wrong at 0.1, 1e-2 at 0.03, "
-    "data reset at 0.01",
+    "below 0.05 bars 3 and 4 speed up faster than the time step follows: torque 1e-5"
+    " wrong at 0.1, 1e-2 at 0.03, data reset at 0.01",
 )
 FASTEST = Boundary(
     "omega_2, greatest",
     3e4,
     "rad/s",
-    "beyond 3e4 rad/s accelerations pass mjMAXVAL = 1e10, which MuJoCo takes for a bad state and resets",
+    "beyond 3e4 rad/s accelerations pass mjMAXVAL = 1e10, which MuJoCo takes for a bad"
+    " state and resets",
 )
 SLOWEST = Boundary(
     "a omega_2^2, least",
     1e-10,
     "m/s^2",
-    "below 1e-10 m/s^2 the accelerations of the crank drown in the constraint solver's rounding",
+    "below 1e-10 m/s^2 the accelerations of the crank drown in the constraint solver's"
+    " rounding",
 )
 HEAVIEST = Boundary(
     "loads and weights / inertial forces, greatest",
     1e10,
     "",
-    "loads and weights beyond 1e10 times the inertial forces open the soft loop, for MuJoCo keeps a softness of 1e-15: "
-    "the gap grows as their ratio",
+    "loads and weights beyond 1e10 times the inertial forces open the soft loop, for"
+    " MuJoCo keeps a softness of 1e-15: the gap grows as their ratio",
 )
 NEAREST_CENTRE = Boundary(
     "distance of a mass centre from the bar's first pin, least but 0",
     2e-6,
     "m",
-    "a centre nearer than about 1e-6 m to its pin is silently taken to lie on it (the compiler's sameframe)",
+    "a centre nearer than about 1e-6 m to its pin is silently taken to lie on it (the"
+    " compiler's sameframe)",
 )
 LIGHTEST = Boundary(
     "mass or inertia of a moving bar, least",
@@ -73,7 +76,8 @@ PROXIMAL = Boundary(
     "mu of the proximal iteration, least",
     0.0,
     "",
-    "the third row of the planar loop is redundant: without proximal regularisation every number is NaN",
+    "the third row of the planar loop is redundant: without proximal regularisation"
+    " every number is NaN",
     "pinocchio-forward",
 )
 LIMITS = (

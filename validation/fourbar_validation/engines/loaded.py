@@ -220,7 +220,8 @@ class Loaded(EngineBars, Protocol):
     def settled(self, balanced: Callable[[], dict[str, Any]]) -> dict[str, Any]:
         """Solve for pin forces and torque that balance what acts, by name; nothing where friction jams.
 
-        Effects that depend on the load of a pin are given the loads of the pass before, until they repeat.
+        Effects that depend on the load of a pin are given the loads of the pass before,
+        until they repeat.
         """
         self.pin_loads, before = {}, math.inf
         forces = balanced()

@@ -62,7 +62,8 @@ Angles = tuple[float, float, float]
 """Turns of bar 2 at O2, of bar 3 against bar 2 at A, of bar 4 at O4, rad."""
 CLOSING = {2: (3, 4), 3: (2, 4), 4: (3, 2)}
 """The two bars that close the loop, by the commanded bar. In this order the sine between them is the branch's, and
-they stand on the diagonal between their free ends as bars 3 and 4 do from A to O4; bar 2 from A back to O2."""
+they stand on the diagonal between their free ends as bars 3 and 4 do from A to O4; bar 2 from A back to O2.
+"""
 
 
 class Assembler:
@@ -90,10 +91,12 @@ class Assembler:
         held = self.along * complex(math.cos(theta), math.sin(theta))
         diagonal = self.ground + held if bar == 4 else self.ground - held
         e, phi = cmath.polar(diagonal)
-        # the gap with a bar held is stationary only where the others lie along the diagonal: this is its least value
+        # the gap with a bar held is stationary only where the others lie along the
+        # diagonal: this is its least value
         if max(e - (near + far), abs(near - far) - e) > closed:
             return None
-        # the triangle as measured is the nearest start, also where a bar is a millionth of the others
+        # the triangle as measured is the nearest start, also where a bar is a millionth
+        # of the others
         triangle = (
             _compute_triangle_angle(e, near, far),
             _compute_triangle_angle(e, far, near),
@@ -116,7 +119,8 @@ class Assembler:
                 return assembled
         if max(e - (near + far), abs(near - far) - e) < -closed:
             raise ArithmeticError(
-                f"the loop closes at theta_{bar} = {theta!r}, but Newton's method does not find it"
+                f"the loop closes at theta_{bar} = {theta!r}, but Newton's method does"
+                " not find it"
             )
         return None
 
@@ -135,9 +139,10 @@ def close_gap(
 ) -> Angles | None:
     """Close the gap with a bar held, never leaving the branch.
 
-    The determinant of the gap's derivative by the angles of the others, for bar 2 -b c sin(theta_4 - theta_3), has the
-    branch's sign. A step is halved until the gap falls and the sign is kept; the last one is taken where
-    nothing smaller than `closed` (m) falls any further.
+    The determinant of the gap's derivative by the angles of the others, for bar 2 -b c
+    sin(theta_4 - theta_3), has the branch's sign. A step is halved until the gap falls
+    and the sign is kept; the last one is taken where nothing smaller than `closed` (m)
+    falls any further.
     """
     theta_3 = q[0] + q[1]
 

@@ -43,7 +43,8 @@ class PinocchioTree(Tree):
                 FIRST_PIN[part.bar],
             )
             self.joint[part.bar] = joint
-            # nothing is appended, no frame either: below 2.2e-16 kg the sum of two inertias has another mass centre
+            # nothing is appended, no frame either: below 2.2e-16 kg the sum of two
+            # inertias has another mass centre
             about_g = np.diag([0.0, 0.0, part.inertia])
             model.inertias[joint] = pin.Inertia(
                 part.mass, np.array([*part.centre, 0.0]), about_g
@@ -58,7 +59,8 @@ class PinocchioTree(Tree):
         self.data = data = model.createData()
         self.q = np.zeros(3)
         self.external = pin.StdVec_Force([pin.Force.Zero()] * model.njoints)
-        # the engine's own memory, read and written in place: to look it up again costs more than a pass of the engine
+        # the engine's own memory, read and written in place: to look it up again costs
+        # more than a pass of the engine
         self.at: dict[str, Array] = {
             name: data.oMf[frame].translation[:2] for name, frame in self.frame.items()
         }
@@ -160,10 +162,12 @@ def _place_at(x: float, y: float) -> Any:
 NAME = "pinocchio-forward"
 TIME_CONSTANT_STEPS = 10.0
 """Time constant of Baumgarte's stabilisation of a free motion, in timesteps: with 30 the loop is lost at a change point
-from h = 5 ms on."""
+from h = 5 ms on.
+"""
 PROXIMAL = (1e-14, 1e-8, 10)
 """Accuracy, mu, iterations. With the default mu = 0 every acceleration is NaN: of the three rows of the closure only
-two are independent in the plane."""
+two are independent in the plane.
+"""
 Acceleration = Callable[[Array, Array], Array]
 
 

@@ -2,15 +2,17 @@
 
     predicted = eps (R sum_i w_i |dy/dx_i| + reach sum_j |dy/dz_j|),
 
-the first-order change of a result y, at this very position and for this very quantity, when every
-stored input x_i (lengths, angles, masses, loads, the command) moves in its last digit, and when the
-loop opens with the speed and the acceleration, and the bars get the couples, that rounding leaves in
-an engine whose lever arms are differences of coordinates as long as `reach` (z_j, one rounding of them).
-Where the first order of a torque vanishes, the product of two first orders is what remains: the error of a
-force times that of its lever arm.
+the first-order change of a result y, at this very position and for this very quantity,
+when every stored input x_i (lengths, angles, masses, loads, the command) moves in its
+last digit, and when the loop opens with the speed and the acceleration, and the bars
+get the couples, that rounding leaves in an engine whose lever arms are differences of
+coordinates as long as `reach` (z_j, one rounding of them). Where the first order of a
+torque vanishes, the product of two first orders is what remains: the error of a force
+times that of its lever arm.
 
-It replaces K eps/condition where no power of a sine is the right law: near change points, where a
-torque cancels, and for forces near a toggle, which a law in s^2 would excuse too much.
+It replaces K eps/condition where no power of a sine is the right law: near change
+points, where a torque cancels, and for forces near a toggle, which a law in s^2 would
+excuse too much.
 """
 
 import math
@@ -38,7 +40,8 @@ if TYPE_CHECKING:
 
 FIRST_ORDER = 0.1
 """Limit of first-order prediction. Angles uncertain by this part of the sine that everything divides by leave speeds,
-forces and the torque undetermined; the torque's own first order can cancel."""
+forces and the torque undetermined; the torque's own first order can cancel.
+"""
 
 
 def predict_from_data(
@@ -99,9 +102,10 @@ def predict_error(
 ) -> Array:
     """Predict the absolute error of a quantity at each position, or at those of a mask, (n,).
 
-    With `carried` the accelerations of the bars are differences of others as large as the fastest bar's at `reach`.
-    NaN where the loop does not close. Infinite at a singular position, where the
-    equations have no answer, and where rounding decides whether the loop closes.
+    With `carried` the accelerations of the bars are differences of others as large as
+    the fastest bar's at `reach`. NaN where the loop does not close. Infinite at a
+    singular position, where the equations have no answer, and where rounding decides
+    whether the loop closes.
     """
     n, (omega, alpha) = len(command.theta_2), list_speeds(command)
     command = with_signs(scene.linkage, command)
@@ -139,7 +143,8 @@ class Sensitivities(NamedTuple):
     """Sensitivity to the data, |y| + sum w_i |dy/dx_i|; for the condition, its value."""
     loop: dict[str, float]
     """Change by a loop that opens at its fastest bar's speed and acceleration times 1 m, and by couples on the bars of
-    the strongest pin force times 1 m."""
+    the strongest pin force times 1 m.
+    """
     carried: dict[str, float]
     """Change by couples on the bars of the heaviest bar's inertial force at 1 m of the fastest bar, times 1 m."""
 

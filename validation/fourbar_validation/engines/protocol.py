@@ -1,7 +1,8 @@
 """Scenes, commands and answers as JSON: what a judge sends to an engine outside, and what comes back.
 
-SI units and radians. A scene travels as it is stated, a command holds what is commanded and nothing that the formulas
-computed; null stands where there is no value. docs/protocol.md is the contract.
+SI units and radians. A scene travels as it is stated, a command holds what is commanded
+and nothing that the formulas computed; null stands where there is no value.
+docs/protocol.md is the contract.
 """
 
 import math
@@ -30,7 +31,8 @@ PROTOCOL = 3
 """Number of the contract; a change that an engine must know of raises it."""
 FURTHEST = 0.1
 """rad, and part of the greatest speed and acceleration: a motion that ends further from the command than this answers
-another question."""
+another question.
+"""
 TABLES = ("lengths", "bars", "drive", "loads", "effects")
 KINDS_OF_COMMAND = (*COMMANDS.values(), STROKE_COMMAND)
 OF_RELEASED = ("theta_2", "omega_2", "energy", "terms")
@@ -55,7 +57,8 @@ class _Numbers(Reader):
 def scene_to_json(scene: Scene) -> dict[str, Any]:
     """Write lengths, bars, drive, loads and effects of a scene; InputError for an effect that no scene file holds.
 
-    Every place is a pair from its bar's first pin, but for the arm of a load. A bar has its mass, whatever states it.
+    Every place is a pair from its bar's first pin, but for the arm of a load. A bar has
+    its mass, whatever states it.
     """
     bars: dict[str, Any] = {
         BAR_NAMES[number]: Bar(bar.length, find_mass(bar), bar.inertia, bar.centre)
@@ -271,7 +274,8 @@ def _make_array(values: Iterable[Any]) -> Array | None:
         array = np.array(values, dtype=float)
     except OverflowError:  # an integer beyond the doubles
         return None
-    # a number beyond the doubles reads as infinity, and NaN is no JSON: no value is null
+    # a number beyond the doubles reads as infinity, and NaN is no JSON: no value is
+    # null
     return (
         array if np.isfinite(array).sum() == len(values) - values.count(None) else None
     )
@@ -320,7 +324,8 @@ def _write_array(array: Array) -> list[Any]:
 def answer_from_json(engine: str, command: Command, data: Any) -> Answer:
     """Read and check what an engine answered to a command.
 
-    Raises InputError for what is no answer, and EngineError with the engine's words where it broke down.
+    Raises InputError for what is no answer, and EngineError with the engine's words
+    where it broke down.
     """
     data = _read_reply(data)
     setting = _read_text("setting", data.get("setting", "exact"))
@@ -403,7 +408,10 @@ def _read_values(
 ) -> Array:
     """Read n numbers, or n pairs of them; null becomes NaN."""
     pairs = name in vectors
-    wanted = f"must be a list of {n} {'pairs [x, y]' if pairs else 'numbers'}, null where there is no value"
+    wanted = (
+        f"must be a list of {n} {'pairs [x, y]' if pairs else 'numbers'}, null where"
+        " there is no value"
+    )
     if not isinstance(value, list) or len(value) != n:
         raise InputError(f"{table}.{name}", value, wanted)
     if pairs:
@@ -491,7 +499,8 @@ def require_near(made: Command, command: Command) -> None:
         0.0 if x is None else float(np.abs(x).max())
         for x in (command.speed, command.acceleration)
     )
-    # the positions of a command are independent; an engine that runs through time is faster by what accelerates it
+    # the positions of a command are independent; an engine that runs through time is
+    # faster by what accelerates it
     faster = (
         float(np.sqrt(1.0 + 2.0 * acceleration * np.ptp(command.angle) / speed**2))
         if speed
@@ -513,7 +522,10 @@ def read_setting(data: Any) -> dict[str, Any]:
     """Read the setting of a question, none where it is left out; InputError names what is wrong."""
     if data is None:
         return {}
-    allowed = "must be an object with name, and steps_per_turn (a whole number above 0) or error (above 0, below 1)"
+    allowed = (
+        "must be an object with name, and steps_per_turn (a whole number above 0) or"
+        " error (above 0, below 1)"
+    )
     checks = {
         "name": lambda value: isinstance(value, str),
         "steps_per_turn": lambda value: type(value) is int and value > 0,

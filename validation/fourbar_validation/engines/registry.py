@@ -76,7 +76,8 @@ class Engine:
     """True if the engine's own residuals predict the errors to be expected."""
     nearby: bool = False
     """True if it answers at the angle that `Command.remainder` completes, so that where an error is beyond the
-    tolerance it can answer again within the rounding of theta_2."""
+    tolerance it can answer again within the rounding of theta_2.
+    """
     stated: bool = True
     """True if an exact engine also checks what the formulas state of the linkage, independently of its motion."""
     code: str = ""
@@ -88,9 +89,11 @@ class Engine:
         """Name everything that its answers and verdicts depend on, alike in every process."""
         values = (getattr(self, part.name) for part in fields(self))
         return ", ".join(
-            f"{value.__module__}:{name}"
-            if (name := getattr(value, "__qualname__", ""))
-            else repr(value)
+            (
+                f"{value.__module__}:{name}"
+                if (name := getattr(value, "__qualname__", ""))
+                else repr(value)
+            )
             for value in values
         )
 
@@ -112,7 +115,10 @@ def find_missing(library: str) -> str | None:
     except ModuleNotFoundError as error:
         if error.name == library:
             package = f"pip install {PACKAGE_OF.get(library, library)}"
-            return f"{library} is not installed: {say_install(EXTRA[library]) if library in EXTRA else package}"
+            return (
+                f"{library} is not installed:"
+                f" {say_install(EXTRA[library]) if library in EXTRA else package}"
+            )
         return _find_broken(library, error)
     except (
         Exception,
@@ -127,11 +133,15 @@ def _find_broken(library: str, error: BaseException) -> str:
 
 
 ONE_BY_ONE = (
-    "each position by itself, in Python: Newton on its own gap, its own speeds and accelerations, then inverse "
-    "dynamics with the loop's multipliers: pin forces and torque"
+    "each position by itself, in Python: Newton on its own gap, its own speeds and"
+    " accelerations, then inverse dynamics with the loop's multipliers: pin forces and"
+    " torque"
 )
 WORK = {
-    "formulas": "all positions in one call on arrays: angles, speeds, accelerations, pin forces and torque",
+    "formulas": (
+        "all positions in one call on arrays: angles, speeds, accelerations, pin forces"
+        " and torque"
+    ),
     **dict.fromkeys(
         (
             "pinocchio-inverse",
@@ -142,11 +152,19 @@ WORK = {
         ),
         ONE_BY_ONE,
     ),
-    "mujoco-simulated": "one motion: every position assembled, the model compiled, Runge-Kutta steps from position to "
-    "position (the fewer positions, the dearer each), then pin forces and torque read",
-    "free-body": "all positions in one call on arrays: Newton on the closure, speeds and accelerations, thirteen "
-    "equations each for pin forces and torque",
-    "ball-arithmetic": "each position by itself, in Python, in many digits with an error bound: pin forces and torque",
+    "mujoco-simulated": (
+        "one motion: every position assembled, the model compiled, Runge-Kutta steps"
+        " from position to position (the fewer positions, the dearer each), then pin"
+        " forces and torque read"
+    ),
+    "free-body": (
+        "all positions in one call on arrays: Newton on the closure, speeds and"
+        " accelerations, thirteen equations each for pin forces and torque"
+    ),
+    "ball-arithmetic": (
+        "each position by itself, in Python, in many digits with an error bound: pin"
+        " forces and torque"
+    ),
 }
 """Work of each engine, by its name: the times that are compared are not for the same work."""
 OF_A_POSITION = tuple(
@@ -267,7 +285,8 @@ def make_demands(
 ) -> Demands:
     """Hold an answer to the engine's tolerance and quantities, with the errors predicted for it at a command.
 
-    `formulas`: their solution at the command, with which an engine that can answers again within theta_2's rounding.
+    `formulas`: their solution at the command, with which an engine that can answers
+    again within theta_2's rounding.
     """
     nearby = None if formulas is None else make_nearby(engine, scene, command, formulas)
     method = ""
@@ -309,10 +328,12 @@ def make_nearby(
 ) -> Nearby | None:
     """Give what answers within the rounding of the theta_2 that are stated, if the engine does.
 
-    Near a limit position the last digits of theta_2 decide sin(theta_4 - theta_3), and with it every other number:
-    once they are chosen such that this sine is that of the formulas, all the others have their digits.
+    Near a limit position the last digits of theta_2 decide sin(theta_4 - theta_3), and
+    with it every other number: once they are chosen such that this sine is that of the
+    formulas, all the others have their digits.
 
-    A drive on bar 3 or 4 has poles of its own, which another theta_2 for the same sine does not correct.
+    A drive on bar 3 or 4 has poles of its own, which another theta_2 for the same sine
+    does not correct.
     """
     by_input = scene.drive_bar == 2 and command.bar == 2
     if (

@@ -75,7 +75,8 @@ def choose_engines(
 ) -> tuple[Engine, ...]:
     """Choose the engines named in a comma-separated list, and every guest.
 
-    Without a list these are all of the harness, and those of the lab that are installed.
+    Without a list these are all of the harness, and those of the lab that are
+    installed.
     """
     table = fill_table() if table is None else table
     if names is None:

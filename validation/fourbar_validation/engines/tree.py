@@ -1,12 +1,13 @@
 """The bars of a four-bar opened at pin B, as a tree of an engine, and what follows from the few numbers that it gives.
 
-Coordinates q = (turn of bar 2 at O2, of bar 3 against bar 2 at A, of bar 4 at O4). With g(q) = B on
-bar 3 minus B on bar 4 and J = dg/dq the loop holds where g = 0, J v = 0, J a + (dJ/dt) v = 0, and
+Coordinates q = (turn of bar 2 at O2, of bar 3 against bar 2 at A, of bar 4 at O4). With
+g(q) = B on bar 3 minus B on bar 4 and J = dg/dq the loop holds where g = 0, J v = 0, J
+a + (dJ/dt) v = 0, and
 
     [J^T e_drive] [lambda; T] = tau(q, v, a),
 
-lambda = F43 and e_drive = the derivative of the driven bar's rotation, or of the stroke of a linear drive. Every number
-comes from the engine.
+lambda = F43 and e_drive = the derivative of the driven bar's rotation, or of the stroke
+of a linear drive. Every number comes from the engine.
 """
 
 from collections.abc import Iterable
@@ -44,8 +45,9 @@ class Tree(Loaded, Protocol):
     """Bars opened at pin B; the engine gives points, Jacobians, accelerations, inverse dynamics and joint forces."""
 
     own: str = (
-        "assembly (Newton on its own gap), velocities (own Jacobian), accelerations (own dJ/dt v), "
-        "inverse dynamics, effects from its own state, loop multipliers, pin forces"
+        "assembly (Newton on its own gap), velocities (own Jacobian), accelerations"
+        " (own dJ/dt v), inverse dynamics, effects from its own state, loop"
+        " multipliers, pin forces"
     )
     turns: dict[int, Array]
     """Derivatives of the bars' rotations by the coordinates, constant in the plane."""
@@ -232,8 +234,9 @@ def solve_closed(
 def solve_multipliers(jacobian: Array, turn: Array, needed: Array) -> Array:
     """Solve [J^T turn] [lambda; T] = tau, (3,); LinAlgError where no torque on that bar balances tau.
 
-    By Cramer's rule: of bar 2 the determinant is that of `solve_closed` to the last digit: there are forces wherever
-    there are speeds, as far as rounding leaves them digits; elimination may find the matrix singular there.
+    By Cramer's rule: of bar 2 the determinant is that of `solve_closed` to the last
+    digit: there are forces wherever there are speeds, as far as rounding leaves them
+    digits; elimination may find the matrix singular there.
     """
     (a, b, c), (d, e, f) = jacobian.tolist()
     (p, q, r), (x, y, z) = turn.tolist(), needed.tolist()

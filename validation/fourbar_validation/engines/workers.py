@@ -1,6 +1,7 @@
 """A function over many items by Pebble's processes: the same results whatever their number.
 
-Each item is a task with a limit of time. A worker that dies or hangs costs the item that it was at.
+Each item is a task with a limit of time. A worker that dies or hangs costs the item
+that it was at.
 """
 
 from collections import deque
@@ -24,9 +25,10 @@ IN_FLIGHT = 4
 LOCKED = 10.0
 """Seconds for which a worker waits for the pipe that all workers share.
 
-A worker that is killed while it reads or writes there leaves the pipe locked for good: the
-others then wait twice as long, and the run ends and can be resumed. A message takes
-milliseconds."""
+A worker that is killed while it reads or writes there leaves the pipe locked for good:
+the others then wait twice as long, and the run ends and can be resumed. A message takes
+milliseconds.
+"""
 Chunk = tuple[int, Sequence[Any]]
 """Number and items."""
 Attempt = Callable[[Any], Any]

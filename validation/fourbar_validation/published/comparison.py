@@ -99,15 +99,18 @@ def check(show_all: bool) -> int:
     console.print(total)
     misprints = sums[2] - reproduced - len(unexplained)
     summary = (
-        "A figure is rounded or truncated if ours, rounded or cut to its digits, equals it. "
-        f"{sums[2]} figures differ: the errata named reproduce {reproduced} of them digit for digit, and "
-        f"{misprints} are misprints."
+        "A figure is rounded or truncated if ours, rounded or cut to its digits,"
+        f" equals it. {sums[2]} figures differ: the errata named reproduce {reproduced}"
+        f" of them digit for digit, and {misprints} are misprints."
     )
     click.echo(click.wrap_text(summary, WIDTH) + "\n")
     console.print("The errata met above (all: errata.toml of published/):")
     for name, erratum in ERRATA.items():
         if met[name]:
-            text = f"#{name} {erratum.where}: printed {erratum.printed}. Right: {erratum.right}. "
+            text = (
+                f"#{name} {erratum.where}: printed {erratum.printed}. Right:"
+                f" {erratum.right}. "
+            )
             text += f"Why: {erratum.derivation}. Effect: {erratum.effect}."
             click.echo(click.wrap_text(text, WIDTH, "", "    "))
     if unexplained:
@@ -129,8 +132,8 @@ HEAD = (
 def list_ladder_rows() -> list[tuple[str, ...]]:
     """List the rows from our answer to the two published ones, error by error, each of these with its printed figures.
 
-    The first row is right: 309.309 N cm and (7.033, -2.121) N. The last two are what the manual and
-    section 5.7 print: 308.804 N cm and (161.418, -156.506) N.
+    The first row is right: 309.309 N cm and (7.033, -2.121) N. The last two are what
+    the manual and section 5.7 print: 308.804 N cm and (161.418, -156.506) N.
     """
     source = read_printed()["published"]
     tables = {

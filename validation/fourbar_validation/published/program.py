@@ -1,7 +1,8 @@
 """The thesis's own program: its 13 unknowns, its units, and its errors, each behind a switch.
 
-Source: I. Linares Mendoza, "Analisis cinematico y dinamico asistido por computadora de mecanismos de
-cuatro barras", UNAM FES Cuautitlan, sections 4.12 and 5.7 and the program's tables in the manual.
+Source: I. Linares Mendoza, "Analisis cinematico y dinamico asistido por computadora de
+mecanismos de cuatro barras", UNAM FES Cuautitlan, sections 4.12 and 5.7 and the
+program's tables in the manual.
 """
 
 import json
@@ -217,8 +218,9 @@ def round_off(
 ) -> dict[str, float]:
     """Bound how far an elimination of these equations may be off in each unknown, whoever makes it: N and N cm.
 
-    13 eps |A^-1| (|A| |x| + |b|): each number of the system carries up to as many roundings as there are
-    unknowns, from its own making and from the elimination (Higham, Accuracy and Stability, 7.2 and 9.3).
+    13 eps |A^-1| (|A| |x| + |b|): each number of the system carries up to as many
+    roundings as there are unknowns, from its own making and from the elimination
+    (Higham, Accuracy and Stability, 7.2 and 9.3).
     """
     matrix, right = make_equations(errors, inertias)
     unknowns = np.linalg.solve(matrix, right)

@@ -1,8 +1,8 @@
 """The thesis's printed figures against ours: angles and limit positions, then motion, constants and unknowns.
 
-Sections 2.4, 4.12 and 5.7, table 3.2 and the tables of the manual. Ours come from `fourbar.solve` and
-`fourbar.formulas.mobility`, or from the thesis's formula for a constant that nobody else defines. Units as printed:
-cm, deg, rad/s, cm/s^2, N, N cm.
+Sections 2.4, 4.12 and 5.7, table 3.2 and the tables of the manual. Ours come from
+`fourbar.solve` and `fourbar.formulas.mobility`, or from the thesis's formula for a
+constant that nobody else defines. Units as printed: cm, deg, rad/s, cm/s^2, N, N cm.
 """
 
 import csv

@@ -1,8 +1,9 @@
 """`python -m validation compare` and `accept`, which keeps the rows of every accepted run in one table.
 
-The table is history.parquet, which pandas and DuckDB read: one line per row, and one per time (quantity "time":
-`times_formulas` is the engine's time over that of the formulas on the scene), with the run's date, commit, machine and
-versions in columns of their own (`version_mujoco`).
+The table is history.parquet, which pandas and DuckDB read: one line per row, and one
+per time (quantity "time": `times_formulas` is the engine's time over that of the
+formulas on the scene), with the run's date, commit, machine and versions in columns of
+their own (`version_mujoco`).
 """
 
 import hashlib
@@ -43,7 +44,8 @@ def append(
 ) -> None:
     """Append a run to the table, which is made if there is none.
 
-    A run with the same date and rows is appended once. InputError if the file is damaged or no such table.
+    A run with the same date and rows is appended once. InputError if the file is
+    damaged or no such table.
     """
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -100,9 +102,11 @@ def _write_table(
     run |= {"settings": json.dumps(about.settings, sort_keys=True)}
     run |= {f"version_{name}": version for name, version in about.versions.items()}
     hashes = {
-        scene: hashlib.sha256(
-            json.dumps(dict(entries), sort_keys=True).encode()
-        ).hexdigest()[:16]
+        scene: (
+            hashlib.sha256(
+                json.dumps(dict(entries), sort_keys=True).encode()
+            ).hexdigest()[:16]
+        )
         for scene, entries in about.scenes.items()
     }
     kinds = MADE_OF | {"times_formulas": float}
@@ -245,12 +249,14 @@ def compare(
 ) -> int:
     """Say what changed from OLD (a run's folder, its results.csv, or an accepted name) to NEW.
 
-    Scenes that changed come first, entry by entry; their rows, and those with other settings or at other
-    positions, are named and not compared. What the new run was not asked for is "not run", and no regression.
-    Exit status 1 on a regression: a rule that is weaker than it was (a wider tolerance, another class or reason, a
-    limit that is met earlier), a verdict that got worse, an error that grew beyond round-off and its allowance, a row
-    that was run for and is gone, a new row that fails; and where nothing was compared. Exit status 2 where the runs
-    share fewer than half of their rows.
+    Scenes that changed come first, entry by entry; their rows, and those with other
+    settings or at other positions, are named and not compared. What the new run was not
+    asked for is "not run", and no regression. Exit status 1 on a regression: a rule
+    that is weaker than it was (a wider tolerance, another class or reason, a limit that
+    is met earlier), a verdict that got worse, an error that grew beyond round-off and
+    its allowance, a row that was run for and is gone, a new row that fails; and where
+    nothing was compared. Exit status 2 where the runs share fewer than half of their
+    rows.
     """
     return report_differences(
         find_baseline(old),
@@ -271,8 +277,8 @@ def _require_as_strict(run: Recorded, target: Path) -> None:
         raise InputError(
             "RESULTS",
             str(run.table.parent),
-            f"is held to weaker rules than {accepted.describe()} ({weakened[0]}{more}): "
-            "say --allow-weaker if that is meant",
+            f"is held to weaker rules than {accepted.describe()} ({weakened[0]}{more}):"
+            " say --allow-weaker if that is meant",
         )
 
 
@@ -295,7 +301,8 @@ def accept_command(
 ) -> None:
     """Record RESULTS (a run's folder) as the accepted state that later runs are compared with.
 
-    It is kept in DIR, and its rows are appended to DIR/history.parquet, a table for pandas or DuckDB.
+    It is kept in DIR, and its rows are appended to DIR/history.parquet, a table for
+    pandas or DuckDB.
     """
     folder = results if results.is_dir() else results.parent
     target = folder.absolute().parent / ACCEPTED if to is None else to

@@ -9,7 +9,8 @@ from fourbar_validation.compare.tolerance import EPS, K
 
 ROUND_OFF = K
 """Errors of an exact comparison move freely by this many eps/condition: another compiler, another
-order of summation. A move beyond it is a change of the numbers themselves."""
+order of summation. A move beyond it is a change of the numbers themselves.
+"""
 NOTICEABLE = 1.25
 """An error that is not round-off has changed where it grew or shrank by this factor."""
 
@@ -78,7 +79,8 @@ def compare_row(
 ) -> Change:
     """Compare a row of both runs, or take that of one of them.
 
-    `asked`: whether the new run was to answer it. `differs`: in what the two rows answer different questions, if so.
+    `asked`: whether the new run was to answer it. `differs`: in what the two rows
+    answer different questions, if so.
     """
     round_off = math.nan
     if old is None:

@@ -218,7 +218,10 @@ class Differences:
 def _say_why_not_compared(change: Change, old: Row, new: Row) -> str:
     if change.kind is Kind.OTHER_SETTING:
         return f"{change.key[0]} / {change.key[1]}: {old.setting} -> {new.setting}"
-    return f"scene {change.key[0]} {'changed' if change.kind is Kind.OTHER_SCENE else 'has other positions'}"
+    return (
+        f"scene {change.key[0]}"
+        f" {'changed' if change.kind is Kind.OTHER_SCENE else 'has other positions'}"
+    )
 
 
 def compare_runs(
@@ -256,7 +259,10 @@ def compare_runs(
             _compare_scene(*rows, answering if run_for else set(), scenes.get(scene))
         )
     if older:
-        compared = f"{differences.compared} of {differences.rows} rows are compared: the others are of one run alone"
+        compared = (
+            f"{differences.compared} of {differences.rows} rows are compared: the"
+            " others are of one run alone"
+        )
         differences.notes += [compared, *older]
     return differences
 

@@ -45,7 +45,10 @@ class Group:
         )
         more = ", ..." if len(self.quantities) > 6 else ""
         cause = f", {self.cause}" if self.cause else ""
-        return f"{self.engine}, {self.scenes} of {self.of_scenes} scenes, {self.rows} rows ({names}{more}){cause}"
+        return (
+            f"{self.engine}, {self.scenes} of {self.of_scenes} scenes, {self.rows} rows"
+            f" ({names}{more}){cause}"
+        )
 
 
 class Fault:
@@ -147,7 +150,10 @@ def write_sentence(worse: set[str], exact: set[str]) -> str:
     if len(exact) > 1 and engines >= exact:
         if FORMULAS in worse:
             return "all engines and the identity disagree: the formulas"
-        return "all engines disagree, and the identities hold: the formulas, or what all engines are given"
+        return (
+            "all engines disagree, and the identities hold: the formulas, or what all"
+            " engines are given"
+        )
     if not engines:
         return "only the identities: the formulas, or what is stated of them"
     return f"only {', '.join(sorted(engines))}" + (

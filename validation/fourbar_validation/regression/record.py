@@ -160,7 +160,10 @@ def _require_whole(
                 rows = f"{count_rows(path)} rows"
             except (KeyError, OSError, ValueError):
                 rows = "no rows that can be read"
-            why = f"is damaged: {rows} of {tables[name]['rows']}, and not the SHA-256 that {ABOUT} states"
+            why = (
+                f"is damaged: {rows} of {tables[name]['rows']}, and not the SHA-256"
+                f" that {ABOUT} states"
+            )
         raise InputError(key, str(path), why)
 
 
@@ -248,7 +251,8 @@ class Recorded:
 def open_run(path: Path, key: str = "RESULTS") -> Recorded:
     """Open a run by its folder, or by a results.csv only (then how it was made is unknown).
 
-    Raises InputError where there is no readable table, an empty or a damaged one, or that of an unfinished run.
+    Raises InputError where there is no readable table, an empty or a damaged one, or
+    that of an unfinished run.
     """
     table = path / TABLE if path.is_dir() else path
     long = path / COLUMNS

@@ -193,7 +193,8 @@ def _render(
 def write_junit(diff: Differences) -> str:
     """Write for the test page of a continuous-integration system: one case per row.
 
-    A regression is a failure, and so is a row that fails as it did before; what was not compared is skipped.
+    A regression is a failure, and so is a row that fails as it did before; what was not
+    compared is skipped.
     """
     return write_document(write_verdict(diff), _list_cases(diff))
 

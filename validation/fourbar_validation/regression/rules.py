@@ -34,7 +34,8 @@ LOOSER = 1.0 + 1e-9
 """Factor by which a number of a rule has grown if it is another one."""
 NOTABLE = 10.0
 """Growth of a row's allowance that is printed. The worst position moves with the kernels
-of a processor, and K eps/condition with it: 139 of 2093 allowances grew so."""
+of a processor, and K eps/condition with it: 139 of 2093 allowances grew so.
+"""
 CLASSES = {
     STATED,
     *(bound.cause for bound in (IDENTITY, EQUIVALENCE, SIMULATED, FULL_ACCURACY)),

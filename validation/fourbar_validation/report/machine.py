@@ -41,7 +41,10 @@ def list_versions() -> dict[str, str]:
 
 def name_machine() -> str:
     """Name processor, number of cores and system in one line."""
-    return f"{_find_processor()}, {os.cpu_count()} cores, {platform.system()} {platform.machine()}"
+    return (
+        f"{_find_processor()}, {os.cpu_count()} cores, {platform.system()}"
+        f" {platform.machine()}"
+    )
 
 
 def describe_setup() -> str:

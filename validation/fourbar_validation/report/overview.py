@@ -306,8 +306,9 @@ class Overview:
             )
         if self.with_forces:
             notes.append(
-                f"Torque and pin forces of {self.checked_twice} of {self.with_forces} "
-                "scenes: at least two independent engines compared all of them and agree."
+                f"Torque and pin forces of {self.checked_twice} of {self.with_forces}"
+                " scenes: at least two independent engines compared all of them and"
+                " agree."
             )
         if self.released:
             notes.append("released: angles, energy and speeds alone (no torque acts)")

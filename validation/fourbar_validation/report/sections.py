@@ -12,18 +12,29 @@ from fourbar_validation.scenes.hard_families import FAMILIES
 
 HARD, COST = "hard", "cost"
 """Folders of the hard cases and of the study, in OUT."""
-ALT = "Error of each engine over the distance to a toggle, a pole of T4 and a change point"
+ALT = (
+    "Error of each engine over the distance to a toggle, a pole of T4 and a change"
+    " point"
+)
 CAPTION = (
-    "Error against the formulas, relative to the value itself, towards a singular position. Dotted: the law "
-    "K eps/condition. Band: what rounding was computed to do there, up to ten times that; above it a row fails."
+    "Error against the formulas, relative to the value itself, towards a singular"
+    " position. Dotted: the law K eps/condition. Band: what rounding was computed to do"
+    " there, up to ten times that; above it a row fails."
 )
 MUST = (
     "each family of singular and extreme linkages must come out as its statement says. "
 )
 PICTURES = {
-    "work-precision-torque.svg": "Error of the driving torque over the CPU time of a simulated second",
-    "work-precision-force.svg": "Error of the worst pin force over the CPU time of a simulated second",
-    "orders.svg": "Error of the driving torque and of each pin force over the timestep; a jump is ringed",
+    "work-precision-torque.svg": (
+        "Error of the driving torque over the CPU time of a simulated second"
+    ),
+    "work-precision-force.svg": (
+        "Error of the worst pin force over the CPU time of a simulated second"
+    ),
+    "orders.svg": (
+        "Error of the driving torque and of each pin force over the timestep; a jump is"
+        " ringed"
+    ),
 }
 """Pictures of the study, and what they show."""
 LARGEST = 2_000_000
@@ -132,9 +143,10 @@ def _read_study(folder: Path) -> Section:
                 SectionFigure(alt, f"{alt}.", image=f"data:image/svg+xml;base64,{data}")
             )
     text = (
-        f"What each digit of {folder.name} costs, from the study in {COST}/{folder.name}/. "
-        "Times are those of torque and pin forces at the scene's positions: of MuJoCo with "
-        "the reading of the forces, of an exact engine in a plain loop that also assembles. "
+        f"What each digit of {folder.name} costs, from the study in"
+        f" {COST}/{folder.name}/. Times are those of torque and pin forces at the"
+        " scene's positions: of MuJoCo with the reading of the forces, of an exact"
+        " engine in a plain loop that also assembles. "
     )
     links = [(name, f"{COST}/{folder.name}/{name}") for name in ("cost.md", "cost.csv")]
     return Section(

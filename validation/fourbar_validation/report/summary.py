@@ -96,9 +96,10 @@ FAILURES_KEPT = 1000
 """Lines of a table at the most; everything is in results.csv."""
 TIMED = 1000
 STATEMENT = (
-    f"K = {K:g} for every exact comparison; where eps/condition > {NOTHING_TO_TELL:g} the row is undecided. "
-    "Errors are relative to the largest magnitude over the positions whose condition is at least 0.1; below that "
-    "to the position's own magnitude; angles modulo 2 pi, in rad."
+    f"K = {K:g} for every exact comparison; where eps/condition > {NOTHING_TO_TELL:g}"
+    " the row is undecided. Errors are relative to the largest magnitude over the"
+    " positions whose condition is at least 0.1; below that to the position's own"
+    " magnitude; angles modulo 2 pi, in rad."
 )
 
 
@@ -263,7 +264,10 @@ class Summary:
             f"{row.quantity} of {row.scene} (allowed {row.allowed:.1e})"
             for row in worst
         )
-        return f'{self.loose} of {self.pairs} quantities of a scene are at best "{DEGRADED}"; the widest: {examples}'
+        return (
+            f"{self.loose} of {self.pairs} quantities of a scene are at best"
+            f' "{DEGRADED}"; the widest: {examples}'
+        )
 
     @property
     def good(self) -> bool:
@@ -304,7 +308,8 @@ class Summary:
     def refusals(self) -> list[tuple[str, str, int]]:
         """Return (engine, reason, number of scenes) of declared limits that were met.
 
-        Reasons that differ by their numbers alone are one, with the numbers of the first scene.
+        Reasons that differ by their numbers alone are one, with the numbers of the
+        first scene.
         """
         return [
             (kind[0], self._first_reason[kind], count)

@@ -1,7 +1,8 @@
 """A matplotlib figure as inline SVG: small, with ids of its own, its text as text, in the colours of the page.
 
-Matplotlib draws with the light colours of page.css; in the page each is the custom property that it came from, which
-has a value for dark pages too (Okabe-Ito hues, darkened or lightened until every one has a contrast of 3:1 or more).
+Matplotlib draws with the light colours of page.css; in the page each is the custom
+property that it came from, which has a value for dark pages too (Okabe-Ito hues,
+darkened or lightened until every one has a contrast of 3:1 or more).
 """
 
 import hashlib
@@ -161,5 +162,6 @@ def _name_styles(svg: str) -> str:
 
     svg = STYLE.sub(name, svg)
     rules = "".join(f".{short}{{{style}}}" for style, short in classes.items())
-    # the rule that matplotlib writes for every element would otherwise hold for the whole page
+    # the rule that matplotlib writes for every element would otherwise hold for the
+    # whole page
     return re.sub(r"<style[^>]*>[^<]*</style>", f"<style>{rules}</style>", svg, count=1)

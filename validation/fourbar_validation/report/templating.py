@@ -39,9 +39,11 @@ def render(package: str, name: str, /, **what: object) -> str:
         ),
         "share": write_share,
         "cell": write_cell,
-        "packed": lambda text: base64.b64encode(
-            gzip.compress(text.encode("utf-8"), mtime=0)
-        ).decode(),
+        "packed": (
+            lambda text: base64.b64encode(
+                gzip.compress(text.encode("utf-8"), mtime=0)
+            ).decode()
+        ),
         "colour": lambda engine: f"var({choose_style(engine).variable})",
         "symbol": lambda engine: choose_style(engine).symbol,
     }
@@ -63,11 +65,13 @@ def write_share(value: float) -> str:
     return (
         "0"
         if value == 0.0
-        else "<0.01"
-        if value < 0.01
-        else f"{value:.2f}"
-        if value < 10.0
-        else f"{value:.1e}"
+        else (
+            "<0.01"
+            if value < 0.01
+            else f"{value:.2f}"
+            if value < 10.0
+            else f"{value:.1e}"
+        )
     )
 
 

@@ -26,8 +26,8 @@ MOST_NOTES = 10
 def print_table(summary: Summary, out: Path, *, verbose: bool = False) -> None:
     """Print the verdict, a row of every engine, what is wrong, and the report's path.
 
-    `verbose`: the worst row of every scene and engine too, each row that fails, and each
-    reason for which something was not compared.
+    `verbose`: the worst row of every scene and engine too, each row that fails, and
+    each reason for which something was not compared.
     """
     from rich.console import Console
     from rich.markup import escape
@@ -119,9 +119,11 @@ def _make_worst_table(summary: Summary) -> "Table":
                 write_short(w.row.error),
                 write_short(w.row.allowed),
                 f"{w.used:.2g}",
-                "-"
-                if math.isnan(w.row.theta_2)
-                else f"{math.degrees(w.row.theta_2):.1f}",
+                (
+                    "-"
+                    if math.isnan(w.row.theta_2)
+                    else f"{math.degrees(w.row.theta_2):.1f}"
+                ),
             )
             words = (f"  {escape(w.row.engine)}", escape(w.row.quantity))
             shown.add_row(*words, *numbers, style="" if w.failed == 0 else "bold red")

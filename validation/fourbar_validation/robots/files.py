@@ -1,8 +1,9 @@
 """A robot's file is data: read with limits, and handed on only as what was screened.
 
-Includes are put in place, every mesh is read here and gets a plain name, and what is for the
-eye alone is left out. The text that the engine gets is written anew from the elements that
-were looked at, so nothing can mean one thing to the reader here and another to the engine's.
+Includes are put in place, every mesh is read here and gets a plain name, and what is
+for the eye alone is left out. The text that the engine gets is written anew from the
+elements that were looked at, so nothing can mean one thing to the reader here and
+another to the engine's.
 """
 
 import io
@@ -50,7 +51,8 @@ COUNTS = (
 )
 MOST_ITERATIONS = 1000
 """Upper limit of each count in <option>, ten times the greatest of MuJoCo's defaults: MuJoCo
-already steps while it compiles, and with a tolerance of 0 nothing else may stop a solver."""
+already steps while it compiles, and with a tolerance of 0 nothing else may stop a solver.
+"""
 
 
 def read_robot(path: Path, assets: Path | None = None) -> RobotFile:

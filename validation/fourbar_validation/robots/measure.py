@@ -97,7 +97,8 @@ def _compare(
 ) -> Iterator[InsideError]:
     """Compare an answer with the formulas at its own theta_2, omega_2 and alpha_2.
 
-    Where dry friction reverses the forces on both sides of the jump are right, and nothing is judged.
+    Where dry friction reverses the forces on both sides of the jump are right, and
+    nothing is judged.
     """
     rows = answer.rows
     motion = loop.scene.motion

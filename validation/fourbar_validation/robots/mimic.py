@@ -63,7 +63,8 @@ def measure_mimic(
 ) -> MimicReport:
     """Hold the polynomial of a joint against the loop of a scene over its motion.
 
-    The leader's position is taken as theta_2, and the follower's zero is theta_4 where the leader is at its own.
+    The leader's position is taken as theta_2, and the follower's zero is theta_4 where
+    the leader is at its own.
 
     Parameters
     ----------
@@ -71,7 +72,8 @@ def measure_mimic(
 
     Raises
     ------
-    InputError : no such equality, or the loop does not close at the zero of the file or over the motion.
+    InputError : no such equality, or the loop does not close at the zero of the file or
+    over the motion.
     """
     file = read_robot(path, assets)
     with examine_guarded(path) as examined:
@@ -121,7 +123,8 @@ def _follow(scene: Scene, theta_2: Array, branch: int) -> tuple[Array, Array]:
         raise InputError(
             "motion.theta_2",
             f"{angle:.6g} deg",
-            "the loop does not close there; the motion and the zero of the file's joints must be in its range",
+            "the loop does not close there; the motion and the zero of the file's"
+            " joints must be in its range",
         )
     assert solution.omega_4 is not None
     return np.unwrap(solution.theta_4), np.asarray(solution.omega_4)
@@ -146,7 +149,8 @@ def fit_squares(x: Array, y: Array, degree: int) -> tuple[float, ...]:
 def fit_minimax(x: Array, y: Array, degree: int) -> tuple[float, ...]:
     """Fit a polynomial with the smallest largest error, lowest power first.
 
-    minimize t subject to |p(x_i) - y_i| <= t, a linear program in the coefficients of Chebyshev's polynomials.
+    minimize t subject to |p(x_i) - y_i| <= t, a linear program in the coefficients of
+    Chebyshev's polynomials.
     """
     from scipy.optimize import linprog
 
@@ -176,8 +180,9 @@ def show_mimic(report: MimicReport) -> None:
     equality, own = report.equality, report.file
     low, high = (f"{math.degrees(angle):.6g}" for angle in report.swing)
     _say(
-        f"{equality.follower} follows {equality.leader} by polycoef {_write(equality.coefficients)}; "
-        f"theta_2 is {equality.leader}, from {low} to {high} deg"
+        f"{equality.follower} follows {equality.leader} by polycoef"
+        f" {_write(equality.coefficients)}; theta_2 is {equality.leader}, from {low} to"
+        f" {high} deg"
     )
     _say(
         f"largest error of the angle: {_deg(own.angle)} deg through the zero of the "

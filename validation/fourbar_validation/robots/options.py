@@ -18,8 +18,10 @@ _OPTIONS = (
         "--pose",
         metavar="JOINT=ANGLE,...",
         multiple=True,
-        help="Positions of joints with units, like knee=-20deg,slide=3mm; the loops are "
-        "closed again around them.",
+        help=(
+            "Positions of joints with units, like knee=-20deg,slide=3mm; the loops are "
+            "closed again around them."
+        ),
     ),
     click.option(
         "--key",
@@ -35,7 +37,9 @@ _OPTIONS = (
     click.option(
         "--drive",
         metavar="JOINT",
-        help="Hinge on the ground of the loop that is driven (default: that of a motor).",
+        help=(
+            "Hinge on the ground of the loop that is driven (default: that of a motor)."
+        ),
     ),
     click.option(
         "--assets",
@@ -67,7 +71,10 @@ speed_option = click.option(
 torque_option = click.option(
     "--torque",
     metavar="T",
-    help="Torque of the motor, N m or with a unit, under which the gap and the pin forces are printed.",
+    help=(
+        "Torque of the motor, N m or with a unit, under which the gap and the pin"
+        " forces are printed."
+    ),
 )
 
 

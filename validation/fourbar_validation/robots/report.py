@@ -79,10 +79,10 @@ def _describe_loop(loop: LoopMeasurement) -> Iterator[Block]:
         f"{speed:.4g} rad/s, MuJoCo in the whole robot against the formulas"
     )
     yield (
-        f"{loop.held} other degrees of freedom are held: at single states by "
-        "generalized forces, through time (once the loop has settled) by armature, a "
-        f"tenth of which changes the errors by {loop.influence:.1g}; contacts, joint limits and "
-        "motors are off"
+        f"{loop.held} other degrees of freedom are held: at single states by"
+        " generalized forces, through time (once the loop has settled) by armature, a"
+        f" tenth of which changes the errors by {loop.influence:.1g}; contacts, joint"
+        " limits and motors are off"
     )
     if loop.switched_off:
         names = ", ".join(loop.switched_off)
@@ -90,8 +90,8 @@ def _describe_loop(loop: LoopMeasurement) -> Iterator[Block]:
     left_out = find_left_out(loop)
     size = f"{left_out:.1e}" if left_out > ROUND_OFF else f"less than {ROUND_OFF:g}"
     yield (
-        f"with rigid pins the robot differs from the formulas by {size} of the largest: "
-        "what the scene leaves out; the rest is MuJoCo's soft constraint"
+        f"with rigid pins the robot differs from the formulas by {size} of the largest:"
+        " what the scene leaves out; the rest is MuJoCo's soft constraint"
     )
     yield TextTable(ERRORS, [error.cells() for error in list_errors(loop)])
     if loop.through_time is None:
@@ -109,9 +109,10 @@ def _describe_loop(loop: LoopMeasurement) -> Iterator[Block]:
     for name in sorted(sticking):
         count = sum(name in row.sticking for row in loop.states.rows)
         yield (
-            f"note: {loop.name}: at {count} of {len(loop.states.rows)} states the dry "
-            f"friction of {name} is less than its couple: it turns too slowly there for "
-            "MuJoCo's soft friction (solreffriction and solimpfriction of the joint)"
+            f"note: {loop.name}: at {count} of {len(loop.states.rows)} states the dry"
+            f" friction of {name} is less than its couple: it turns too slowly there"
+            " for MuJoCo's soft friction (solreffriction and solimpfriction of the"
+            " joint)"
         )
     yield from _describe_torn(loop)
     for remark in loop.remarks:
@@ -144,7 +145,8 @@ def describe_advice(advice: SettingsAdvice) -> Iterator[Block]:
         yield f"Type this for an error within {advice.wanted:g}:"
     else:
         yield (
-            f"None of {advice.tried} combinations was within {advice.wanted:g}; the best:"
+            f"None of {advice.tried} combinations was within {advice.wanted:g}; the"
+            " best:"
         )
     for element in advice.typed:
         yield Typed(element)

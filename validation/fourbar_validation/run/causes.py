@@ -22,7 +22,8 @@ numbers: it was made in another order of summation than the hypothesis."""
 def find_causes(question: Question, answer: Answer, tolerance: ErrorBound) -> list[str]:
     """List the mistakes that explain all that differs in an answer, the simplest first.
 
-    The scene is stated as an engine is told it, with every place from the bar's first pin.
+    The scene is stated as an engine is told it, with every place from the bar's first
+    pin.
     """
     at = answer.at
     if at is None or at.commanded != "theta_2" or answer.assembled is None:
@@ -49,8 +50,8 @@ def find_causes(question: Question, answer: Answer, tolerance: ErrorBound) -> li
 def make_table(answer: Answer, tolerance: ErrorBound) -> TheirTable:
     """Make a table of an engine's numbers, as if they had been read from a file.
 
-    Each is taken to be rounded to what the engine is held to, so that a mistake need not
-    explain more of it.
+    Each is taken to be rounded to what the engine is held to, so that a mistake need
+    not explain more of it.
     """
     assert answer.at is not None and answer.assembled is not None
     rows = slice(MOST_POSITIONS)

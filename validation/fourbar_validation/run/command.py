@@ -63,8 +63,11 @@ from fourbar_validation.run.run import run
 @click.option(
     "--type",
     metavar="TYPES",
-    help=f"Types of the random linkages, comma-separated: {ALL_TYPES} (all); or uneven: with every ratio over ten "
-    "decades and every effect but loaded friction, for exact engines.",
+    help=(
+        f"Types of the random linkages, comma-separated: {ALL_TYPES} (all); or uneven:"
+        " with every ratio over ten decades and every effect but loaded friction, for"
+        " exact engines."
+    ),
 )
 @click.option(
     "--workers",
@@ -82,13 +85,19 @@ from fourbar_validation.run.run import run
     "--guest",
     metavar="MODULE:CLASS|COMMAND",
     multiple=True,
-    help="An engine of your own, a class or a program, to judge with the others (docs/protocol.md).",
+    help=(
+        "An engine of your own, a class or a program, to judge with the others"
+        " (docs/protocol.md)."
+    ),
 )
 @click.option(
     "--time-limit",
     type=click.FloatRange(min=0.0, min_open=True),
     metavar="SECONDS",
-    help="End a guest that takes longer for one answer; left out: a minute, and more for many positions.",
+    help=(
+        "End a guest that takes longer for one answer; left out: a minute, and more for"
+        " many positions."
+    ),
 )
 @click.option(
     "--sample-derived",
@@ -96,13 +105,18 @@ from fourbar_validation.run.run import run
     default=SAMPLE,
     show_default=True,
     metavar="N",
-    help="Judge studies, derivatives, bounds, equilibria, SDF and USD in this many scenes, evenly chosen.",
+    help=(
+        "Judge studies, derivatives, bounds, equilibria, SDF and USD in this many"
+        " scenes, evenly chosen."
+    ),
 )
 @click.option(
     "--part",
     metavar="K/N",
-    help="Judge the K-th of N parts alone, into DIR/parts; `collect` puts parts "
-    "together.",
+    help=(
+        "Judge the K-th of N parts alone, into DIR/parts; `collect` puts parts "
+        "together."
+    ),
 )
 @click.option(
     "--verbose",

@@ -1,7 +1,8 @@
 """The formulas' own numbers: the equations that they satisfy, and where they have none.
 
-The equations use the printed results alone (forces, accelerations, torque) and none of the elimination that produced
-them: closure, the sum of forces on the three bars, and the sum of moments about O2.
+The equations use the printed results alone (forces, accelerations, torque) and none of
+the elimination that produced them: closure, the sum of forces on the three bars, and
+the sum of moments about O2.
 """
 
 from collections import Counter
@@ -86,7 +87,8 @@ def check_identities(question: Question) -> Iterator[Row]:
 def _check_sweep(question: Question) -> Row:
     """Check a sweep that the scene leaves open: a whole turn, or one degree short of where the loop just closes.
 
-    At the end of an interval narrower than four degrees it leaves out a quarter of that, which is half of the sweep.
+    At the end of an interval narrower than four degrees it leaves out a quarter of
+    that, which is half of the sweep.
     """
     command, linkage = question.at, question.scene.linkage
     start, stop = float(command.theta_2[0]), float(command.theta_2[-1])
@@ -165,7 +167,8 @@ def _check_sums(question: Question) -> Iterator[Row]:
     first_pins = {2: np.zeros(2), 3: solution.A, 4: O4}
     for number in MOVING_BARS:
         force_on, couple = acting.on(number)
-        # the ground's pull on bars 2 and 4 goes through their pins; between moving bars it cancels
+        # the ground's pull on bars 2 and 4 goes through their pins; between moving bars
+        # it cancels
         resultant = force_on + actions.through.get(
             {2: "O2", 4: "O4"}.get(number, ""), 0.0
         )
@@ -177,14 +180,16 @@ def _check_sums(question: Question) -> Iterator[Row]:
         balance.couple(
             actions.bodies[number - 2].I * getattr(solution, f"alpha_{number}"), -1.0
         )
-    # the forces of the bars that are not driven are solved apart, and the torque is that of virtual work
+    # the forces of the bars that are not driven are solved apart, and the torque is
+    # that of virtual work
     with np.errstate(divide="ignore", invalid="ignore"):
         force_size = balance.forces / (
             find_lever(scene.linkage) * solution.drive_condition
         )
         moment_size = balance.moments / find_condition(drive, scene.linkage, solution)
     judged = solution.status_code == OK
-    # the sense of dry friction at a pin at rest is decided by rounding: not the same here as in the answer
+    # the sense of dry friction at a pin at rest is decided by rounding: not the same
+    # here as in the answer
     judged &= ~question.reversing(IDENTITY.factor)
     yield _check_power(question, drive, judged)
     forces, moments = (
@@ -265,14 +270,18 @@ def _solve_exactly(question: Question) -> tuple[OfSome | None, OfSome | None]:
     )
     loaded = any(effect.loaded_pins for effect in scene.effects)
     return (
-        None
-        if unknown
-        else lambda indices: compute_sines(
-            scene.linkage, select_positions(command, indices)
+        (
+            None
+            if unknown
+            else lambda indices: compute_sines(
+                scene.linkage, select_positions(command, indices)
+            )
         ),
-        (lambda indices: count_solutions(scene, select_positions(command, indices)))
-        if loaded
-        else None,
+        (
+            (lambda indices: count_solutions(scene, select_positions(command, indices)))
+            if loaded
+            else None
+        ),
     )
 
 
@@ -286,8 +295,8 @@ def compare_status(
 
     That a loop does not close is compared by itself where doubles can decide it.
 
-    `sines`: sin(theta_4 - theta_3) in many digits at some positions, NaN where the loop does not close; near 0 it
-    decides whether they are singular. None: nothing is.
+    `sines`: sin(theta_4 - theta_3) in many digits at some positions, NaN where the loop
+    does not close; near 0 it decides whether they are singular. None: nothing is.
     `solutions`: how many solutions loaded friction has at some positions.
     """
     scene, formulas = question.scene, question.solution
@@ -309,7 +318,8 @@ def compare_status(
             formulas.a_G4,
             *formulas.acceleration.values(),
         ]
-        # if everything that the forces need is finite, a missing number is the forces' own
+        # if everything that the forces need is finite, a missing number is the forces'
+        # own
         moves = np.isfinite(np.hstack([a for a in accelerations if a is not None])).all(
             axis=1
         )

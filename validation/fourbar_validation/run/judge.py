@@ -60,7 +60,10 @@ CHECKS = (
     Check(check_blocks),
     Check(
         check_error_bars,
-        needs_theta_2="error bars: balls are asked at theta_2, and `stability --bar` at the other bars",
+        needs_theta_2=(
+            "error bars: balls are asked at theta_2, and `stability --bar` at the other"
+            " bars"
+        ),
     ),
     Check(check_residual),
     Check(check_transformed),
@@ -71,7 +74,9 @@ CHECKS = (
     Check(compare_answers),
     Check(
         compare_statements,
-        needs_theta_2="statements of the linkage: engines are led to its limits by theta_2",
+        needs_theta_2=(
+            "statements of the linkage: engines are led to its limits by theta_2"
+        ),
     ),
     Check(check_mjcf, needs_theta_2="MJCF as derived: it drives bar 2"),
     Check(compare_inertia),
@@ -146,8 +151,9 @@ def judge(
 ) -> Record:
     """Make every check of one scene.
 
-    `order`: measure the observed order of what is simulated, which takes two more simulations and changes no row.
-    `derived`: check the functions other than `solve` too (studies, sensitivities, SDF and USD), which takes a second.
+    `order`: measure the observed order of what is simulated, which takes two more
+    simulations and changes no row. `derived`: check the functions other than `solve`
+    too (studies, sensitivities, SDF and USD), which takes a second.
     """
     question, free = ask(name, scene, engines), scene.motion.free is not None
     question.order = order
@@ -163,7 +169,10 @@ def judge(
             or question.free_body.refusal
         )
     ):
-        reason = "they are checked against the free bodies, which have no forces for this scene"
+        reason = (
+            "they are checked against the free bodies, which have no forces for this"
+            " scene"
+        )
         question.left_out.append(f"functions other than solve: {reason}")
         derived = False
     rows: list[Row] = []
@@ -212,7 +221,10 @@ def _select_needed(
             reason = (
                 None
                 if engine.positions
-                else "the scene states positions only, and this engine computes only forces"
+                else (
+                    "the scene states positions only, and this engine computes only"
+                    " forces"
+                )
             )
         elif engine.through_time and not np.any(command.speed):
             reason = "omega_2 is 0: nothing moves through time"

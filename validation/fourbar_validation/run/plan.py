@@ -20,7 +20,8 @@ from fourbar_validation.scenes.suites import Files, Suite
 WORKERS = 2
 SAMPLE = 30
 """Scenes in which everything else that is shipped is judged. In a scene that takes as long as judging thirty scenes:
-a tenth more for 10 000 random ones."""
+a tenth more for 10 000 random ones.
+"""
 CHUNK = {True: 1, False: 20}
 """Scenes per task: one where something is simulated or drawn (a second each), else twenty (a second together)."""
 MOST_PARTS = 10_000

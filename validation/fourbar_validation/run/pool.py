@@ -41,7 +41,8 @@ def make_jobs(
 ) -> list[Job]:
     """Make the jobs of some scenes; one of a file carries its own text alone.
 
-    `sample`: number of scenes of the suite, evenly chosen, in which functions other than `solve` are checked too.
+    `sample`: number of scenes of the suite, evenly chosen, in which functions other
+    than `solve` are checked too.
     """
     jobs = []
     for i in scenes:

@@ -179,7 +179,8 @@ def check_blocks(question: Question) -> Iterator[Row]:
         condition = np.where(
             np.isnan(condition), 1.0, condition
         )  # decided by the command where nothing closes
-        # evaluated by the same code, but not in the same company of a processor's registers
+        # evaluated by the same code, but not in the same company of a processor's
+        # registers
         apart = find_error(quantity, one, due, size) * condition
         error[finite] = np.maximum(error[finite], apart[finite])
     alone = {angle: np.empty(n) for angle in ("theta_3", "theta_4")}
@@ -266,7 +267,10 @@ def check_error_bars(question: Question) -> Iterator[Row]:
         share = np.where(tells, np.maximum(divide(true, BARS * width), wide), 0.0)
         share[tells & ~np.isfinite(width)] = np.inf
         index = find_worst(share)
-        reason = f"the error is {true[index]:.1e}, the bar {width[index]:.1e}, of {size[index]:.1e}"
+        reason = (
+            f"the error is {true[index]:.1e}, the bar {width[index]:.1e}, of"
+            f" {size[index]:.1e}"
+        )
         yield question.row(
             bar, share, 1.0, reason, tells, float(condition[index]), sampled.theta_2
         )
@@ -347,9 +351,10 @@ def check_residual(question: Question) -> Iterator[Row]:
 def check_law(question: Question) -> Iterator[Row]:
     """Check a motion law by its own table: the piecewise cubic through its points whose acceleration is continuous.
 
-    Each piece is the cubic of Hermite through the table's angles with the speeds at its ends; that it is the law's
-    is decided by the accelerations of neighbouring pieces and by the ends alone. Angle, speed and acceleration of
-    every position, and the conditions on the pieces, by the worst of them.
+    Each piece is the cubic of Hermite through the table's angles with the speeds at its
+    ends; that it is the law's is decided by the accelerations of neighbouring pieces
+    and by the ends alone. Angle, speed and acceleration of every position, and the
+    conditions on the pieces, by the worst of them.
     """
     law, command = question.scene.motion.law, question.at
     if law is None or command.time is None:
@@ -407,8 +412,9 @@ def check_law(question: Question) -> Iterator[Row]:
 def _check_rise(question: Question, law: Rise) -> Row:
     """Check a rise, its dwell and its fall by other forms of the standard laws, part by part.
 
-    cycloidal, with x = pi u:  u - sin x cos x/pi,  2 sin^2 x,  4 pi sin x cos x;
-    345: the polynomial of Bernstein with the coefficients 0, 0, 0, 1, 1, 1, and its derivatives.
+    cycloidal, with x = pi u:  u - sin x cos x/pi,  2 sin^2 x,  4 pi sin x cos x; 345:
+    the polynomial of Bernstein with the coefficients 0, 0, 0, 1, 1, 1, and its
+    derivatives.
     """
     command = question.at
     assert command.time is not None

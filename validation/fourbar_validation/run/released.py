@@ -1,7 +1,8 @@
 """Free motions: every engine against the exact solution where there is one, otherwise against the formulas.
 
-An engine's error is predicted by itself: it runs twice, with its step and with twice its step, and
-the difference is what the coarser motion errs by. The finer one must not err by more than ten times that.
+An engine's error is predicted by itself: it runs twice, with its step and with twice
+its step, and the difference is what the coarser motion errs by. The finer one must not
+err by more than ten times that.
 """
 
 import math
@@ -67,7 +68,8 @@ LONGEST_STEP = 2e-3
 """s, of a guest."""
 FULL = {"theta_2": 1e-9, "omega_2": 1e-8, "energy": 1e-10}
 """Errors (rad, of the greatest speed, of the greatest energies) at which a free motion agrees: the
-formulas hold theta_2 to 1e-9 rad over 5 s; a motion of 100 s may amplify that by its duration, so 5 s is the unit."""
+formulas hold theta_2 to 1e-9 rad over 5 s; a motion of 100 s may amplify that by its duration, so 5 s is the unit.
+"""
 UNIT = 5.0
 
 
@@ -88,16 +90,18 @@ class Pendulum(NamedTuple):
             self.omega_0**2 + 2.0 * k * (1.0 + math.cos(self.phi_0))
         )  # speed at the lowest point
         m = 4.0 * k / bottom**2
-        # half the angle from the lowest point is the amplitude; it starts at phi_0 - pi, seen along the motion
+        # half the angle from the lowest point is the amplitude; it starts at phi_0 -
+        # pi, seen along the motion
         start = ellipkinc(0.5 * (sense * self.phi_0 - math.pi), m)
         turns = 0.5 * bottom * times + start
         half_turns = np.round(
             turns / (2.0 * ellipk(m))
         )  # the amplitude grows by pi in every 2 K
         _, _, dn, amplitude = ellipj(turns - half_turns * 2.0 * ellipk(m), m)
-        return sense * (
-            2.0 * (amplitude + math.pi * half_turns) + math.pi
-        ), sense * bottom * dn
+        return (
+            sense * (2.0 * (amplitude + math.pi * half_turns) + math.pi),
+            sense * bottom * dn,
+        )
 
 
 def make_pendulum(scene: Scene) -> Pendulum | None:
@@ -189,7 +193,8 @@ def check_released(question: Question) -> Iterator[Row]:
 def _compare_forces(question: Question) -> Iterator[Row]:
     """Compare motion, pin forces and the torque, which is none, of every instant, by engines that answer one by one.
 
-    They are given theta_2, omega_2 and alpha_2; that these balance without a torque is the equation of motion.
+    They are given theta_2, omega_2 and alpha_2; that these balance without a torque is
+    the equation of motion.
     """
     name, scene, solution = question.name, question.scene, question.solution
     none = solution.torque if solution.drive is None else solution.drive_force
@@ -263,7 +268,8 @@ def _compare_forces_by(
         ]
     reference = make_reference(scene, answer)
     assert reference is not None
-    # the formulas are conditioned by the angle that is independent there, an engine by theta_2
+    # the formulas are conditioned by the angle that is independent there, an engine by
+    # theta_2
     conditioned = replace(
         solution,
         condition=reference.condition,
@@ -272,7 +278,8 @@ def _compare_forces_by(
         at=driven.at,
     )
     names = tuple(name for name in UNKNOWNS if name in engine.answers)
-    # nor are theta_2, omega_2 and alpha_2 more than that angle's, rounded: what that costs there is computed
+    # nor are theta_2, omega_2 and alpha_2 more than that angle's, rounded: what that
+    # costs there is computed
     held = make_demands(replace(engine, answers=names), scene, driven.at, answer)
     rows = Comparison(driven.name, scene, answer, conditioned, held, reference).rows()
     return [row for row in rows if row.quantity != "undecided"]
@@ -283,8 +290,9 @@ def _prescribe(
 ) -> Iterator[tuple[Scene, NDArray[np.intp]]]:
     """Prescribe the instants at which the linkage moves, and each standstill with the couples of dry friction there.
 
-    An engine has no friction at rest. A standstill that lasts is held: every pin takes the same part of its torque, and
-    no more than all of it; one that ends begins to move against the whole torque.
+    An engine has no friction at rest. A standstill that lasts is held: every pin takes
+    the same part of its torque, and no more than all of it; one that ends begins to
+    move against the whole torque.
     """
     assert command.omega_2 is not None
     friction = next(

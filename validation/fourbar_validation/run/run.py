@@ -50,7 +50,8 @@ from fourbar_validation.scenes.suites import Suite
 TIMINGS = ("scene", "engine", "setting", "positions", "seconds", "times_formulas")
 OUTCOME = (TABLE, COLUMNS, ABOUT, "timings.csv", "report.md", "report.html", OUTPUT)
 """Files that a run ends with. A run first removes those of an earlier run, so that none passes for its own if it ends
-early."""
+early.
+"""
 
 
 def run(

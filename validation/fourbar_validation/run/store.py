@@ -1,8 +1,9 @@
 """The folder of whatever runs long: a lock, finished parts, and at the end the results.
 
 lock               held while a run goes on; the system frees it when the process dies
-run.json           what is being run; a rerun of the same thing resumes, of another starts over
-parts/000012       what chunk 12 came to, written whole: a line of JSON that says of which run it is, and the SHA-256
+run.json           what is being run; a rerun of the same thing resumes, of another
+starts over parts/000012       what chunk 12 came to, written whole: a line of JSON that
+says of which run it is, and the SHA-256
                    of what follows; then a line of JSON for each result, packed by gzip
 """
 
@@ -73,7 +74,8 @@ class Store:
         if not same:
             if marker.is_file() and self.parts.is_dir() and any(self.parts.iterdir()):
                 self.notes.append(
-                    f"made again: the parts of another run ({self._name_difference(marker)})"
+                    "made again: the parts of another run"
+                    f" ({self._name_difference(marker)})"
                 )
             marker.unlink(missing_ok=True)
             shutil.rmtree(self.parts, ignore_errors=True)

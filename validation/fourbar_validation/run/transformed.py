@@ -1,7 +1,8 @@
 """The same linkage stated otherwise: mirrored, turned, scaled, read from its other end, in parts.
 
-A symmetry of mechanics takes the formulas' numbers of one scene into those of another, which other branches of the
-code compute; it needs no reference. Scaling by powers of two changes no digit at all.
+A symmetry of mechanics takes the formulas' numbers of one scene into those of another,
+which other branches of the code compute; it needs no reference. Scaling by powers of
+two changes no digit at all.
 """
 
 import math
@@ -76,7 +77,10 @@ OTHER_FORCE = {
 REASONS = {
     "mirrored": "y, angles and couples change their signs",
     "turned": "everything turns with the ground; nothing else changes",
-    "scaled": "lengths and accelerations times 2^7, forces times 2^7, couples times 4^7, to the last digit",
+    "scaled": (
+        "lengths and accelerations times 2^7, forces times 2^7, couples times 4^7, to"
+        " the last digit"
+    ),
     "exchanged": "bars 2 and 4 change places, the coupler is read from B",
     "superposed": "the forces of all loads and effects are the sum of what each adds",
     "split masses": "a bar of two bodies has the forces of both",
@@ -488,9 +492,11 @@ def _measure_superposed(few: _Few) -> dict[str, Array]:
         raise _NoCounterpartError
     bare = replace(scene, loads=(), effects=())
     alone = [
-        replace(bare, loads=(term,))
-        if isinstance(term, Load)
-        else replace(bare, effects=(term,))
+        (
+            replace(bare, loads=(term,))
+            if isinstance(term, Load)
+            else replace(bare, effects=(term,))
+        )
         for term in terms
     ]
     return _measure_sum(few, bare, alone)
@@ -520,7 +526,8 @@ def _take_part(linkage: FourBar, part: float) -> FourBar:
         assert bar.inertia is not None and bar.centre is not None
         mass = part * bar.mass
         apart = APART * math.sqrt(bar.inertia / bar.mass) if bar.mass else 0.0
-        # the inertia of both parts about the common centre, less what their distance makes
+        # the inertia of both parts about the common centre, less what their distance
+        # makes
         rest = bar.inertia - PART * (1.0 - PART) * bar.mass * apart * apart
         away = apart * ((1.0 - PART) if part == PART else -PART)
         r, phi = bar.centre

@@ -143,7 +143,10 @@ def toggle(*, distances: tuple[float, ...] = TOGGLE, seeds: range = range(2)) ->
                 inside = psi + inward * np.array([*REGULAR, *distances])
                 beyond = psi - inward * np.array(distances)
                 for branch, name in BRANCH_NAMES.items():
-                    label = f"{kind.value} {seed} {'stretched' if stretched else 'folded'} {name}"
+                    label = (
+                        f"{kind.value} {seed} {'stretched' if stretched else 'folded'}"
+                        f" {name}"
+                    )
                     yield (
                         label,
                         set_angles(

@@ -293,7 +293,8 @@ def draw_uneven_lengths(
 ) -> tuple[Sequence[float], float]:
     """Draw (ground, input, coupler, output), m, and an angle theta_2 - theta_1 at which they close, rad.
 
-    `crank` and `coupler`: of the ground, and of the diagonal from A to O4 at that angle.
+    `crank` and `coupler`: of the ground, and of the diagonal from A to O4 at that
+    angle.
     """
     d = float(rng.uniform(0.1, 1.0))
     a = d * crank(rng)

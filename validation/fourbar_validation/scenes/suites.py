@@ -90,7 +90,10 @@ class Random:
 
     def fingerprint(self) -> str:
         """State what the scenes are drawn from."""
-        return f"random {self.count} {self.seed} {','.join(kind.value for kind in self.types)}"
+        return (
+            f"random {self.count} {self.seed}"
+            f" {','.join(kind.value for kind in self.types)}"
+        )
 
 
 def list_model_files() -> list[Path]:
@@ -108,8 +111,9 @@ def read_default_suite() -> Files:
 def read_scene_files(paths: Iterable[Path]) -> Files:
     """Read and check scene files; each is named by its stem, or by its path where two stems are alike.
 
-    What does not print in a name is written as its escape. Raises InputError for a file that is bad, and for two of
-    one name, at once: a long run does not start on bad input.
+    What does not print in a name is written as its escape. Raises InputError for a file
+    that is bad, and for two of one name, at once: a long run does not start on bad
+    input.
     """
     files = list(dict.fromkeys(Path(path) for path in paths))
     stems = Counter(_write_printed(file.stem) for file in files)
@@ -144,7 +148,10 @@ def _count_positions(scene: Scene, file: Path) -> int:
         if isinstance(stated, (Sweep, Law, Rise, Free)):
             seconds = stated.duration if isinstance(stated, Free) else 0.0
             if seconds > MOST_SECONDS:
-                allowed = f"must not exceed {MOST_SECONDS:g} s in a run: engines go through it in steps of 1 ms"
+                allowed = (
+                    f"must not exceed {MOST_SECONDS:g} s in a run: engines go through"
+                    " it in steps of 1 ms"
+                )
                 raise InputError("motion.free.duration", seconds, allowed, str(file))
             return stated.steps + 1 + math.ceil(AS_LONG_AS * seconds)
     return DEFAULT_STEPS + 1
@@ -157,7 +164,8 @@ LARGEST_LIST = 16 * 2**20
 def read_suite(path: Path) -> Files:
     """Read the scenes that a file lists, named from its own folder: TOML with `scenes = [...]`, or one per line.
 
-    An entry may hold * for any name. InputError where an entry leaves the folder or names no file.
+    An entry may hold * for any name. InputError where an entry leaves the folder or
+    names no file.
     """
 
     def refuse(entry: object, allowed: str) -> InputError:

@@ -58,7 +58,7 @@ def test_instant_centres_lie_on_the_lines_of_the_bars() -> None:
     across = path @ np.array([-np.sin(theta_1), np.cos(theta_1)])
     assert np.isfinite(across).sum() > 30
     assert across[np.isfinite(across)] == pytest.approx(0.0, abs=1e-9)
-    (A, B) = (here.A[0], here.B[0])
+    A, B = (here.A[0], here.B[0])
     centre = derive(here, "I24")
     assert centre is not None
     along, away = B - A, centre[0] - A

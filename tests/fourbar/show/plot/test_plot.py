@@ -198,7 +198,7 @@ def test_bars_are_drawn_to_scale_at_the_requested_position() -> None:
     bars = [line for line in axes.lines if line.get_linewidth() == 4.5]
     lengths = [float(np.hypot(*np.diff(line.get_xydata(), axis=0)[0])) for line in bars]
     assert lengths == pytest.approx([100.0, 250.0, 220.0])  # mm
-    (x, y) = bars[0].get_xydata()[1]
+    x, y = bars[0].get_xydata()[1]
     assert math.atan2(y, x) == pytest.approx(1.3)
     x_scale, y_scale = (
         np.diff(axes.transData.transform([(0, 0), step]), axis=0)[0]
@@ -252,7 +252,8 @@ def test_positions_that_do_not_assemble_leave_a_gap_and_poles_cut_the_line() -> 
     at_closed = np.isin(curve.get_xdata(), closed)
     assert np.all(np.isnan(curve.get_ydata()[at_closed]))
     (pole,) = find_poles(shown)
-    # the torque of bar 4 diverges where omega_4 changes sign, bars 2 and 3 being in line
+    # the torque of bar 4 diverges where omega_4 changes sign, bars 2 and 3 being in
+    # line
     assert shown.sweep.omega_4[pole] * shown.sweep.omega_4[pole + 1] < 0
     assert shown.sweep.torque[pole] * shown.sweep.torque[pole + 1] < 0
     assert np.isnan(break_at_poles(shown.sweep.torque, np.array([pole]))[pole + 1])
@@ -281,7 +282,8 @@ def test_transmission_angle_marks_limits_and_dead_centres() -> None:
         if line.get_marker() in "sD"
     }
     d, a, b, c = thesis().linkage.lengths
-    # bars 3 and 4 folded: |b - c| between A and O4; bars 2 and 3 in line on the sweep: c seen from O2 at b - a or a + b
+    # bars 3 and 4 folded: |b - c| between A and O4; bars 2 and 3 in line on the sweep:
+    # c seen from O2 at b - a or a + b
     limit = math.degrees(math.acos((a * a + d * d - (b - c) ** 2) / (2 * a * d)))
     assert marks["limit"] == pytest.approx(np.sort([45 - limit, 45 + limit]), abs=1e-9)
     inner = math.degrees(math.acos(((b - a) ** 2 + d * d - c * c) / (2 * (b - a) * d)))

@@ -277,7 +277,8 @@ def test_a_simulation_that_fails_names_the_ratio_of_masses(
     assert failed.quantity == "torque_inertia"
     assert (
         failed.reason
-        == "softness and time step: 1e-05 of the scale; of coupler and output one is 9.1e+06 times lighter"
+        == "softness and time step: 1e-05 of the scale; of coupler and output one is"
+        " 9.1e+06 times lighter"
     )
 
 

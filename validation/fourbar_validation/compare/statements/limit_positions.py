@@ -1,9 +1,10 @@
 """Check the range of each bar: the loop closes inside it and not beyond its limits, and at a limit the bar is at rest.
 
-The loop is a sum of vectors, d u_1 = a u_2 + b u_3 - c u_4, and any moving bar may come first in it: an engine
-that turns bar 2 alone is given the linkage with bar k in that place. The distance that the other two bars have to
-span grows steadily while bar k turns from the ground's direction to the opposite one, so the answers beyond and on
-the limits and along the ground settle every angle.
+The loop is a sum of vectors, d u_1 = a u_2 + b u_3 - c u_4, and any moving bar may come
+first in it: an engine that turns bar 2 alone is given the linkage with bar k in that
+place. The distance that the other two bars have to span grows steadily while bar k
+turns from the ground's direction to the opposite one, so the answers beyond and on the
+limits and along the ground settle every angle.
 """
 
 import itertools
@@ -160,7 +161,8 @@ def compute_step_beyond(linkage: FourBar, theta_2: float) -> float:
     d, a, *_ = linkage.lengths
     psi, little = theta_2 - linkage.ground_angle, BEYOND * sum(linkage.lengths)
     e = max(abs(d - a * np.exp(1j * psi)), little)
-    # e grows by d a sin(psi)/e to first order, by d a/(2 e) to second where the bar lies along the ground
+    # e grows by d a sin(psi)/e to first order, by d a/(2 e) to second where the bar
+    # lies along the ground
     slope = max(d * a * abs(math.sin(psi)) / e, math.sqrt(0.5 * little * d * a / e))
     return float(little / slope) + 4.0 * EPS * (abs(theta_2) + TURN)
 
@@ -198,7 +200,8 @@ def _try_bar(linkage: FourBar, bar: int) -> _Trial:
         mobility.turns_fully(linkage, bar),
     )
     expected = [((start + stop) / 2.0, True) for start, stop in spans]
-    # that the loop closes up to its limits is seen where the limit positions themselves are examined
+    # that the loop closes up to its limits is seen where the limit positions themselves
+    # are examined
     for i, (start, stop) in enumerate(() if full else spans):
         before, after = (
             (start - spans[i - 1][1]) % TURN,

@@ -126,8 +126,8 @@ class ClosedLoop(Assembled):
     def branch(self, bar: int = 2) -> int:
         """Return the branch of the state that was last forwarded, of a command of a bar.
 
-        The null vector of the gap's derivative turns the bar as -b c sin(theta_4 - theta_3) is of bar 2, and as the
-        opposite products are of bars 3 and 4.
+        The null vector of the gap's derivative turns the bar as -b c sin(theta_4 -
+        theta_3) is of bar 2, and as the opposite products are of bars 3 and 4.
         """
         turn = self.drive_column(bar) @ np.cross(*self.jacobian()[:, :3])
         return int(np.sign(turn if bar != 2 else -turn))
@@ -159,7 +159,8 @@ class ClosedLoop(Assembled):
     def carried(self) -> dict[str, Array]:
         """Read the force of the parent on each bar and all that the bar carries, world axes, N.
 
-        That is cfrc_int without the forces of actuators on sites, which MuJoCo counts into it, unlike those of tendons.
+        That is cfrc_int without the forces of actuators on sites, which MuJoCo counts
+        into it, unlike those of tendons.
         """
         on = {name: force.copy() for name, force in self._carried.items()}
         for actuator, site, (along, across), names in self._borne:
@@ -292,9 +293,10 @@ def solve_couple_elsewhere(
 ) -> float | None:
     """Solve for what accelerates the crank as before; None where it does not move the crank.
 
-    That is a couple on bar 3 or 4, or the force of the actuator between the cylinder's two sites. The accelerations are
-    linear in it; two trials of the size of the crank's torque (T2, N m) give it, and `light`, the same linkage with a
-    light flywheel, is left at a third, to be read.
+    That is a couple on bar 3 or 4, or the force of the actuator between the cylinder's
+    two sites. The accelerations are linear in it; two trials of the size of the crank's
+    torque (T2, N m) give it, and `light`, the same linkage with a light flywheel, is
+    left at a third, to be read.
 
     `alpha_2`: what the flywheel's motor was given, rad/s^2.
     """
@@ -305,7 +307,8 @@ def solve_couple_elsewhere(
     )  # a drive may have its own
     d.time = loop.data.time
     happened = loop.data.qacc[O2]
-    # the light flywheel's motor gives it alpha_2 as commanded; this gives it what the crank really had
+    # the light flywheel's motor gives it alpha_2 as commanded; this gives it what the
+    # crank really had
     correction = light.model.dof_armature[O2] * (happened - alpha_2)
     speed = float(loop.drive_column(drive_bar) @ d.qvel)
     guess = crank_torque * d.qvel[O2] / speed if speed else crank_torque
@@ -322,8 +325,9 @@ def solve_couple(
 ) -> float | None:
     """Solve for the couple under which an acceleration, linear in it, is the wanted one, and which was evaluated last.
 
-    None where it does not depend on the couple. The difference of the two trials loses digits: each refinement, from
-    where the couple before leads, brings some of them back.
+    None where it does not depend on the couple. The difference of the two trials loses
+    digits: each refinement, from where the couple before leads, brings some of them
+    back.
     """
     at_low, at_high = acceleration(low), acceleration(high)
     slope = (at_high - at_low) / (high - low)

@@ -1,7 +1,8 @@
 """The couple under which a joint accelerates as wanted, asked of MuJoCo by trials.
 
-The acceleration is continuous in the couple. Where nothing but pins acts it is linear; dry friction, joint limits and
-clamped actuators make it piecewise linear, and the couple is bracketed.
+The acceleration is continuous in the couple. Where nothing but pins acts it is linear;
+dry friction, joint limits and clamped actuators make it piecewise linear, and the
+couple is bracketed.
 """
 
 import math
@@ -36,17 +37,20 @@ def find_couple(
 
     Parameters
     ----------
-    acceleration : evaluates `model` and `data` under a couple, N m, and returns an acceleration, rad/s^2.
+    acceleration : evaluates `model` and `data` under a couple, N m, and returns an
+    acceleration, rad/s^2.
     """
     free = acceleration(0.0)
-    # without a couple it may already accelerate as wanted, to the rounding of the others
+    # without a couple it may already accelerate as wanted, to the rounding of the
+    # others
     others = float(np.abs(data.qacc_smooth).max()) or 1.0
     sought = max(abs(wanted - free), LEAST * others)
     trial = float(model.dof_M0.sum()) * sought
     couple = solve_couple(acceleration, wanted, 0.0, trial, REFINEMENTS)
     if couple is None or abs(acceleration(couple) - wanted) <= MISSED * sought:
         return couple
-    # the solver starts from the same accelerations at every trial, or its noise would look like a jump
+    # the solver starts from the same accelerations at every trial, or its noise would
+    # look like a jump
     start = data.qacc_warmstart.copy()
 
     def repeatable(size: float) -> float:
@@ -62,8 +66,9 @@ def bracket_couple(
 ) -> float | None:
     """Solve for the couple under which an acceleration is the wanted one, and which was evaluated last.
 
-    The acceleration is continuous in the couple and need not be linear: dry friction, joint limits and clamped
-    actuators make it piecewise linear. None where no couple gives the acceleration to within `allowed`.
+    The acceleration is continuous in the couple and need not be linear: dry friction,
+    joint limits and clamped actuators make it piecewise linear. None where no couple
+    gives the acceleration to within `allowed`.
     """
     from scipy.optimize import brentq
 

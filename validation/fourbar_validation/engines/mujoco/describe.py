@@ -1,7 +1,8 @@
 """The entries of a four-bar's MJCF that decide its motion and forces: read from a compiled model, set in the generated.
 
-Each entry stands under a name by which two files can be compared, whatever the tree of their bodies, their axes and
-their names. What an entry costs is seen by setting it, alone, in the generated file.
+Each entry stands under a name by which two files can be compared, whatever the tree of
+their bodies, their axes and their names. What an entry costs is seen by setting it,
+alone, in the generated file.
 """
 
 import math
@@ -67,7 +68,8 @@ SOFTEST, STIFFEST = 1e-4, 0.9999
 def describe_model(topology: Topology, flywheel: float = 0.0) -> Described:
     """Describe lengths, masses, pins, gravity, closure, loads, tendons and options, as compiled.
 
-    `flywheel`: the part of the armature of pin O2 that drives, kg m^2, and so is no inertia of the input.
+    `flywheel`: the part of the armature of pin O2 that drives, kg m^2, and so is no
+    inertia of the input.
     """
     model = topology.model
     described = {"plane": ModelEntry(topology.plane)}
@@ -269,8 +271,9 @@ def _sum_inverse_weights(topology: Topology, number: int) -> float:
 def _describe_loads(topology: Topology) -> Described:
     """Describe what actuators exert with a control of 0: at sites the sum on each bar, at hinges the couple.
 
-    Forces that keep their axes add up to one force, one couple, and the first moments r x F and r . F about the bar's
-    first pin, which tell where the force acts. The drive is taken off, and is no load.
+    Forces that keep their axes add up to one force, one couple, and the first moments r
+    x F and r . F about the bar's first pin, which tell where the force acts. The drive
+    is taken off, and is no load.
     """
     model, data = topology.model, topology.data
     sums: dict[str, Array] = {}
@@ -307,7 +310,10 @@ def _describe_loads(topology: Topology) -> Described:
                 else topology.in_plane(force)
             )
             x, y = topology.along_bar(bar, data.site_xpos[number])
-            key = f"loads.{BAR_NAMES[bar]}, {f'axes of the {BAR_NAMES[bearer]}' if turns else 'world axes'}"
+            key = (
+                f"loads.{BAR_NAMES[bar]},"
+                f" {f'axes of the {BAR_NAMES[bearer]}' if turns else 'world axes'}"
+            )
             load = (
                 fx,
                 fy,
@@ -341,7 +347,8 @@ def _describe_loads(topology: Topology) -> Described:
 def _read_bias(model: mujoco.MjModel, actuator: int) -> Array:
     """Read what an actuator exerts without a control: its force, and its force per length and per speed, (3,).
 
-    Of direct-current motors that have no control, those are read whose force is constant: a cogging without a period.
+    Of direct-current motors that have no control, those are read whose force is
+    constant: a cogging without a period.
     """
     bias, kinds = model.actuator_biasprm[actuator, :3], mujoco.mjtBias
     if model.actuator_biastype[actuator] == kinds.mjBIAS_AFFINE:
@@ -610,8 +617,9 @@ def _set_load(
 def mend_entry(topology: Topology, key: str, value: Value | None) -> bool:
     """Make one entry of a compiled model that of the generated file; False where that is not possible.
 
-    A weld becomes a pin, contacts are switched off, a stop and the motors at a pin are removed, the loop is made as
-    stiff as MuJoCo lets it be, and a setting gets its value.
+    A weld becomes a pin, contacts are switched off, a stop and the motors at a pin are
+    removed, the loop is made as stiff as MuJoCo lets it be, and a setting gets its
+    value.
     """
     model, (subject, _, rest) = topology.model, key.partition(".")
     pin, _, what = rest.partition(".")

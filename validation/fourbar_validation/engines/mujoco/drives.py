@@ -1,7 +1,7 @@
 """Drive the generated MJCF by other means, for the study of their cost.
 
-Each builds a loop from the generated text; the flywheel of the text is taken out where another
-drive takes its place, and the torque is read where that drive exerts it.
+Each builds a loop from the generated text; the flywheel of the text is taken out where
+another drive takes its place, and the torque is read where that drive exerts it.
 """
 
 from collections.abc import Mapping, Sequence
@@ -35,7 +35,8 @@ class Driven(ClosedLoop):
         root = ET.fromstring(mjcf)
         crank = root.find(".//joint[@name='O2']")
         assert crank is not None
-        # the inertia that sized the flywheel is a measure of the linkage's inertia about O2
+        # the inertia that sized the flywheel is a measure of the linkage's inertia
+        # about O2
         self.flywheel = float(crank.attrib.pop("armature"))
         self.add_drive(root)
         super().__init__(ET.tostring(root, encoding="unicode"))
@@ -56,8 +57,8 @@ class Driven(ClosedLoop):
 class Actuated(Driven):
     """An actuator on O2: of speed alone, or a position servo whose target turns at omega, as `intvelocity`'s does.
 
-    `position`: kp per (inertia omega^2); none: kv (omega - omega_2), without a control input, by the affine bias.
-    `velocity`: kv per (inertia omega).
+    `position`: kp per (inertia omega^2); none: kv (omega - omega_2), without a control
+    input, by the affine bias. `velocity`: kv per (inertia omega).
     """
 
     def __init__(

@@ -1,8 +1,9 @@
 """MuJoCo's forward dynamics of the generated MJCF without its flywheel: of a released linkage, and at one state.
 
-At one state the torque is that with which the closed loop accelerates as commanded. At an exactly closed state the only
-error is the closure's softness, in proportion to (1-d)/d with d the impedance: the values at several d, extrapolated to
-(1-d)/d = 0, are free of it.
+At one state the torque is that with which the closed loop accelerates as commanded. At
+an exactly closed state the only error is the closure's softness, in proportion to
+(1-d)/d with d the impedance: the values at several d, extrapolated to (1-d)/d = 0, are
+free of it.
 """
 
 import math
@@ -32,7 +33,8 @@ RELEASED, ONE_STATE = "mujoco-forward", "mujoco-one-state"
 """Names of the engines."""
 TIME_CONSTANT_STEPS = 2.0
 """Time constant of the loop's closure, in timesteps. Through change points the closure takes energy out: 1e-6 of it in
-ten seconds at 1 ms with 2, three hundred times as much with 10."""
+ten seconds at 1 ms with 2, three hundred times as much with 10.
+"""
 FRICTION = (
     mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF,
     mujoco.mjtConstraint.mjCNSTR_FRICTION_TENDON,
@@ -160,7 +162,10 @@ class MujocoOneState:
             command,
             assembled,
             values,
-            shared="lengths, masses, inertias, centres, loads and effects as MJCF text; the command",
+            shared=(
+                "lengths, masses, inertias, centres, loads and effects as MJCF text;"
+                " the command"
+            ),
             own="assembly, velocities, accelerations, drive torque, pin forces",
             seconds=time.perf_counter() - began,
         )

@@ -27,8 +27,9 @@ def find_refusal(scene: Scene) -> str:
     for part in list_parts(scene.linkage):
         if min(part.mass, part.inertia) < LIGHTEST.boundary:
             return (
-                f"bar {part.bar} has mass {part.mass:g} kg and inertia {part.inertia:g} kg m^2; "
-                f"MuJoCo compiles no moving body below {LIGHTEST.boundary:g} of either"
+                f"bar {part.bar} has mass {part.mass:g} kg and inertia {part.inertia:g}"
+                f" kg m^2; MuJoCo compiles no moving body below {LIGHTEST.boundary:g}"
+                " of either"
             )
     return ""
 
@@ -37,8 +38,8 @@ def find_refusal(scene: Scene) -> str:
 def compile_bars() -> mujoco.MjModel:
     """Compile the open tree of three bars of unit length and mass, constraints off; what is fixed lies at 0.
 
-    Only numbers differ from tree to tree, and to compile takes a hundred times as long as to
-    write them. What the compiler takes from nobody, `find_refusal` refuses.
+    Only numbers differ from tree to tree, and to compile takes a hundred times as long
+    as to write them. What the compiler takes from nobody, `find_refusal` refuses.
     """
     spec = mujoco.MjSpec()
     spec.option.disableflags |= (
@@ -57,7 +58,8 @@ def compile_bars() -> mujoco.MjModel:
         for name in part.points:
             body.add_site(name=name)
     model = spec.compile()
-    # a centre or site nearer than 1e-6 m is taken for the body's origin, silently; these marks are why
+    # a centre or site nearer than 1e-6 m is taken for the body's origin, silently;
+    # these marks are why
     model.body_sameframe[:] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
     model.site_sameframe[:] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
     model.body_simple[:] = model.dof_simplenum[:] = 0
@@ -79,7 +81,8 @@ class MujocoTree(Tree):
         self.body = {bar: model.body(f"bar{bar}").id for bar in FIRST_PIN}
         self.site = {model.site(number).name: number for number in range(model.nsite)}
         self._describe(scene)
-        # the engine's own memory, read and written in place: to look it up again takes longer than its work
+        # the engine's own memory, read and written in place: to look it up again takes
+        # longer than its work
         self.in_space = {name: data.site_xpos[site] for name, site in self.site.items()}
         self.at: dict[str, Array] = {
             name: place[:2] for name, place in self.in_space.items()
@@ -103,7 +106,8 @@ class MujocoTree(Tree):
     def _describe(self, scene: Scene) -> None:
         """Write places, masses and inertias.
 
-        Of what the compiler derives from them inverse dynamics reads the borne masses alone.
+        Of what the compiler derives from them inverse dynamics reads the borne masses
+        alone.
         """
         model = self.model
         for part in list_parts(scene.linkage):
@@ -188,7 +192,8 @@ class MujocoTree(Tree):
     def carried(self) -> dict[int, Pair]:
         """Return cfrc_int, the force of the parent on each body."""
         for bar, (x, y, _) in self.wrenches.items():
-            # the couples about the mass centres, at which these forces act, ask nothing of the pins of a tree
+            # the couples about the mass centres, at which these forces act, ask nothing
+            # of the pins of a tree
             self.xfrc_applied[self.body[bar], :2] = x, y
         mujoco.mj_rnePostConstraint(self.model, self.data)
         forces = {}

@@ -1,7 +1,8 @@
 """Monitor a simulation's own error: the loop's residuals, the power balance, and what both do to the answer.
 
-A small closure gap proves little: an explicit step with a closure stiffer than it can follow holds
-the gap at micrometres while accelerations and forces are anything. At every sample this asks
+A small closure gap proves little: an explicit step with a closure stiffer than it can
+follow holds the gap at micrometres while accelerations and forces are anything. At
+every sample this asks
 
 - how far the loop is open in position, in velocity (J v) and in acceleration (J a + J' v),
 - whether the drive's power is that of the moving bars:  T_k omega_k = v . (M a + bias - applied),
@@ -35,15 +36,18 @@ class ResidualLimit:
 LIMITS = {
     "acceleration_gap": ResidualLimit(
         1e-3,
-        "of the greatest a_B: healthy runs have 1e-7..1e-4, a step that errs by 98 % has 4",
+        "of the greatest a_B: healthy runs have 1e-7..1e-4, a step that errs by 98 %"
+        " has 4",
     ),
     "power_gap": ResidualLimit(
         1e-4,
-        "of the greatest power: healthy runs have 1e-8..1e-5, that step 4e-2, a stopped solver 1",
+        "of the greatest power: healthy runs have 1e-8..1e-5, that step 4e-2, a stopped"
+        " solver 1",
     ),
     "force_gap": ResidualLimit(
         1e-3,
-        "of the greatest joint torque: the solver did not converge; healthy runs have 1e-8..1e-4",
+        "of the greatest joint torque: the solver did not converge; healthy runs have"
+        " 1e-8..1e-4",
     ),
 }
 """Residuals of motion and forces that `ResidualMonitor` measures."""
@@ -125,7 +129,8 @@ class ResidualMonitor:
         self._keep(
             "acceleration_gap", float(np.hypot(*seen.jerk)), float(np.hypot(*seen.a_B))
         )
-        # at a pole of T3 or T4 the speed of the driven bar, which vanishes, is as uncertain as the others
+        # at a pole of T3 or T4 the speed of the driven bar, which vanishes, is as
+        # uncertain as the others
         lever = float(np.abs(seen.drive).max())
         terms = abs(torque) * lever * float(np.abs(v).max()) + float(
             np.abs(seen.needed * v).sum()

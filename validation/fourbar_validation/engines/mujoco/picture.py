@@ -1,7 +1,8 @@
 """Draw off-screen pictures of MJCF texts by MuJoCo's own renderer, in a separate process.
 
-A missing or broken OpenGL may end the process that asks for it, so `render_pictures` asks from outside:
-``python -m fourbar_validation.engines.mujoco.picture`` reads {name: MJCF} and answers {name: base64 of a PNG}.
+A missing or broken OpenGL may end the process that asks for it, so `render_pictures`
+asks from outside: ``python -m fourbar_validation.engines.mujoco.picture`` reads {name:
+MJCF} and answers {name: base64 of a PNG}.
 """
 
 import base64

@@ -1,15 +1,16 @@
 """Run a model through a motion: its segments, its steps, and the forces that MJCF cannot express.
 
-MuJoCo is supplied with loads over theta_2 and the acceleration of a law at each stage of a step, from the description
-alone, at its own angle and time.
+MuJoCo is supplied with loads over theta_2 and the acceleration of a law at each stage
+of a step, from the description alone, at its own angle and time.
 
-Where another bar or the cylinder is commanded the input is led so that it moves as told. With J the derivative of the
-gap by the joint angles and c that of the commanded bar's direction or of the stroke,
+Where another bar or the cylinder is commanded the input is led so that it moves as
+told. With J the derivative of the gap by the joint angles and c that of the commanded
+bar's direction or of the stroke,
 
     J a + (dJ/dt) v = 0,   c a + (dc/dt) v = the commanded acceleration
 
-are solved for the acceleration of the input from MuJoCo's own state at each stage, which the motor of its flywheel is
-given.
+are solved for the acceleration of the input from MuJoCo's own state at each stage,
+which the motor of its flywheel is given.
 """
 
 import bisect
@@ -49,8 +50,8 @@ LOOKED_AT = 2000
 class Steady:
     """A segment of positions in the order of their angles, at constant alpha_2.
 
-    As of `Lawful`, `omega` is the speed at the start, `fastest` the greatest |omega_2|, and `turning` that of the
-    input, rad/s.
+    As of `Lawful`, `omega` is the speed at the start, `fastest` the greatest |omega_2|,
+    and `turning` that of the input, rad/s.
     """
 
     bar: int | None = 2
@@ -148,7 +149,8 @@ def order_in_time(values: Array, time: Array | None, speed: float) -> NDArray[np
 
 LIGHT_FLYWHEEL = 1e4
 """Flywheel of the model that gives T3 or T4: heavy enough to keep the closure's softness
-small, light enough that the torque it needs does not drown in its rounding."""
+small, light enough that the torque it needs does not drown in its rounding.
+"""
 Found = tuple[float, float, float] | None
 """Own joint angles (O2, A, O4), None where the loop does not close."""
 
@@ -264,7 +266,8 @@ def split_segments(
 
 MOST_UNEVEN = 20.0
 """Greatest speed of the input over its mean: near a limit of what is commanded it grows without bound, and with it the
-steps of a window, which are those of the fastest throughout; here they are 40 000."""
+steps of a window, which are those of the fastest throughout; here they are 40 000.
+"""
 
 
 class Lead:
@@ -274,7 +277,8 @@ class Lead:
         motion = scene.motion
         if motion.law is not None:
             raise LimitError(
-                "a motion law of another bar than the input is not run through time here"
+                "a motion law of another bar than the input is not run through time"
+                " here"
             )
         still = replace(take_full_size(scene), motion=Motion(0.0, 1.0))
         self.loop = loop = ClosedLoop(
@@ -317,7 +321,8 @@ class Lead:
                 branch[index] = loop.branch()
         self.input[0, self.closes] = np.unwrap(self.input[0, self.closes])
         theta_2, omega_2, alpha_2 = self.input[:, self.closes]
-        # greatest speed and acceleration, as for a law: flywheel and closure are sized by them
+        # greatest speed and acceleration, as for a law: flywheel and closure are sized
+        # by them
         most = (
             float(np.abs(omega_2).max()),
             float(np.abs(alpha_2).max()) or np.finfo(float).tiny,
@@ -364,7 +369,8 @@ class Led(Steady):
         duration = self.run.time(self.run.stop)
         if (uneven := duration * self.turning / self.turned) > MOST_UNEVEN:
             raise LimitError(
-                f"the input is at most {uneven:.0f} times as fast as on the mean; up to {MOST_UNEVEN:g} it is led"
+                f"the input is at most {uneven:.0f} times as fast as on the mean; up to"
+                f" {MOST_UNEVEN:g} it is led"
             )
         steps = duration * self.turning / (2.0 * np.pi) * settings.steps_per_revolution
         if 0.0 < self.turned < FULL_TURN:
@@ -429,7 +435,8 @@ def clip_angles(scene: Scene, theta_2: Array) -> Array:
         outside = over > 0.0
         if not (~outside | (np.minimum(over, under) < OVERRUN)).all():
             raise LimitError(
-                f"the motion leaves the table of a load, which covers {first:g} to {last:g} rad"
+                f"the motion leaves the table of a load, which covers {first:g} to"
+                f" {last:g} rad"
             )
         inside = inside + np.where(outside, np.where(over < under, -over, under), 0.0)
     return inside

@@ -22,7 +22,8 @@ NAME = "mujoco-simulated"
 QUANTITY = "as shipped"
 OPEN = 1e4 * K * EPS
 """Gap in parts of the lengths, and gap speed in parts of the speeds: one rounding near a limit position, where |sin mu|
-is 1e-4 and less MuJoCo is not run."""
+is 1e-4 and less MuJoCo is not run.
+"""
 STEPS = 200
 """A servo of two steps' time constant has brought the input to its speed to e^-100 by then."""
 SPEED = 100.0 * SIMULATED.factor
@@ -120,7 +121,10 @@ def compare_shipped(name: str, scene: Scene, command: Command) -> Row | None:
     errors.append(
         (
             speed,
-            f"after {STEPS} steps the input turns at {d.qvel[O2]:.6g} of {moving:.6g} rad/s",
+            (
+                f"after {STEPS} steps the input turns at {d.qvel[O2]:.6g} of"
+                f" {moving:.6g} rad/s"
+            ),
         )
     )
     error, reason = _find_worst(errors)

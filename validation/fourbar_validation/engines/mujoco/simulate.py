@@ -53,10 +53,13 @@ from fourbar_validation.engines.mujoco.runner import (
 )
 
 SHARED = (
-    "lengths, masses, inertias, centres, loads and effects as MJCF text; tables of loads; what is commanded or the "
-    "motion law, and the branch"
+    "lengths, masses, inertias, centres, loads and effects as MJCF text; tables of"
+    " loads; what is commanded or the motion law, and the branch"
 )
-OWN = "assembly, velocities at the start, the motion through time, accelerations, drive torque, pin forces"
+OWN = (
+    "assembly, velocities at the start, the motion through time, accelerations, drive"
+    " torque, pin forces"
+)
 FINE = np.radians(2.0)
 """Greatest step between positions at which the loop is tried for closure, rad."""
 COLLINEAR = 1e-9
@@ -101,7 +104,8 @@ class MujocoSimulated:
                 raise LimitError("a free motion has no commanded sweep")
             if command.speed is None or not np.any(command.speed):
                 raise LimitError(
-                    f"{scene.motion.names[1]} is 0 or not stated: nothing to simulate through time"
+                    f"{scene.motion.names[1]} is 0 or not stated: nothing to simulate"
+                    " through time"
                 )
             if command.bar != 2 or command.stroke is not None:
                 lead = Lead(scene, command)
@@ -126,7 +130,8 @@ def _require_run(scene: Scene, command: Command) -> None:
     law = scene.motion.law if command.time is not None else None
     if law is None and any(np.ptp(values) != 0.0 for values in list_speeds(command)):
         raise LimitError(
-            "omega_2 or alpha_2 differs from position to position: that is no one motion through time"
+            "omega_2 or alpha_2 differs from position to position: that is no one"
+            " motion through time"
         )
     if np.ptp(command.theta_2) == 0.0:
         raise LimitError("one position: nothing to run through")
@@ -186,7 +191,8 @@ class _Simulation:
     ) -> None:
         self.bounded, self.lead = bounded, lead
         self.settings, self.command, self.law = settings, command, scene.motion.law
-        # the text is that of the command, which a caller may have given instead of the scene's own
+        # the text is that of the command, which a caller may have given instead of the
+        # scene's own
         self.scene = make_run_scene(scene, command) if lead is None else scene
         self.supplied = evaluate_loads(scene)
         n = len(command.angle)
@@ -223,7 +229,8 @@ class _Simulation:
         )
         if self.bounded and least < NEAREST_TOGGLE.boundary:
             raise LimitError(
-                f"|sin(theta_4 - theta_3)| falls to {least:.1e}; {NEAREST_TOGGLE.reason}"
+                f"|sin(theta_4 - theta_3)| falls to {least:.1e};"
+                f" {NEAREST_TOGGLE.reason}"
             )
         for segment in split_segments(
             assembled, self.order, partial(self._closes_between, position)
@@ -401,7 +408,8 @@ def observe_order(
 ) -> tuple[float, float, float]:
     """Return errors at 4h and 2h with the closure's time constant held in seconds, and log2 of their ratio.
 
-    At the recipe's own h the softness is already of the size of the truncation; the order shows above it.
+    At the recipe's own h the softness is already of the size of the truncation; the
+    order shows above it.
     """
     errors = [
         error(

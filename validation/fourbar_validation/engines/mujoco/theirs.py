@@ -1,11 +1,12 @@
 """Somebody's own MJCF of a linkage, and its torque and pin forces on a scene.
 
-At one state: its own assembly and speeds, then the couple on the driven bar with which its crank
-accelerates as commanded. The accelerations are linear in that couple, so a few `mj_forward` find it;
-where the acceleration found is another one (dry friction, joint limits, clamped actuators) the couple
-is bracketed, and where none gives the acceleration this is said.
-Through time: the same, at the states that its own timestep, integrator and closure lead to, a
-flywheel on pin O2 keeping the speed. The file's own drive on that pin is taken off in both.
+At one state: its own assembly and speeds, then the couple on the driven bar with which
+its crank accelerates as commanded. The accelerations are linear in that couple, so a
+few `mj_forward` find it; where the acceleration found is another one (dry friction,
+joint limits, clamped actuators) the couple is bracketed, and where none gives the
+acceleration this is said. Through time: the same, at the states that its own timestep,
+integrator and closure lead to, a flywheel on pin O2 keeping the speed. The file's own
+drive on that pin is taken off in both.
 """
 
 import math
@@ -84,7 +85,10 @@ GENERATED = Path("generated.xml")
 """Name of the file that is generated from a scene."""
 NO_BIAS = mujoco.mjtBias.mjBIAS_NONE
 SHARED = "theta_2, omega_2, alpha_2 and the branch; the rest is the file's"
-OWN = "assembly, speeds, accelerations, drive torque and pin forces, by MuJoCo from the file as compiled"
+OWN = (
+    "assembly, speeds, accelerations, drive torque and pin forces, by MuJoCo from the"
+    " file as compiled"
+)
 
 
 @dataclass(slots=True)
@@ -125,7 +129,8 @@ def compile_topology(
 def orient(topology: Topology, scene: Scene) -> Topology:
     """Return a four-bar in the axes of a scene, as far as gravity has the same direction there; else as it is.
 
-    A linkage that is turned in its plane together with gravity, or seen from the other side, is the same one.
+    A linkage that is turned in its plane together with gravity, or seen from the other
+    side, is the same one.
     """
     model = topology.model
     if not np.all(np.isfinite(topology.rest_angles)):
@@ -187,8 +192,8 @@ def _free_unmet_stops(described: Described, loop: "UserLoop") -> Iterator[str]:
         described[key] = described[key]._replace(value=FREE)
         low, high = (f"{math.degrees(stop):.4g}" for stop in stops)
         yield (
-            f"the stops of joint {loop.model.joint(joint).name!r}, at {low} and {high} deg of pin {pin}, "
-            "are not met"
+            f"the stops of joint {loop.model.joint(joint).name!r}, at {low} and {high}"
+            f" deg of pin {pin}, are not met"
         )
 
 
@@ -197,7 +202,8 @@ def examine_changed(
 ) -> list[list[Answer] | None]:
     """Answer with the generated file, without a drive, as it is; then with each entry alone changed in it.
 
-    None stands for an entry that cannot be set alone. After PRICING seconds the rest are not evaluated either.
+    None stands for an entry that cannot be set alone. After PRICING seconds the rest
+    are not evaluated either.
     """
     start, answered = time.perf_counter(), list[list[Answer] | None]()
     file = RobotFile(GENERATED, write_mjcf(scene, drive="none"))
@@ -241,9 +247,10 @@ def predict_softness(
 ) -> dict[str, float]:
     """Predict what the stiffest constraint of MuJoCo leaves of the torque and the pin forces of a file, N m and N.
 
-    The error of a soft constraint goes as (1 - d)/d in its impedance d. Between STIFFEST and an impedance of twice that
-    yield it grows by itself, so the error is measured without anything to compare the file with. Empty where no
-    connect or weld closes the loop.
+    The error of a soft constraint goes as (1 - d)/d in its impedance d. Between
+    STIFFEST and an impedance of twice that yield it grows by itself, so the error is
+    measured without anything to compare the file with. Empty where no connect or weld
+    closes the loop.
     """
     answers = []
     for times in (1.0, 2.0):
@@ -288,7 +295,8 @@ def _choose_positions(command: Command) -> Command:
         )
     if np.ptp(command.omega_2) != 0.0 or np.ptp(command.alpha_2) != 0.0:
         raise LimitError(
-            "omega_2 or alpha_2 differs from position to position: that is no one motion through time"
+            "omega_2 or alpha_2 differs from position to position: that is no one"
+            " motion through time"
         )
     keep = np.unique(np.linspace(0, n - 1, min(n, POSITIONS)).round().astype(int))
     omega_2, alpha_2 = float(np.max(command.omega_2)), float(np.max(command.alpha_2))
@@ -355,13 +363,14 @@ class UserLoop(Assembled):
         model = self.model
         if self.flywheel:
             self.notes.append(
-                f"its armature of {self.flywheel:.3g} kg m^2 on pin O2 is taken for a flywheel that drives: "
-                "the torque on it is not counted"
+                f"its armature of {self.flywheel:.3g} kg m^2 on pin O2 is taken for a"
+                " flywheel that drives: the torque on it is not counted"
             )
         for i in self.topology.drives():
             model.actuator_gainprm[i], model.actuator_biasprm[i] = 0.0, 0.0
             self.notes.append(
-                f"its drive {model.actuator(i).name!r} on pin O2 is taken off: the torque is solved for"
+                f"its drive {model.actuator(i).name!r} on pin O2 is taken off: the"
+                " torque is solved for"
             )
         cylinders = self.topology.cylinders() if self.scene.drive is not None else []
         if self.scene.drive is not None and len(cylinders) != 1:
@@ -381,7 +390,8 @@ class UserLoop(Assembled):
             model.actuator_gainprm[i, 0] = 1.0 / model.actuator_gear[i, 0]
             model.actuator_ctrllimited[i] = model.actuator_forcelimited[i] = False
             self.notes.append(
-                f"its actuator {model.actuator(i).name!r} gives the cylinder's force that is solved for"
+                f"its actuator {model.actuator(i).name!r} gives the cylinder's force"
+                " that is solved for"
             )
         self.cylinder = next(iter(cylinders), None)
         for i in range(model.neq):
@@ -392,7 +402,8 @@ class UserLoop(Assembled):
             ):
                 self.data.eq_active[i] = 0
                 self.notes.append(
-                    f"its equality {model.equality(i).name or i!r} is switched off: it is no pin"
+                    f"its equality {model.equality(i).name or i!r} is switched off: it"
+                    " is no pin"
                 )
 
     # methods that `Assembler` needs of a tree
@@ -568,7 +579,8 @@ def answer_one_state(loop: UserLoop, command: Command) -> Answer:
         )
         places = ", ".join(dict.fromkeys(loop.unreached))
         loop.notes.append(
-            f"nothing on {what} gives the commanded acceleration at theta_2 = {places} deg"
+            f"nothing on {what} gives the commanded acceleration at theta_2 ="
+            f" {places} deg"
         )
     evidence = {"closure_gap_m": gap, "contacts": float(contacts)}
     return Answer(ONE_STATE, "as compiled", command, assembled, out, evidence=evidence)
@@ -597,7 +609,8 @@ def answer_through_time(loop: UserLoop, command: Command) -> Answer:
     steps = run.time(run.stop) / timestep
     if not 1.0 <= steps <= MOST_STEPS:
         raise LimitError(
-            f"its timestep of {timestep:g} s makes {steps:.3g} steps of the motion; must be 1 to {MOST_STEPS}"
+            f"its timestep of {timestep:g} s makes {steps:.3g} steps of the motion;"
+            f" must be 1 to {MOST_STEPS}"
         )
     position.find(float(command.theta_2[segment[0]]), int(command.branch[segment[0]]))
     data.qpos[:], data.qvel[:] = loop.data.qpos, loop.speeds(command.omega_2)
@@ -635,7 +648,10 @@ def answer_through_time(loop: UserLoop, command: Command) -> Answer:
     finite = np.isfinite(out["theta_2"])
     out = {name: array[finite] for name, array in out.items()}
     motion, _ = split_answer(out, command.branch[segment][finite])
-    setting = f"{mujoco.mjtIntegrator(model.opt.integrator).name.removeprefix('mjINT_')} {timestep:g} s"
+    setting = (
+        f"{mujoco.mjtIntegrator(model.opt.integrator).name.removeprefix('mjINT_')}"
+        f" {timestep:g} s"
+    )
     return Answer(
         THROUGH_TIME,
         setting,

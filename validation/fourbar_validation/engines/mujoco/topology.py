@@ -1,7 +1,7 @@
 """The four-bar in somebody's compiled MJCF: which body is which bar, where its pins are, what holds the loop closed.
 
-Any cut is understood: three of the pins are hinges, the fourth is an equality (connect, weld) or two sites by
-name. The plane may be any.
+Any cut is understood: three of the pins are hinges, the fourth is an equality (connect,
+weld) or two sites by name. The plane may be any.
 """
 
 import math
@@ -355,7 +355,8 @@ class Topology:
     def qpos(self, x: Sequence[float]) -> Array:
         """Return the joint positions at (theta_2, theta_3 - theta_2, theta_4).
 
-        MuJoCo counts the turns of a hinge: a joint with stops stands in the turn of its range.
+        MuJoCo counts the turns of a hinge: a joint with stops stands in the turn of its
+        range.
         """
         q = self._rest.copy()
         turned = self.to_joints @ (np.asarray(x) - self._rest_angles)
@@ -383,15 +384,18 @@ def find_topology(
 ) -> tuple[Topology, list[str]]:
     """Find the four-bar in a model; add a note on what was guessed. Names that are given, or in the file, stand.
 
-    `lengths`: of ground, input, coupler and output in the scene, m: the guess that fits them best is taken.
+    `lengths`: of ground, input, coupler and output in the scene, m: the guess that fits
+    them best is taken.
 
     Raises InputError in one line: why no three bodies fit.
     """
     roles = {role: names.get(role, role) for role in (*ROLES, *SITES)}
     bodies = [
-        find_stated_body(model, names, role)
-        if role in names
-        else find_body(model, role)
+        (
+            find_stated_body(model, names, role)
+            if role in names
+            else find_body(model, role)
+        )
         for role in ROLES
     ]
     if None not in bodies and (
@@ -435,7 +439,10 @@ def find_topology(
             else "no connect, weld or pair of sites closes it"
         )
         why = refused[0] if refused else few
-        nowhere = f"no body is named {', '.join(missing) or 'B3, B4'}, and no guess makes a four-bar ({why})"
+        nowhere = (
+            f"no body is named {', '.join(missing) or 'B3, B4'}, and no guess makes a"
+            f" four-bar ({why})"
+        )
         unstated = [role for role in missing or SITES if role not in names]
         advice = ""
         if unstated:
@@ -449,7 +456,8 @@ def find_topology(
     )
     pairs = ", ".join(f"{role}={name}" for role, name in guessed.items())
     return topology, [
-        f"guessed from what hangs together and from the lengths: {pairs} (--name states it otherwise)"
+        f"guessed from what hangs together and from the lengths: {pairs} (--name states"
+        " it otherwise)"
     ]
 
 

@@ -2,14 +2,16 @@
 
 From the laws that the study of cost measured:
 
-    the closure's time constant    error = STIFF (h/tc)^4, whatever the timestep        -> tc in steps
-    the timestep                   error ~ h^ORDER until a floor                         -> steps
+    the closure's time constant    error = STIFF (h/tc)^4, whatever the timestep
+    -> tc in steps the timestep                   error ~ h^ORDER until a floor
+    -> steps
 
-The scene is assembled once by the engine itself; each trial compiles the generated MJCF anew, with
-the drive to be tried, and reports its own motion, torque and pin forces.
+The scene is assembled once by the engine itself; each trial compiles the generated MJCF
+anew, with the drive to be tried, and reports its own motion, torque and pin forces.
 
-A run that is no more precise than wanted has the settings of the laws, confirmed by the error that the engine predicts
-from its own residuals, never by what the formulas say: how wrong it is against them stays a finding.
+A run that is no more precise than wanted has the settings of the laws, confirmed by the
+error that the engine predicts from its own residuals, never by what the formulas say:
+how wrong it is against them stays a finding.
 """
 
 import time
@@ -150,7 +152,8 @@ class TrialSetup:
             or np.ptp(command.theta_2) == 0.0
         ):
             raise LimitError(
-                "nothing to run through in time: a sweep of theta_2 at omega_2 is needed"
+                "nothing to run through in time: a sweep of theta_2 at omega_2 is"
+                " needed"
             )
         if scene.motion.law is not None:
             raise LimitError(
@@ -179,7 +182,8 @@ class TrialSetup:
         }
         if not self.segments:
             raise LimitError(
-                "the loop closes at no two neighbouring positions: nothing to run through in time"
+                "the loop closes at no two neighbouring positions: nothing to run"
+                " through in time"
             )
 
     def text(self, settings: Settings, timestep: float) -> str:
@@ -199,9 +203,10 @@ class TrialSetup:
     ) -> tuple[ClosedLoop, ClosedLoop | None]:
         """Build the loop that is stepped, and the one that a drive elsewhere is read from.
 
-        Both are closed alike: at a state that a soft closure has reached, another closure
-        asks for other forces. Pads stiffen the closure of a crank with a flywheel alone, so
-        with pads the second loop has a light one; otherwise it is the linkage by itself.
+        Both are closed alike: at a state that a soft closure has reached, another
+        closure asks for other forces. Pads stiffen the closure of a crank with a
+        flywheel alone, so with pads the second loop has a light one; otherwise it is
+        the linkage by itself.
         """
         text = self.text(settings, timestep)
         loop = (drive or closure or _keep_text)(text, self.omega)

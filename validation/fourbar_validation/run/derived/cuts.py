@@ -1,7 +1,8 @@
 """Internal forces: each bar is cut, and the piece beyond the cut freed; nothing of the formulas' beam is used.
 
-The free bodies give pin forces and the drive. A piece of a uniform bar is a rigid bar of its own, with a mass, a
-centre and an inertia; of any other bar all of that is in the piece that has G's foot on the line.
+The free bodies give pin forces and the drive. A piece of a uniform bar is a rigid bar
+of its own, with a mass, a centre and an inertia; of any other bar all of that is in the
+piece that has G's foot on the line.
 """
 
 from dataclasses import dataclass
@@ -35,8 +36,9 @@ WHERE = (0.0, 0.137, 0.479, 0.863)
 """Cuts, in parts of the bar's length from its first pin; just beyond that pin, and none at another foot."""
 CUT = ErrorBound(
     "cut bars",
-    "1e-10 of the sum of the absolute terms: pin forces at conditions of at least 0.1 differ by some 1e-14, and "
-    "terms that cancel in the balance of a piece stand in the sum",
+    "1e-10 of the sum of the absolute terms: pin forces at conditions of at least 0.1"
+    " differ by some 1e-14, and terms that cancel in the balance of a piece stand in"
+    " the sum",
     1e-10,
     conditioned=False,
 )

@@ -1,6 +1,7 @@
 """Judge equilibria by the linkage held at rest in 320-bit arithmetic: its torque, the slope of that and its inertia.
 
-With T the torque that holds the independent bar and J the torque per unit of its acceleration, T = -Q and
+With T the torque that holds the independent bar and J the torque per unit of its
+acceleration, T = -Q and
     dT/dq > 0: stable,   sqrt((dT/dq)/J)/(2 pi): the frequency.
 Free bodies held at many positions between say that no equilibrium was missed.
 """
@@ -44,8 +45,9 @@ AT_LIMIT = EPS**-0.5
 """Most roundings by which a rounding of theta_2 moves theta_4, at a limit of theta_2."""
 REST = ErrorBound(
     "rest",
-    "K eps of the sum of what moving each stored number by its own size would change, from differences in 320-bit "
-    "arithmetic; of an inertia at least of the sum of m L^2 and I",
+    "K eps of the sum of what moving each stored number by its own size would change,"
+    " from differences in 320-bit arithmetic; of an inertia at least of the sum of m"
+    " L^2 and I",
     K * EPS,
     conditioned=False,
 )
@@ -86,7 +88,10 @@ def equilibria(question: Question) -> Iterator[Row]:
             if equilibrium.place.branch in (branch, 0)
         ]
         missed += _count_missed(scene, branch, theta_2, torque, places)
-    reason = f"{len(answer.found)} equilibria; {SAMPLES} positions of a turn held by free bodies"
+    reason = (
+        f"{len(answer.found)} equilibria; {SAMPLES} positions of a turn held by free"
+        " bodies"
+    )
     yield Row.judged(
         (question.name, "equilibria", "exact"), "missed", missed, 0.0, reason
     )
@@ -183,8 +188,9 @@ def _count_missed(
 ) -> int:
     """Count the steps in which the torque changes its sign and no equilibrium was found, or the reverse.
 
-    `places`: angles of the equilibria on the branch, and how far off each may be: a step that one may be in or not is
-    not counted, nor one at an end of which 320 bits find another sign than the free bodies, or none.
+    `places`: angles of the equilibria on the branch, and how far off each may be: a
+    step that one may be in or not is not counted, nor one at an end of which 320 bits
+    find another sign than the free bodies, or none.
     """
     counted, open_steps = (
         np.zeros(len(torque) - 1, dtype=int),
@@ -220,7 +226,8 @@ def _count_missed(
 def _judge(scene: Scene, equilibrium: Equilibrium) -> tuple[float, dict[str, float]]:
     """Compare torque, slope, inertia and frequency; also, how far off the equilibrium may be, rad.
 
-    No errors where nothing is decided: that near to a singular position first order predicts nothing.
+    No errors where nothing is decided: that near to a singular position first order
+    predicts nothing.
     """
     place, bar = equilibrium.place, int(equilibrium.angle[-1])
     theta = {2: place.theta_2, 3: place.theta_3, 4: place.theta_4}
@@ -265,8 +272,9 @@ def _derive(
 ) -> tuple[Derived, Derived, Derived] | None:
     """Derive the torque on a bar held at rest, its slope over the bar's angle, and the bar's inertia.
 
-    None where there are none, or where the rounding of the inputs decides the angles of the others. The bar's angle
-    may be off by as much as makes theta_2 round otherwise: a place is stated by theta_2.
+    None where there are none, or where the rounding of the inputs decides the angles of
+    the others. The bar's angle may be off by as much as makes theta_2 round otherwise:
+    a place is stated by theta_2.
     """
     from flint import arb
 

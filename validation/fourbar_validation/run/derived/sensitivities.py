@@ -84,7 +84,8 @@ def study(question: Question) -> list[Row]:
         key: np.array([x + number * APART * step for number in range(MEMBERS)])
         for key, (x, step) in stated.items()
     }
-    # the places of each member lie within those of the scene: nothing says that a table reaches further
+    # the places of each member lie within those of the scene: nothing says that a table
+    # reaches further
     positions = np.array(
         [
             places + APART * number * (places.mean() - places)
@@ -122,11 +123,13 @@ SMALL = 1e-8
 """Step of the first order that tolerances are held to: rounding adds 1e-7, and what bends a curve nothing."""
 CONVERGED = 1e-5
 """Most that the fourth order may change the second by, in parts of the sum of the absolute terms: it leaves out some
-hundred times the square of that. Elsewhere a linkage that does not assemble is too near for differences."""
+hundred times the square of that. Elsewhere a linkage that does not assemble is too near for differences.
+"""
 DIFFERENCES = ErrorBound(
     "differences",
-    "1e-7 of the sum of the absolute terms: the fourth-order difference of free bodies at positions whose condition is "
-    "at least 0.1, where it leaves out 1e-11 and rounding adds 1e-10",
+    "1e-7 of the sum of the absolute terms: the fourth-order difference of free bodies"
+    " at positions whose condition is at least 0.1, where it leaves out 1e-11 and"
+    " rounding adds 1e-10",
     1e-7,
     conditioned=False,
 )
@@ -135,14 +138,16 @@ SAMPLES, DRAWN = 1024, 20_000
 """Number of samples of the tolerances, and of the first-order sum by which percentiles are judged."""
 SPREAD = ErrorBound(
     "spread",
-    "3 % of a deviation or of a worst case, of a percentile 30 % of one: 1024 quasi-random samples against cubature "
-    "and 20 000 draws, twice what they were seen to differ by",
+    "3 % of a deviation or of a worst case, of a percentile 30 % of one: 1024"
+    " quasi-random samples against cubature and 20 000 draws, twice what they were seen"
+    " to differ by",
     0.03,
     conditioned=False,
 )
 NEARLY_STRAIGHT, STRAIGHT = 0.1, 1e-4
 """Relative differences of cubature and first order. Below the first, three points are enough for a deviation; below the
-second, percentiles are those of the first order: what bends a curve by q skews it by q and widens it by q^2."""
+second, percentiles are those of the first order: what bends a curve by q skews it by q and widens it by q^2.
+"""
 SLIGHT = 1e-3
 """Part of the greatest worst case of a quantity, below which differences and rounding are as large as their result."""
 MOST = 3

@@ -1,7 +1,8 @@
 """What `analyze` prints and its JSON holds, against free bodies at many positions and plain sums.
 
-Each peak and each end of a range is taken at the place that is printed with it, and none of many positions between the
-scene's own may exceed it. Means and energies are summed anew from the free bodies' forces.
+Each peak and each end of a range is taken at the place that is printed with it, and
+none of many positions between the scene's own may exceed it. Means and energies are
+summed anew from the free bodies' forces.
 """
 
 import math
@@ -46,13 +47,15 @@ PRESSURE = 1e6
 """Pressure of the cylinder whose bore is judged, Pa."""
 PRINTED = ErrorBound(
     "summary",
-    "1e-8 of the value: five calls leave a place to 1e-7 of a step, a range the fourth power of 0.05 degrees",
+    "1e-8 of the value: five calls leave a place to 1e-7 of a step, a range the fourth"
+    " power of 0.05 degrees",
     1e-8,
     conditioned=False,
 )
 LOCATED_ROUGHLY = ErrorBound(
     "summary, bending",
-    "1e-6 of the moment: three calls of 40 cuts leave a place to 1e-4 of a step, a maximum the square of that",
+    "1e-6 of the moment: three calls of 40 cuts leave a place to 1e-4 of a step, a"
+    " maximum the square of that",
     1e-6,
     conditioned=False,
 )

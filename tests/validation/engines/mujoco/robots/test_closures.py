@@ -115,8 +115,8 @@ def test_angles_count_from_the_horizontal_and_with_the_driven_joint(sign: str) -
 
 def test_bodies_without_joints_are_one_bar_and_what_hangs_on_it_is_held() -> None:
     plate = (
-        '<body name="plate" pos="0.1 0 0"><geom size="0.01"/>'
-        '<body name="flap"><joint name="flap" axis="0 1 0"/><geom size="0.01"/></body></body>'
+        '<body name="plate" pos="0.1 0 0"><geom size="0.01"/><body name="flap"><joint'
+        ' name="flap" axis="0 1 0"/><geom size="0.01"/></body></body>'
     )
     loop = loop_of(Planar(on_coupler=plate).text())
     model = mujoco.MjModel.from_xml_string(Planar(on_coupler=plate).text())
@@ -179,7 +179,10 @@ def test_two_motors_are_named() -> None:
         (Planar(by="weld", cut="B", joint='type="slide"'), "slide"),
         (
             Planar(
-                more='<equality><connect body1="input" body2="output" anchor="0.1 0.1 0"/></equality>'
+                more=(
+                    '<equality><connect body1="input" body2="output" anchor="0.1 0.1'
+                    ' 0"/></equality>'
+                )
             ),
             "no freedom is left",
         ),
@@ -219,8 +222,9 @@ def test_a_ball_joint_and_a_floating_body_are_named() -> None:
     ball = Planar().text().replace('name="A" axis="0 0 1"', 'name="A" type="ball"')
     assert "A is a ball joint" in closure_of(ball).reason
     loose = (
-        '<mujoco><worldbody><body name="a"><freejoint name="float"/><geom size="1"/></body>'
-        "</worldbody><equality><connect body1='a' anchor='0 0 0'/></equality></mujoco>"
+        '<mujoco><worldbody><body name="a"><freejoint name="float"/><geom'
+        " size=\"1\"/></body></worldbody><equality><connect body1='a' anchor='0 0"
+        " 0'/></equality></mujoco>"
     )
     assert "float floats freely" in closure_of(loose).reason
 

@@ -65,7 +65,8 @@ def open_loop(name: str) -> tuple[LoopInside, LoopScene]:
 def ask_again(inside: LoopInside, theta_2: float, alpha_2: float) -> float:
     """Find all joint forces at once by `mj_forward` alone, with the hinges that are not driven left to themselves.
 
-    Newton's method on the accelerations of the driven and the held joints; then bisection on the couple.
+    Newton's method on the accelerations of the driven and the held joints; then
+    bisection on the couple.
     """
     state = inside.state(theta_2, 2.0)
     assert state is not None

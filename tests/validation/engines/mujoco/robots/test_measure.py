@@ -36,7 +36,7 @@ def test_a_scene_with_axes_of_its_own_gives_the_same_errors() -> None:
     (made,) = measure_loops(file, options, None).loops
     scene = made.scene
     linkage = replace(scene.linkage, ground_angle=scene.linkage.ground_angle + 0.3)
-    (gravity, *others) = scene.effects
+    gravity, *others = scene.effects
     turned = replace(
         scene,
         linkage=linkage,

@@ -1,8 +1,8 @@
 """A scene from a loop against MuJoCo, asked in the whole robot: inverse dynamics, and multipliers of the closure.
 
-Every other joint of the robot stands still. Nothing of the scene enters: the loop is closed by
-Newton's method on MuJoCo's own residual of the equality, its speeds and accelerations follow from
-MuJoCo's Jacobian.
+Every other joint of the robot stands still. Nothing of the scene enters: the loop is
+closed by Newton's method on MuJoCo's own residual of the equality, its speeds and
+accelerations follow from MuJoCo's Jacobian.
 """
 
 import cmath

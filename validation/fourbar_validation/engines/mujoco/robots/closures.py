@@ -1,8 +1,8 @@
 """The closures of a robot: from both bodies of each equality to their common ancestor.
 
-A planar four-bar is three hinges with parallel axes on the way and a connect, which is the
-fourth pin; or four hinges and a weld, which joins two halves of a bar. Bodies that no joint
-parts, or a held one, are one bar.
+A planar four-bar is three hinges with parallel axes on the way and a connect, which is
+the fourth pin; or four hinges and a weld, which joins two halves of a bar. Bodies that
+no joint parts, or a held one, are one bar.
 """
 
 import math
@@ -85,7 +85,8 @@ def find_closures(posed: PosedRobot, options: PoseOptions) -> list[RobotClosure]
 
     Raises
     ------
-    InputError : a joint that is held or drives is none of the robot's, or drives no loop.
+    InputError : a joint that is held or drives is none of the robot's, or drives no
+    loop.
     """
     finder = _Finder(posed, options)
     closures = [finder.describe(number) for number in range(posed.model.neq)]

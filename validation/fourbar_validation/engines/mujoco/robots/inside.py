@@ -1,19 +1,22 @@
 """A four-bar inside somebody's whole robot: the torque and the pin forces that MuJoCo gives it there.
 
-No joint is removed, for that would change the softness that is measured: MuJoCo sizes a constraint's softness by the
-bodies of the whole model. The loop's driven hinge moves as commanded, the other joints of the robot stay where they
-are, contacts, joint limits and motors are off, and so are equalities between the moving bars and joints that stay.
+No joint is removed, for that would change the softness that is measured: MuJoCo sizes a
+constraint's softness by the bodies of the whole model. The loop's driven hinge moves as
+commanded, the other joints of the robot stay where they are, contacts, joint limits and
+motors are off, and so are equalities between the moving bars and joints that stay.
 
-At a state the joint forces follow from MuJoCo's own inverse dynamics of its soft constraints. The driven hinge has the
-acceleration alpha, a held joint none, and the accelerations x of the loop's other hinges are those at which
+At a state the joint forces follow from MuJoCo's own inverse dynamics of its soft
+constraints. The driven hinge has the acceleration alpha, a held joint none, and the
+accelerations x of the loop's other hinges are those at which
 
     (M a(x) + c - J^T f(a(x)))_i = 0    at each of these hinges i,
 
-since nothing acts there. The forces that hold the joints are then known, and the couple on the driven hinge is found
-by `mj_forward`, with the solver of the file.
+since nothing acts there. The forces that hold the joints are then known, and the couple
+on the driven hinge is found by `mj_forward`, with the solver of the file.
 
-Were the pins rigid, J a = -(dJ/dt) v would hold, with multipliers in the place of f, and dry friction in full: that
-couple and these pin forces are what MuJoCo's are compared with, in the same model.
+Were the pins rigid, J a = -(dJ/dt) v would hold, with multipliers in the place of f,
+and dry friction in full: that couple and these pin forces are what MuJoCo's are
+compared with, in the same model.
 """
 
 import math
@@ -59,7 +62,8 @@ BALANCED = 1e-10
 HEAVY = 1e4
 """Armature that holds a joint while the model is stepped, over the largest inertia of the robot. It lets the joints
 move by about its inverse; beyond 1e5 MuJoCo's solver loses the light bars beside it: at 1e6 the gap was three times
-too large."""
+too large.
+"""
 LIMIT = int(mujoco.mjtDisableBit.mjDSBL_LIMIT)
 SETTLED = 5.0
 """Time constants after which the loop has yielded but for 1 %, at most half of the motion."""
@@ -393,8 +397,9 @@ class LoopInside:
     ) -> InsideAnswer:
         """Step the whole robot through the angles, at the file's own timestep, integrator and solver.
 
-        Each joint that is held, and the driven one, gets an armature of `heavy` times the robot's largest inertia. The
-        couple that a state asks for acts on the driven one until the next, so that its speed is kept.
+        Each joint that is held, and the driven one, gets an armature of `heavy` times
+        the robot's largest inertia. The couple that a state asks for acts on the driven
+        one until the next, so that its speed is kept.
         """
         answer = InsideAnswer()
         angles = sorted(theta_2, reverse=omega_2 < 0.0)
@@ -419,11 +424,13 @@ class LoopInside:
         ]
         if not 1.0 <= instants[-1] / timestep <= MOST_STEPS:
             raise LimitError(
-                f"its timestep of {timestep:g} s makes {instants[-1] / timestep:.3g} steps of the motion; "
-                f"must be 1 to {MOST_STEPS}: --speed states another speed"
+                f"its timestep of {timestep:g} s makes {instants[-1] / timestep:.3g}"
+                f" steps of the motion; must be 1 to {MOST_STEPS}: --speed states"
+                " another speed"
             )
         spent = 0.0
-        # the loop starts exactly closed, and takes some time constants to yield as far as it does
+        # the loop starts exactly closed, and takes some time constants to yield as far
+        # as it does
         settled = min(SETTLED * self.find_constant(), 0.5 * instants[-1])
         for instant in instants[1:]:
             if instant < settled:
@@ -454,7 +461,8 @@ class LoopInside:
     ) -> list[TornState]:
         """From rest at each angle let a motor's torque act for some time, the other joints held.
 
-        A state is the one of the largest gap on the way from each angle; of a motion that MuJoCo loses there is none.
+        A state is the one of the largest gap on the way from each angle; of a motion
+        that MuJoCo loses there is none.
         """
         states = []
         model, data = copy(self.model), mujoco.MjData(self.model)

@@ -53,7 +53,8 @@ def measure_loops(
 
     Parameters
     ----------
-    scene : of the loop, of several the one whose lengths fit; None: it is made from the file.
+    scene : of the loop, of several the one whose lengths fit; None: it is made from the
+    file.
 
     Raises
     ------
@@ -192,7 +193,8 @@ def _choose_motion(scene: Scene, turned: float) -> LoopMotion:
 def _compare(one: InsideAnswer, other: InsideAnswer) -> float:
     """Return by how much the errors of two runs differ at the same angles, of the largest of each quantity.
 
-    Each is the error at its own state: the motions differ too, and near a limit position the forces with them.
+    Each is the error at its own state: the motions differ too, and near a limit
+    position the forces with them.
     """
     scales, worst = one.scales(), 0.0
     if one.lost or other.lost:

@@ -16,7 +16,8 @@ from fourbar_validation.engines.mujoco.robots.pose import HINGE, find_joint
 class JointEquality:
     """The position of a joint as a polynomial of that of another.
 
-    y - y0 = a0 + a1 (x - x0) + ... + a4 (x - x0)^4, with x of the leader and y of the follower.
+    y - y0 = a0 + a1 (x - x0) + ... + a4 (x - x0)^4, with x of the leader and y of the
+    follower.
     """
 
     follower: str
@@ -34,7 +35,8 @@ def read_joint_equality(file: RobotFile, name: str) -> JointEquality:
 
     Raises
     ------
-    InputError : no such joint, no equality by which it follows, or a joint that is no hinge.
+    InputError : no such joint, no equality by which it follows, or a joint that is no
+    hinge.
     """
     model = compile_robot(file).model
     joint = find_joint(model, name, "--mimic")

@@ -1,8 +1,8 @@
 """The pose in which a robot is looked at: as the file has it, as stated, closed again by least squares.
 
-The residuals are those of MuJoCo's own active equalities, the unknowns the joints that they
-depend on. A step of Gauss and Newton is a linear least-squares problem within the joints'
-ranges; damping keeps the pose near the one that was stated.
+The residuals are those of MuJoCo's own active equalities, the unknowns the joints that
+they depend on. A step of Gauss and Newton is a linear least-squares problem within the
+joints' ranges; damping keeps the pose near the one that was stated.
 """
 
 from dataclasses import dataclass
@@ -55,7 +55,8 @@ def pose_robot(model: mujoco.MjModel, options: PoseOptions) -> PosedRobot:
 
     Raises
     ------
-    InputError : an unknown joint or keyframe, a position without a unit or of another kind.
+    InputError : an unknown joint or keyframe, a position without a unit or of another
+    kind.
     """
     stated, origin = _choose_start(model, options)
     fixed = {find_joint(model, name, "--hold") for name in options.held}
@@ -88,7 +89,7 @@ def pose_robot(model: mujoco.MjModel, options: PoseOptions) -> PosedRobot:
         )
     elif after > OPEN:
         notes.append(
-            f"no pose near this one closes all loops within the joints' ranges; what "
+            "no pose near this one closes all loops within the joints' ranges; what "
             f"is left is {1e3 * after:.3g} mm or mrad: state one by --pose or --key"
         )
     return PosedRobot(model, _evaluate(model, closed), stated, tuple(notes))

@@ -1,7 +1,7 @@
 """A scene from a loop of a robot: lengths, masses, effects and range, in the pose, everything else held.
 
-What hangs on a bar by other joints is held as it stands and counts with its mass. What a scene
-cannot hold is named with its size.
+What hangs on a bar by other joints is held as it stands and counts with its mass. What
+a scene cannot hold is named with its size.
 """
 
 import cmath
@@ -58,7 +58,8 @@ DIGITS = 12
 """Significant digits of a number of the scene; those beyond are round-off of the compiler."""
 FLAT = 2e-3
 """rad; where the outputs of both assemblies are nearer the pose does not tell which it is: a
-loop that is closed to 1e-12 m leaves about half as much open where its bars are in line."""
+loop that is closed to 1e-12 m leaves about half as much open where its bars are in line.
+"""
 STEPS = 120
 """Intervals of the sweep."""
 SAMPLES = 720
@@ -210,7 +211,8 @@ class _SceneOfLoop:
         model, loop = self.model, self.loop
         closing = loop.name if loop.cut else ""
         pins = (
-            f"{pin} {name_joint(model, loop.hinges[pin]) if pin in loop.hinges else closing}"
+            f"{pin}"
+            f" {name_joint(model, loop.hinges[pin]) if pin in loop.hinges else closing}"
             for pin in PAIRS
         )
         bars = (
@@ -306,8 +308,8 @@ class _SceneOfLoop:
                 name = name_joint(model, joint)
                 if pin == "O4":
                     self.remarks.append(
-                        f"the armature {size:.6g} kg m^2 of {name} is in the inertia of "
-                        "the output, which turns as it does"
+                        f"the armature {size:.6g} kg m^2 of {name} is in the inertia of"
+                        " the output, which turns as it does"
                     )
                 elif pin != "O2":
                     self.remarks.append(
@@ -413,8 +415,8 @@ class _SceneOfLoop:
             free &= inside
         if stops:
             self.remarks.append(
-                f"the range of {', '.join(sorted(stops))} ends the motion before that of "
-                f"{name_joint(self.model, self.loop.joint)}"
+                f"the range of {', '.join(sorted(stops))} ends the motion before that"
+                f" of {name_joint(self.model, self.loop.joint)}"
             )
         if not free.any():
             raise InputError(

@@ -1,7 +1,7 @@
 """What to type into a robot's file: each setting of a loop's softness and of the stepping, measured in the file itself.
 
-A setting is changed alone first. Then combinations are tried, those that cost least time first, until one keeps the
-torque and the pin forces within the wanted error.
+A setting is changed alone first. Then combinations are tried, those that cost least
+time first, until one keeps the torque and the pin forces within the wanted error.
 """
 
 import math
