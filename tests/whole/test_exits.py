@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import click
@@ -240,6 +241,7 @@ STATUSES: list[tuple[Callable[[list[str]], int], str, int]] = [
     (VALIDATION, "check scene.toml no-such-file", BAD_INPUT),
     (VALIDATION, "run scene.toml --engines free-body --no-pictures --out out", HOLDS),
     (VALIDATION, "run scene.toml --engines nobody --out out", BAD_INPUT),
+    (VALIDATION, "collect no-such-folder --out out", BAD_INPUT),
     (LAB, "fuzz-files --count 3", HOLDS),
     (LAB, "stability --samples 2 --family random --jobs 1", HOLDS),
     (LAB, "stability --samples 0", BAD_INPUT),
@@ -303,8 +305,7 @@ def test_a_torque_off_in_its_twelfth_digit_is_status_1(
     def off(*arguments: object, **options: object) -> fourbar.Solution:
         solution = true(*arguments, **options)  # type: ignore[arg-type]
         assert solution.torque is not None
-        solution.torque *= 1.0 + 1e-12
-        return solution
+        return replace(solution, torque=solution.torque * (1.0 + 1e-12))
 
     judge_here(monkeypatch)
     monkeypatch.setattr("fourbar_lab.stability.solve", off)
@@ -370,6 +371,7 @@ PROCESSES = [
     ("fourbar_lab", "benchmark --no-such-option", BAD_INPUT),
     ("fourbar_lab", "findings --release 1.0", BAD_INPUT),
     ("validation", f"accept {NO_FILE}", BAD_INPUT),
+    ("validation", f"collect {NO_FILE} --out {NO_FILE}", BAD_INPUT),
     (
         "validation",
         (

@@ -23,7 +23,7 @@ from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.scenes.suites import list_model_files
 from tests.support.scenes import crank_rocker
-from tests.validation.run.derived.test_shipped import rows_of
+from tests.validation.run.derived.test_derived import rows_of
 
 STEPS = 20
 NUMBER = r"-?[\d.]+(?:e-?\d+)?"

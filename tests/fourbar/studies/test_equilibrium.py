@@ -33,7 +33,7 @@ from fourbar.scene.motion import Free
 from fourbar.studies.circuit_curve import SAMPLES, CircuitCurve
 from fourbar.studies.equilibrium import Equilibria, Equilibrium, equilibrium
 from tests.support.scenes import crank_rocker
-from tests.validation.run.derived.test_shipped import failing, rows_of
+from tests.validation.run.derived.test_derived import failing, rows_of
 
 MODELS = Path(__file__).parents[3] / "models"
 M, R, INERTIA = 1.5, 0.04, 0.002

@@ -10,7 +10,7 @@ import fourbar
 from fourbar.effects import Place
 from fourbar.errors import InputError
 from tests.support.scenes import crank_rocker
-from tests.validation.run.derived.test_shipped import rows_of
+from tests.validation.run.derived.test_derived import rows_of
 
 ROUNDED = 1e-12
 """Relative to the sum of the terms: some tens of roundings and a division by sin mu, which is above 0.6 here."""

@@ -43,7 +43,7 @@ IDENTITIES = (
 )
 """Rows of the formulas that no engine answers: they do not count as compared."""
 
-SHIPPED = (
+DERIVED = (
     "study",
     "sensitivity",
     "internal_forces",

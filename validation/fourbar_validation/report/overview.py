@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 
 from fourbar.quantities import LINE, PIN_FORCES, UNITS
 from fourbar_validation.compare.rows import (
+    DERIVED,
     FORMULAS,
     HOLDING_VERDICTS,
     REFUSES,
-    SHIPPED,
     UNDECIDED,
     Row,
     write_one_line,
@@ -19,7 +19,7 @@ from fourbar_validation.compare.tolerance import find_used
 from fourbar_validation.report.record import Record
 from fourbar_validation.report.words import NUMBER
 
-OWN_ENGINES = (FORMULAS, *SHIPPED)
+OWN_ENGINES = (FORMULAS, *DERIVED)
 """Engines whose rows check fourbar against itself: identities, and functions other than `solve`."""
 TORQUE, PINS, MOTION = "torque", "pin forces", "motion"
 GROUPS = (TORQUE, PINS, MOTION)
