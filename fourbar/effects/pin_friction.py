@@ -172,9 +172,8 @@ class PinFriction(PinRows):
                     for c in by
                 ]
                 slopes.append(np.broadcast_arrays(*pulls, along.real)[:-1])
-            matrix = np.eye(len(names)) - np.moveaxis(
-                np.array(slopes), (0, 1), (-2, -1)
-            )
+            slope = np.moveaxis(np.array(slopes), (0, 1), (-2, -1))
+            matrix = np.eye(len(names), dtype=slope.dtype) - slope
             usable = np.asarray(np.isfinite(matrix).all(axis=(-2, -1)))
             usable[usable] = np.linalg.det(matrix[usable]) != 0.0
             inverse = np.zeros_like(matrix)

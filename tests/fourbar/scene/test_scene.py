@@ -320,8 +320,8 @@ def test_released_at_an_angle_of_another_bar_it_moves_as_at_its_own_theta_2(
 
 def replace_alpha(solution: Solution) -> Solution:
     """Give it accelerations, which a release has none of."""
-    solution.alpha_2 = solution.alpha_3 = solution.alpha_4 = np.zeros(len(solution))
-    return solution
+    none = np.zeros(len(solution))
+    return replace(solution, alpha_2=none, alpha_3=none, alpha_4=none)
 
 
 def test_released_at_theta_4_it_passes_limits_of_theta_2_and_its_own() -> None:

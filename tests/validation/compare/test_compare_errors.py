@@ -142,10 +142,7 @@ def test_ten_times_its_prediction_an_error_is_degraded_and_no_more(
 
 def test_a_scene_of_which_most_numbers_are_undecided_does_not_hold() -> None:
     """A tolerance that is wider than a thousandth at every position leaves nothing to decide by."""
-    blind = replace(FORMULAS)
-    for name in ("at", "lengths", "ground", "scene"):
-        setattr(blind, name, getattr(FORMULAS, name))
-    blind.condition = np.full(POSITIONS, 1e-14)
+    blind = replace(FORMULAS, condition=np.full(POSITIONS, 1e-14))
     answer = make_answer()
     held = Demands(EQUIVALENCE, ("omega_3", "F12"))
     rows = {

@@ -100,9 +100,9 @@ def test_what_is_wrong_by_more_than_is_predicted_fails(
 
     def off(*arguments: object, **keywords: object) -> Solution:
         solution: Solution = true(*arguments, **keywords)  # type: ignore[arg-type]
-        if solution.omega_3 is not None:
-            solution.omega_3 *= 1.0 + 1e-11
-        return solution
+        if solution.omega_3 is None:
+            return solution
+        return replace(solution, omega_3=solution.omega_3 * (1.0 + 1e-11))
 
     monkeypatch.setattr("fourbar_validation.run.question.solve", off)
     rows = judge("short", SCENES["short input"], BY_ITSELF).rows
