@@ -411,7 +411,7 @@ IN_A_TREE = {
     "rotation": (partial(scaled, factor=1.0 + 1e-9), {"F43", "torque"}),
     "forces": (wrong_loop_force, {"F12", "F32", "F14"}),
     "carried": (longer, {"F12", "F32", "F14"}),
-    "twist": (nothing_on_bar_3, {"torque"}),
+    "couple": (nothing_on_bar_3, {"torque"}),
     "angle": (larger, {"theta_3", "theta_4"}),
 }
 PLANTED = {
@@ -427,7 +427,7 @@ PLANTED = {
             {"omega_3", "omega_4", "torque"},
         ),
         "rotation": (partial(scaled, factor=1.0 + 1e-9), {"F43", "torque"}),
-        "twist": (nothing_on_bar_3, {"torque"}),
+        "couple": (nothing_on_bar_3, {"torque"}),
         "angle": (larger, {"theta_3", "theta_4"}),
     },
     "opensim-constraints": {
@@ -438,7 +438,7 @@ PLANTED = {
         "_read_reaction": (partial(scaled, factor=1.0 + 1e-9), {"F12", "F43", "F14"}),
         "_compute_closing_force": (partial(scaled, factor=-1.0), {"F32"}),
         "rotation": (partial(scaled, factor=1.0 + 1e-9), {"F43", "torque"}),
-        "twist": (nothing_on_bar_3, {"torque"}),
+        "couple": (nothing_on_bar_3, {"torque"}),
         "angle": (larger, {"theta_3", "theta_4"}),
     },
 }

@@ -141,17 +141,18 @@ def orient(topology: Topology, scene: Scene) -> Topology:
         start=np.zeros(2),
     )
     allowed = SAME_GRAVITY * float(np.linalg.norm(gravity))
-    seen = [
+    front, behind = (
         topology.turned(scene.linkage.ground_angle, behind=behind)
         for behind in (False, True)
-    ]
-    fitting = [
-        one for one in seen if np.linalg.norm(one.in_plane(gravity) - wanted) <= allowed
-    ]
-    missed = [miss_output(scene, *one.rest_angles) for one in fitting]
-    if len(fitting) > 1 and missed[1] < missed[0] - SAME_OUTPUT:
-        return fitting[1]
-    return fitting[0] if fitting else topology
+    )
+    missed, missed_behind = (
+        miss_output(scene, *one.rest_angles) for one in (front, behind)
+    )
+    # gravity alone does not tell the side: a file whose gravity is reversed has the
+    # right one from behind
+    nearest = behind if missed_behind < missed - SAME_OUTPUT else front
+    fits = np.linalg.norm(nearest.in_plane(gravity) - wanted) <= allowed
+    return nearest if fits else topology
 
 
 def examine(scene: Scene, file: RobotFile | None, names: Mapping[str, str]) -> Examined:
