@@ -48,7 +48,7 @@ def demo(*, draw: bool = True) -> Record:
         scene,
         tuple(w for w in ENGINES if w.name != "mujoco-simulated"),
         draw=draw,
-        shipped=draw,
+        derived=draw,
     )
 
 

@@ -78,7 +78,7 @@ CHECKS = (
             "statements of the linkage: engines are led to its limits by theta_2"
         ),
     ),
-    Check(check_mjcf, needs_theta_2="MJCF as derived: it drives bar 2"),
+    Check(check_mjcf, needs_theta_2="MJCF as shipped: it drives bar 2"),
     Check(compare_inertia),
     Check(
         check_released,

@@ -174,7 +174,12 @@ def test_the_points_of_a_scene_are_drawn_where_they_are() -> None:
     assert {f"path of $G_{bar}$" for bar in (2, 4)} <= {
         line.get_label() for line in panels[0].lines
     }
-    assert np.allclose(path.get_xydata(), solution.points["P"], rtol=0.0, atol=1e-15)
+    # the path has steps of its own along the curve: each position lies between two
+    drawn = np.asarray(path.get_xydata()) @ (1.0, 1.0j)
+    stated = solution.points["P"] @ (1.0, 1.0j)
+    steps = np.abs(np.diff(drawn))
+    away = np.abs(stated[:, None] - drawn).min(axis=1)
+    assert away.max() < steps.max() < 0.01 * np.abs(drawn).max()
     for panel, of_points in zip(
         panels[1:], (solution.velocity, solution.acceleration), strict=True
     ):

@@ -26,6 +26,7 @@ ENGINES = {
     "study",
     "sensitivity",
     "internal_forces",
+    "summary",
     "tolerances",
     "equilibria",
     "sdf",
