@@ -44,6 +44,7 @@ from fourbar_validation.compare.tolerance import (
     find_condition,
     find_error,
     magnitude,
+    mark_touching,
 )
 from fourbar_validation.run.question import Question
 
@@ -58,7 +59,7 @@ PART, APART = 0.3, 0.4
 AT_A_REVERSAL = 1e-3
 """Part of its speeds below which a pin with dry friction may reverse."""
 FORCES = (*PIN_FORCES, "torque", "drive_force")
-COMPARED_VERDICTS = (
+COMPARED_QUANTITIES = (
     *(f"{name}_{bar}" for name in ("theta", "omega", "alpha") for bar in MOVING_BARS),
     *FORCES,
     "power",
@@ -130,7 +131,7 @@ class _Few:
         return find_error(name, ours, theirs, np.maximum(scale, summed)) * condition
 
     def compare(
-        self, convert: Callable[[str], Array], names: Sequence[str] = COMPARED_VERDICTS
+        self, convert: Callable[[str], Array], names: Sequence[str] = COMPARED_QUANTITIES
     ) -> dict[str, Array]:
         """Compare the quantities that the scene has with those of another one, converted."""
         return {
@@ -409,12 +410,18 @@ def _convert(scene: Scene, to: _Conversion) -> Scene:
 
 
 def _measure_mirrored(few: _Few) -> dict[str, Array]:
-    """Mirror at the x-axis."""
-    command = few.command
+    """Mirror at the x-axis.
+
+    The names of the assemblies are exchanged, unless all bars come to lie in line where
+    the commanded one lies along the ground: an assembly is its own mirror image there.
+    """
+    command, linkage = few.command, few.scene.linkage
+    along_the_ground = np.array([linkage.ground_angle])
+    keeps_name = mark_touching(linkage, along_the_ground, command.bar)[0]
     other = few.solve(
         _convert(few.scene, _Conversion(sense=-1.0)),
         angle=-command.angle,
-        branch=-command.branch,
+        branch=command.branch if keeps_name else -command.branch,
         speed=-np.asarray(command.speed),
         acceleration=-np.asarray(command.acceleration),
     )
@@ -453,7 +460,7 @@ def _measure_scaled(few: _Few) -> dict[str, Array]:
         name: magnitude(
             np.array(getattr(other, name)) / power.get(UNITS[name], 1.0) - ours
         )
-        for name in COMPARED_VERDICTS
+        for name in COMPARED_QUANTITIES
         if (ours := getattr(few.solution, name, None)) is not None
     }
 
