@@ -190,15 +190,14 @@ class Bar:
 
     Parameters
     ----------
-    length : distance between its two pins, m, > 0. mass : kg, >= 0. inertia : about the
-    mass centre G, kg m^2, >= 0; left out: uniform slender bar, m L^2/12. centre : (r,
-    phi), polar position of G from the bar's first pin (O2, A, O4), phi measured
+    length : distance between its two pins, m, > 0.
+    mass : kg, >= 0.
+    inertia : about the mass centre G, kg m^2, >= 0; left out: uniform slender bar, m L^2/12.
+    centre : (r, phi), polar position of G from the bar's first pin (O2, A, O4), phi measured
         from the bar's line, m and rad; left out: mid-bar.
-    density : kg/m^3, > 0, in place of `mass`, which is then that of a uniform bar from
-    pin to pin
+    density : kg/m^3, > 0, in place of `mass`, which is then that of a uniform bar from pin to pin
         and follows the length.
-    section : (height, thickness) of a rectangular cross-section, m: the height lies in
-    the plane
+    section : (height, thickness) of a rectangular cross-section, m: the height lies in the plane
         of motion.
     diameter : of a round cross-section, m, in place of `section`.
 

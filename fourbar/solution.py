@@ -182,9 +182,9 @@ class Solution(Quantities):  # noqa: PLW1641 - arrays have no hash
 
         Parameters
         ----------
-        degrees : theta in deg. units : other units, as `fourbar.units("mm N.mm")` makes
-        them; every heading then names its unit. decimal : "," writes decimal commas,
-        and semicolons between the columns, as many spreadsheets expect.
+        degrees : theta in deg.
+        units : other units, as `fourbar.units("mm N.mm")` makes them; every heading then names its unit.
+        decimal : "," writes decimal commas, and semicolons between the columns, as many spreadsheets expect.
         """
         expect("path", path, str, Path, type(None))
         expect("degrees", degrees, bool)

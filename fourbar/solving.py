@@ -68,24 +68,18 @@ def solve(
 
     Parameters
     ----------
-    stage : "position", "velocity", "acceleration", "force" or "error"; each includes
-    those before
+    stage : "position", "velocity", "acceleration", "force" or "error"; each includes those before
         it. Left out: "force", or "position" where the scene states no omega_2.
-    at : other positions, velocities and accelerations than the scene's own, of a bar of
-    its own. out : arrays to write into, by name, (n,) or (n, 2), of a study (m, n) or
-    (m, n, 2), which share no memory; only the
-        quantities named are evaluated, with the stages they need, and the others are
-        None in the result.
-    side : in which sense pins at rest are about to turn where dry friction acts: +1 as
-    the commanded angle grows, -1 as
+    at : other positions, velocities and accelerations than the scene's own, of a bar of its own.
+    out : arrays to write into, by name, (n,) or (n, 2), of a study (m, n) or (m, n, 2), which share no memory; only the
+        quantities named are evaluated, with the stages they need, and the others are None in the result.
+    side : in which sense pins at rest are about to turn where dry friction acts: +1 as the commanded angle grows, -1 as
         it falls, 0 neither.
 
     Raises
     ------
-    InputError : the stage or a name in `out` is unknown, its array has the wrong shape,
-    the scene does not state
-        the omega_2 that is needed, or a study, which states its own positions, is given
-        others.
+    InputError : the stage or a name in `out` is unknown, its array has the wrong shape, the scene does not state
+        the omega_2 that is needed, or a study, which states its own positions, is given others.
     """
     require_whole("side", side, (-1, 0, 1), "must be -1, 0 or 1")
     if not isinstance(scene, Scene):

@@ -36,12 +36,13 @@ def read_bytes(
 
     Parameters
     ----------
-    key : what names the file, for the error. largest : bytes. shown : how the error
-    names it; left out: by its path. pipes : read standard input for the path `-`, and
-    pipes (those of a shell's `<(...)` too) until they end.
+    key : what names the file, for the error.
+    largest : bytes.
+    shown : how the error names it; left out: by its path.
+    pipes : read standard input for the path `-`, and pipes (those of a shell's `<(...)` too) until they end.
 
-    Raises InputError for a file that is missing, too large or unreadable, for a
-    directory, for devices, and for pipes where they are not read.
+    Raises InputError for a file that is missing, too large or unreadable, for a directory, for devices, and for pipes
+    where they are not read.
     """
 
     def refuse(allowed: str) -> InputError:

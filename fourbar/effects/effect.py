@@ -60,9 +60,9 @@ class Actions:
 
     Parameters
     ----------
-    state : positions and motion. bodies : of bars 2, 3, 4. side : the sense in which
-    pins at rest are about to turn: +1 as theta_2 grows, -1 as it falls, 0 neither;
-    between
+    state : positions and motion.
+    bodies : of bars 2, 3, 4.
+    side : the sense in which pins at rest are about to turn: +1 as theta_2 grows, -1 as it falls, 0 neither; between
         them the part of its torque that dry friction holds them with.
     """
 
@@ -94,8 +94,8 @@ class Actions:
 
         Parameters
         ----------
-        point : of the bar's frame at its first pin, complex, m. beyond : vector from
-        there to where the force acts, complex, m, world axes; left out: it acts there.
+        point : of the bar's frame at its first pin, complex, m.
+        beyond : vector from there to where the force acts, complex, m, world axes; left out: it acts there.
         """
         if bar != 1:
             self.forces[bar] = self.forces[bar] + force if bar in self.forces else force

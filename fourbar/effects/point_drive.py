@@ -28,9 +28,9 @@ class PointDrive(ForceDrive):
 
     Parameters
     ----------
-    place : where the force acts, which turns with its bar. direction : angle of the
-    force, rad. frame : "world": the direction is from +x; "bar": from the bar's line,
-    and turns with it.
+    place : where the force acts, which turns with its bar.
+    direction : angle of the force, rad.
+    frame : "world": the direction is from +x; "bar": from the bar's line, and turns with it.
     """
 
     place: Place

@@ -43,9 +43,8 @@ GAS = {
 class Spring:
     """A spring that pulls its two points together with preload + stiffness (distance - length), N.
 
-    Where that is negative it pushes them apart: a compression spring is shorter than
-    `length`, a gas spring has a negative preload. With stiffness 0 the force is
-    constant.
+    Where that is negative it pushes them apart: a compression spring is shorter than `length`, a gas spring has a
+    negative preload. With stiffness 0 the force is constant.
 
     Parameters
     ----------

@@ -242,8 +242,7 @@ def compute_error_bars(
     Parameters
     ----------
     state, dynamics : evaluation in doubles, to which the error bars belong.
-    refined_rows : indices of the positions whose half angle is evaluated in many
-    digits.
+    refined_rows : indices of the positions whose half angle is evaluated in many digits.
     """
     longer, branch = case.lengthened(), find_sign(command.branch)
     lost, remainder = command.lost, command.remainder

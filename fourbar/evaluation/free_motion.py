@@ -89,9 +89,8 @@ def release(scene: Scene) -> Released:
 
     Raises
     ------
-    InputError : the scene says nothing of a release, or names more than one angle; and
-    as of `integrate`. LimitError : it winds a spring beyond half a turn from its rest;
-    and as of `integrate`.
+    InputError : the scene says nothing of a release, or names more than one angle; and as of `integrate`.
+    LimitError : it winds a spring beyond half a turn from its rest; and as of `integrate`.
 
     >>> import fourbar
     >>> free = fourbar.Free(duration=0.2, steps=2)
@@ -202,21 +201,21 @@ def integrate(
 ) -> Released:
     """Integrate the motion from theta_2 with omega_2 under the effects, with no driving torque.
 
-    To 1e-9 rad over 5 s wherever the motion itself does not amplify errors by more than
-    1000.
+    To 1e-9 rad over 5 s wherever the motion itself does not amplify errors by more than 1000.
 
     Parameters
     ----------
-    terms : loads and effects. theta, omega, branch : of the bar that is released, at
-    the start; its assembly is +1 or -1. times : (n,) rising from 0, s. bar : 2, or 3 or
-    4.
+    terms : loads and effects.
+    theta, omega, branch : of the bar that is released, at the start; its assembly is +1 or -1.
+    times : (n,) rising from 0, s.
+    bar : 2, or 3 or 4.
 
     Raises
     ------
-    InputError : the linkage does not assemble at theta_2, or the motion takes more than
-    STEPS steps. LimitError : friction that depends on the pin forces acts. FourBarError
-    : nothing that moves has inertia, or the motion cannot be continued. DependencyError
-    : SciPy is not installed.
+    InputError : the linkage does not assemble at theta_2, or the motion takes more than STEPS steps.
+    LimitError : friction that depends on the pin forces acts.
+    FourBarError : nothing that moves has inertia, or the motion cannot be continued.
+    DependencyError : SciPy is not installed.
     """
     terms = tuple(terms)
     if any(term.loaded_pins for term in terms):

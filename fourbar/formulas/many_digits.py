@@ -33,8 +33,8 @@ def half_angle(
 
     Parameters
     ----------
-    theta_2 : rad. offset : what theta_2 as a double leaves out of the angle meant (rad,
-    mpmath), where that is known. A position
+    theta_2 : rad.
+    offset : what theta_2 as a double leaves out of the angle meant (rad, mpmath), where that is known. A position
         beyond the limit then does not assemble, however near.
     unit : of the lengths, m.
     member : index into numbers of the linkage that are arrays.

@@ -118,19 +118,16 @@ def _wrap(angle: float) -> float:
 def limit_positions(linkage: FourBar, bar: int = 2) -> tuple[LimitPosition, ...]:
     """Find the positions in which a bar reverses, all mirror solutions, counter-clockwise in theta_2 from theta_1.
 
-    cos psi = (d^2 + l^2 - (x +- y)^2)/(2 d l), psi the angle between the ground and the
-    bar.
+    cos psi = (d^2 + l^2 - (x +- y)^2)/(2 d l), psi the angle between the ground and the bar.
 
-    They are the limits of the input for bar 2 (bars 3, 4 collinear) and of the output
-    for bar 4 (bars 2, 3 collinear), and the dead centres of a drive on that bar. A
-    change point is none.
+    They are the limits of the input for bar 2 (bars 3, 4 collinear) and of the output for bar 4
+    (bars 2, 3 collinear), and the dead centres of a drive on that bar. A change point is none.
 
     Parameters
     ----------
     bar : 2, 3 or 4; InputError otherwise.
 
-    Source: R. L. Norton, Design of Machinery; Linares Mendoza, eqs 3.7-3.15 (one of
-    each mirror pair).
+    Source: R. L. Norton, Design of Machinery; Linares Mendoza, eqs 3.7-3.15 (one of each mirror pair).
     """
     reach = reach_of(linkage, bar)
     theta_1 = linkage.ground_angle
@@ -477,15 +474,14 @@ def meet_change_points(
 ) -> tuple[float, float, float, float]:
     """Return the lengths of ground, input, coupler and output with the equalities that they miss by rounding.
 
-    The equalities b + c = a + d, d + c = a + b, d + b = a + c of change points hold
-    within the sum of the roundings or not; the lengths nearest to the stated ones that
-    fulfil those which hold are returned, the stated ones if none.
+    The equalities b + c = a + d, d + c = a + b, d + b = a + c of change points hold within the sum of the roundings
+    or not; the lengths nearest to the stated ones that fulfil those which hold are returned, the stated ones if none.
 
     Parameters
     ----------
-    lengths : as stated, m. roundings : largest error of each length by the rounding of
-    what was stated, m. decimals : half of the last decimals of what was stated, if not
-    the roundings; too coarse
+    lengths : as stated, m.
+    roundings : largest error of each length by the rounding of what was stated, m.
+    decimals : half of the last decimals of what was stated, if not the roundings; too coarse
         ones round nothing.
     """
     largest = DIGITS_STATED * math.fsum(lengths)

@@ -129,17 +129,16 @@ def pin_forces(
 ) -> PinForces:
     """Compute the four pin forces; inf or NaN where the two bars that are not driven lie in one line.
 
-    With the drive on bar 2 the force at B is written with the diagonal D from A to O4,
-    which closes the triangle of bars 3 and 4, so that a couple between them keeps its
-    digits:
+    With the drive on bar 2 the force at B is written with the diagonal D from A to O4, which closes the
+    triangle of bars 3 and 4, so that a couple between them keeps its digits:
         F43 = ((M3 - C) D - (M3 + M4) b u3)/(b c sin(theta_4 - theta_3)).
 
     Parameters
     ----------
-    drive_bar : 2, 3 or 4. sine : between the two bars that are not driven, of theta_4 -
-    theta_3, theta_4 - theta_2, theta_3 - theta_2. w, mass_at_A : everything that acts,
-    as from `inertia_wrenches`. moment_of_F32 : with the drive on bar 2: a u2 x F32 (N
-    m), which the virtual work of bars 3 and 4 knows; on bar 4:
+    drive_bar : 2, 3 or 4.
+    sine : between the two bars that are not driven, of theta_4 - theta_3, theta_4 - theta_2, theta_3 - theta_2.
+    w, mass_at_A : everything that acts, as from `inertia_wrenches`.
+    moment_of_F32 : with the drive on bar 2: a u2 x F32 (N m), which the virtual work of bars 3 and 4 knows; on bar 4:
         b u3 x F32, the opposite of the coupler's moment about B.
 
     >>> from math import pi

@@ -82,9 +82,8 @@ def instant_centres(
 ) -> dict[tuple[int, int], Centre]:
     """Locate the six instant centres I_ij, keyed by (i, j) with i < j.
 
-    I12, I23, I34, I14 are the pins; I13 = line O2 A with line B O4, I24 = line A B with
-    line O2 O4 (Aronhold-Kennedy). Where two such lines coincide the centre is
-    undetermined: x = y = w = 0.
+    I12, I23, I34, I14 are the pins; I13 = line O2 A with line B O4, I24 = line A B with line O2 O4
+    (Aronhold-Kennedy). Where two such lines coincide the centre is undetermined: x = y = w = 0.
 
     Parameters
     ----------
@@ -136,19 +135,17 @@ def coupler_curve(
 ) -> CouplerCurve:
     """Trace the closed coupler curve of one circuit, run smoothly through limits and change points.
 
-    Where the input turns fully theta_2 is spaced evenly, over two turns if the linkage
-    has a single change point; else it goes from limit to limit on one branch and back
-    on the other, spaced by the cosine, so that the curve's points do not thin out at
-    the limits.
+    Where the input turns fully theta_2 is spaced evenly, over two turns if the linkage has a single
+    change point; else it goes from limit to limit on one branch and back on the other, spaced by
+    the cosine, so that the curve's points do not thin out at the limits.
 
     Parameters
     ----------
-    r_along, r_across : the point in the coupler's frame at A, m. circuit : index into
-    `circuits`; InputError where there is none of that number. branch : assembly, for a
-    linkage with change points. steps : number of intervals, a multiple of 4 (InputError
-    otherwise): limits and change points,
-        at which directions are undetermined or lose digits, then fall between
-        positions.
+    r_along, r_across : the point in the coupler's frame at A, m.
+    circuit : index into `circuits`; InputError where there is none of that number.
+    branch : assembly, for a linkage with change points.
+    steps : number of intervals, a multiple of 4 (InputError otherwise): limits and change points,
+        at which directions are undetermined or lose digits, then fall between positions.
     """
     every = circuits(linkage)
     point = complex(require("r_along", r_along), require("r_across", r_across))

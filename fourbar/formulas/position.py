@@ -239,16 +239,16 @@ def close_loop(
 ) -> Position:
     """Compute the directions of coupler and output.
 
-        u3 = (O4 - A) ((e^2 + b^2 - c^2) + i root)/(2 b e^2),   e^2 = (d - a)^2 + 4 a d
-        sin^2 h, u4 = (O4 - A) ((b^2 - e^2 - c^2) + i root)/(2 c e^2),   sin(theta_4 -
-        theta_3) = root/(2 b c).
+        u3 = (O4 - A) ((e^2 + b^2 - c^2) + i root)/(2 b e^2),   e^2 = (d - a)^2 + 4 a d sin^2 h,
+        u4 = (O4 - A) ((b^2 - e^2 - c^2) + i root)/(2 c e^2),   sin(theta_4 - theta_3) = root/(2 b c).
 
     Parameters
     ----------
-    lengths : of the loop, m. u1, u2 : e^{i theta_1} and e^{i theta_2}. half : of
-    theta_2 - theta_1. branch : assembly, +1 (B lies left of the diagonal from A to O4
-    for 0 < theta_2 - theta_1 < 180 deg) or -1. unit : of the lengths, m; the diagonal
-    is found in m.
+    lengths : of the loop, m.
+    u1, u2 : e^{i theta_1} and e^{i theta_2}.
+    half : of theta_2 - theta_1.
+    branch : assembly, +1 (B lies left of the diagonal from A to O4 for 0 < theta_2 - theta_1 < 180 deg) or -1.
+    unit : of the lengths, m; the diagonal is found in m.
 
     >>> lengths, theta_2 = loop(100, 40, 120, 80), np.radians(40)  # mm; Norton, example 4-1
     >>> position = close_loop(lengths, 1.0, direction(theta_2), half_angle(lengths, theta_2), 1)

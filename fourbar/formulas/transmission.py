@@ -95,8 +95,8 @@ def mechanical_advantage(
 ) -> Array:
     """Compute F_out/F_in = (omega_2/omega_4)(r_in/r_out) of a linkage without losses, (n,).
 
-    The signed ratio of torques where the radii are equal; +-inf where the output stands
-    still (bars 2, 3 collinear), NaN at a singular position.
+    The signed ratio of torques where the radii are equal; +-inf where the output stands still (bars
+    2, 3 collinear), NaN at a singular position.
 
     Parameters
     ----------
@@ -116,16 +116,16 @@ def distance_to_singular(
 ) -> Array:
     """Compute the angle of the input to the nearest singular position, rad, in [0, pi], (n,); inf where there is none.
 
-    Singular are the limits of theta_2 and the change points (speeds are 0/0), and for a
-    drive on bar 3 or 4 its dead centres, where no torque on it holds the linkage. Error
-    at most about eps (|theta_2| + |theta_1| + 2 pi). Not counted is the kite whose
-    input and coupler coincide: there a drive on bar 4 is dead at every position of that
-    motion.
+    Singular are the limits of theta_2 and the change points (speeds are 0/0), and for a drive on bar 3
+    or 4 its dead centres, where no torque on it holds the linkage. Error at most about
+    eps (|theta_2| + |theta_1| + 2 pi). Not counted is the kite whose input and coupler coincide: there
+    a drive on bar 4 is dead at every position of that motion.
 
     Parameters
     ----------
-    theta_2 : (n,), rad. drive_bar : 2, 3 or 4. branch : assembly, +1 or -1, or one for
-    each position; left out: dead centres of both count.
+    theta_2 : (n,), rad.
+    drive_bar : 2, 3 or 4.
+    branch : assembly, +1 or -1, or one for each position; left out: dead centres of both count.
     """
     theta_2 = np.asarray(theta_2, dtype=float)
     path = prepare_path(Loop(*linkage.lengths, 0.0, 0.0), linkage.ground_angle)

@@ -47,13 +47,12 @@ def assemble(
 
     Parameters
     ----------
-    form : the file's, for errors. reader : whose joints state what acts at the pins, as
-    in `Effect.joint_elements`; None: they state nothing. without_loads : leave the
-    loads out, instead of refusing them.
+    form : the file's, for errors.
+    reader : whose joints state what acts at the pins, as in `Effect.joint_elements`; None: they state nothing.
+    without_loads : leave the loads out, instead of refusing them.
 
-    Raises LimitError for a load, a motion law or an effect without a counterpart there,
-    InputError for a bar without mass or inertia, NotAssembledError where the linkage
-    closes at none of the scene's positions.
+    Raises LimitError for a load, a motion law or an effect without a counterpart there, InputError for a bar without
+    mass or inertia, NotAssembledError where the linkage closes at none of the scene's positions.
     """
     require_input(scene, "the drive of an SDF or a USD")
     if scene.motion.law is not None:
@@ -141,11 +140,10 @@ def write_sdf(
 
     Parameters
     ----------
-    reader : who closes the loop how: "gazebo" by a fourth joint, "drake" by its own
-    ball constraint. start : the assembled state to stand in; None: that of
-    `find_start`. without_loads : leave the scene's loads out, for the program to apply;
-    otherwise they are refused. plane : where the linkage, or the drawing that states
-    its pins, stands in the world.
+    reader : who closes the loop how: "gazebo" by a fourth joint, "drake" by its own ball constraint.
+    start : the assembled state to stand in; None: that of `find_start`.
+    without_loads : leave the scene's loads out, for the program to apply; otherwise they are refused.
+    plane : where the linkage, or the drawing that states its pins, stands in the world.
 
     Raises
     ------

@@ -76,22 +76,20 @@ def write_mjcf(
 
     Parameters
     ----------
-    settings : of MuJoCo; the default ones carry every linkage above MuJoCo's floor of
-    mass. reader : one of `SIMULATORS`: the comments say where torque and pin force are
-    read there. keyframe : False leaves it out, and with it the assembled pose and the
-    servo that starts it from rest; then
+    settings : of MuJoCo; the default ones carry every linkage above MuJoCo's floor of mass.
+    reader : one of `SIMULATORS`: the comments say where torque and pin force are read there.
+    keyframe : False leaves it out, and with it the assembled pose and the servo that starts it from rest; then
         `settings.timestep` must be given and no position is computed.
-    start : the assembled state to open with; None: that of `find_start`. drive :
-    "flywheel" keeps the input at omega_2; "motor" leaves the driven bar to a
-    controller, "none" likewise
+    start : the assembled state to open with; None: that of `find_start`.
+    drive : "flywheel" keeps the input at omega_2; "motor" leaves the driven bar to a controller, "none" likewise
         without an actuator: then nothing is added to the linkage's inertia.
     plane : where the linkage stands in the world.
     origin : place of O2 in the linkage's plane, m.
 
     Raises
     ------
-    InputError : a bar has less mass or inertia than MuJoCo carries, or nothing sets the
-    timestep. LimitError : an effect or the motion has no counterpart in MJCF.
+    InputError : a bar has less mass or inertia than MuJoCo carries, or nothing sets the timestep.
+    LimitError : an effect or the motion has no counterpart in MJCF.
     NotAssembledError : the linkage closes at none of the scene's positions.
     """
     require_input(scene, "the drive of an MJCF")

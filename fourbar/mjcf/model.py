@@ -25,23 +25,19 @@ class Settings:
 
     Parameters
     ----------
-    timestep : s; None: from the two numbers of steps. steps_per_window : at least so
-    many where the input does not turn fully: towards a limit position
-        bars 3 and 4 speed up without bound, and 628 steps per revolution are too few
-        there.
-    timestep_scale : factor on the timestep. integrator : "RK4", "Euler", "implicit" or
-    "implicitfast". time_constant_steps : solref's time constant of the loop's closure,
-    in timesteps. impedance : solimp's impedance d; MuJoCo clamps it at 0.9999. pad :
-    where the inertial frame of the massless pads that carry the closure lies, as a part
-    of
-        the bar's length: the softness of the closure goes as its square. None: no pads;
-        "fitted": to the speed and the loads (`fit_pad`).
-    solver, tolerance, iterations : of the constraint solver. MuJoCo divides the
-    tolerance by the
-        flywheel's inertia, so only 0 is tight, and the number of iterations is then
-        what stops it.
-    flywheel : inertia on pin O2 relative to the linkage's own; the speed ripples by
-    about its inverse.
+    timestep : s; None: from the two numbers of steps.
+    steps_per_window : at least so many where the input does not turn fully: towards a limit position
+        bars 3 and 4 speed up without bound, and 628 steps per revolution are too few there.
+    timestep_scale : factor on the timestep.
+    integrator : "RK4", "Euler", "implicit" or "implicitfast".
+    time_constant_steps : solref's time constant of the loop's closure, in timesteps.
+    impedance : solimp's impedance d; MuJoCo clamps it at 0.9999.
+    pad : where the inertial frame of the massless pads that carry the closure lies, as a part of
+        the bar's length: the softness of the closure goes as its square. None: no pads; "fitted": to
+        the speed and the loads (`fit_pad`).
+    solver, tolerance, iterations : of the constraint solver. MuJoCo divides the tolerance by the
+        flywheel's inertia, so only 0 is tight, and the number of iterations is then what stops it.
+    flywheel : inertia on pin O2 relative to the linkage's own; the speed ripples by about its inverse.
     """
 
     timestep: float | None = None

@@ -139,10 +139,10 @@ class Law:
 
     Parameters
     ----------
-    time : rising, s. theta_2, theta_3, theta_4 : one angle of the commanded bar for
-    each time, rad; the others are left out. steps : the law is evaluated at the ends of
-    so many equal intervals of time. ends : "free", "rest" (speed 0 at both ends) or
-    "periodic" (the speed and acceleration at the end
+    time : rising, s.
+    theta_2, theta_3, theta_4 : one angle of the commanded bar for each time, rad; the others are left out.
+    steps : the law is evaluated at the ends of so many equal intervals of time.
+    ends : "free", "rest" (speed 0 at both ends) or "periodic" (the speed and acceleration at the end
         are those at the start; the angle may have gained whole turns).
     """
 
@@ -256,14 +256,14 @@ class Rise:
 
     Parameters
     ----------
-    kind : "cycloidal" or "345". rise : (angle, duration): how far the bar turns from
-    its first angle and in which time, rad
+    kind : "cycloidal" or "345".
+    rise : (angle, duration): how far the bar turns from its first angle and in which time, rad
         and s; a negative angle turns clockwise.
-    theta_2, theta_3, theta_4 : first angle of the commanded bar, rad; the others are
-    left out. dwell : time at the end of the rise, s, >= 0. fall : time in which the bar
-    returns by the same law, s; left out: it does not. rest : time at the first angle
-    after the fall, s, >= 0. steps : the law is evaluated at the ends of so many equal
-    intervals of time.
+    theta_2, theta_3, theta_4 : first angle of the commanded bar, rad; the others are left out.
+    dwell : time at the end of the rise, s, >= 0.
+    fall : time in which the bar returns by the same law, s; left out: it does not.
+    rest : time at the first angle after the fall, s, >= 0.
+    steps : the law is evaluated at the ends of so many equal intervals of time.
 
     >>> Rise("cycloidal", ("60 deg", "0.5 s"), theta_2="20 deg", dwell="0.2 s").time
     (0.0, 0.5, 0.7)
@@ -363,22 +363,19 @@ class Motion:
 
     Parameters
     ----------
-    theta_2 : one angle, an array of them (n,), a Sweep, a FromLimit, or None (the
-    default range), rad. omega_2 : rad/s; None: positions only. alpha_2 : rad/s^2.
-    branch : "open" or +1, "crossed" or -1: the assembly. Open has sin(theta_4 -
-    theta_3) > 0 for
-        0 < theta_2 - theta_1 < 180 deg, and at every other angle that it reaches
-        smoothly from there, through change points too. Where bar 3 is commanded it is
-        sin(theta_4 - theta_2), by theta_3; where bar 4 is, it is sin(theta_3 -
-        theta_2), for 180 deg < theta_4 - theta_1 < 360 deg.
-    free : released motion instead of a prescribed one. law : an angle over time instead
-    of theta_2, omega_2 and alpha_2: a Law through points, or a Rise. theta_3, omega_3,
-    alpha_3, theta_4, omega_4, alpha_4 : of the coupler or the output instead. stroke,
-    stroke_speed, stroke_acceleration : of the scene's cylinder between the ground and
-    bar 2 or 4 instead: one
+    theta_2 : one angle, an array of them (n,), a Sweep, a FromLimit, or None (the default range), rad.
+    omega_2 : rad/s; None: positions only.
+    alpha_2 : rad/s^2.
+    branch : "open" or +1, "crossed" or -1: the assembly. Open has sin(theta_4 - theta_3) > 0 for
+        0 < theta_2 - theta_1 < 180 deg, and at every other angle that it reaches smoothly from there, through change
+        points too. Where bar 3 is commanded it is sin(theta_4 - theta_2), by theta_3; where bar 4 is, it is
+        sin(theta_3 - theta_2), for 180 deg < theta_4 - theta_1 < 360 deg.
+    free : released motion instead of a prescribed one.
+    law : an angle over time instead of theta_2, omega_2 and alpha_2: a Law through points, or a Rise.
+    theta_3, omega_3, alpha_3, theta_4, omega_4, alpha_4 : of the coupler or the output instead.
+    stroke, stroke_speed, stroke_acceleration : of the scene's cylinder between the ground and bar 2 or 4 instead: one
         stroke, an array of them or a Sweep, m; m/s; m/s^2.
-    side : "left" or "right", with a stroke: on which side of the line from the bar's
-    ground pin to the cylinder's end
+    side : "left" or "right", with a stroke: on which side of the line from the bar's ground pin to the cylinder's end
         on the ground, seen towards that end, its end on the bar lies.
     """
 

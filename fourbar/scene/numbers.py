@@ -34,9 +34,9 @@ class Point:
     Parameters
     ----------
     name : letters, digits and underlines; no name of a quantity, as v_ and a_ with it.
-    bar : 1, 2, 3 or 4. from_pin : (distance, angle), from the bar's first pin (O2, O2,
-    A, O4), the angle from its line, m and rad. from_centre : likewise from the bar's
-    mass centre, in place of `from_pin`.
+    bar : 1, 2, 3 or 4.
+    from_pin : (distance, angle), from the bar's first pin (O2, O2, A, O4), the angle from its line, m and rad.
+    from_centre : likewise from the bar's mass centre, in place of `from_pin`.
     """
 
     name: str
@@ -144,9 +144,8 @@ class Tolerance:
 
     Parameters
     ----------
-    key : of the number, as in the scene file, pairs and lists by index. width : in its
-    SI unit or a text like "0.1 mm", > 0: plus or minus, evenly distributed, or the
-    standard deviation
+    key : of the number, as in the scene file, pairs and lists by index.
+    width : in its SI unit or a text like "0.1 mm", > 0: plus or minus, evenly distributed, or the standard deviation
         of a normal distribution.
     sigma : whether it is that.
     """

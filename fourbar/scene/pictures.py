@@ -34,8 +34,7 @@ class Picture:
     name : path relative to the scene file, parts joined by "/", none of them "..".
     folder : where the scene file is.
 
-    Raises InputError for a bar that does not move and for a name that leads out of the
-    folder.
+    Raises InputError for a bar that does not move and for a name that leads out of the folder.
     """
 
     bar: int

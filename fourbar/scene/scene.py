@@ -61,16 +61,18 @@ class Scene:
 
     Parameters
     ----------
-    linkage : bars and ground, as `uniform` or `FourBar` make them. motion : what the
-    commanded bar does: angles, speed, branch. drive_bar : 2, 3 or 4, on which the
-    drive's torque acts; left out: 2. loads : forces and couples, `Load`. effects :
-    `Gravity`, `Viscous`, `Friction`, ...: only what acts, each kind once. title, source
-    : words. pictures : of bars, as a scene file names them. points : points of bars
-    whose paths are wanted, `Point`. tolerances : of numbers by their keys in a scene
-    file, `Tolerance`. drive : a force in place of a torque on a bar: `LinearDrive` or
-    `PointDrive`. drawing : the pins as they are drawn, `DrawnPins`: places are shown in
-    its coordinates. coordinates : keys of the places that a scene file states by x and
-    y, with these, m; a file is written likewise.
+    linkage : bars and ground, as `uniform` or `FourBar` make them.
+    motion : what the commanded bar does: angles, speed, branch.
+    drive_bar : 2, 3 or 4, on which the drive's torque acts; left out: 2.
+    loads : forces and couples, `Load`.
+    effects : `Gravity`, `Viscous`, `Friction`, ...: only what acts, each kind once.
+    title, source : words.
+    pictures : of bars, as a scene file names them.
+    points : points of bars whose paths are wanted, `Point`.
+    tolerances : of numbers by their keys in a scene file, `Tolerance`.
+    drive : a force in place of a torque on a bar: `LinearDrive` or `PointDrive`.
+    drawing : the pins as they are drawn, `DrawnPins`: places are shown in its coordinates.
+    coordinates : keys of the places that a scene file states by x and y, with these, m; a file is written likewise.
     """
 
     linkage: FourBar
@@ -151,19 +153,16 @@ class Scene:
 
         Parameters
         ----------
-        figure : "overview", "linkage", "coupler", "kinematics", "points", "torque",
-        "stroke", "forces", "hodograph",
+        figure : "overview", "linkage", "coupler", "kinematics", "points", "torque", "stroke", "forces", "hodograph",
             "energy", "transmission", "freebody", "bars" or "sensitivity".
-        position : what is commanded where linkage and free bodies are drawn, rad or m;
-        left out: the scene's own. branches : "one" (the scene's) or "both" (open and
-        crossed, to the same scales). units : in which numbers are drawn, as
-        `fourbar.units` makes them; left out: SI with the prefix that suits, deg.
+        position : what is commanded where linkage and free bodies are drawn, rad or m; left out: the scene's own.
+        branches : "one" (the scene's) or "both" (open and crossed, to the same scales).
+        units : in which numbers are drawn, as `fourbar.units` makes them; left out: SI with the prefix that suits, deg.
         dimensions : write the lengths of the bars at them.
 
         Raises
         ------
-        InputError : unknown figure or choice of branches; a figure of forces without
-        omega_2; a position or dimensions
+        InputError : unknown figure or choice of branches; a figure of forces without omega_2; a position or dimensions
             for a figure that shows none.
         NotAssembledError : there is no position to draw.
         DependencyError : matplotlib is missing.

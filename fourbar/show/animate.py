@@ -355,19 +355,18 @@ def write(
 
     Parameters
     ----------
-    path : the file; its ending says which of html, gif and mp4 is meant. pictures : for
-    bars "input", "coupler", "output", in place of the scene's own: a PNG or JPEG file
-        that is laid along the bar, its left edge at the bar's first pin (O2, A, O4) and
-        its right edge at the second. Pages only.
-    units : in which numbers are shown; left out: SI. Angles are in degrees. vectors :
-    with arrows of velocity and acceleration at the points; a page can show and hide
-    them. seconds : duration of a film; left out: 6 s for a sweep, of a motion through
-    time its own.
+    path : the file; its ending says which of html, gif and mp4 is meant.
+    pictures : for bars "input", "coupler", "output", in place of the scene's own: a PNG or JPEG file
+        that is laid along the bar, its left edge at the bar's first pin (O2, A, O4) and its right
+        edge at the second. Pages only.
+    units : in which numbers are shown; left out: SI. Angles are in degrees.
+    vectors : with arrows of velocity and acceleration at the points; a page can show and hide them.
+    seconds : duration of a film; left out: 6 s for a sweep, of a motion through time its own.
 
     Raises
     ------
-    InputError : unknown format; a picture that cannot be read, is too large or no PNG
-    or JPEG. NotAssembledError : the linkage assembles at none of the scene's positions.
+    InputError : unknown format; a picture that cannot be read, is too large or no PNG or JPEG.
+    NotAssembledError : the linkage assembles at none of the scene's positions.
     DependencyError : a film without matplotlib, or MP4 without ffmpeg.
     """
     target, kind = Path(path), format_of(path, FORMATS)

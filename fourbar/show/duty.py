@@ -137,17 +137,15 @@ def bearing_load(solution: Solution, pin: str) -> BearingLoad:
 def motor_duty(solution: Solution) -> MotorDuty | None:
     """Return peak and RMS torque and power, peak speed, and the energy in and out by the trapezoidal rule.
 
-    E = integral of P dt, dt = d theta/omega of the commanded bar, or ds/speed of the
-    stroke, in a sweep; E_in of the positive part of P, E_out of the negative. Positions
-    without a value are left out, and so are the steps from and to them.
+    E = integral of P dt, dt = d theta/omega of the commanded bar, or ds/speed of the stroke, in a sweep; E_in of the
+    positive part of P, E_out of the negative.
+    Positions without a value are left out, and so are the steps from and to them.
 
-    Returns None where no position has a torque or force of the drive: a released
-    linkage, or positions alone.
+    Returns None where no position has a torque or force of the drive: a released linkage, or positions alone.
 
     Parameters
     ----------
-    solution : positions of a sweep or of a motion law, to the stage "force"; or of a
-    study of one.
+    solution : positions of a sweep or of a motion law, to the stage "force"; or of a study of one.
     """
     expect("solution", solution, Solution)
     drive = read_drive(solution)

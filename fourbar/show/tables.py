@@ -92,9 +92,9 @@ def print_positions(
 
     Parameters
     ----------
-    columns : the columns; left out: all of them, most wanted first. width : columns of
-    a terminal, where the positions are thinned out; None: a file or a pipe, which gets
-    them all. every : show every so many positions; left out: as `width` says.
+    columns : the columns; left out: all of them, most wanted first.
+    width : columns of a terminal, where the positions are thinned out; None: a file or a pipe, which gets them all.
+    every : show every so many positions; left out: as `width` says.
     """
     step = every or (1 if width is None else _choose_step(len(solution)))
     cells = None

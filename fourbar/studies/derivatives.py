@@ -198,15 +198,13 @@ class Sensitivity:
 def sensitivity(scene: Scene) -> Sensitivity:
     """Differentiate every quantity at each position of a scene by each of its numbers.
 
-    d(quantity)/d(key), the other numbers held; what the scene leaves out (the inertia
-    of a uniform bar, its centre at mid-bar) follows the length. What is commanded is
-    held too, and "motion.theta_2" (or theta_3, theta_4, stroke) is the derivative by
-    it.
+    d(quantity)/d(key), the other numbers held; what the scene leaves out (the inertia of a uniform bar, its centre
+    at mid-bar) follows the length. What is commanded is held too, and "motion.theta_2" (or theta_3, theta_4, stroke) is
+    the derivative by it.
 
     Raises
     ------
-    InputError : a free motion, or a position that is described by its distance from a
-    limit.
+    InputError : a free motion, or a position that is described by its distance from a limit.
 
     >>> from fourbar import Motion, Scene, uniform
     >>> found = sensitivity(Scene(uniform(0.3, 0.1, 0.25, 0.22), Motion(1.0, 10.0)))

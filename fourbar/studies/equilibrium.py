@@ -108,12 +108,10 @@ class Equilibria(NamedTuple):
 def equilibrium(scene: Scene) -> Equilibria:
     """Find the positions in which a linkage stays by itself, whether they are stable, and what holds the others.
 
-    On the circuit of the scene's first position that assembles, on both branches where
-    it has both, within the sweep of theta_2 if one is stated (or that of its motion
-    law, or of the command of another bar or a stroke). Speed, acceleration and drive of
-    the scene play no part, viscous damping none either. Zeros of Q are sought between
-    the positions of a grid, 3600 a turn and the ends of the sweep: where Q changes its
-    sign, and where its size is least.
+    On the circuit of the scene's first position that assembles, on both branches where it has both, within the sweep
+    of theta_2 if one is stated (or that of its motion law, or of the command of another bar or a stroke). Speed,
+    acceleration and drive of the scene play no part, viscous damping none either. Zeros of Q are sought between the
+    positions of a grid, 3600 a turn and the ends of the sweep: where Q changes its sign, and where its size is least.
 
     Raises
     ------

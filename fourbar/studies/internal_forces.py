@@ -62,10 +62,9 @@ def internal_forces(
 ) -> InternalForces:
     """Compute the internal forces of a moving bar.
 
-    A bar counts as uniform where its inertia and centre are left out; the weight and
-    inertia of any other act at G, its rotary inertia as a couple there. A load's couple
-    acts at its place, the drive's at the bar's ground pin (of bar 3 at A), the couples
-    of effects at their pins.
+    A bar counts as uniform where its inertia and centre are left out; the weight and inertia of any other act at G,
+    its rotary inertia as a couple there. A load's couple acts at its place, the drive's at the bar's ground pin (of
+    bar 3 at A), the couples of effects at their pins.
 
     Parameters
     ----------

@@ -34,10 +34,9 @@ def find_positions(scene: Scene, wanted: list[tuple[str, float]]) -> Command:
 
     Parameters
     ----------
-    wanted : names among `PLACES` and values, rad, m or s. Each gives the positions of
-    the scene's
-        assembly that have it, of a motion over time those that it passes, of a released
-        one the first.
+    wanted : names among `PLACES` and values, rad, m or s. Each gives the positions of the scene's
+        assembly that have it, of a motion over time those that it passes, of a released one the
+        first.
 
     Raises
     ------

@@ -165,8 +165,8 @@ def tolerances(
 ) -> Tolerances:
     """Compute the spread of every quantity at each position, from quasi-random samples of the toleranced numbers.
 
-    With the samples come first-order figures, from s_i = d(quantity)/d(number i): the
-    worst case sum |s_i| t_i and the shares (s_i sigma_i)^2 of the variance.
+    With the samples come first-order figures, from s_i = d(quantity)/d(number i): the worst case sum |s_i| t_i and
+    the shares (s_i sigma_i)^2 of the variance.
 
     Parameters
     ----------
@@ -176,11 +176,10 @@ def tolerances(
 
     Raises
     ------
-    InputError : no tolerances, a key that the scene does not have, a number that it
-    leaves out, a free motion. DependencyError : SciPy is not installed.
+    InputError : no tolerances, a key that the scene does not have, a number that it leaves out, a free motion.
+    DependencyError : SciPy is not installed.
 
-    Source: I. M. Sobol', USSR Comput. Math. Math. Phys. 7 (1967) 86; error propagation:
-    JCGM 100:2008, 5.1.2.
+    Source: I. M. Sobol', USSR Comput. Math. Math. Phys. 7 (1967) 86; error propagation: JCGM 100:2008, 5.1.2.
     """
     expect("scene", scene, Scene)
     if (

@@ -176,20 +176,17 @@ def vary(scene: Scene, values: Mapping[str, Any]) -> Study:
 
     Parameters
     ----------
-    values : arrays of one length m, or single numbers, SI and rad or texts like "48
-    cm", by keys as in the
-        scene file: lists by index ("loads.0.moment"), pairs likewise
-        ("bars.coupler.centre.0"). "motion.theta_2" (or theta_3, theta_4, stroke, where
-        that is commanded) is (n,), for all members, or (m, n); a scene that states none
-        needs it. What the scene leaves out (the inertia of a uniform bar, its centre at
-        mid-bar) follows the length of each member.
+    values : arrays of one length m, or single numbers, SI and rad or texts like "48 cm", by keys as in the
+        scene file: lists by index ("loads.0.moment"), pairs likewise ("bars.coupler.centre.0"). "motion.theta_2" (or
+        theta_3, theta_4, stroke, where that is commanded) is (n,), for all members, or (m, n); a scene that states none
+        needs it. What the scene leaves out (the inertia of a uniform bar, its centre at mid-bar) follows the length of
+        each member.
 
     Raises
     ------
-    InputError : a key that the scene does not have or that is no number, a value that
-    is no array of numbers, shapes
-        that do not fit, a free motion. A member with numbers that a scene refuses has
-        the status "invalid", one that never closes "not_assembled".
+    InputError : a key that the scene does not have or that is no number, a value that is no array of numbers, shapes
+        that do not fit, a free motion. A member with numbers that a scene refuses has the status "invalid", one that
+        never closes "not_assembled".
 
     >>> from fourbar import Motion, Scene, solve, uniform
     >>> scene = Scene(uniform(0.3, 0.1, 0.25, 0.22), Motion(1.0, 10.0))

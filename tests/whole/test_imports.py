@@ -42,7 +42,7 @@ LAYERS = {
         "scene",
         "solution",
         "evaluation",
-        "solve",
+        "solving",
         "files mjcf studies",
         "show",
         "edit",

@@ -207,10 +207,9 @@ def make_view(scene: Scene, position: float | None = None) -> View:
 
     Parameters
     ----------
-    position : what is commanded where the linkage is drawn to scale, rad or m; left
-    out: the scene's own where it
-        names one (the start of a motion through time), else 60 deg into the longest
-        stretch that assembles, clear of poles.
+    position : what is commanded where the linkage is drawn to scale, rad or m; left out: the scene's own where it
+        names one (the start of a motion through time), else 60 deg into the longest stretch that assembles, clear of
+        poles.
 
     Raises
     ------

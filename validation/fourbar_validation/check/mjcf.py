@@ -195,8 +195,7 @@ def examine_model(
 
     Parameters
     ----------
-    wanted : relative error that theirs is held to; None: that of the generated file,
-    and where its torque or pin forces
+    wanted : relative error that theirs is held to; None: that of the generated file, and where its torque or pin forces
         exceed this, what MuJoCo's stiffest constraint leaves in it.
     """
     tolerance = SIMULATED

@@ -127,8 +127,8 @@ class Row:
 
         Parameters
         ----------
-        who : scene, engine and setting. error : each a number, or an array over the
-        positions, (n,), as `allowed`, `theta_2` and `condition`; one that
+        who : scene, engine and setting.
+        error : each a number, or an array over the positions, (n,), as `allowed`, `theta_2` and `condition`; one that
             is no finite number fails.
         where : positions that are held to it; undecided where there are none.
         """

@@ -443,9 +443,9 @@ def continue_couples(F: Complex, C: Complex, k: Array) -> Array:
 
     Parameters
     ----------
-    F : pin forces without this friction, (n, p), N. C : force that a couple of 1 N m
-    against the rotation at pin q adds at pin p, (n, p, p), 1/m. k : mu r of each pin,
-    m.
+    F : pin forces without this friction, (n, p), N.
+    C : force that a couple of 1 N m against the rotation at pin q adds at pin p, (n, p, p), 1/m.
+    k : mu r of each pin, m.
     """
     x = np.full(F.shape, np.nan)
     remaining = np.flatnonzero(

@@ -63,8 +63,7 @@ def measure_mimic(
 ) -> MimicReport:
     """Hold the polynomial of a joint against the loop of a scene over its motion.
 
-    The leader's position is taken as theta_2, and the follower's zero is theta_4 where
-    the leader is at its own.
+    The leader's position is taken as theta_2, and the follower's zero is theta_4 where the leader is at its own.
 
     Parameters
     ----------
@@ -72,8 +71,7 @@ def measure_mimic(
 
     Raises
     ------
-    InputError : no such equality, or the loop does not close at the zero of the file or
-    over the motion.
+    InputError : no such equality, or the loop does not close at the zero of the file or over the motion.
     """
     file = read_robot(path, assets)
     with examine_guarded(path) as examined:

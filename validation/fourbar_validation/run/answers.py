@@ -152,9 +152,9 @@ def check_statements(
 
     Parameters
     ----------
-    answer : what the engine found over the scene's own motion. stated : what the
-    formulas state, where several engines are held to it at one motion. predicted : the
-    errors to be expected of the answer.
+    answer : what the engine found over the scene's own motion.
+    stated : what the formulas state, where several engines are held to it at one motion.
+    predicted : the errors to be expected of the answer.
     """
     if stated is None or (
         stated.over is not None and stated.over.command is not answer.at

@@ -27,6 +27,7 @@ from fourbar.effects import (
     Torsion,
     Viscous,
 )
+from fourbar.formulas.mobility import change_points as find_change_points
 from fourbar.linkage import MOVING_BARS, Bar, FourBar
 from fourbar.quantities import OK, PIN_FORCES, UNITS
 from fourbar.scene import Command, Scene
@@ -131,7 +132,9 @@ class _Few:
         return find_error(name, ours, theirs, np.maximum(scale, summed)) * condition
 
     def compare(
-        self, convert: Callable[[str], Array], names: Sequence[str] = COMPARED_QUANTITIES
+        self,
+        convert: Callable[[str], Array],
+        names: Sequence[str] = COMPARED_QUANTITIES,
     ) -> dict[str, Array]:
         """Compare the quantities that the scene has with those of another one, converted."""
         return {
@@ -466,7 +469,13 @@ def _measure_scaled(few: _Few) -> dict[str, Array]:
 
 
 def _measure_exchanged(few: _Few) -> dict[str, Array]:
-    """Read the linkage from O4."""
+    """Read the linkage from O4.
+
+    Of a linkage with change points the assemblies have other names there, which depend
+    on the side from which each change point is reached: it is left out.
+    """
+    if find_change_points(few.scene.linkage):
+        raise _NoCounterpartError
     command = few.command
     bar = OTHER_BAR[command.bar]
     line = math.pi if bar == 3 else 0.0

@@ -37,8 +37,7 @@ def find_couple(
 
     Parameters
     ----------
-    acceleration : evaluates `model` and `data` under a couple, N m, and returns an
-    acceleration, rad/s^2.
+    acceleration : evaluates `model` and `data` under a couple, N m, and returns an acceleration, rad/s^2.
     """
     free = acceleration(0.0)
     # without a couple it may already accelerate as wanted, to the rounding of the

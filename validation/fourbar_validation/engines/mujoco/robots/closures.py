@@ -85,8 +85,7 @@ def find_closures(posed: PosedRobot, options: PoseOptions) -> list[RobotClosure]
 
     Raises
     ------
-    InputError : a joint that is held or drives is none of the robot's, or drives no
-    loop.
+    InputError : a joint that is held or drives is none of the robot's, or drives no loop.
     """
     finder = _Finder(posed, options)
     closures = [finder.describe(number) for number in range(posed.model.neq)]

@@ -81,8 +81,7 @@ def list_unknown_parts(robot: CompiledRobot, bodies: set[int]) -> list[str]:
 
     Raises
     ------
-    InputError : a body that has joints of its own is among them: nothing else of it is
-    known.
+    InputError : a body that has joints of its own is among them: nothing else of it is known.
     """
     model = robot.model
     unknown = [number for number in robot.unknown_masses if number in bodies]

@@ -53,8 +53,7 @@ def measure_loops(
 
     Parameters
     ----------
-    scene : of the loop, of several the one whose lengths fit; None: it is made from the
-    file.
+    scene : of the loop, of several the one whose lengths fit; None: it is made from the file.
 
     Raises
     ------

@@ -35,8 +35,7 @@ def read_joint_equality(file: RobotFile, name: str) -> JointEquality:
 
     Raises
     ------
-    InputError : no such joint, no equality by which it follows, or a joint that is no
-    hinge.
+    InputError : no such joint, no equality by which it follows, or a joint that is no hinge.
     """
     model = compile_robot(file).model
     joint = find_joint(model, name, "--mimic")

@@ -55,8 +55,7 @@ def pose_robot(model: mujoco.MjModel, options: PoseOptions) -> PosedRobot:
 
     Raises
     ------
-    InputError : an unknown joint or keyframe, a position without a unit or of another
-    kind.
+    InputError : an unknown joint or keyframe, a position without a unit or of another kind.
     """
     stated, origin = _choose_start(model, options)
     fixed = {find_joint(model, name, "--hold") for name in options.held}
