@@ -150,6 +150,18 @@ class DrakeTree(Tree):
             )
         return np.array(self.plant.CalcInverseDynamics(self.context, self.a, forces))
 
+    def forces(self, loop_force: Array, drive: float) -> dict[str, Pair]:
+        """Return F12, F32, F14 with the force of the loop and the drive put back.
+
+        The reaction port finds the accelerations from all that acts.
+        """
+        self.push(3, loop_force, self.point("end3"))
+        self.push(4, -loop_force, self.point("end4"))
+        self.work(drive)
+        on = self.carried()
+        x, y = on[3]
+        return {"F12": on[2], "F32": (-x, -y), "F14": on[4]}
+
     def carried(self) -> dict[int, Pair]:
         """Read the reaction port, which finds the accelerations once more."""
         applied = []
