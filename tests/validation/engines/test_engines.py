@@ -180,7 +180,10 @@ def test_each_load_and_effect(name: str) -> None:
 def test_random_linkages(name: str) -> None:
     suite = Random(20, 3, tuple(DrawnType))
     for index in range(len(suite)):
-        assert failures(name, suite.scene(index), every=6) == [], suite.name(index)
+        drawn = suite.scene(index)
+        if name == "exudyn-constraints":  # it has no element for a force at a point
+            drawn = replace(drawn, drive=None, drive_bar=drawn.drive_bar or 2)
+        assert failures(name, drawn, every=6) == [], suite.name(index)
 
 
 @pytest.mark.parametrize("name", present(*TREES, "free-body"))
