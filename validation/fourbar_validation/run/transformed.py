@@ -27,7 +27,6 @@ from fourbar.effects import (
     Torsion,
     Viscous,
 )
-from fourbar.formulas.mobility import change_points as find_change_points
 from fourbar.linkage import MOVING_BARS, Bar, FourBar
 from fourbar.quantities import OK, PIN_FORCES, UNITS
 from fourbar.scene import Command, Scene
@@ -60,7 +59,7 @@ PART, APART = 0.3, 0.4
 AT_A_REVERSAL = 1e-3
 """Part of its speeds below which a pin with dry friction may reverse."""
 FORCES = (*PIN_FORCES, "torque", "drive_force")
-COMPARED_QUANTITIES = (
+TRANSFORMED_QUANTITIES = (
     *(f"{name}_{bar}" for name in ("theta", "omega", "alpha") for bar in MOVING_BARS),
     *FORCES,
     "power",
@@ -69,6 +68,8 @@ COMPARED_QUANTITIES = (
 OTHER_BAR = {1: 1, 2: 4, 3: 3, 4: 2}
 OTHER_PIN = {"O2": "O4", "A": "B", "B": "A", "O4": "O2"}
 """Bars and pins by their numbers and names where the linkage is read from its other end."""
+ADDED = {2: 2.0 * math.pi, 3: math.pi, 4: 0.0}
+"""Added to the commanded angle of a bar there, rad: its half angle stays."""
 OTHER_FORCE = {
     "F12": ("F14", 1.0),
     "F14": ("F12", 1.0),
@@ -131,15 +132,11 @@ class _Few:
         ours = getattr(self.solution, name)
         return find_error(name, ours, theirs, np.maximum(scale, summed)) * condition
 
-    def compare(
-        self,
-        convert: Callable[[str], Array],
-        names: Sequence[str] = COMPARED_QUANTITIES,
-    ) -> dict[str, Array]:
+    def compare(self, convert: Callable[[str], Array]) -> dict[str, Array]:
         """Compare the quantities that the scene has with those of another one, converted."""
         return {
             name: self.measure(name, convert(name))
-            for name in names
+            for name in TRANSFORMED_QUANTITIES
             if getattr(self.solution, name, None) is not None
         }
 
@@ -463,7 +460,7 @@ def _measure_scaled(few: _Few) -> dict[str, Array]:
         name: magnitude(
             np.array(getattr(other, name)) / power.get(UNITS[name], 1.0) - ours
         )
-        for name in COMPARED_QUANTITIES
+        for name in TRANSFORMED_QUANTITIES
         if (ours := getattr(few.solution, name, None)) is not None
     }
 
@@ -471,18 +468,16 @@ def _measure_scaled(few: _Few) -> dict[str, Array]:
 def _measure_exchanged(few: _Few) -> dict[str, Array]:
     """Read the linkage from O4.
 
-    Of a linkage with change points the assemblies have other names there, which depend
-    on the side from which each change point is reached: it is left out.
+    At its other end the ground points the other way, theta_1 + pi. Whole turns are
+    added to the commanded angle such that the half angle of its assembly stays what it
+    was, since the assembly of a linkage with change points depends on it.
     """
-    if find_change_points(few.scene.linkage):
-        raise _NoCounterpartError
     command = few.command
     bar = OTHER_BAR[command.bar]
-    line = math.pi if bar == 3 else 0.0
     branch = -command.branch if bar == 3 else command.branch
     other = few.solve(
         _convert(few.scene, _Conversion(exchanged=True)),
-        angle=command.angle + line,
+        angle=command.angle + ADDED[command.bar],
         branch=branch,
         bar=bar,
     )
