@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 import opensim as osim
 
-from fourbar.effects import PointDrive
 from fourbar.errors import LimitError
 from fourbar.linkage import MOVING_BARS
 from fourbar.scene import Scene
@@ -50,15 +49,13 @@ TURNING = {2: "O2", 4: "O4"}
 """Joint whose coordinate is the direction of a bar."""
 
 ENDS = ("start", "end")
-"""Names of the two ends of a cylinder."""
+"""Names of the two ends of a cylinder; a force at a point has the first alone."""
 
 
 def find_refusal(scene: Scene) -> str:
     """Name the declared limit that a scene meets, if any."""
     if reason := find_unknown(scene, has_term, linear=True):
         return reason
-    if isinstance(scene.drive, PointDrive):
-        return "a force at a point has no element here"
     for number in MOVING_BARS:
         if scene.linkage.bar(number).mass == 0.0:
             return (
@@ -104,14 +101,11 @@ class OpenSimBars(Loaded):
             for part in self.part.values()
             for name, place in part.points.items()
         }
-        self.ends = (
-            [(name, end) for name, (_, end) in zip(ENDS, scene.drive.ends, strict=True)]
-            if scene.drive
-            else ()
-        )
-        self.local |= {
-            name: (end.bar, resolve(end.distance, end.angle)) for name, end in self.ends
-        }
+        if scene.drive is not None:
+            self.local |= {
+                name: (end.bar, resolve(end.distance, end.angle))
+                for name, (_, end) in zip(ENDS, scene.drive.ends, strict=False)
+            }
         self.length = {bar: part.length for bar, part in self.part.items()}
         self.joint = {
             "O2": self._make_joint("O2", 1, ZERO, 2, ZERO),
@@ -252,15 +246,16 @@ class OpenSimBars(Loaded):
         """Differentiate the driven bar's direction, or the stroke of a linear drive, by the coordinates, (3,)."""
         if self.linear is None:
             return PER_COORDINATE[self.drive_bar]
-        start, end = (
-            (
+        rate = sum(
+            sense
+            * (
                 np.zeros((2, 3))
-                if spring_end.bar == 1
+                if place.bar == 1
                 else self._compute_station_jacobian(name)
             )
-            for name, spring_end in self.ends
+            for name, (sense, place) in zip(ENDS, self.linear.ends, strict=False)
         )
-        return np.asarray(self.line()[2] @ (end - start))
+        return np.asarray(self.line()[2] @ rate)
 
     def _set_motion(self, speed: float, acceleration: float) -> tuple[Array, Array]:
         """Solve the constraint equations for the coordinates' speeds per speed commanded, and their accelerations."""
