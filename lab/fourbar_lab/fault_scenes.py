@@ -239,6 +239,12 @@ FAULT_SCENES: dict[str, Scene] = {
         (Load(4, moment=0.1),),
         (WEIGHT, Viscous.at(O4=0.01, B=0.003), Friction.at(O2=0.02)),
     ),
+    "released, pushed from G": Scene(
+        CRANK,
+        Motion(1.0, 3.0, free=Free(0.5, 50)),
+        2,
+        (Load(3, (2.0, -0.4), from_centre=(0.06, 0.5), frame="bar"),),
+    ),
     "double rocker released": Scene(
         ROCKER,
         Motion(math.radians(50.0), 0.0, free=Free(1.0, 100)),

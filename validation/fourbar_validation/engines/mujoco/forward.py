@@ -51,6 +51,7 @@ class MujocoForward:
 
     def release(self, scene: Scene, times: Array) -> ReleasedAnswer:
         """Integrate the motion at the given times, rising from 0 (s)."""
+        scene = state_from_pins(scene)
         setting = f"RK4 {self.step:g} s"
         start = with_signs(scene.linkage, command_of(scene))
         interval = float(
