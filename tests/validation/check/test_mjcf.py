@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from click import UsageError
 from click.testing import CliRunner
 
 import fourbar
@@ -719,6 +720,16 @@ def test_the_command_writes_and_prints_what_it_found(tmp_path: Path) -> None:
 def test_a_role_that_no_body_has_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="ROLE=NAME"):
         run(tmp_path, GENERATED, "--name", "wheel=a")
+
+
+@pytest.mark.parametrize(
+    "options", [["--pose", "A=20deg"], ["--torque", "1"], ["--hold", "A"]]
+)
+def test_a_name_beside_an_option_of_a_robot_is_refused(
+    options: list[str], tmp_path: Path
+) -> None:
+    with pytest.raises(UsageError, match="--name is for the MJCF of a four-bar alone"):
+        run(tmp_path, GENERATED, "--name", "input=input", *options)
 
 
 def run(tmp_path: Path, text: str, *options: str) -> tuple[int | None, list[float]]:

@@ -439,6 +439,6 @@ def _is_robot(
     mjcf: Path, names: tuple[str, ...], assets: Path | None, robot: Mapping[str, Any]
 ) -> bool:
     """Tell whether a file is to be measured as a robot: by its options, or because it has more joints."""
-    if names:
-        return False
-    return any(robot.values()) or not is_four_bar_alone(read_robot(mjcf, assets))
+    return any(robot.values()) or (
+        not names and not is_four_bar_alone(read_robot(mjcf, assets))
+    )
