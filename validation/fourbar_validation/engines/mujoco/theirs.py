@@ -58,7 +58,7 @@ from fourbar_validation.engines.mujoco.robots.compiled import (
     list_unknown_parts,
 )
 from fourbar_validation.engines.mujoco.robots.loop import RobotFile
-from fourbar_validation.engines.mujoco.robots.scene import miss_output
+from fourbar_validation.engines.mujoco.robots.scene import is_seen_from_behind
 from fourbar_validation.engines.mujoco.runner import (
     Stepper,
     find_assembled,
@@ -79,8 +79,6 @@ DRIVING = 1e3
 """Armature over the inertia of all else from which it is a flywheel that drives: the speed then ripples by 1e-3."""
 SAME_GRAVITY = 1e-9
 """Part of gravity by which its direction may differ in the axes of a scene."""
-SAME_OUTPUT = 1e-6
-"""rad; two ways to see a linkage whose outputs miss that of the scene alike."""
 GENERATED = Path("generated.xml")
 """Name of the file that is generated from a scene."""
 NO_BIAS = mujoco.mjtBias.mjBIAS_NONE
@@ -141,16 +139,10 @@ def orient(topology: Topology, scene: Scene) -> Topology:
         start=np.zeros(2),
     )
     allowed = SAME_GRAVITY * float(np.linalg.norm(gravity))
-    front, behind = (
-        topology.turned(scene.linkage.ground_angle, behind=behind)
-        for behind in (False, True)
-    )
-    missed, missed_behind = (
-        miss_output(scene, *one.rest_angles) for one in (front, behind)
-    )
     # gravity alone does not tell the side: a file whose gravity is reversed has the
     # right one from behind
-    nearest = behind if missed_behind < missed - SAME_OUTPUT else front
+    behind = is_seen_from_behind(scene, *topology.rest_angles)
+    nearest = topology.turned(scene.linkage.ground_angle, behind=behind)
     fits = np.linalg.norm(nearest.in_plane(gravity) - wanted) <= allowed
     return nearest if fits else topology
 

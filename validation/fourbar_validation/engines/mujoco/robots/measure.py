@@ -27,7 +27,10 @@ from fourbar_validation.engines.mujoco.robots.compiled import compile_robot
 from fourbar_validation.engines.mujoco.robots.inside import HEAVY, LoopInside
 from fourbar_validation.engines.mujoco.robots.loop import RobotFile, RobotLoop
 from fourbar_validation.engines.mujoco.robots.pose import PosedRobot, pose_robot
-from fourbar_validation.engines.mujoco.robots.scene import make_scene, miss_output
+from fourbar_validation.engines.mujoco.robots.scene import (
+    is_seen_from_behind,
+    make_scene,
+)
 from fourbar_validation.engines.mujoco.robots.settings import (
     SettingsSearch,
     read_settings,
@@ -41,7 +44,7 @@ TORN_POSITIONS = 5
 CONSTANTS = 10.0
 """Time constants of the closure during which it acts: the loop has then yielded as far as it does."""
 ALIKE = 1e-6
-"""Difference of logarithms of lengths, or of angles in rad, below which two ways round fit a scene alike."""
+"""Difference of logarithms of lengths below which two ways round fit a scene alike."""
 LIGHTER = 0.1
 """Factor on what holds the other joints, to see what it matters."""
 
@@ -96,12 +99,9 @@ def _turn_to(
     if options.pose.drive is None and output is not None and turned < apart - ALIKE:
         pose = replace(options.pose, drive=name_joint(posed.model, output))
         loop = choose_loop(find_closures(posed, pose), loop.name)
-    behind = loop.seen_from_behind()
-    missed, missed_behind = (
-        miss_output(scene, one.angles[0], one.angles[1], one.angles[3])
-        for one in (loop, behind)
-    )
-    return behind if missed_behind < missed - ALIKE else loop
+    theta_1, theta_2, _, theta_4 = loop.angles
+    behind = is_seen_from_behind(scene, theta_1, theta_2, theta_4)
+    return loop.seen_from_behind() if behind else loop
 
 
 def _miss_lengths(scene: Scene, loop: RobotLoop) -> tuple[float, float]:

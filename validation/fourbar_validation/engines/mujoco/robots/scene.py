@@ -21,10 +21,11 @@ from fourbar.formulas.mobility import (
     turns_fully,
 )
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, Bar, FourBar
-from fourbar.scene import Scene
+from fourbar.scene import Command, Scene, with_signs
 from fourbar.scene.motion import CROSSED, OPEN, Motion, Sweep
 from fourbar.solving import solve
 from fourbar_validation.compare.answer import Array
+from fourbar_validation.engines.free_body_closure import close
 from fourbar_validation.engines.mujoco.robots.ancestry import (
     climb,
     is_enabled,
@@ -72,6 +73,8 @@ ACROSS = 1e-6
 """Part of gravity below which none acts across the plane."""
 SKEW = 1e-6
 """rad; axes less apart than this are parallel but for the digits of the file."""
+SAME_OUTPUT = 1e-6
+"""rad; two ways to see a linkage whose outputs miss that of the scene alike."""
 
 
 def read_loop_scene(
@@ -165,14 +168,27 @@ def round_angle(angle: float) -> float:
     return round(angle, DIGITS) + 0.0
 
 
-def miss_output(scene: Scene, theta_1: float, theta_2: float, theta_4: float) -> float:
+def _miss_output(scene: Scene, theta_1: float, theta_2: float, theta_4: float) -> float:
     """Return by how much the output of a scene misses that of a loop in its pose, rad; infinite where it is open."""
     linkage = scene.linkage
     angle = np.array([theta_2 - theta_1 + linkage.ground_angle])
-    motion = Motion(angle, branch=scene.motion.branch)
-    output = float(solve(Scene(linkage, motion), "position").theta_4[0])
+    sign = np.array([scene.motion.branch], dtype=np.int8)
+    branch = with_signs(linkage, Command(angle, sign, None, 0.0)).branch
+    output = float(close(linkage, angle, branch).theta[1, 0])
     away = output - linkage.ground_angle - (theta_4 - theta_1)
     return abs(math.remainder(away, math.tau)) if math.isfinite(away) else math.inf
+
+
+def is_seen_from_behind(
+    scene: Scene, theta_1: float, theta_2: float, theta_4: float
+) -> bool:
+    """Tell whether a loop in its pose has the output of a scene where its plane is seen from the other side.
+
+    All angles turn the other way there.
+    """
+    missed = _miss_output(scene, theta_1, theta_2, theta_4)
+    missed_behind = _miss_output(scene, -theta_1, -theta_2, -theta_4)
+    return missed_behind < missed - SAME_OUTPUT
 
 
 @dataclass(frozen=True, slots=True)
