@@ -148,22 +148,13 @@ class DrakeTree(Tree):
             self.body[bar].AddInForceInWorld(
                 self.context, _make_spatial(wrench), forces
             )
-        return np.array(self.plant.CalcInverseDynamics(self.context, self.a, forces))
-
-    def forces(self, loop_force: Array, drive: float) -> dict[str, Pair]:
-        """Return F12, F32, F14 with the force of the loop and the drive put back.
-
-        The reaction port finds the accelerations from all that acts.
-        """
-        self.push(3, loop_force, self.point("end3"))
-        self.push(4, -loop_force, self.point("end4"))
-        self.work(drive)
-        on = self.carried()
-        x, y = on[3]
-        return {"F12": on[2], "F32": (-x, -y), "F14": on[4]}
+        self.balancing = np.array(
+            self.plant.CalcInverseDynamics(self.context, self.a, forces)
+        )
+        return self.balancing
 
     def carried(self) -> dict[int, Pair]:
-        """Read the reaction port, which finds the accelerations once more."""
+        """Read the reaction port, which finds the accelerations once more, from what acts and what the motion needs."""
         applied = []
         for bar, wrench in self.wrenches.items():
             force = ExternallyAppliedSpatialForce()
@@ -174,6 +165,9 @@ class DrakeTree(Tree):
             applied.append(force)
         port = self.plant.get_applied_spatial_force_input_port()
         port.FixValue(self.context, Value[list[ExternallyAppliedSpatialForce]](applied))
+        self.plant.get_applied_generalized_force_input_port().FixValue(
+            self.context, self.balancing
+        )
         borne = self.plant.get_reaction_forces_output_port().Eval(self.context)
         return {
             b: rotate_by(
