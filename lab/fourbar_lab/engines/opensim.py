@@ -255,7 +255,7 @@ class OpenSimBars(Loaded):
             )
             for name, (sense, place) in zip(ENDS, self.linear.ends, strict=False)
         )
-        return np.asarray(self.line()[2] @ rate)
+        return np.asarray(self.line()[1] @ rate)
 
     def _set_motion(self, speed: float, acceleration: float) -> tuple[Array, Array]:
         """Solve the constraint equations for the coordinates' speeds per speed commanded, and their accelerations."""

@@ -165,11 +165,8 @@ class Loaded(EngineBars, Protocol):
         )
         return complex(*on), complex(*ground)
 
-    def line(self) -> tuple[list[tuple[float, int, Pair]], float | None, Array]:
-        """Place the drive: sense, bar and point of each end, m; its stroke, m; and its direction.
-
-        A force at a point has no stroke.
-        """
+    def line(self) -> tuple[list[tuple[float, int, Pair]], Array]:
+        """Place the drive: sense, bar and point of each end, m; and its direction."""
         assert self.linear is not None
         ends = [
             (sense, place.bar, self.end(place)) for sense, place in self.linear.ends
@@ -178,18 +175,17 @@ class Loaded(EngineBars, Protocol):
             along = resolve(1.0, self.linear.direction)
             if self.linear.frame == "bar":
                 along = self.rotate(self.linear.place.bar, *along)
-            return ends, None, np.array(along)
+            return ends, np.array(along)
         (*_, one), (*_, second) = ends
         line = np.subtract(second, one)
-        stroke = math.hypot(*line)
-        return ends, stroke, line / stroke
+        return ends, line / math.hypot(*line)
 
     def work(self, size: float) -> None:
         """Let the drive act with a torque, N m, or a force, N."""
         if self.linear is None:
             self.couple(self.drive_bar, size)
             return
-        ends, _, along = self.line()
+        ends, along = self.line()
         for sense, bar, point in ends:
             self.push(bar, sense * size * along, point)
 

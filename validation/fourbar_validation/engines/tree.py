@@ -127,7 +127,7 @@ class Tree(Loaded, Protocol):
         """Return what the drive does on the coordinates per N m or N: of a line the derivative of its stroke, (3,)."""
         if self.linear is None:
             return self.turns[self.drive_bar]
-        *_, along = self.line()
+        _, along = self.line()
         rate = sum(
             sense * self.end_jacobian(place) for sense, place in self.linear.ends
         )
@@ -154,7 +154,7 @@ class Tree(Loaded, Protocol):
         carry(on, 3, x, y)
         carry(on, 4, -x, -y)
         if self.linear is not None:
-            ends, _, along = self.line()
+            ends, along = self.line()
             for sense, bar, _ in ends:
                 carry(on, bar, *(sense * drive * along).tolist())
         x, y = on[3]
