@@ -37,6 +37,10 @@ from fourbar_validation.compare.compare import Comparison, Demands
 from fourbar_validation.compare.rows import FAILS, Row
 from fourbar_validation.compare.tolerance import SIMULATED
 from fourbar_validation.engines.description import ModelEntry, Value
+from fourbar_validation.engines.mujoco import theirs
+from fourbar_validation.engines.mujoco.robots import compiled as robots_compiled
+from fourbar_validation.engines.mujoco.robots.compiled import CompiledRobot
+from fourbar_validation.engines.mujoco.robots.loop import RobotFile
 from fourbar_validation.engines.mujoco.theirs import (
     ONE_STATE,
     THROUGH_TIME,
@@ -438,6 +442,36 @@ def test_a_load_that_is_missing_and_an_entry_that_cannot_stand_alone() -> None:
         errors_by_quantity[name] == pytest.approx(expected[name], abs=FLOOR)
         for name in TORQUE_AND_PINS
     )
+
+
+def test_a_file_is_compiled_once_and_each_entry_is_mended_in_a_model_of_its_own(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    compiled: list[RobotFile] = []
+
+    def compile_robot(file: RobotFile) -> CompiledRobot:
+        compiled.append(file)
+        return robots_compiled.compile_robot(file)
+
+    monkeypatch.setattr(theirs, "compile_robot", compile_robot)
+    file = RobotFile(Path("mine.xml"), other_plane())
+    settings: list[tuple[str, Value | None]] = [
+        ("closure.softness", None),
+        ("option.tolerance", 1e-8),
+    ]
+    stiff, soft = theirs.examine_mended(BARE, file, MINE, settings)
+    assert len(compiled) == 1
+    assert stiff is not None and soft is not None
+    (alone,) = theirs.examine_mended(BARE, file, MINE, settings[1:])
+    assert alone is not None
+    for one, other in zip(soft, alone, strict=True):
+        assert np.array_equal(one.quantities["torque"], other.quantities["torque"])
+    assert not np.array_equal(
+        stiff[0].quantities["torque"], soft[0].quantities["torque"]
+    )
+    monkeypatch.setattr(theirs, "PRICING", 0.0)
+    assert theirs.examine_mended(BARE, file, MINE, settings) == [None, None]
+    assert len(compiled) == 3
 
 
 @pytest.mark.parametrize("axis", ["0 -1 0", "0 1 0"])

@@ -225,12 +225,14 @@ def examine_mended(
 ) -> list[list[Answer] | None]:
     """Answer with a file one entry of which is that of the generated one; None where it cannot be."""
     start, answered = time.perf_counter(), list[list[Answer] | None]()
+    seen = compile_topology(file, names, scene)
     for key, value in changes:
-        topology = compile_topology(file, names, scene)
         answers = None
-        if time.perf_counter() - start < PRICING and mend_entry(topology, key, value):
-            with collect_warnings():
-                answers = _list_answers(UserLoop(topology, scene), scene)
+        if time.perf_counter() - start < PRICING:
+            topology = seen.copied()
+            if mend_entry(topology, key, value):
+                with collect_warnings():
+                    answers = _list_answers(UserLoop(topology, scene), scene)
         answered.append(answers)
     return answered
 
@@ -245,11 +247,11 @@ def predict_softness(
     measured without anything to compare the file with. Empty where no connect or weld
     closes the loop.
     """
-    answers = []
+    answers, seen = [], compile_topology(file, names, scene)
+    if seen.closure is None:
+        return {}
     for times in (1.0, 2.0):
-        topology = compile_topology(file, names, scene)
-        if topology.closure is None:
-            return {}
+        topology = seen.copied()
         impedance = 1.0 / (1.0 + times * (1.0 / STIFFEST - 1.0))
         topology.model.eq_solimp[topology.closure, :2] = impedance
         loop = UserLoop(topology, scene)

@@ -6,6 +6,7 @@ weld) or two sites by name. The plane may be any.
 
 import math
 from collections.abc import Mapping, Sequence
+from copy import copy
 from itertools import permutations
 
 import mujoco
@@ -313,6 +314,10 @@ class Topology:
         cos, sin = math.cos(angle), math.sin(angle)
         axes = np.array([cos * x + sin * y, cos * y - sin * x])
         return Topology(self.model, self.names, axes)
+
+    def copied(self) -> "Topology":
+        """Return the same four-bar in a model of its own, which may be changed."""
+        return Topology(copy(self.model), self.names, self.axes)
 
     def rest_angle(self, pin: str) -> float:
         """Measure a hinge in the rest state: from the line of its bearer to that of the bar that hangs on it."""
