@@ -123,6 +123,11 @@ class LoopInside:
             mujoco.mjtDisableBit.mjDSBL_FRICTIONLOSS
         )
         self._friction = self.model.dof_frictionloss * rubs
+        bodies = [int(model.jnt_bodyid[joint]) for joint in loop.hinges.values()]
+        self.borne = {body: self._find_borne(body) for body in bodies}
+        """Actuators on sites of each body of a hinge and of all that it bears."""
+        self.lift = {body: self._find_lift(body) for body in bodies}
+        """What lifts each body of a hinge, and all that it bears, against gravity (gravcomp), (3,), N."""
 
     def angle(self, qpos: Array) -> float:
         """Return theta_2 of a pose, rad."""
@@ -340,14 +345,19 @@ class LoopInside:
     def _read_hinge(self, data: mujoco.MjData, body: int) -> Array:
         """Return the force on a body from the one that bears it, (3,), N."""
         force = data.cfrc_int[body, 3:].copy()
-        for load in self.loads:  # MuJoCo counts them into it
-            site = self.model.actuator_trnid[load, 0]
-            if body in climb(self.model, int(self.model.site_bodyid[site])):
-                force -= load_force(self.model, data, load)
-        return np.asarray(force - self._find_lift(body))
+        for load in self.borne[body]:  # MuJoCo counts them into it
+            force -= load_force(self.model, data, load)
+        return np.asarray(force - self.lift[body])
+
+    def _find_borne(self, body: int) -> list[int]:
+        sites = self.model.actuator_trnid[:, 0]
+        return [
+            load
+            for load in self.loads
+            if body in climb(self.model, int(self.model.site_bodyid[sites[load]]))
+        ]
 
     def _find_lift(self, body: int) -> Array:
-        """Return what lifts a body, and all that it bears, against gravity (gravcomp), (3,), N."""
         model = self.model
         if not hasattr(model, "body_gravcomp") or not is_enabled(model, "gravity"):
             return np.zeros(3)
