@@ -1,7 +1,5 @@
 """What was measured of a robot's loops, as sentences and tables: on the terminal, in Markdown, as CSV."""
 
-import csv
-import io
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -11,7 +9,7 @@ import click
 
 from fourbar.quantities import PIN_FORCES
 from fourbar.writing import write_text
-from fourbar_validation.compare.rows import make_plain, write_cell_text
+from fourbar_validation.compare.rows import make_plain, write_csv
 from fourbar_validation.engines.mujoco.robots.answers import (
     LoopMeasurement,
     RobotMeasurement,
@@ -202,9 +200,10 @@ def write_markdown(title: str, blocks: Sequence[Block]) -> str:
 
 def write_states(measurement: RobotMeasurement) -> str:
     """Write every state that MuJoCo was asked at as CSV, under STATES_FILE."""
-    text = io.StringIO()
-    table = csv.writer(text, lineterminator="\n")
-    table.writerow(STATES_FILE)
+    return write_csv(STATES_FILE, _list_states(measurement))
+
+
+def _list_states(measurement: RobotMeasurement) -> Iterator[tuple[str | float, ...]]:
     for loop in measurement.loops:
         for method, answer in (
             (STATES, loop.states),
@@ -216,9 +215,7 @@ def write_states(measurement: RobotMeasurement) -> str:
                 for pins in (row.soft, row.rigid):
                     numbers += [math.hypot(*pins.forces[name]) for name in PIN_FORCES]
                 numbers.append(1e3 * row.gap)
-                name = write_cell_text(make_plain(loop.name))
-                table.writerow((name, method, *map(repr, map(float, numbers))))
-    return text.getvalue()
+                yield make_plain(loop.name), method, *map(float, numbers)
 
 
 def report(measurement: RobotMeasurement, robot: Path, out: Path) -> None:
