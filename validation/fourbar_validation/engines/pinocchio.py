@@ -93,11 +93,6 @@ class PinocchioTree(Tree):
         """Place of a frame."""
         return self.at[name]
 
-    def locate(self, name: str) -> Pair:
-        """Read the place of a frame."""
-        x, y = self.at[name].tolist()
-        return x, y
-
     def rotation(self, bar: int) -> Array:
         """Return that of the joint."""
         return self.turned_to[bar]

@@ -131,11 +131,6 @@ class MujocoTree(Tree):
         """Place of a site."""
         return self.at[name]
 
-    def locate(self, name: str) -> Pair:
-        """Read the place of a site."""
-        x, y = self.at[name].tolist()
-        return x, y
-
     def rotation(self, bar: int) -> Array:
         """Return that of the body."""
         return self.turned_to[bar]
