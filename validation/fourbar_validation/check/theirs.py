@@ -188,7 +188,7 @@ def read_table(path: Path) -> TheirTable:
         raise InputError(
             "table", path.name, "needs a header and at least one row", str(path)
         )
-    columns, left_out = _read_columns(path, headings, unit_line)
+    columns, left_out, renamings = _read_columns(path, headings, unit_line)
     _drop_repeated(path, columns, left_out, headings, rows)
     names = [name for name, _ in columns.values()]
     if "theta_2" not in names:
@@ -196,7 +196,7 @@ def read_table(path: Path) -> TheirTable:
             "header",
             headings,
             "needs a column theta_2 (say theta_2 [deg] for degrees)"
-            + _list_suggestions(left_out),
+            + _list_renamings(renamings),
             str(path),
         )
     numbers = {name: np.empty(len(rows)) for name in names}
@@ -243,21 +243,16 @@ def read_table(path: Path) -> TheirTable:
         raise InputError(
             "header",
             headings,
-            f"needs a result, such as {examples}{_list_suggestions(left_out)}; "
+            f"needs a result, such as {examples}{_list_renamings(renamings)}; "
             f"known are {_find_known()}",
             str(path),
         )
     return table
 
 
-def _list_suggestions(left_out: dict[str, str]) -> str:
+def _list_renamings(renamings: dict[str, str]) -> str:
     """List the columns that are not known and what they may be renamed to."""
-    suggestions = [
-        f"; {heading}: {why.partition(': ')[2]}"
-        for heading, why in left_out.items()
-        if ": " in why
-    ]
-    return "".join(suggestions)
+    return "".join(f"; {heading}: {what}" for heading, what in renamings.items())
 
 
 def _drop_repeated(
@@ -435,10 +430,14 @@ def _is_unit_line(cells: list[str]) -> bool:
 
 def _read_columns(
     path: Path, headings: list[str], unit_line: list[str]
-) -> tuple[dict[int, tuple[str, Unit]], dict[str, str]]:
-    """Return each column's name and unit by its place in a row, and the headings left out, each with the reason."""
+) -> tuple[dict[int, tuple[str, Unit]], dict[str, str], dict[str, str]]:
+    """Return each column's name and unit by its place in a row, and the headings left out.
+
+    Of these each has a reason, and some that are not known what they may be renamed to.
+    """
     columns: dict[int, tuple[str, Unit]] = {}
     left_out: dict[str, str] = {}
+    renamings: dict[str, str] = {}
     for index, heading in enumerate(headings):
         match = HEADING.fullmatch(heading.strip())
         name = match["name"] + (match["letter"] or "") if match else heading.strip()
@@ -449,12 +448,11 @@ def _read_columns(
         if not name and index >= len(headings) - 1:
             continue  # an empty cell that a spreadsheet leaves at the end of a line
         if match is None or quantity in NOT_JUDGED or quantity not in UNITS:
-            unknown = "not a known column"
-            if suggestion := _suggest(name):
-                unknown += f": {suggestion}"
-            left_out[heading.strip() or f"column {index + 1}"] = NOT_JUDGED.get(
-                quantity, unknown
-            )
+            column = heading.strip() or f"column {index + 1}"
+            left_out[column] = NOT_JUDGED.get(quantity, "not a known column")
+            if quantity not in NOT_JUDGED and (renaming := _suggest(name)):
+                left_out[column] += f": {renaming}"
+                renamings[column] = renaming
             continue
         below = unit_line[index].strip(" []()") if index < len(unit_line) else ""
         text = (match["square"] or match["round"] or below).strip()
@@ -462,7 +460,7 @@ def _read_columns(
             f"|{name}|" if name in VECTORS else name,
             _read_unit(path, heading, quantity, text),
         )
-    return columns, left_out
+    return columns, left_out, renamings
 
 
 def _read_unit(path: Path, heading: str, quantity: str, text: str) -> Unit:
