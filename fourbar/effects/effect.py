@@ -12,7 +12,7 @@ from fourbar.errors import InputError, LimitError, expect
 from fourbar.formulas.arithmetic import Number, cross, is_any, polar, select
 from fourbar.formulas.motion import State
 from fourbar.formulas.pin_forces import Bodies, Body, PinForces, Wrenches
-from fourbar.linkage import MOVING_BARS, PINS, Declared, FourBar, require
+from fourbar.linkage import PINS, Declared, FourBar, require
 from fourbar.quantities import Array
 
 Joints = tuple[float, float, float]
@@ -31,28 +31,6 @@ def list_bodies(linkage: FourBar, effects: Iterable[Any] = ()) -> Bodies:
         for bar, inertia in effect.carried.items():
             bodies[bar - 2] = bodies[bar - 2]._replace(I=bodies[bar - 2].I + inertia)
     return bodies[0], bodies[1], bodies[2]
-
-
-def find_shortest(linkage: FourBar) -> float:
-    """Return the least length of a moving bar, m: a couple over it is a force at most."""
-    return min(bar.length for bar in linkage.moving)
-
-
-def add_levers(linkage: FourBar, places: Iterable[tuple[int, float]]) -> float:
-    """Return how many times forces at distances along bars count, their couples with them."""
-    return sum(
-        1.0 + abs(distance) / linkage.bar(bar).length
-        for bar, distance in places
-        if bar != 1
-    )
-
-
-def find_slip(solution: Any, pin: str) -> Any:
-    """Return omega_j - omega_i of the bars that meet at a pin, rad/s, (n,)."""
-    omega = {1: 0.0}
-    omega |= {bar: getattr(solution, f"omega_{bar}") for bar in MOVING_BARS}
-    one, second = PINS[pin]
-    return omega[second] - omega[one]
 
 
 class Actions:
@@ -344,7 +322,10 @@ class Effect:
         raise NotImplementedError
 
     def size(self, linkage: FourBar, solution: Any) -> Any:
-        """Return the size of its forces, N, one number or (n,): the scale of what vanishes."""
+        """Return the size of its forces, N, one number or (n,): the scale of what vanishes.
+
+        Effects of this package have none: the harness states theirs itself.
+        """
         raise NotImplementedError
 
     @property

@@ -5,13 +5,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from fourbar.effects.effect import Effect
-from fourbar.linkage import (
-    AT_LEAST_ZERO,
-    Declared,
-    FourBar,
-    check_numbers,
-    require_whole,
-)
+from fourbar.linkage import AT_LEAST_ZERO, Declared, check_numbers, require_whole
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,11 +41,6 @@ class Flywheel(Effect):
     def carried(self) -> Mapping[int, float]:
         """The wheel's inertia on its bar: a rotation has no other."""
         return {self.bar: self.inertia}
-
-    def size(self, linkage: FourBar, solution: Any) -> Any:
-        """Return J alpha over the bar's length."""
-        alpha = getattr(solution, f"alpha_{self.bar}")
-        return self.inertia * abs(alpha) / linkage.bar(self.bar).length
 
     def add_to_mjcf(self, model: Any) -> None:
         """Add it as inertia of the body, because MuJoCo's armature of pin O2 is the drive."""

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from fourbar.effects.effect import Actions, PinRows, find_shortest
+from fourbar.effects.effect import Actions, PinRows
 from fourbar.formulas.arithmetic import is_any
 from fourbar.formulas.motion import State
 from fourbar.linkage import AT_LEAST_ZERO, Declared, FourBar
@@ -40,10 +40,6 @@ class Friction(PinRows):
         """Set the attribute ``frictionloss`` of the hinge (of a tendon at the cut pin B)."""
         for pin, f in self.torques:
             model.add_dry_friction(pin, f)
-
-    def size(self, linkage: FourBar, solution: Any) -> Any:
-        """Sum the couples of all pins over the shortest bar."""
-        return sum(f for _, f in self.torques) / find_shortest(linkage)
 
     def couple_on_drive(self, linkage: FourBar, speed: float) -> float:
         """Sum the couples of all pins."""

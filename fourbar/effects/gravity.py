@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from fourbar.effects.effect import Actions, Effect, add_levers
+from fourbar.effects.effect import Actions, Effect
 from fourbar.formulas.arithmetic import is_any, polar, vector
 from fourbar.formulas.motion import State
 from fourbar.linkage import MOVING_BARS, Declared, FourBar, check_numbers
@@ -49,15 +49,6 @@ class Gravity(Effect):
         for number, body in zip(MOVING_BARS, actions.bodies, strict=True):
             if is_any(body.m != 0.0):
                 actions.force(number, body.m * field, body.z)
-
-    def size(self, linkage: FourBar, solution: Any) -> Any:
-        """Sum the weights with their levers about the bars' first pins."""
-        return sum(
-            bar.mass
-            * abs(self.magnitude)
-            * add_levers(linkage, [(number, bar.mass_centre[0])])
-            for number, bar in zip(MOVING_BARS, linkage.moving, strict=True)
-        )
 
     def add_to_mjcf(self, model: Any) -> None:
         """Set the option ``gravity``."""

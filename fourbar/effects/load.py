@@ -245,10 +245,6 @@ class Load(Effect):
             else total * max(abs(factor) for factor in self.table.factor)
         )
 
-    def size(self, linkage: FourBar, solution: Any) -> Any:
-        """Return the force with its lever, and the couple over the bar's length."""
-        return self.greatest_force(linkage)
-
     def add_to_mjcf(self, model: Any) -> None:
         """Add a constant actuator on a site (force) or on the bar (couple)."""
         if self.table is not None:

@@ -18,12 +18,12 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.effects.effect import Actions, PinRows, SolvedFriction, find_shortest
+from fourbar.effects.effect import Actions, PinRows, SolvedFriction
 from fourbar.errors import InputError
 from fourbar.formulas.arithmetic import is_any, make_like
 from fourbar.formulas.longer import take_doubles
 from fourbar.formulas.pin_forces import PinForces
-from fourbar.linkage import AT_LEAST_ZERO, PIN_FORCE, Declared, FourBar
+from fourbar.linkage import AT_LEAST_ZERO, PIN_FORCE, Declared
 from fourbar.quantities import JAMMED, OK, SEVERAL, Array
 
 ONE, NONE, MANY = range(3)
@@ -182,14 +182,6 @@ class PinFriction(PinRows):
                 for column, gap in enumerate(gaps):
                     couples[pin] = couples[pin] + inverse[..., row, column] * gap
         return couples
-
-    def size(self, linkage: FourBar, solution: Any) -> Any:
-        """Sum mu r |F| of all pins over the shortest bar."""
-        total = 0.0
-        for pin, mu, r in self.pins:
-            force = np.hypot(*np.moveaxis(getattr(solution, PIN_FORCE[pin]), -1, 0))
-            total = total + mu * r * np.nan_to_num(force) / find_shortest(linkage)
-        return total
 
     def act_known(self, actions: Actions, forces: Mapping[str, Array]) -> None:
         """Add the friction couples for pin forces that are known already (name: (n, 2), N)."""

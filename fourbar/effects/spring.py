@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.effects.effect import Actions, Effect, add_levers
+from fourbar.effects.effect import Actions, Effect
 from fourbar.effects.place import (
     STATED_PLACES,
     Place,
@@ -195,16 +195,6 @@ class Springs(Effect):
     def add_to_mjcf(self, model: Any) -> None:
         """Add spatial tendons."""
         model.springs.extend(self.springs)
-
-    def size(self, linkage: FourBar, solution: Any) -> Any:
-        """Sum the greatest tensions with their levers about the bars' first pins."""
-        return sum(
-            spring.greatest_tension(linkage)
-            * add_levers(
-                linkage, [(end.bar, end.distance) for end in (spring.start, spring.end)]
-            )
-            for spring in self.springs
-        )
 
     def couple_on_drive(self, linkage: FourBar, speed: float) -> float:
         """Sum the greatest tensions, at the longest arm."""

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.effects.effect import Actions, Joints, PinRows, find_shortest
+from fourbar.effects.effect import Actions, Joints, PinRows
 from fourbar.errors import LimitError, expect
 from fourbar.formulas.arithmetic import Number, angle, wrap_angle
 from fourbar.formulas.motion import State
@@ -100,10 +100,6 @@ class Torsion(PinRows):
             model.pin[pin]["springlength" if pin == "B" else "springref"] = (
                 rest + turned - preload / k
             )
-
-    def size(self, linkage: FourBar, solution: Any) -> Any:
-        """Return the greatest couple over the shortest bar."""
-        return self.greatest_couple / find_shortest(linkage)
 
     def couple_on_drive(self, linkage: FourBar, speed: float) -> float:
         """Return no less than the sum of the couples."""

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from fourbar.effects.effect import Actions, PinRows, find_shortest, find_slip
+from fourbar.effects.effect import Actions, PinRows
 from fourbar.formulas.motion import State
 from fourbar.linkage import AT_LEAST_ZERO, Declared, FourBar
 
@@ -28,13 +28,6 @@ class Viscous(PinRows):
         """Set the attribute ``damping`` of the hinge (of a tendon at the cut pin B)."""
         for pin, k in self.coefficients:
             model.pin[pin]["damping"] = k
-
-    def size(self, linkage: FourBar, solution: Any) -> Any:
-        """Sum the couples of all pins over the shortest bar."""
-        return sum(
-            k * abs(find_slip(solution, pin)) / find_shortest(linkage)
-            for pin, k in self.coefficients
-        )
 
     def couple_on_drive(self, linkage: FourBar, speed: float) -> float:
         """Sum the couples of all pins at the speed."""

@@ -20,6 +20,7 @@ from fourbar.scene import Scene, command
 from fourbar.solving import solve
 from fourbar.studies.derivatives import sensitivity
 from fourbar.studies.study import vary
+from fourbar_validation.compare import effects as in_scales
 from fourbar_validation.engines import effects as on_trees
 from fourbar_validation.engines import free_body_effects
 from fourbar_validation.engines.free_body import FreeBody
@@ -193,9 +194,9 @@ def test_every_effect_of_the_package_has_a_row_in_each_table() -> None:
     """Loads have a table of their own in a file."""
     keys = {*effects.list_kinds()}
     assert keys == {*free_body_effects.WRENCH_OF}
-    assert keys | {"load"} == {*on_trees.TERM_OF}
+    assert keys | {"load"} == {*on_trees.TERM_OF} == {*in_scales.SIZE_OF}
     for kind in (*effects.list_kinds().values(), Load):
-        assert kind.size is not effects.Effect.size
+        assert kind.size is effects.Effect.size  # nothing judged sets its own scale
     without_mjcf = {
         key for key, kind in effects.list_kinds().items() if not kind.has_mjcf()
     }
