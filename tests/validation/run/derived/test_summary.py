@@ -96,6 +96,99 @@ def test_a_fact_that_is_off_fails_its_row(
     assert name in failing
 
 
+def lose(bars: Any, kept: int) -> Any:
+    return {kept: bars[kept]}
+
+
+def spoil_bending(facts: Facts, value: float) -> Facts:
+    spoiled = facts.bending[3]._replace(
+        peak=facts.bending[3].peak._replace(value=value)
+    )
+    return replace(facts, bending={**facts.bending, 3: spoiled})
+
+
+MISSING: dict[str, tuple[str, Callable[[Facts], Facts]]] = {
+    "no pin": ("all", lambda f: replace(f, pins={})),
+    "one pin": ("all", lambda f: replace(f, pins={"A": f.pins["A"]})),
+    "no bending": ("all", lambda f: replace(f, bending={})),
+    "bending of one bar": ("all", lambda f: replace(f, bending=lose(f.bending, 3))),
+    "angles of one bar": ("all", lambda f: replace(f, angles=lose(f.angles, 2))),
+    "no peak": ("all", lambda f: replace(f, peak=None)),
+    "no duty": ("all", lambda f: replace(f, duty=None)),
+    "bending that is no number": ("bending", lambda f: spoil_bending(f, np.nan)),
+    "bending that is none": ("bending", lambda f: spoil_bending(f, 0.0)),
+    "a range whose low end is no number": (
+        "all",
+        lambda f: replace(
+            f,
+            angles={
+                **f.angles,
+                4: (f.angles[4][0]._replace(value=np.nan), f.angles[4][1]),
+            },
+        ),
+    ),
+    "a transmission angle that is no number": (
+        "ranges",
+        lambda f: replace(f, transmission=f.transmission._replace(value=np.nan)),
+    ),
+    "a peak that is no number": (
+        "peaks",
+        lambda f: replace(f, peak=f.peak._replace(value=np.nan)),  # type: ignore[union-attr]
+    ),
+    "a mean of a pin that is no number": (
+        "pins",
+        lambda f: replace(f, pins={**f.pins, "O4": f.pins["O4"]._replace(rms=np.nan)}),
+    ),
+}
+
+
+@pytest.mark.parametrize("fault", MISSING)
+def test_what_is_missing_or_no_number_fails(
+    fault: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What the judge cannot find breaks its check down, in a row that fails."""
+    name, change = MISSING[fault]
+    summarize = module.summarize
+    monkeypatch.setattr(module, "summarize", lambda *of: change(summarize(*of)))
+    question = ask("scene", TURN, ())
+    rows = [*question.attempt(lambda: summary(question), "summary")]
+    assert [row.quantity for row in rows if row.failed] == [name]
+
+
+@pytest.mark.parametrize(
+    ("key", "name"),
+    [
+        ("", "all"),
+        ("peak_torque", "peaks"),
+        ("peak_speed", "peaks"),
+        ("peak_power", "peaks"),
+        ("rms_torque", "means"),
+        ("rms_power", "means"),
+        ("energy_in", "means"),
+        ("energy_out", "means"),
+        ("pins", "pins"),
+    ],
+)
+def test_what_is_missing_in_the_json_or_no_number_fails(
+    key: str, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write = module.write_motor
+
+    def spoil(*of: Any) -> Any:
+        entry = write(*of)
+        if not key or entry is None:
+            return None
+        spoiled: Any = np.nan
+        if key == "pins":
+            spoiled = {**entry["pins"], "B": {**entry["pins"]["B"], "peak": np.nan}}
+        return {**entry, key: spoiled}
+
+    monkeypatch.setattr(module, "write_motor", spoil)
+    question = ask("scene", TURN, ())
+    rows = [*question.attempt(lambda: summary(question), "summary")]
+    assert [row.quantity for row in rows if row.failed] == [name]
+
+
 @pytest.mark.parametrize("factor", (1.0 - 2e-3, 1.0 + 2e-3))
 @pytest.mark.parametrize(
     ("key", "name"),

@@ -92,7 +92,7 @@ def move_bars(scene: Scene, command: Command, answer: Answer) -> BodyMotion:
 
 
 @dataclass
-class _Piece(BodyWrenches):
+class Piece(BodyWrenches):
     """The piece of a bar beyond a cut: forces in the bar's axes and their moment about the cut, counter-clockwise."""
 
     bar: int
@@ -143,10 +143,10 @@ class _Piece(BodyWrenches):
 
 def free_piece(
     scene: Scene, motion: BodyMotion, answer: Answer, bar: int, cut: float
-) -> _Piece:
+) -> Piece:
     """Free the piece of a bar beyond a cut."""
     described = scene.linkage.bar(bar)
-    piece, length = _Piece(bar, cut, motion), described.length
+    piece, length = Piece(bar, cut, motion), described.length
     uniform = described.inertia is None and described.centre is None
     for pin in ENDS[bar]:
         name = PIN_FORCE[pin]
@@ -195,7 +195,7 @@ def free_piece(
 
 
 def _push_rigid(
-    piece: _Piece, mass: float, ends: tuple[float, float], a_pin: Any, gravity: Any
+    piece: Piece, mass: float, ends: tuple[float, float], a_pin: Any, gravity: Any
 ) -> None:
     """Put weight and inertia of a piece of a uniform bar on it, as of a rigid bar between two places."""
     start, end = ends
@@ -207,9 +207,7 @@ def _push_rigid(
     piece.place = 0.0
 
 
-def _push_drive(
-    scene: Scene, motion: BodyMotion, answer: Answer, piece: _Piece
-) -> None:
+def _push_drive(scene: Scene, motion: BodyMotion, answer: Answer, piece: Piece) -> None:
     """Put the couple of the drive at the first pin of its bar, or its force at the ends of its line."""
     if scene.drive is None:
         if scene.drive_bar == piece.bar:

@@ -7,6 +7,7 @@ summed anew from the free bodies' forces.
 
 import math
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -27,11 +28,12 @@ from fourbar_validation.compare.scales import make_reference
 from fourbar_validation.compare.tolerance import (
     Array,
     ErrorBound,
+    divide,
     magnitude,
     wrap_angle,
 )
 from fourbar_validation.engines.description import state_from_pins
-from fourbar_validation.run.derived.cuts import free_piece, move_bars
+from fourbar_validation.run.derived.cuts import CUT, Piece, free_piece, move_bars
 from fourbar_validation.run.derived.variants import ask_free_bodies, make_row
 from fourbar_validation.run.question import NotAskedError, Question
 
@@ -114,7 +116,11 @@ class _SummaryJudge:
         """Add by how much a peak is no value at its place, and by how much another one exceeds it."""
         size = abs(peak.value)
         self.add(row, np.abs(np.abs(at_peak) - size) / size)
-        self.add(row, max(float(np.abs(fine).max()) - size, 0.0) / size)
+        self.add_excess(row, (np.abs(fine).max() - size) / size)
+
+    def add_excess(self, row: str, *excess: Any) -> None:
+        """Add the largest of some excesses, or zero where none is one; NaN where one is no number."""
+        self.add(row, np.max((*excess, 0.0)))
 
 
 def summary(question: Question) -> list[Row]:
@@ -156,13 +162,14 @@ def _summarize(question: Question) -> Facts:
 
 def _judge_ranges(judged: _SummaryJudge) -> None:
     """Judge the ends of the ranges of all bars, and the smallest transmission angle."""
-    for bar, ends in judged.facts.angles.items():
+    for bar in MOVING_BARS:
+        ends = judged.facts.angles[bar]
         there = _take(judged, judged.ask([end.place for end in ends]), f"theta_{bar}")
         low, high = ends
         judged.add("ranges", np.abs(wrap_angle(there - [low.value, high.value])))
         fine = np.unwrap(_take(judged, judged.fine, f"theta_{bar}"))
         fine -= 2.0 * math.pi * round((fine.min() - low.value) / (2.0 * math.pi))
-        judged.add("ranges", max(fine.max() - high.value, low.value - fine.min(), 0.0))
+        judged.add_excess("ranges", fine.max() - high.value, low.value - fine.min())
     least = judged.facts.transmission
     answers = judged.ask(least.place), judged.fine
     sines = [
@@ -170,7 +177,7 @@ def _judge_ranges(judged: _SummaryJudge) -> None:
         for of in answers
     ]
     judged.add("ranges", np.abs(sines[0] - math.sin(least.value)))
-    judged.add("ranges", max(math.sin(least.value) - float(sines[1].min()), 0.0))
+    judged.add_excess("ranges", math.sin(least.value) - sines[1].min())
 
 
 def _take(judged: _SummaryJudge, answer: Answer, name: str) -> Array:
@@ -199,10 +206,9 @@ def _judge_drive(judged: _SummaryJudge) -> None:
     """Judge peak, mean, power and energies of the drive, as printed and in the JSON."""
     facts, solution = judged.facts, judged.solution
     entry = write_motor(judged.scene, solution, {})
-    if facts.peak is None or facts.duty is None or entry is None:
-        return
+    assert facts.peak is not None and facts.duty is not None and entry is not None
     values, speed = _find_work(judged, judged.own)
-    if not np.abs(values).max() > 0.0:
+    if np.abs(values).max() == 0.0:
         return
     power = values * speed
     name = read_drive(solution).keys.value
@@ -214,7 +220,7 @@ def _judge_drive(judged: _SummaryJudge) -> None:
         judged.add_value("peaks", entry[f"peak_{kind}"], abs(facts.peak.value))
     counted = slice(None, -1) if bool(is_once_round(solution)) else slice(None)
     for key, of_own in ((f"rms_{kind}", values), ("rms_power", power)):
-        if np.abs(of_own).max() > 0.0:
+        if np.abs(of_own).max() != 0.0:
             mean = math.sqrt(np.square(of_own[counted]).mean())
             judged.add_value("means", entry[key], mean)
     for key, fine in (
@@ -222,9 +228,9 @@ def _judge_drive(judged: _SummaryJudge) -> None:
         ("peak_power", fine_values * fine_speed),
     ):
         most = float(np.abs(fine).max())
-        if key.removeprefix("peak_") not in facts.between.growing and most > 0.0:
-            judged.add("peaks", max(most - entry[key], 0.0) / most)
-            judged.add("peaks", max(entry[key] / most - 1.0 - BETWEEN, 0.0))
+        if key.removeprefix("peak_") not in facts.between.growing and most != 0.0:
+            judged.add_excess("peaks", (most - entry[key]) / most)
+            judged.add_excess("peaks", entry[key] / most - 1.0 - BETWEEN)
     _judge_energy(judged, entry, power)
     _judge_bore(judged, fine_values)
 
@@ -244,7 +250,7 @@ def _judge_energy(judged: _SummaryJudge, entry: dict[str, Any], power: Array) ->
     for part in (np.maximum(power, 0.0), np.maximum(-power, 0.0)):
         sums.append(float((spans * 0.5 * (part[:-1] + part[1:])).sum()))
     for key, total in zip(("energy_in", "energy_out"), sums, strict=True):
-        judged.add("means", abs(entry[key] - total) / max(sums) if max(sums) else 0.0)
+        judged.add("means", divide(abs(entry[key] - total), np.max(sums)))
 
 
 def _judge_bore(judged: _SummaryJudge, fine: Array) -> None:
@@ -261,7 +267,7 @@ def _judge_bore(judged: _SummaryJudge, fine: Array) -> None:
         for number, word in re.findall(r"(\d\S*) mm\b[^;]*? to (\w+) ", text)
     }
     for word, force in (("push", float(fine.max())), ("pull", -float(fine.min()))):
-        if force > 0.0:
+        if not force <= 0.0:
             bore = math.sqrt(4.0 * force / (math.pi * PRESSURE))
             judged.add_value("bore", printed.get(word), bore)
 
@@ -270,11 +276,12 @@ def _judge_pins(judged: _SummaryJudge) -> None:
     """Judge peak, place and mean of each pin's load, as printed and in the JSON, and the force on the frame."""
     facts, solution = judged.facts, judged.solution
     entry = write_motor(judged.scene, solution, {})
+    assert entry is not None
     counted = slice(None, -1) if bool(is_once_round(solution)) else slice(None)
-    for pin, load in facts.pins.items():
-        name = PIN_FORCE[pin]
+    for pin, name in PIN_FORCE.items():
+        load = facts.pins[pin]
         own = magnitude(judged.own.quantities[name])
-        if not own.max() > 0.0:
+        if own.max() == 0.0:
             continue
         mean = math.sqrt(np.square(own[counted]).mean())
         judged.add_value("pins", load.rms, mean)
@@ -284,17 +291,16 @@ def _judge_pins(judged: _SummaryJudge) -> None:
         at_peak = magnitude(there.quantities[name])
         fine = magnitude(judged.fine.quantities[name])
         judged.add_peak("pins", load.peak, at_peak, fine)
-        if entry is not None:
-            of_pin = entry["pins"][pin]
-            judged.add_value("pins", of_pin["peak"], load.peak.value)
-            judged.add_value("pins", of_pin["rms"], mean)
-            apart = _take(judged, there, "theta_2") - of_pin["theta_2"]
-            judged.add("pins", np.abs(wrap_angle(apart)))
+        of_pin = entry["pins"][pin]
+        judged.add_value("pins", of_pin["peak"], load.peak.value)
+        judged.add_value("pins", of_pin["rms"], mean)
+        apart = _take(judged, there, "theta_2") - of_pin["theta_2"]
+        judged.add("pins", np.abs(wrap_angle(apart)))
     if judged.scene.drive is None:
         on_frame = -(judged.own.quantities["F12"] + judged.own.quantities["F14"])
         size = magnitude(judged.own.quantities["F12"]).max()
         size += magnitude(judged.own.quantities["F14"]).max()
-        if size > 0.0:
+        if size != 0.0:
             apart = magnitude(shaking_force(solution) - on_frame)
             judged.add("frame_force", apart / size)
 
@@ -304,8 +310,8 @@ def _judge_bending(judged: _SummaryJudge) -> None:
     stated = state_from_pins(judged.scene)
     fine_motion = move_bars(judged.scene, _command_of(judged.fine), judged.fine)
     for bar in MOVING_BARS:
-        largest = judged.facts.bending.get(bar)
-        if largest is None or largest.grows or not largest.peak.value > 0.0:
+        largest = judged.facts.bending[bar]
+        if largest.grows:
             continue
         there = judged.ask(largest.peak.place)
         motion = move_bars(judged.scene, _command_of(there), there)
@@ -313,19 +319,24 @@ def _judge_bending(judged: _SummaryJudge) -> None:
         beside = [
             largest.x * (1.0 + off) + off * length for off in (-CUT_BESIDE, CUT_BESIDE)
         ]
-        moments = [
-            float(np.abs(free_piece(stated, motion, there, bar, cut).M[0]))
-            for cut in beside
-        ]
+        at_peak, others = (
+            [free_piece(stated, moved, answer, bar, cut) for cut in beside]
+            for moved, answer in ((motion, there), (fine_motion, judged.fine))
+        )
+        most = np.max([np.abs(piece.M).max() for piece in others])
         size = abs(largest.peak.value)
-        judged.add("bending", abs(max(moments) - size) / size)
-        others = [
-            float(
-                np.abs(free_piece(stated, fine_motion, judged.fine, bar, cut).M).max()
-            )
-            for cut in beside
-        ]
-        judged.add("bending", max(max(others) - size, 0.0) / size)
+        if size == 0.0:  # a bar that is said not to bend, as one between two forces
+            judged.add("bending", _exceed_rounding(others))
+            continue
+        moment = np.max([np.abs(piece.M[0]) for piece in at_peak])
+        judged.add("bending", abs(moment - size) / size)
+        judged.add_excess("bending", (most - size) / size)
+
+
+def _exceed_rounding(pieces: Sequence[Piece]) -> float:
+    """Return zero where no moment of some pieces exceeds the rounding of its terms, or else infinity."""
+    vanish = [np.abs(piece.M) <= CUT.factor * piece.turning for piece in pieces]
+    return 0.0 if np.all(vanish) else math.inf
 
 
 CUT_BESIDE = 1e-10
