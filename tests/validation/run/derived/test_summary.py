@@ -155,6 +155,57 @@ def test_what_is_missing_or_no_number_fails(
     assert [row.quantity for row in rows if row.failed] == [name]
 
 
+def grow_bending(facts: Facts) -> Facts:
+    grown = {bar: of._replace(grows=True) for bar, of in facts.bending.items()}
+    return replace(facts, bending=grown)
+
+
+GROWING: dict[str, Callable[[Facts], Facts]] = {
+    name: lambda f, name=name: replace(f, between=f.between._replace(growing={name}))  # type: ignore[misc]
+    for name in ("torque", "speed", "power", "F12", "F43")
+}
+GROWING["bending"] = grow_bending
+
+
+@pytest.mark.parametrize("name", GROWING)
+def test_what_is_said_to_grow_far_from_every_pole_fails(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    summarize = module.summarize
+    change = GROWING[name]
+    monkeypatch.setattr(module, "summarize", lambda *of: change(summarize(*of)))
+    rows = judge(TURN)
+    assert {row.quantity for row in rows.values() if row.failed} == {"peaks"}
+
+
+@pytest.mark.parametrize("turns", (1, 24))
+def test_what_grows_between_positions_is_believed(turns: int) -> None:
+    """The drive's bar stands still between the positions, of which none is near."""
+    sweep = fourbar.Sweep(0.12, 0.12 + 2 * np.pi * turns, 40 * turns)
+    scene = crank_rocker(motion=fourbar.Motion(sweep, 9.0), drive_bar=4)
+    question = ask("scene", scene, ())
+    assert module._summarize(question).between.growing
+    assert not judge(scene)["peaks"].failed
+
+
+@pytest.mark.parametrize("part", (0.0, 0.137, 0.479, 0.863))
+def test_a_bar_that_bends_more_elsewhere_fails(
+    part: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The largest moment that is said may be a true one, at another place."""
+    free_piece = module.free_piece
+
+    def bend_more(*of: Any) -> Any:
+        piece = free_piece(*of)
+        if piece.bar == 3 and piece.cut == part * TURN.linkage.coupler.length:
+            piece.M += 1e3
+        return piece
+
+    monkeypatch.setattr(module, "free_piece", bend_more)
+    rows = judge(TURN)
+    assert {row.quantity for row in rows.values() if row.failed} == {"bending"}
+
+
 @pytest.mark.parametrize(
     ("key", "name"),
     [

@@ -33,7 +33,7 @@ from fourbar_validation.compare.tolerance import (
     wrap_angle,
 )
 from fourbar_validation.engines.description import state_from_pins
-from fourbar_validation.run.derived.cuts import CUT, Piece, free_piece, move_bars
+from fourbar_validation.run.derived.cuts import CUT, WHERE, Piece, free_piece, move_bars
 from fourbar_validation.run.derived.variants import ask_free_bodies, make_row
 from fourbar_validation.run.question import NotAskedError, Question
 
@@ -130,6 +130,7 @@ def summary(question: Question) -> list[Row]:
     _judge_drive(judged)
     _judge_pins(judged)
     _judge_bending(judged)
+    _judge_growth(judged)
     rows = []
     for name in ROWS:
         errors = judged.errors.get(name, [])
@@ -319,9 +320,13 @@ def _judge_bending(judged: _SummaryJudge) -> None:
         beside = [
             largest.x * (1.0 + off) + off * length for off in (-CUT_BESIDE, CUT_BESIDE)
         ]
+        anywhere = [*beside, *(part * length for part in WHERE)]
         at_peak, others = (
-            [free_piece(stated, moved, answer, bar, cut) for cut in beside]
-            for moved, answer in ((motion, there), (fine_motion, judged.fine))
+            [free_piece(stated, moved, answer, bar, cut) for cut in cuts]
+            for moved, answer, cuts in (
+                (motion, there, beside),
+                (fine_motion, judged.fine, anywhere),
+            )
         )
         most = np.max([np.abs(piece.M).max() for piece in others])
         size = abs(largest.peak.value)
@@ -337,6 +342,25 @@ def _exceed_rounding(pieces: Sequence[Piece]) -> float:
     """Return zero where no moment of some pieces exceeds the rounding of its terms, or else infinity."""
     vanish = [np.abs(piece.M) <= CUT.factor * piece.turning for piece in pieces]
     return 0.0 if np.all(vanish) else math.inf
+
+
+def _judge_growth(judged: _SummaryJudge) -> None:
+    """Fail what is said to grow without bound where the bars are far from every pole throughout the motion.
+
+    What grows has no peak that could be judged, so none of it is believed.
+    """
+    facts = judged.facts
+    grows = any(bending.grows for bending in facts.bending.values())
+    if not facts.between.growing and not grows:
+        return
+    reference = make_reference(judged.scene, judged.fine)
+    assert reference is not None and reference.drive_condition is not None
+    conditions = np.stack((reference.condition, reference.drive_condition))
+    # a sine that passes through zero between two positions is no further from it there
+    # than it changes in a step
+    least = conditions.min() - np.abs(np.diff(conditions)).max()
+    if least > LEAST_CONDITION:
+        judged.add("peaks", math.inf)
 
 
 CUT_BESIDE = 1e-10
