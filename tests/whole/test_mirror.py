@@ -27,7 +27,6 @@ JUDGED_BY = {
     ),
     "whole/test_kills.py": "validation/run: pool",
     "whole/test_results_format.py": "validation/compare: columns",
-    "whole/test_package.py": "validation: places",
     # one table or one evaluation, whose rows are no use alone
     "fourbar/effects/test_effects.py": "fourbar/effects: *",
     "fourbar/effects/test_place.py": "fourbar/files: place",

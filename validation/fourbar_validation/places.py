@@ -1,6 +1,7 @@
 """Locate this package, the models, and the checkout that contains both, if there is one."""
 
 import os
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,8 +16,17 @@ FORMULAS = Path(fourbar.__file__).resolve().parent
 CHECKOUT = None if (PACKAGE / "models" / "problems").is_dir() else PACKAGE.parents[1]
 """The folder of pyproject.toml, models, tests and docs; None where the package is installed, with the models in it."""
 MODELS = PACKAGE / "models" if CHECKOUT is None else CHECKOUT / "models"
-PROGRAM = "fourbar-validation" if CHECKOUT is None else "python -m validation"
-"""Command that starts the harness here."""
+
+
+def find_program(started: str) -> str:
+    """Return the command that starts the harness, from the file that was started (`sys.argv[0]`)."""
+    if Path(started).parts[-2:] == ("validation", "__main__.py"):
+        return "python -m validation"
+    return "fourbar-validation"
+
+
+PROGRAM = find_program(sys.argv[0] if sys.argv else "")
+"""Command that started the harness."""
 
 
 def find_checkout(what: str) -> Path:
