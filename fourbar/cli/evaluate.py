@@ -198,7 +198,7 @@ def _choose_form(table: bool, as_json: bool, as_csv: bool, out: Path | None) -> 
     default=None,
     help="Unit of the angles (default: degrees; rad in JSON and CSV).",
 )
-@given.own_units_option
+@given.own_units_option("those of the file; SI in CSV and JSON")
 @click.option(
     "--pressure",
     metavar="P",
@@ -207,7 +207,10 @@ def _choose_form(table: bool, as_json: bool, as_csv: bool, out: Path | None) -> 
 @click.option(
     "--sensitivity",
     is_flag=True,
-    help="Rank the numbers of the scene by what the results depend on.",
+    help=(
+        "Rank the numbers of the scene by how far each changes the results, in SI units;"
+        " without --at, --units and --degrees."
+    ),
 )
 @given.text_option(*given.TABLES, ".csv")
 def analyze(  # noqa: PLR0913 - one for each option
@@ -226,8 +229,8 @@ def analyze(  # noqa: PLR0913 - one for each option
 ) -> None:
     """Solve a scene: ranges, torque, pin forces, and what the drive must deliver.
 
-    Of one position, the scene's or that of --at, everything is printed. A FILE that
-    ends in .csv or .json asks for that form.
+    If the scene states one position, or --at names one, everything about it is printed.
+    A FILE that ends in .csv or .json asks for that form.
     """
     form = _choose_form(table or every is not None, as_json, decimal is not None, out)
     if columns is not None and form == "json":
@@ -237,7 +240,9 @@ def analyze(  # noqa: PLR0913 - one for each option
     if sensitivity:
         if form in ("csv", "table") or degrees or units or at:
             raise click.UsageError(
-                "--sensitivity is a table, or with --json all of it, SI and rad"
+                "--sensitivity cannot be combined with --at, --units, --degrees,"
+                " --columns, --table, --every, --all and --csv: it prints a table in SI"
+                " units; --json prints every position"
             )
         _print_sensitivity(scene, form == "json", out)
         return

@@ -74,7 +74,7 @@ without_loads_option = click.option(
 @click.option(
     "--dimensions", is_flag=True, help="Write the lengths of the bars at them."
 )
-@given.own_units_option
+@given.own_units_option()
 def plot(
     scene: Path,
     out: Path,
@@ -127,7 +127,7 @@ def _find_place(scene: Scene, text: str) -> float:
 @click.option(
     "--vectors", is_flag=True, help="Draw velocity and acceleration at the points."
 )
-@given.own_units_option
+@given.own_units_option()
 def animate(
     scene: Path,
     out: Path,

@@ -56,15 +56,12 @@ at_option = click.option(
     metavar="PLACE",
     help='Position, like "60 deg", "theta_4=30 deg" or "time=0.2 s"; repeatable.',
 )
-own_units_option = click.option(
-    "--units",
-    callback=_read_units,
-    metavar="UNITS",
-    help=(
-        'Units: SI, imperial or a list like "mm N.mm deg" (default: those of the file;'
-        " of CSV and JSON SI)."
-    ),
-)
+
+
+def own_units_option(default: str = "those of the file") -> Callable[..., Any]:
+    """Make --units of a command whose default, which the help states, is not SI."""
+    told = f'Units: SI, imperial or a list like "mm N.mm deg" (default: {default}).'
+    return click.option("--units", callback=_read_units, metavar="UNITS", help=told)
 
 
 def text_option(*endings: str, required: bool = False) -> Callable[..., Any]:

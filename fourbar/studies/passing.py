@@ -58,7 +58,7 @@ def _find_places(scene: Scene, name: str, value: float) -> list[float]:
         return [value]
     if name == "time":
         raise InputError(
-            "at", name, "needs a law or a release: motion.law, motion.free"
+            "at", name, "needs a motion over time: state motion.law or motion.free"
         )
     places: list[float] = []
     for place in _list_candidates(scene, name, value):

@@ -57,7 +57,7 @@ def test_a_place_out_of_range_is_refused_with_the_range() -> None:
         find_positions(thesis(), [("theta_2", math.radians(30.0))])
     with pytest.raises(NotAssembledError, match="no position of this assembly"):
         find_positions(crank_rocker(), [("theta_4", 0.0)])
-    with pytest.raises(InputError, match="needs a law or a release"):
+    with pytest.raises(InputError, match="needs a motion over time: state motion"):
         find_positions(crank_rocker(), [("time", 1.0)])
     with pytest.raises(NotAssembledError, match="it stays within"):
         find_positions(LAW, [("theta_2", 3.0)])

@@ -37,6 +37,7 @@ from fourbar_validation.regression.scenes import find_renamed
 
 HISTORY = "history.parquet"
 TIME = "time"
+Command = Callable[..., Any]
 
 
 def append(
@@ -133,21 +134,24 @@ CHOICES = {"only": "scene", "engines": "engine", "quantity": "quantity"}
 """Option, and the column that it chooses by."""
 
 
-def add_output_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add the options --markdown, --html and --junit."""
-    for form in reversed(FORMS):
-        path = click.Path(path_type=Path, dir_okay=False)
-        text = f"Write the differences as {form} too"
-        text += (
-            "; of a run held against nothing its own comparisons."
-            if form == "junit"
-            else "."
-        )
-        command = click.option(f"--{form}", type=path, help=text)(command)
-    return command
+def add_output_options(junit: str = "") -> Callable[[Command], Command]:
+    """Make a decorator that adds --markdown, --html and --junit.
+
+    `junit`: end of the help of --junit.
+    """
+
+    def add(command: Command) -> Command:
+        for form in reversed(FORMS):
+            path = click.Path(path_type=Path, dir_okay=False)
+            end = junit if form == "junit" else ""
+            text = f"Write the differences as {form} too{end}."
+            command = click.option(f"--{form}", type=path, help=text)(command)
+        return command
+
+    return add
 
 
-def add_choosing_options(command: Callable[..., Any]) -> Callable[..., Any]:
+def add_choosing_options(command: Command) -> Command:
     """Add the options --only, --engines and --quantity."""
     for option, column in reversed(CHOICES.items()):
         text = f"These alone, comma-separated: names of column {column}."
@@ -238,7 +242,7 @@ def _is_chosen(
 @click.argument("old")
 @click.argument("new", type=click.Path(path_type=Path))
 @add_choosing_options
-@add_output_options
+@add_output_options()
 def compare(
     old: str,
     new: Path,

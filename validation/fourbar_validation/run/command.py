@@ -106,8 +106,8 @@ from fourbar_validation.run.run import run
     show_default=True,
     metavar="N",
     help=(
-        "Judge studies, derivatives, bounds, equilibria, SDF and USD in this many"
-        " scenes, evenly chosen."
+        "Judge studies, derivatives, internal forces, the summary of `analyze`,"
+        " tolerances, equilibria, SDF and USD in this many scenes, evenly chosen."
     ),
 )
 @click.option(
@@ -128,7 +128,7 @@ from fourbar_validation.run.run import run
     is_flag=True,
     help="Draw nothing and measure no observed order; no verdict changes.",
 )
-@add_output_options
+@add_output_options("; without --against the comparisons of the run")
 def command(**stated: Any) -> int:
     """Judge scenes (default: models/ and capabilities/); write results.csv, timings.csv, report.md, report.html."""
     from fourbar_validation.report.terminal import print_table

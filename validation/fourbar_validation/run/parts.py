@@ -114,7 +114,7 @@ def collect(
 def command(folders: tuple[Path, ...], out: Path, verbose: bool) -> int:
     """Write tables and report of a run from the folders in which `run --part` judged its parts.
 
-    Raises InputError for parts of different runs, and names those that are missing.
+    Parts of different runs are refused. If parts are missing, the command names them.
     """
     from fourbar_validation.report.terminal import print_table
 

@@ -47,7 +47,7 @@ def read_joint_equality(file: RobotFile, name: str) -> JointEquality:
     raise InputError(
         "--mimic",
         name,
-        'follows no other: the file has no <joint joint1="..." joint2="..."> of it',
+        f'follows no other joint: the file has no <joint joint1="{name}" joint2="...">',
     )
 
 
