@@ -5,9 +5,11 @@ the speed of the independent angle q is ds/dq, and virtual work gives the force,
     F ds/dq = J q'' + J'/2 q'^2 - Q,
 as it gives the torque on a bar k, where h_k stands for ds/dq. There is no force where
     P = (ds/dtheta_2) sin(theta_4 - theta_3) = 0,
-which is of the same form, with (theta_2', theta_3', theta_4') = (sin(theta_4 -
-theta_3), (a/b) sin(theta_2 - theta_4), (a/c) sin(theta_2 - theta_3)) for the
-coefficients h_k, and so is finite where these are not.
+which is of the same form, with
+    theta_2' = sin(theta_4 - theta_3),
+    theta_3' = (a/b) sin(theta_2 - theta_4),
+    theta_4' = (a/c) sin(theta_2 - theta_3)
+for the coefficients h_k, and so is finite where these are not.
 """
 
 from abc import ABC, abstractmethod

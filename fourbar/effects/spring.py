@@ -138,8 +138,8 @@ class Springs(Effect):
     """Linear springs.
 
     Where the two points of a spring coincide its pull has no direction: status
-    "no_direction". One that pulls with stiffness times distance alone (preload =
-    stiffness length) pulls with 0 there.
+    "no_direction". A spring that pulls with stiffness times distance alone pulls with 0
+    there; its preload is stiffness times length.
     """
 
     springs: tuple[Spring, ...]

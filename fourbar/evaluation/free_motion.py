@@ -1,11 +1,13 @@
 """Free motion: the linkage released and moved by loads and effects alone, integrated by SciPy.
 
-The reduced equation J q'' + J'/2 q'^2 = Q is integrated with q = theta_2 or q =
-theta_4, whichever is further from its limit position: bars 3, 4 collinear stop theta_2,
-bars 2, 3 collinear stop theta_4, and both at once happen at a change point alone, where
-an assembly is regular. The loop therefore closes to round-off at every instant, and
-nothing drifts off it. The motion runs on through limit positions, and through change
-points on its assembly, where another motion is possible.
+The reduced equation
+    J q'' + J'/2 q'^2 = Q
+is integrated with theta_2 or theta_4 as q, whichever is further from its limit
+position: bars 3, 4 collinear stop theta_2, bars 2, 3 collinear stop theta_4, and both
+at once happen at a change point alone, where an assembly is regular. The loop therefore
+closes to round-off at every instant, and nothing drifts off it. The motion runs on
+through limit positions, and through change points on its assembly, where another motion
+is possible.
 """
 
 import cmath

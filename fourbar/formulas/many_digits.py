@@ -118,8 +118,9 @@ def limit_remainder(
 ) -> Any:
     """Compute (limit position + offset) - theta_2 in many digits, for the limit position whose double is `limit`.
 
-    Where bars 3, 4 are collinear cos(theta_2 - theta_1) = (a^2 + d^2 - (b +- c)^2)/(2 a
-    d); likewise as the loop is read from another bar, whose angle theta_2 then is.
+    Where bars 3, 4 are collinear,
+        cos(theta_2 - theta_1) = (a^2 + d^2 - (b +- c)^2)/(2 a d);
+    likewise as the loop is read from another bar, whose angle theta_2 then is.
     """
     from mpmath import mp, mpf
 

@@ -3,10 +3,11 @@
 Let bar k (length l) close the loop with the ground (d) and the other two moving bars
 (x, y). With e the distance from the bar's free end to the far end of the ground, the
 loop closes where
-|x - y| <= e <= x + y, while e runs from |d - l| to d + l. Where e = x + y the other two bars are
-stretched, where e = |x - y| they are folded: a limit of bar k. Where an end of e meets
-an end of the allowed range all four bars are collinear: a change point. All sums of
-lengths are exact, rounded once.
+    |x - y| <= e <= x + y,
+while e runs from |d - l| to d + l. At e = x + y the other two bars are stretched, at
+e = |x - y| they are folded: a limit of bar k. Where an end of e meets an end of the
+allowed range all four bars are collinear: a change point. All sums of lengths are
+exact, rounded once.
 """
 
 import math
@@ -75,8 +76,9 @@ class Reach(NamedTuple):
     def triangle(self, stretched: bool) -> tuple[float, float]:
         """Compute the angles of the triangle d, l, e at both ends of the ground, rad, from its Heron factors.
 
-        tan^2(psi/2) = (e + l - d)(e + d - l)/((d + l - e)(d + l + e)), and with d, e
-        for d, l.
+            tan^2(psi/2) = (e + l - d)(e + d - l)/((d + l - e)(d + l + e)),
+
+        and the same with d, e for d, l.
         """
         x, y = (1, 1) if stretched else (1, -1) if self.x >= self.y else (-1, 1)
         short_d, short_l = self.sum(-1, 1, x, y), self.sum(1, -1, x, y)
@@ -232,9 +234,10 @@ def find_limit_angles(linkage: FourBar, bar: int = 2) -> tuple[float, ...]:
 def change_points(linkage: FourBar, bar: int = 2) -> tuple[float, ...]:
     """Find the angles of a bar (theta_2 if none is named) at which all bars are collinear and both branches cross, rad.
 
-    theta_1 where |a - d| = |b - c|, theta_1 + pi where a + d = b + c, within the
-    rounding of the lengths; likewise of the lengths as they are read from another bar,
-    from bar 4 with the ground reversed.
+        theta_1 where |a - d| = |b - c|,   theta_1 + pi where a + d = b + c,
+
+    within the rounding of the lengths; likewise of the lengths as they are read from
+    another bar, from bar 4 with the ground reversed.
     """
     reach, theta_1 = reach_of(linkage, bar), linkage.ground_angle
     folded, stretched = reach.beyond_folded == 0.0, reach.beyond_stretched == 0.0
@@ -252,8 +255,10 @@ def swing(linkage: FourBar, bar: int = 4) -> float:
 def time_ratio(linkage: FourBar) -> float | None:
     """Compute the quick return of a crank-rocker: time of the slower stroke over the faster, at constant omega_2.
 
-    (2 pi - delta)/delta, delta <= pi the input's angle between the two limits of the
-    output (R. L. Norton, Design of Machinery). None where the input does not turn fully
+        (2 pi - delta)/delta,
+
+    delta <= pi the input's angle between the two limits of the output (R. L. Norton,
+    Design of Machinery). None where the input does not turn fully
     or the output has no stroke of its own.
     """
     if not turns_fully(linkage) or change_points(linkage):
@@ -416,8 +421,8 @@ def classify(linkage: FourBar, within: float = TOUCHING) -> LinkageType:
     if opposite + with_input + with_output == 2:
         if not opposite:
             return found(13, "S2X", PARALLELOGRAM)
-        # d + b = a + c and d + c = a + b give d = a; d + b = a + c and d + a = b + c
-        # give d = c
+        # d + b = a + c and d + c = a + b give d = a;
+        # d + b = a + c and d + a = b + c give d = c
         pairs = (
             ("ground and input", "coupler and output")
             if with_output

@@ -38,12 +38,12 @@ class Coefficients(NamedTuple):
 def coefficients(lengths: Loop, position: Position) -> Coefficients:
     """Compute the coefficients by theta_2 from the triangle A, B, O4: side e turns by t, the angle at B opens by 2 g.
 
-        h3 = n - g,   h4 = n + g,   n = t + (x/e^2) g = 1/2 + w, t = (a (a - d) + 2 a d
-        sin^2 h)/e^2,   g = 2 a d sin h cos h/root,   x = b^2 - c^2.
+        h3 = n - g,   h4 = n + g,   n = t + (x/e^2) g = 1/2 + w,
+        t = (a (a - d) + 2 a d sin^2 h)/e^2,   g = 2 a d sin h cos h/root,   x = b^2 - c^2.
 
     Where e is short its sides turn fast and the bars do not; there w comes without e,
-    from Heron's formula for both triangles on e, with S = 4 a d sin h cos h, y = d^2 -
-    a^2:
+    from Heron's formula for both triangles on e:
+        S = 4 a d sin h cos h,   y = d^2 - a^2,
         w = -(E2 (d + a)^2 outer + E1 (b - c)^2 4 a d sin^2 h)/(2 root (x S + y root)).
 
     >>> from math import radians

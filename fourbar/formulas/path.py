@@ -304,9 +304,8 @@ def drive_sine(position: Position, drive_bar: int) -> Number:
 def drive_sine_of_triangle(lengths: Loop, position: Position, drive_bar: int) -> Number:
     """Compute the drive's sine from the triangle A, B, O4: nearly equal directions of a short ground lose digits.
 
-        sin(theta_4 - theta_2) = ((d cos psi - a) root + d sin psi (e^2 - b^2 + c^2))/(2
-        c e^2), sin(theta_3 - theta_2) = ((d cos psi - a) root - d sin psi (e^2 + b^2 -
-        c^2))/(2 b e^2).
+        sin(theta_4 - theta_2) = ((d cos psi - a) root + d sin psi (e^2 - b^2 + c^2))/(2 c e^2),
+        sin(theta_3 - theta_2) = ((d cos psi - a) root - d sin psi (e^2 + b^2 - c^2))/(2 b e^2).
 
     `lengths`: of the loop that the position was closed with.
     """

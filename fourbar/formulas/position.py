@@ -3,16 +3,16 @@
     a e^{i theta_2} + b e^{i theta_3} = d e^{i theta_1} + c e^{i theta_4}
 
 With h = (theta_2 - theta_1)/2 and e the diagonal from A to O4, the loop closes where
-both factors of Heron's formula are >= 0; their product is the square of four times the
-area of the triangle:
+neither factor of Heron's formula is negative; their product is the square of four times
+the area of the triangle:
     outer = (b + c)^2 - e^2 = E1 + 4 a d cos^2 h,   E1 = (b + c - a - d)(a + b + c + d),
     inner = e^2 - (b - c)^2 = E2 + 4 a d sin^2 h,   E2 = (d - a - b + c)(d - a + b - c).
 outer = 0 is bars 3, 4 stretched, inner = 0 is bars 3, 4 folded.
 
 A linkage with E1 = 0 or E2 = 0 has a change point at h = 90 deg or h = 0, where a
 factor is a square and its root passes through zero:
-    sqrt(outer) = 2 sqrt(a d) cos h if E1 = 0,   sqrt(inner) = 2 sqrt(a d) sin h if E2 =
-    0,
+    sqrt(outer) = 2 sqrt(a d) cos h if E1 = 0,
+    sqrt(inner) = 2 sqrt(a d) sin h if E2 = 0,
 with their signs. With these roots a branch is an assembly, which moves smoothly through
 change points.
 
@@ -273,9 +273,9 @@ def close_loop(
 def find_parallel_pairs(lengths: Loop, branch: Number) -> tuple[Number, Number]:
     """Mark assemblies in which two pairs of bars stay parallel: E1 = E2 = 0, root = +- 4 a d sin h cos h.
 
-    First: the coupler keeps the ground's direction and bars 2, 4 turn together (a = c,
-    b = d). Second: B stays on O2, bars 2, 3 turn together and bar 4 rests (a = b, c =
-    d).
+    First: the coupler keeps the ground's direction and bars 2, 4 turn together
+    (a = c, b = d).
+    Second: B stays on O2, bars 2, 3 turn together and bar 4 rests (a = b, c = d).
     """
     d, a, b, c, _, _ = lengths
     return (a == c) & (b == d) & (branch > 0), (a == b) & (c == d) & (branch < 0)

@@ -41,8 +41,7 @@ def half_slope(
 
     About the pins O2, O4 of bars 2, 4 that is (I + m r^2) h_k h_k'; of the coupler,
     with G = A + R,
-        G'.G'' = a^2 h2 h2' + r^2 h3 h3' + (h2 h3' + h3 h2') A.R + h2 h3 (h2 - h3) A x
-        R.
+        G'.G'' = a^2 h2 h2' + r^2 h3 h3' + (h2 h3' + h3 h2') A.R + h2 h3 (h2 - h3) A x R.
     """
     two, three, four = bodies
     # m h2 (A.R + i A x R)
@@ -60,7 +59,7 @@ def half_slope(
 
 
 def driving_torque(by: Number, inertial: Number, Q: Number) -> Number:
-    """Compute T_k = (J q'' + J'/2 q'^2 - Q)/h_k, N m, or the force of a drive along a line with ds/dq for h_k, N.
+    """Compute T_k = (J q'' + J'/2 q'^2 - Q)/h_k, N m, or the force of a drive with ds/dq for h_k, N.
 
     Parameters
     ----------

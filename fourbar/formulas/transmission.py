@@ -24,9 +24,10 @@ from fourbar.linkage import FourBar
 def transmission_angle(state: State) -> Array:
     """Compute mu, the acute angle between coupler and output, rad, in [0, pi/2], (n,); NaN where not assembled.
 
-    tan mu = |sin(theta_4 - theta_3)| / |cos(theta_4 - theta_3)|, so mu keeps
-    eps-accuracy near 0 and pi/2 as far as the position itself does: |error| about
-    eps/|sin mu|.
+        tan mu = |sin(theta_4 - theta_3)| / |cos(theta_4 - theta_3)|,
+
+    so mu keeps eps-accuracy near 0 and pi/2 as far as the position itself does: |error|
+    about eps/|sin mu|.
 
     Source: R. L. Norton, Design of Machinery.
     """
@@ -59,8 +60,9 @@ class TransmissionExtremes(NamedTuple):
 def transmission_extremes(linkage: FourBar) -> TransmissionExtremes:
     """Find the extremes of the angle at B: bars 1, 2 collinear, or a limit of the input; the same on both branches.
 
-    tan^2(mu/2) = (e + b - c)(e - b + c)/((b + c - e)(b + c + e)) at e = |d - a| and e =
-    d + a.
+        tan^2(mu/2) = (e + b - c)(e - b + c)/((b + c - e)(b + c + e))
+
+    at e = |d - a| and e = d + a.
     """
     reach, theta_1 = reach_of(linkage), linkage.ground_angle
     sign = 1 if reach.d >= reach.own else -1

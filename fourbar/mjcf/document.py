@@ -363,8 +363,9 @@ FULL_TURN = 2.0 * math.pi * (1.0 - 1e-9)
 class WindowMotion:
     """The input's motion through a window of theta_2, in time.
 
-    theta_2 = start + omega t + alpha t^2/2 from `start` to `stop`, at the speed `omega`
-    at the start.
+        theta_2 = start + omega t + alpha t^2/2
+
+    from `start` to `stop`, at the speed `omega` at the start.
     """
 
     def __init__(self, start: float, stop: float, omega: float, alpha: float) -> None:

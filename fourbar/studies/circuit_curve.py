@@ -1,11 +1,12 @@
 """The circuit of a scene as a curve that can be walked through its limits, and the generalised force along it.
 
-With psi = theta_2 - theta_1 and mu = theta_4 - theta_3 the diagonal from A to O4,
+With psi = theta_2 - theta_1 and mu = theta_4 - theta_3, the diagonal from A to O4,
 squared, is in both triangles
     a^2 + d^2 - 2 a d cos psi = b^2 + c^2 - 2 b c cos mu,
 and along the curve, by a parameter s that does not stop where a bar reverses,
-    theta_2' = sin(theta_4 - theta_3), theta_3' = (a/b) sin(theta_2 - theta_4), theta_4'
-    = (a/c) sin(theta_2 - theta_3).
+    theta_2' = sin(theta_4 - theta_3),
+    theta_3' = (a/b) sin(theta_2 - theta_4),
+    theta_4' = (a/c) sin(theta_2 - theta_3).
 All three vanish at change points alone.
 """
 
@@ -101,11 +102,11 @@ def of_input(scene: Scene) -> Command:
 class CircuitCurve:
     """The circuit of a scene: its branches as closed rows of psi = theta_2 - theta_1 and mu = theta_4 - theta_3.
 
-    A row is sampled by an angle tau: psi itself where the input turns fully, else psi =
-    middle - half width cos tau, on the open branch up to half a turn and back on the
-    crossed one, so that it is smooth through the limits. A linkage with two change
-    points has one row, its assembly: a parallelogram never becomes an
-    antiparallelogram.
+    A row is sampled by an angle tau: psi itself where the input turns fully, otherwise
+        psi = middle - half width cos tau,
+    on the open branch up to half a turn and back on the crossed one, so that it is
+    smooth through the limits. A linkage with two change points has one row, its
+    assembly: a parallelogram never becomes an antiparallelogram.
     """
 
     def __init__(self, scene: Scene) -> None:

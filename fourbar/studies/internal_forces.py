@@ -3,8 +3,9 @@
 With x from the first pin (O2, A, O4) towards the second and y to the left of it, over
 all that acts at or before x, inertia (d'Alembert) and weight included:
 
-    N(x) = -sum F_x  (tension > 0),   V(x) = sum F_y,   M(x) = sum (F_y (x - x_i)) - sum
-    of the couples (ccw > 0).
+    N(x) = -sum F_x  (tension > 0),
+    V(x) = sum F_y,
+    M(x) = sum (F_y (x - x_i)) - sum of the couples  (ccw > 0).
 
 A force beside the line acts at its foot on it, together with its couple about that
 foot.
@@ -331,7 +332,7 @@ def _record_pins(recorder: _Recorder, solution: Solution) -> None:
 
 
 def _record_drive(recorder: _Recorder, scene: Scene, solution: Solution) -> None:
-    """Record the couple of the drive at the bar's first pin, or the force along its line."""
+    """Record the couple of the drive at the bar's first pin, or the force at its points."""
     if scene.motion.free is not None:
         return
     if scene.drive is not None:

@@ -1,8 +1,9 @@
 """Derivatives of every output by every number of a scene: of `sensitivity` against those of balls.
 
-The error allowed of a derivative s_i = dy/dx_i is 8 eps (|s_i| + sum |x_j ds_i/dx_j| +
-sum |x_j s_j| / |x_i|): that of a value, and of what all numbers do to y, or to the
-vector, together: what cancels leaves a last digit of that.
+The error allowed of a derivative s_i = dy/dx_i is
+    8 eps (|s_i| + sum |x_j ds_i/dx_j| + sum |x_j s_j| / |x_i|):
+that of a value, and of what all numbers do to y, or to the vector, together: what
+cancels leaves a last digit of that.
 """
 
 import math

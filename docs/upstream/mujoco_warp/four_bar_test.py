@@ -1,9 +1,9 @@
 """Test forces of closed four-bars against Newton-Euler values, dense and sparse, in four worlds.
 
 A crank that turns at 10 rad/s under its weight carries two four-bars. Its joint bears
-an armature of 1e3 kg m^2, so that the torque is -armature * qacc. Reference: m a_G =
-sum(F), I_G alpha = sum(r x F) + tau of each bar, solved to 1e-13 (problems
-crank_rocker, second_on_the_crank and sprung).
+an armature of 1e3 kg m^2, so that the torque is -armature * qacc. The reference is
+    m a_G = sum(F),   I_G alpha = sum(r x F) + tau
+of each bar, solved to 1e-13 (problems crank_rocker, second_on_the_crank and sprung).
 """
 
 import mujoco

@@ -25,8 +25,8 @@ def solve_position(theta_2):
     """Return the angles of coupler and rocker from the loop closure, open configuration.
 
     With the diagonal p from the crank's pin A to the rocker's pivot O4, the law of
-    cosines gives the angle between p and the coupler: cos(beta) = (b^2 + |p|^2 - c^2) /
-    (2 b |p|).
+    cosines gives the angle between p and the coupler:
+        cos(beta) = (b^2 + |p|^2 - c^2) / (2 b |p|).
     """
     p = GROUND - CRANK * np.exp(1j * theta_2)
     beta = np.arccos((COUPLER**2 + abs(p) ** 2 - ROCKER**2) / (2.0 * COUPLER * abs(p)))

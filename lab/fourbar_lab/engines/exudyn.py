@@ -1,12 +1,13 @@
 """Exudyn: nine absolute coordinates, the multipliers of four pins and a drive; springs and dampers are its own.
 
-A bar is `ObjectRigidBody2D` with coordinates (x, y of its first pin, direction). With g
-= 0 the nine constraints (two of each pin, and the drive: a bar's direction, or the
-distance of a cylinder's ends), J = dg/dq, J_c the pins' rows above that of the
+A bar is `ObjectRigidBody2D` with coordinates (x, y of its first pin, direction). The
+nine constraints g = 0 are two of each pin, and the drive: a bar's direction, or the
+distance of a cylinder's ends. With J = dg/dq, J_c the pins' rows above that of the
 commanded bar's direction, M the mass matrix and f what acts,
 
-    J_c v = e omega,   J_c a = e alpha - (dJ_c/dt) v,   J^T [F12 F32 F43 F14 drive] = M
-    a - f.
+    J_c v = e omega,
+    J_c a = e alpha - (dJ_c/dt) v,
+    J^T [F12 F32 F43 F14 drive] = M a - f.
 
 g, J, (dJ/dt) v, M and f are Exudyn's; the three linear systems are solved here.
 """

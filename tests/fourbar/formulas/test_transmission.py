@@ -78,8 +78,8 @@ def test_extremes_are_those_of_a_scan() -> None:
             (extremes.least, angle.min()),
             (extremes.greatest, angle.max()),
         ):
-            # mu^2/2 = steep sin psi delta at a limit; else mu'' = steep/sin mu, a whole
-            # step away at most
+            # mu^2/2 = steep sin psi delta at a limit;
+            # else mu'' = steep/sin mu, a whole step away at most
             at_limit = end in (0.0, math.pi)
             miss = (
                 math.sqrt(2.0 * steep * step)
@@ -116,8 +116,8 @@ def test_extremes_keep_their_digits_near_a_change_point() -> None:
 
 
 def test_speed_ratio_follows_from_the_centres_of_rotation() -> None:
-    # the velocity of B along the coupler equals that of A: a sin(theta_2 - theta_3) =
-    # (omega_4/omega_2) c sin(...)
+    # the velocity of B along the coupler equals that of A:
+    # a sin(theta_2 - theta_3) = (omega_4/omega_2) c sin(...)
     for drawn in random_positions(23, 100):
         _, a, _, c = drawn.bars.lengths
         moving = drawn.moving()

@@ -169,10 +169,13 @@ def make_balls(scene: Scene, angle: float, **motion: float) -> Values:
 def closure(x: Values, branch: int) -> tuple[Complex, Complex, Complex] | None:
     """Return e^{i theta_2}, e^{i theta_3}, e^{i theta_4}; None if the loop does not close.
 
-    With D = d e^{i theta_1} - a e^{i theta_2}, |D - b w| = c is b conj(D) w^2 - K w + b
-    D = 0, K = D^2 + b^2 - c^2. Where bar 3 is commanded D = d e^{i theta_1} - b e^{i
-    theta_3} is what bars 2 and 4 span, where bar 4 is it is d e^{i theta_1} + c e^{i
-    theta_4}, spanned by bars 3 and 2 with bar 2 reversed.
+    The two bars that are not commanded, of lengths b and c, span a vector D. With w the
+    direction of the first of them, |D - b w| = c is
+        b conj(D) w^2 - K w + b D = 0,   K = |D|^2 + b^2 - c^2.
+    In the letters of the linkage
+        D = d e^{i theta_1} - a e^{i theta_2} of bars 3 and 4,
+        D = d e^{i theta_1} - b e^{i theta_3} of bars 2 and 4,
+        D = d e^{i theta_1} + c e^{i theta_4} of bars 3 and 2, bar 2 reversed.
     """
     bar, d = find_commanded(x), x["d"]
     held, b, c = {2: ("a", "b", "c"), 3: ("b", "a", "c"), 4: ("c", "b", "a")}[bar]

@@ -104,8 +104,8 @@ def compute_sines(linkage: FourBar, command: Command) -> Array:
 def shift_to(linkage: FourBar, theta_2: float, sin_mu: float) -> Any:
     """Compute what to add to theta_2 (mpmath, rad) for sin(theta_4 - theta_3) to be +-sin_mu; None if beyond rounding.
 
-    The diagonal e from A to O4 has d^2 + a^2 - 2 a d cos(theta_2 - theta_1) = e^2 = b^2
-    + c^2 -+ 2 b c cos(mu).
+    The diagonal e from A to O4 has
+        e^2 = d^2 + a^2 - 2 a d cos(theta_2 - theta_1) = b^2 + c^2 -+ 2 b c cos(mu).
     """
     from mpmath import mp, mpf
 

@@ -1,8 +1,12 @@
 """Ask an engine as a user would: a plain loop over its own calls, for torque and pin forces alone.
 
-Each position is assembled from the one before. With g(q) the gap at pin B and J =
-dg/dq, one position takes Newton's steps on g, the speeds and accelerations of J v = 0
-and J a + (dJ/dt) v = 0, one inverse dynamics tau(q, v, a), and the multipliers of
+Each position is assembled from the one before. With the gap g(q) at pin B and its
+derivative J = dg/dq, one position takes Newton's steps on g, the speeds and
+accelerations of
+
+    J v = 0,   J a + (dJ/dt) v = 0,
+
+one inverse dynamics tau(q, v, a), and the multipliers of
 
     [J^T e_drive] [lambda; T] = tau.
 """

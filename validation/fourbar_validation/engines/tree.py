@@ -1,13 +1,14 @@
 """The bars of a four-bar opened at pin B, as a tree of an engine, and what follows from the few numbers that it gives.
 
-Coordinates q = (turn of bar 2 at O2, of bar 3 against bar 2 at A, of bar 4 at O4). With
-g(q) = B on bar 3 minus B on bar 4 and J = dg/dq the loop holds where g = 0, J v = 0, J
-a + (dJ/dt) v = 0, and
+The coordinates q are the turns of bar 2 at O2, of bar 3 against bar 2 at A, and of bar 4
+at O4. With g(q) the place of B on bar 3 minus that on bar 4, and J = dg/dq, the loop
+holds where
 
-    [J^T e_drive] [lambda; T] = tau(q, v, a),
+    g = 0,   J v = 0,   J a + (dJ/dt) v = 0,
+    [J^T e_drive] [lambda; T] = tau(q, v, a).
 
-lambda = F43 and e_drive = the derivative of the driven bar's rotation, or of the stroke
-of a linear drive. Every number comes from the engine.
+lambda is F43, and e_drive the generalized force of the drive per N m or N. Every number
+comes from the engine.
 """
 
 from collections.abc import Iterable
@@ -124,7 +125,7 @@ class Tree(Loaded, Protocol):
         return self.needed(self.field, self.wrenches)
 
     def drive_column(self) -> Array:
-        """Return what the drive does on the coordinates per N m or N: of a line the derivative of its stroke, (3,)."""
+        """Return what the drive does on the coordinates per N m or N: of a force the derivative of its path, (3,)."""
         if self.linear is None:
             return self.turns[self.drive_bar]
         _, along = self.line()
@@ -146,7 +147,7 @@ class Tree(Loaded, Protocol):
         """Return F12, F32, F14 at the motion and wrenches last set.
 
         The open tree carries what acts. The force of the loop on bar 3, its opposite on
-        bar 4 and a drive along a line are carried on to the ground; a couple asks
+        bar 4 and the force of a drive are carried on to the ground; a couple asks
         nothing of the pins.
         """
         x, y = loop_force.tolist()

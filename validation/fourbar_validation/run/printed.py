@@ -412,8 +412,8 @@ def check_law(question: Question) -> Iterator[Row]:
 def _check_rise(question: Question, law: Rise) -> Row:
     """Check a rise, its dwell and its fall by other forms of the standard laws, part by part.
 
-    cycloidal, with x = pi u:  u - sin x cos x/pi,  2 sin^2 x,  4 pi sin x cos x; 345:
-    the polynomial of Bernstein with the coefficients 0, 0, 0, 1, 1, 1, and its
+    cycloidal, with x = pi u:  u - sin x cos x/pi,  2 sin^2 x,  4 pi sin x cos x;
+    345: the polynomial of Bernstein with the coefficients 0, 0, 0, 1, 1, 1, and its
     derivatives.
     """
     command = question.at

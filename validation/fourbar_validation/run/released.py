@@ -90,8 +90,8 @@ class Pendulum(NamedTuple):
             self.omega_0**2 + 2.0 * k * (1.0 + math.cos(self.phi_0))
         )  # speed at the lowest point
         m = 4.0 * k / bottom**2
-        # half the angle from the lowest point is the amplitude; it starts at phi_0 -
-        # pi, seen along the motion
+        # half the angle from the lowest point is the amplitude; it starts at
+        # phi_0 - pi, seen along the motion
         start = ellipkinc(0.5 * (sense * self.phi_0 - math.pi), m)
         turns = 0.5 * bottom * times + start
         half_turns = np.round(

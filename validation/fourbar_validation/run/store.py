@@ -1,9 +1,8 @@
 """The folder of whatever runs long: a lock, finished parts, and at the end the results.
 
 lock               held while a run goes on; the system frees it when the process dies
-run.json           what is being run; a rerun of the same thing resumes, of another
-starts over parts/000012       what chunk 12 came to, written whole: a line of JSON that
-says of which run it is, and the SHA-256
+run.json           what is being run; a rerun of the same thing resumes, of another starts over
+parts/000012       what chunk 12 came to, written whole: a line of JSON that says of which run it is, and the SHA-256
                    of what follows; then a line of JSON for each result, packed by gzip
 """
 

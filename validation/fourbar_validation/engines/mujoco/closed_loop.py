@@ -126,8 +126,10 @@ class ClosedLoop(Assembled):
     def branch(self, bar: int = 2) -> int:
         """Return the branch of the state that was last forwarded, of a command of a bar.
 
-        The null vector of the gap's derivative turns the bar as -b c sin(theta_4 -
-        theta_3) is of bar 2, and as the opposite products are of bars 3 and 4.
+        The null vector of the gap's derivative turns bars 2, 3 and 4 in proportion to
+            -b c sin(theta_4 - theta_3),
+            a c sin(theta_4 - theta_2),
+            a b sin(theta_3 - theta_2).
         """
         turn = self.drive_column(bar) @ np.cross(*self.jacobian()[:, :3])
         return int(np.sign(turn if bar != 2 else -turn))

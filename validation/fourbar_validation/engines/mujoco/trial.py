@@ -2,9 +2,8 @@
 
 From the laws that the study of cost measured:
 
-    the closure's time constant    error = STIFF (h/tc)^4, whatever the timestep
-    -> tc in steps the timestep                   error ~ h^ORDER until a floor
-    -> steps
+    the closure's time constant    error = STIFF (h/tc)^4, whatever the timestep        -> tc in steps
+    the timestep                   error ~ h^ORDER until a floor                         -> steps
 
 The scene is assembled once by the engine itself; each trial compiles the generated MJCF
 anew, with the drive to be tried, and reports its own motion, torque and pin forces.

@@ -1,8 +1,10 @@
 """Judge equilibria by the linkage held at rest in 320-bit arithmetic: its torque, the slope of that and its inertia.
 
 With T the torque that holds the independent bar and J the torque per unit of its
-acceleration, T = -Q and
-    dT/dq > 0: stable,   sqrt((dT/dq)/J)/(2 pi): the frequency.
+acceleration,
+    T = -Q,
+    dT/dq > 0 where it is stable,
+    sqrt((dT/dq)/J)/(2 pi) is the frequency.
 Free bodies held at many positions between say that no equilibrium was missed.
 """
 
