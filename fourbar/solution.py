@@ -60,7 +60,7 @@ class Solution(Quantities):  # noqa: PLW1641 - arrays have no hash
 
     title: str
     drive_bar: int
-    """2, 3 or 4; None where the drive is linear."""
+    """2, 3 or 4; None where the drive exerts a force."""
     status_code: NDArray[np.uint8]
     """0 ok: every quantity that was requested is a number. 1 not_assembled, 2 singular (velocities are 0/0); of
     friction that depends on the pin forces: 3 jammed (no forces fulfil it: they are NaN; at rest, where it is the
@@ -70,9 +70,9 @@ class Solution(Quantities):  # noqa: PLW1641 - arrays have no hash
     forces are NaN (T3 and T4 have these poles where omega_3, omega_4 are 0). 8 overflow: numbers beyond the range of
     doubles; from the first stage (position, velocity, ...) that meets them on everything is NaN. 9 invalid: a member of
     a study with numbers that a scene refuses (a length that is not positive, a mass below 0); all of it is NaN.
-    10 no_lever: the line of the drive has none there, its stroke stands still, forces are NaN. 11 change_point: all
-    bars are in line; positions, speeds and the drive are their limits along the assembly, pin forces, which have no
-    bound there, are NaN.
+    10 no_lever: the stroke of a linear drive stands still, or the point of a driving force moves across its direction;
+    forces are NaN. 11 change_point: all bars are in line; positions, speeds and the drive are their limits along the
+    assembly, pin forces, which have no bound there, are NaN.
     """
     branch: NDArray[np.int8]
     """Sign of sin(theta_4 - theta_3): +1 or -1."""
@@ -89,12 +89,12 @@ class Solution(Quantities):  # noqa: PLW1641 - arrays have no hash
     lengths: tuple[Any, Any, Any, Any] | None = field(default=None, kw_only=True)
     """Lengths of ground, input, coupler and output, m; of a study (m, 1) each where they vary."""
     drive: "ForceDrive | None" = field(default=None, kw_only=True)
-    """Linear drive of the scene; None: a bar is driven."""
+    """Drive of the scene that exerts a force; None: a couple drives a bar."""
     change_points: tuple[float, ...] | None = field(default=None, kw_only=True)
     """Times at which a free motion passed a change point, s: another motion was possible there."""
 
     at: Command = field(default=None, kw_only=True)  # type: ignore[assignment]  # `solve` states it
-    """Name of the commanded quantity; theta_2 for a free motion."""
+    """Positions that were solved, with what is commanded."""
 
     def __len__(self) -> int:
         return len(self.theta_2)
@@ -115,7 +115,7 @@ class Solution(Quantities):  # noqa: PLW1641 - arrays have no hash
     __iter__: ClassVar[None] = None  # neither positions nor names
 
     def __eq__(self, other: object) -> bool:
-        """Return whether everything is equal, each number bit by bit and NaN to NaN."""
+        """Return whether all fields are equal, number by number and NaN to NaN."""
         if not isinstance(other, Solution):
             return NotImplemented
         return all(
@@ -438,7 +438,7 @@ def find_unit_in(unit: str, units: Conversion) -> tuple[str, float]:
 
 
 def _list_quantities(solution: "Solution") -> list[str]:
-    """List every quantity of a solution, evaluated or not; time and those of a linear drive only where there is one."""
+    """List every quantity of a solution, evaluated or not; time and those of a force drive only where there is one."""
     left_out: tuple[str, ...] = LINE_QUANTITIES
     if solution.drive is not None:
         left_out = () if solution.drive.has_stroke else (STROKE,)

@@ -195,8 +195,7 @@ class Session:
         require_steps(scene.motion, MOST_POSITIONS, "in the workbench", str(self.path))
         return SceneState(text, scene, tomllib.loads(text))
 
-    # ---- what a page asks for
-    # ----------------------------------------------------------------
+    # ---- what a page asks for ----
 
     def answer(self) -> dict[str, Any]:
         """Describe the present state, without error bars and summary."""
@@ -368,10 +367,8 @@ def _move(session: Session, by: int) -> None:
 
 
 def _keep(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
-    name = (
-        "state"
-        f" {max((int(name.split()[1]) for name in session.kept if name != 'start'), default=0) + 1}"
-    )
+    numbers = (int(kept.split()[1]) for kept in session.kept if kept != "start")
+    name = f"state {max(numbers, default=0) + 1}"
     session.kept[name] = session.now.text
     if len(session.kept) > MOST_KEPT:
         del session.kept[next(name for name in session.kept if name != "start")]
@@ -556,6 +553,12 @@ def _save(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
     return {"note": f"saved {session.path.name}", "saved": True}
 
 
+def _export(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
+    form = str(asked["format"])
+    file = session.exports.write(session.now.scene, form, session.units)
+    return {"note": f"wrote {file}"}
+
+
 ACTIONS: dict[str, Callable[[Session, dict[str, Any]], dict[str, Any] | None]] = {
     "set": lambda session, asked: session.change(
         lambda of: of.set(asked["path"], str(asked["value"])),
@@ -577,12 +580,7 @@ ACTIONS: dict[str, Callable[[Session, dict[str, Any]], dict[str, Any] | None]] =
     "restate": _restate,
     "draw": _draw,
     "save": _save,
-    "export": lambda session, asked: {
-        "note": (
-            "wrote"
-            f" {session.exports.write(session.now.scene, str(asked['format']), session.units)}"
-        )
-    },
+    "export": _export,
     "bodies": lambda session, asked: {
         "bodies": session.exports.free_bodies(
             session.now.scene, float(asked["position"]), session.units

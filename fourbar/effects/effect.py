@@ -309,7 +309,7 @@ class Effect:
     def act_on_engine(self, bars: Any) -> None:
         """Apply it to an engine's bars, from the engine's own motion: a second derivation, with nothing of `act`.
 
-        `bars`: of `engines.loaded.Loaded`, with `push`, `twist`, `angle`, `velocity`,
+        `bars`: of `engines.loaded.Loaded`, with `push`, `couple`, `angle`, `velocity`,
         `alpha`, `rotate`, `point`.
         """
         raise NotImplementedError

@@ -39,8 +39,8 @@ class Torsion(PinRows):
     key: ClassVar[str] = "torsion"
     in_balls: ClassVar[bool] = True
     example: ClassVar[str] = (
-        'torsion = { B = { stiffness = "2 N m/rad", rest = "30 deg", preload = "0.1 N'
-        ' m" } }'
+        'torsion = { B = { stiffness = "2 N m/rad", rest = "30 deg",'
+        ' preload = "0.1 N m" } }'
     )
     numbers: ClassVar[dict[str, Declared]] = {
         "stiffness": Declared("N m/rad", POSITIVE),

@@ -93,7 +93,7 @@ class Case(NamedTuple):
     side: Any = 0
     """Impending direction of rotation at pins at rest, or the fraction of its torque with which friction holds them."""
     drive: "ForceDrive | None" = None
-    """Linear drive that replaces the couple on the driven bar."""
+    """Drive that exerts a force in place of the couple on the driven bar."""
 
     @classmethod
     def of(cls, scene: Scene, bar: int = 2) -> "Case":
@@ -403,9 +403,9 @@ class _FreeBodies(NamedTuple):
     sines: dict[int, Any]
     """Sines between the two other bars, by the bar whose moment is left out."""
     drive: Actions | None
-    """Actions of a linear drive per newton; None: the drive is a couple on a bar."""
+    """Actions of a drive that exerts a force, per newton; None: the drive is a couple on a bar."""
     gain: Any
-    """h of the driven bar, or ds/dq of the linear drive, m."""
+    """h of the driven bar, or ds/dq of the drive that exerts a force, m."""
 
     def solve_pin_forces(
         self, actions: Actions, *, with_inertia: bool = True
@@ -413,9 +413,9 @@ class _FreeBodies(NamedTuple):
         """Solve for the pin forces under some actions and the drive that balances them.
 
         A couple on one bar leaves the moments of the other two alone, which give the
-        force between them. A force along a line is found first, by virtual work, and
-        then is one more load; where it acts on two moving bars or on bar 3, of the
-        three pairs of bars that whose directions differ most has the digits.
+        force between them. The force of a drive that exerts one is found first, by
+        virtual work, and then is one more load; where it acts on two moving bars or on
+        bar 3, the pair of bars whose directions differ most keeps the digits.
         """
         inertia = self.inertia if with_inertia else _Inertia()
         if self.drive is not None:

@@ -22,7 +22,7 @@ class Quantity(NamedTuple):
     meaning: str
     group: str = ""
     """unknown: of the equations of a position, which an engine can be held to; dry friction, pin loads, linear drive:
-    exists only where the scene has dry friction, friction that depends on the pin forces, a drive along a line.
+    exists only where the scene has dry friction, friction that depends on the pin forces, a drive that exerts a force.
     """
 
 
@@ -117,7 +117,10 @@ class Quantities:
         "N m", "force", "couple of ground on the driven bar", "unknown"
     )
     drive_force: Array | None = _scalar(
-        "N", "force", "force of the drive, pushing its ends apart", "linear drive"
+        "N",
+        "force",
+        "force of the drive, pushing its ends apart or along its direction",
+        "linear drive",
     )
     power: Array | None = _scalar("W", "force", "power of the drive")
     drive_condition: Array | None = _scalar(
@@ -139,7 +142,7 @@ class Quantities:
         "N m", "force", "greatest then; otherwise both are torque", "dry friction"
     )
     drive_force_low: Array | None = _scalar(
-        "N", "force", "least force of the linear drive then", "dry friction"
+        "N", "force", "least force of the drive then", "dry friction"
     )
     drive_force_high: Array | None = _scalar(
         "N", "force", "greatest then", "dry friction"
@@ -199,7 +202,7 @@ COUPLE = DriveNames("torque", "torque_error", "torque_low", "torque_high")
 LINE = DriveNames(
     "drive_force", "drive_force_error", "drive_force_low", "drive_force_high"
 )
-"""Names for a drive that pushes along a line."""
+"""Names for a drive that exerts a force."""
 LINE_QUANTITIES = (
     *dict.fromkeys((*(q.name for q in QUANTITIES if q.group == "linear drive"), *LINE)),
 )

@@ -78,7 +78,7 @@ class Scene:
     linkage: FourBar
     motion: Motion = field(default_factory=Motion)
     drive_bar: int = None  # type: ignore[assignment]  # resolved below
-    """2, where nothing is stated; None where the drive is linear."""
+    """2, where nothing is stated; None where the drive exerts a force."""
     loads: "tuple[Load, ...]" = ()
     effects: "tuple[Effect, ...]" = ()
     title: str = ""
@@ -120,7 +120,7 @@ class Scene:
             )
             object.__setattr__(self, "drive_bar", bar)
         else:
-            self._require_linear(self.drive)
+            self._require_force_drive(self.drive)
         self._require_points()
         if self.drive is not None:
             settled = self.settled().drive
@@ -154,7 +154,7 @@ class Scene:
         Parameters
         ----------
         figure : "overview", "linkage", "coupler", "kinematics", "points", "torque", "stroke", "forces", "hodograph",
-            "energy", "transmission", "freebody", "bars" or "sensitivity".
+            "energy", "transmission", "shaking", "ratios", "centres", "freebody", "bars" or "sensitivity".
         position : what is commanded where linkage and free bodies are drawn, rad or m; left out: the scene's own.
         branches : "one" (the scene's) or "both" (open and crossed, to the same scales).
         units : in which numbers are drawn, as `fourbar.units` makes them; left out: SI with the prefix that suits, deg.
@@ -180,8 +180,8 @@ class Scene:
     def _repr_html_(self) -> Any:
         return load_show("notebook").show_scene(self)
 
-    def _require_linear(self, drive: object) -> None:
-        """Raise InputError where the drive is none along a line, acts on a bar too, or never moves its ends."""
+    def _require_force_drive(self, drive: object) -> None:
+        """Raise InputError where the drive does not exert a force, or a driven bar is stated too."""
         from fourbar.effects.force_drive import ForceDrive
 
         expect("drive", drive, ForceDrive)
@@ -360,8 +360,8 @@ class Triangle(NamedTuple):
 
     With l from the pivot to the end on the bar, r to the end on the ground, beta the
     angle between them, s the stroke,
-        s^2 = l^2 + r^2 - 2 l r cos beta,   ds/dbeta = l r sin beta/s = the lever from
-        the pivot to the line.
+        s^2 = l^2 + r^2 - 2 l r cos beta,
+        ds/dbeta = l r sin beta/s: the lever from the pivot to the line.
     """
 
     bar: int

@@ -37,11 +37,11 @@ class MotorDuty(NamedTuple):
     """
 
     peak_torque: float | None
-    """Largest size, N m; None where the drive is linear."""
+    """Largest size, N m; None where the drive exerts a force."""
     rms_torque: float | None
     """N m."""
     peak_speed: float
-    """Largest size of omega of the driven bar, rad/s, or of the speed of the stroke, m/s."""
+    """Largest size of omega of the driven bar, rad/s, or of the speed of the stroke or of the driven point, m/s."""
     peak_power: float
     """Largest size of T_k omega_k, or of force times speed, W."""
     rms_power: float
@@ -53,7 +53,7 @@ class MotorDuty(NamedTuple):
     closed: bool
     """The sweep is one turn of the input, or several."""
     peak_force: float | None = None
-    """Peak force of a linear drive, N."""
+    """Largest size of the force of a drive that exerts one, N."""
     rms_force: float | None = None
 
 
@@ -67,7 +67,7 @@ DUTY_UNITS = {
     },
     **{"energy_in": "J", "energy_out": "J", "peak_force": "N", "rms_force": "N"},
 }
-"""SI unit of each number of `MotorDuty`; the speed of a linear drive is in m/s."""
+"""SI unit of each number of `MotorDuty`; the speed of a drive that exerts a force is in m/s."""
 
 
 def shaking_force(solution: Solution) -> Array:
@@ -328,8 +328,8 @@ class Energies(NamedTuple):
 def compute_energies(scene: Scene, motion: Solution) -> Energies:
     """Compute the kinetic energy, and the work of each effect and of the loads.
 
-    T = sum of m v_G^2/2 + I omega^2/2;   W(t) = integral of the power, by a cubic
-    spline through the instants.
+        T = sum of m v_G^2/2 + I omega^2/2,
+        W(t) = integral of the power, by a cubic spline through the instants.
 
     Raises DependencyError where SciPy is not installed.
     """

@@ -128,8 +128,8 @@ class InUnits:
 
 
 def in_units(shown: "Scene | Solution", units: str) -> InUnits:
-    """Show a scene or a solution of a notebook in "imperial" or a list of units like "mm N.mm".
+    """Return a scene or a solution that a notebook shows in other units: "imperial", or a list like "mm N.mm".
 
-    Raises InputError for what is no such list.
+    Raises InputError for a word that is no unit of a result, and for two units of one dimension.
     """
     return InUnits(shown, units)

@@ -418,7 +418,7 @@ class Facts:
 
     @property
     def linear(self) -> bool:
-        """Return True if a cylinder drives."""
+        """Return True if the drive exerts a force."""
         return self.solution.drive is not None
 
 

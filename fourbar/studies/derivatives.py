@@ -64,7 +64,7 @@ class Influence(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sensitivity:
-    """d(quantity)/d(key) at n positions, SI and rad."""
+    """Derivatives d(quantity)/d(key) at n positions, in SI units and radians."""
 
     scene: Scene
     solution: Solution

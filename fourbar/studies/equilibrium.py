@@ -108,10 +108,12 @@ class Equilibria(NamedTuple):
 def equilibrium(scene: Scene) -> Equilibria:
     """Find the positions in which a linkage stays by itself, whether they are stable, and what holds the others.
 
-    On the circuit of the scene's first position that assembles, on both branches where it has both, within the sweep
-    of theta_2 if one is stated (or that of its motion law, or of the command of another bar or a stroke). Speed,
-    acceleration and drive of the scene play no part, viscous damping none either. Zeros of Q are sought between the
-    positions of a grid, 3600 a turn and the ends of the sweep: where Q changes its sign, and where its size is least.
+    The search covers the circuit of the scene's first position that assembles, on both
+    branches where the circuit has both. If the scene states a sweep (of theta_2, of
+    another bar or of a stroke) or a motion law, the search stays within it. Speed,
+    acceleration and drive of the scene play no part, nor does viscous damping. Zeros of
+    the generalized force Q are sought between the positions of a grid (3600 a turn, and
+    the ends of the sweep): where Q changes its sign, and where its size is least.
 
     Raises
     ------

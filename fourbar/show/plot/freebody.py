@@ -158,7 +158,7 @@ def take_one(vector: Any) -> complex:
 
 
 def _record_actions(view: View) -> Recorder:
-    """Record what the drive along a line, loads and effects put on the bars."""
+    """Record what a drive that exerts a force, loads and effects put on the bars."""
     scene, state = view.scene.settled(), view.state()
     recorder = Recorder(scene, state)
     if scene.drive is not None and scene.motion.free is None:

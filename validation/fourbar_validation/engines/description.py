@@ -198,7 +198,7 @@ def list_speeds(command: Command) -> tuple[Array, Array]:
 
 
 def name_driving(scene: Scene) -> str:
-    """Name what is solved for of a scene's drive: its torque, or the force of a linear one."""
+    """Name what is solved for of a scene's drive: its torque or its force."""
     return (COUPLE if scene.drive is None else LINE).value
 
 
@@ -222,7 +222,7 @@ def find_unknown(
 ) -> str:
     """Give the reason to refuse a scene with an effect that an engine does not know; empty where there is none.
 
-    `linear`: whether a drive along a line is known.
+    `linear`: whether a drive that exerts a force is known.
     """
     if scene.drive is not None and scene.motion.free is None and not linear:
         return "a drive that exerts a force has no model here"

@@ -148,7 +148,7 @@ class Loaded(EngineBars, Protocol):
         return (0.0, 0.0) if bar == 1 else self.locate(f"first_pin{bar}")
 
     def end(self, point: "Place") -> Pair:
-        """Locate an end of a spring or of a linear drive, m."""
+        """Locate an end of a spring or a place of the drive, m."""
         x, y = self.first_pin(point.bar)
         along, across = self.rotate(point.bar, *resolve(point.distance, point.angle))
         return x + along, y + across

@@ -226,11 +226,8 @@ class _SceneOfLoop:
         """Say which joint is which pin, which body which bar, and what is held."""
         model, loop = self.model, self.loop
         closing = loop.name if loop.cut else ""
-        pins = (
-            f"{pin}"
-            f" {name_joint(model, loop.hinges[pin]) if pin in loop.hinges else closing}"
-            for pin in PAIRS
-        )
+        hinges = {pin: name_joint(model, joint) for pin, joint in loop.hinges.items()}
+        pins = (f"{pin} {hinges.get(pin, closing)}" for pin in PAIRS)
         bars = (
             f"{name} {' + '.join(model.body(body).name for body in loop.bodies[bar])}"
             for bar, name in BAR_NAMES.items()
