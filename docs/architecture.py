@@ -113,8 +113,8 @@ def text() -> str:
                 (x, y), (u, v) = place[layer], place[lower]
                 y, v = y + HEIGHT / 2, v - HEIGHT / 2
                 parts.append(
-                    f'<path d="M{x:.0f} {y:.0f} C{x:.0f} {y + 24:.0f} {u:.0f}'
-                    f' {v - 24:.0f} {u:.0f} {v:.0f}"/>'
+                    f'<path d="M{x:.0f} {y:.0f}'
+                    f' C{x:.0f} {y + 24:.0f} {u:.0f} {v - 24:.0f} {u:.0f} {v:.0f}"/>'
                 )
         for layer, (x, y) in place.items():
             box = (
@@ -126,14 +126,14 @@ def text() -> str:
             )
         margin += wide + 40
     style = (
-        "text{font:13px"
-        " sans-serif;text-anchor:middle;fill:#1b2733}.package{font-weight:bold;font-size:15px}"
+        "text{font:13px sans-serif;text-anchor:middle;fill:#1b2733}"
+        ".package{font-weight:bold;font-size:15px}"
         "rect{fill:#eef3f8;stroke:#5b7a99}path{fill:none;stroke:#5b7a99;stroke-width:1.2;opacity:.6}"
         "@media(prefers-color-scheme:dark){text{fill:#dfe7ee}rect{fill:#24323f}}"
     )
     size = (
-        f'width="{margin - 20:.0f}" height="{top + 40:.0f}" viewBox="0 0'
-        f' {margin - 20:.0f} {top + 40:.0f}"'
+        f'width="{margin - 20:.0f}" height="{top + 40:.0f}"'
+        f' viewBox="0 0 {margin - 20:.0f} {top + 40:.0f}"'
     )
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" {size}>\n<style>{style}</style>\n'

@@ -128,10 +128,8 @@ def write_question(problem: dict[str, Any]) -> str:
         if command.get("alpha_2")
         else ""
     )
-    branch = (
-        "branch"
-        f" {command['branch'] if np.ndim(command['branch']) == 0 else 'in the file'}"
-    )
+    sign = command["branch"]
+    branch = f"branch {sign if np.ndim(sign) == 0 else 'in the file'}"
     if problem["ask"] == "release":
         times = problem["times"]
         start = f"Released at θ₂ {write_number(math.degrees(angles[0]))}°"

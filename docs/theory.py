@@ -95,8 +95,10 @@ def text() -> str:
         "@media(prefers-color-scheme:dark){text{fill:#dfe7ee}path{stroke:#dfe7ee}circle{fill:#24323f;stroke:#dfe7ee}}"
     )
     return (
-        '<svg xmlns="http://www.w3.org/2000/svg" width="480" height="320" viewBox="0 0'
-        f' 480 320">\n<style>{style}</style>\n' + "\n".join(parts) + "\n</svg>\n"
+        '<svg xmlns="http://www.w3.org/2000/svg" width="480" height="320"'
+        f' viewBox="0 0 480 320">\n<style>{style}</style>\n'
+        + "\n".join(parts)
+        + "\n</svg>\n"
     )
 
 

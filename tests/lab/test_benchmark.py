@@ -202,9 +202,10 @@ def test_of_several_timesteps_the_finest_is_judged_and_each_setting_is_a_row(
 ) -> None:
     (folder / "slow.py").write_text(SLOW.format(path=str(folder / "mine.py")))
     (folder / "engines.toml").write_text(
-        '[[engine]]\nname = "slow"\ncommand = ["python",'
-        f' "{folder / "slow.py"}"]\nsteps = [9, 100, 1000]\n[because]\n"slow: bad" ='
-        ' "its torque is wrong on purpose"\n"slow" = "another reason"\n'
+        '[[engine]]\nname = "slow"\n'
+        f'command = ["python", "{folder / "slow.py"}"]\nsteps = [9, 100, 1000]\n'
+        '[because]\n"slow: bad" = "its torque is wrong on purpose"\n'
+        '"slow" = "another reason"\n'
     )
     letters = run(folder, "crank_rocker", "sprung")
     assert (

@@ -506,8 +506,8 @@ def test_a_read_only_folder_is_reported(tmp_path: Path) -> None:
         ('theta_2 = { from = "0 deg", to = "9 deg", steps = %d }', "motion.theta_2"),
         (
             (
-                'law = { time = ["0 s", "1 s"], theta_2 = ["0 deg", "9 deg"], ends ='
-                ' "rest", steps = %d }'
+                'law = { time = ["0 s", "1 s"], theta_2 = ["0 deg", "9 deg"],'
+                ' ends = "rest", steps = %d }'
             ),
             "motion.law",
         ),
@@ -521,8 +521,8 @@ def test_a_scene_of_too_many_positions_is_refused_before_anything_runs(
         '[lengths]\nground = "4 m"\ninput = "1 m"\ncoupler = "3 m"\noutput = "3 m"\n'
     )
     masses = (
-        '[bars.input]\nmass = "1 kg"\n[bars.coupler]\nmass = "1'
-        ' kg"\n[bars.output]\nmass = "1 kg"\n'
+        '[bars.input]\nmass = "1 kg"\n[bars.coupler]\nmass = "1 kg"\n'
+        '[bars.output]\nmass = "1 kg"\n'
     )
     path = tmp_path / "long.toml"
     path.write_text(f"{lengths}{masses}[motion]\n{motion % (MOST_POSITIONS - 1)}\n")

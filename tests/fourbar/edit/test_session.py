@@ -219,8 +219,8 @@ def test_what_is_dragged_stands_where_it_was_dragged_to(session: Session) -> Non
     added = {
         "points": {"P": {"bar": 3, "from_pin": ["1 in", "20 deg"]}},
         "effects": tomllib.loads(
-            'x = [{ from = { bar = 1 }, to = { bar = 4 }, stiffness = "9 N/m", length ='
-            ' "1 mm" }]'
+            'x = [{ from = { bar = 1 }, to = { bar = 4 }, stiffness = "9 N/m",'
+            ' length = "1 mm" }]'
         ),
     }
     session.document.put(["points"], added["points"])
@@ -279,8 +279,8 @@ def test_the_arrow_of_a_load_goes_where_it_is_dragged_in_either_frame_and_a_nega
     session: Session, frame: str, size: str
 ) -> None:
     load = (
-        f'[[loads]]\nbar = 3\nforce = ["{size}", "10 deg"]\nfrom_pin = ["20 mm", "0'
-        f' deg"]\nframe = "{frame}"\n'
+        f'[[loads]]\nbar = 3\nforce = ["{size}", "10 deg"]\n'
+        f'from_pin = ["20 mm", "0 deg"]\nframe = "{frame}"\n'
     )
     session.do({"do": "text", "text": session.now.text + load})
     load_path = ["loads", len(session.now.scene.loads) - 1]
@@ -304,8 +304,8 @@ def test_a_place_by_coordinates_is_dragged_and_stays_so_until_it_is_restated(
     session: Session,
 ) -> None:
     load = (
-        '[[loads]]\nbar = 3\nforce = ["5 N", "10 deg"]\nfrom_pin = { x = "1 in", y ='
-        ' "20 mm" }\n'
+        '[[loads]]\nbar = 3\nforce = ["5 N", "10 deg"]\n'
+        'from_pin = { x = "1 in", y = "20 mm" }\n'
     )
     line = (
         '[drive]\nfrom = { bar = 1, from_pin = { x = "-30 mm", y = "40 mm" } }\n'

@@ -434,8 +434,8 @@ def test_a_motion_reads_by_the_name_of_what_it_commands() -> None:
         ),
         (
             (
-                'law = { time = ["0 s", "1 s"], theta_2 = ["0 rad", "1 rad"], theta_3 ='
-                ' ["0 rad", "1 rad"] }'
+                'law = { time = ["0 s", "1 s"], theta_2 = ["0 rad", "1 rad"],'
+                ' theta_3 = ["0 rad", "1 rad"] }'
             ),
             "motion.law",
         ),

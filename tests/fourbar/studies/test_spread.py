@@ -21,8 +21,8 @@ from tests.support.scenes import crank_rocker
 
 MODEL = (Path(__file__).parents[3] / "models" / "crank_rocker.toml").read_text()
 TABLE = (
-    '[tolerances]\n"lengths.input" = "0.05 mm"\nlengths.coupler = ["0.02 mm",'
-    ' "sigma"]\n'
+    '[tolerances]\n"lengths.input" = "0.05 mm"\n'
+    'lengths.coupler = ["0.02 mm", "sigma"]\n'
 )
 QUASI = 0.02
 """Of a standard deviation from 2048 quasi-random samples: a random sample would scatter by 1/sqrt(2 N) = 0.016."""

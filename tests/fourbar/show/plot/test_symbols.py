@@ -38,8 +38,8 @@ def everything() -> Scene:
     """Every effect that a scene file can name, by its own example, and loads of both frames."""
     effects = "\n".join(kind.example for kind in list_kinds().values())
     lengths = (
-        '[lengths]\nground = "0.3 m"\ninput = "0.1 m"\ncoupler = "0.25 m"\noutput ='
-        ' "0.22 m"\n'
+        '[lengths]\nground = "0.3 m"\ninput = "0.1 m"\n'
+        'coupler = "0.25 m"\noutput = "0.22 m"\n'
     )
     described = loads(f'{lengths}[motion]\nomega_2 = "3 rad/s"\n[effects]\n{effects}\n')
     return crank_rocker(loads=(TURNING, TABLED), effects=described.effects, drive_bar=4)
