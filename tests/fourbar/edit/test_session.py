@@ -32,6 +32,8 @@ PIXEL = 1e-3
 """m: what a pixel is worth in these tests; a number dragged is exact to it."""
 BARE_SOLVES = 10
 """That an answer may take: the issue's demand."""
+BARE_A_READING, ANSWERS_A_READING = 150, 20
+"""Of the processor's clock, which ticks at 15.6 ms on Windows: above a tenth of a second."""
 
 
 @pytest.fixture
@@ -103,16 +105,26 @@ def test_each_part_that_is_offered_is_one_that_the_file_takes() -> None:
         document.put(place, part["value"])
         assert document.text() != before or place[0] == "effects"
         loads(document.text())
+
+
+@pytest.mark.parametrize("in_place", ["density", "mass"])
+def test_each_field_that_is_offered_is_one_that_the_file_takes(in_place: str) -> None:
+    """A density stands in place of a mass: each field is set in one of two documents."""
     fields = dict(leaves(list_offers()["fields"]))
     document = SceneDocument(CRANK_ROCKER.read_text())
+    bars = ("input", "coupler", "output")
+    if in_place == "mass":
+        for bar in bars:
+            document.remove(["bars", bar, "mass"])
     for place, value in fields.items():
-        if place[-1] != "density":  # which stands in place of the mass
+        if place[-1] != in_place:
             document.set(place, str(value))
     scene = loads(document.text())
-    assert (
-        scene.linkage.input.inertia == pytest.approx(2e-4)
-        and scene.title == "of the drawing"
-    )
+    assert scene.title == "of the drawing"
+    for bar in scene.linkage.moving:
+        steel = 7850.0 * math.pi * 0.025**2 * bar.length
+        assert bar.inertia == pytest.approx(2e-4)
+        assert bar.mass == pytest.approx(0.2 if in_place == "density" else steel)
 
 
 def test_what_a_pair_consists_of_is_read_from_the_declarations() -> None:
@@ -534,23 +546,26 @@ def test_every_linkage_that_people_know_has_an_answer(tmp_path: Path) -> None:
         assert unpacked(pack_frame(told))["columns"], path
 
 
+@pytest.mark.slow
 def test_an_answer_takes_ten_bare_solves_at_most(session: Session) -> None:
     best = {"bare": math.inf, "answer": math.inf}
     # by turns, in processor time, and the quickest of each: the machine has other work
-    for turn in range(60):
+    for turn in range(5):
         start = time.process_time()
-        fourbar.solve(session.now.scene)
+        for _ in range(BARE_A_READING):
+            fourbar.solve(session.now.scene)
         middle = time.process_time()
-        request = {
-            "do": "set",
-            "path": ["lengths", "input"],
-            "value": f"{100 + turn % 9} mm",
-            "gesture": "g",
-        }
-        pack_frame(session.do(request))
+        for number in range(ANSWERS_A_READING):
+            request = {
+                "do": "set",
+                "path": ["lengths", "input"],
+                "value": f"{100 + (turn + number) % 9} mm",
+                "gesture": "g",
+            }
+            pack_frame(session.do(request))
         end = time.process_time()
-        best["bare"] = min(best["bare"], middle - start)
-        best["answer"] = min(best["answer"], end - middle)
+        best["bare"] = min(best["bare"], (middle - start) / BARE_A_READING)
+        best["answer"] = min(best["answer"], (end - middle) / ANSWERS_A_READING)
     assert best["answer"] < BARE_SOLVES * best["bare"], best
 
 
