@@ -76,8 +76,9 @@ RANGES = {
     "motion.omega_2": (-5.0, 5.0),
     "motion.alpha_2": (-5.0, 5.0),
     "loads.0.force.0": (0.0, 5.0),
-    "loads.0.from_centre.1": (0.0, 5.0),
+    "loads.0.arm.1": (0.0, 5.0),
     "loads.1.moment": (-1.0, 1.0),
+    "loads.2.from_centre.0": (0.0, 0.05),
     "effects.gravity.0": (5.0, 10.0),
     "effects.gravity.1": (-2.0, 2.0),
     "effects.viscous.A": (0.0, 0.1),
@@ -107,6 +108,12 @@ def spread(case: Scene) -> dict[str, Any]:
     return {
         key: random.uniform(*ends, M) for key, ends in RANGES.items() if key in entries
     }
+
+
+def test_every_range_is_of_a_number_of_the_scenes() -> None:
+    """`spread` passes over the keys that a scene does not have."""
+    entries = [list_entries(scene(effects)) for effects in (DRIVEN, RUBBING)]
+    assert RANGES.keys() <= entries[0].keys() | entries[1].keys()
 
 
 def alone(study: Study, values: dict[str, Any], member: int) -> Scene:
