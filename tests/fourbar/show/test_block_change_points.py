@@ -295,7 +295,7 @@ def test_a_kite_on_its_change_point_shows_zeros_and_not_their_rounding() -> None
     )
     scene = fourbar.Scene(kite, fourbar.Motion(0.0, 1.0))
     text = "\n".join(write_block(scene, fourbar.solve(scene)))
-    assert "e-" not in text.replace("1e-", "")
+    assert "e-" not in text
     assert "-0.0000" not in text
     assert re.search(r"transmission angle +0 deg", text)
     assert re.search(r"torque +0 N m", text)
