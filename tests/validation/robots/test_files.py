@@ -4,12 +4,17 @@ from pathlib import Path
 
 import pytest
 
-from fourbar.errors import InputError
+import fourbar
+from fourbar.errors import BAD_INPUT, InputError
+from fourbar.mjcf import write_mjcf
+from fourbar_validation.cli import status
 from fourbar_validation.engines.mujoco.robots.compiled import (
     compile_robot,
     list_unknown_parts,
 )
+from fourbar_validation.robots import files, guard
 from fourbar_validation.robots.files import is_four_bar_alone, read_robot
+from tests.whole.test_imports import ROOT
 
 TETRAHEDRON = (
     "v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nv 0 0 0.1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
@@ -124,20 +129,98 @@ def test_no_file_outside_is_opened(tmp_path: Path) -> None:
         ("<mujoco><option ccd_iterations='1e9'/></mujoco>", "up to 1000"),
         ("<!DOCTYPE a [<!ENTITY b 'c'>]><mujoco/>", "no document type"),
         ("<mujoco model='a\0b'/>", "no XML"),
-        ("\xff\xfe", "no XML"),
+        (b"\xff\xfe\x00", "UTF-8"),
+        (b"<mujoco model='\xff'/>", "UTF-8"),
         ("<robot/>", "a URDF holds no closed loop"),
         ("<mujoco>", "no XML"),
         ("<mujoco>" + 200 * "<body>" + 200 * "</body>" + "</mujoco>", "deeper"),
     ],
 )
 def test_what_a_file_may_not_hold_is_one_line(
-    tmp_path: Path, text: str, words: str
+    tmp_path: Path, text: str | bytes, words: str
 ) -> None:
     path = tmp_path / "robot.xml"
-    path.write_text(text)
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    assert_refused(path, words)
+
+
+def assert_refused(path: Path, words: str) -> None:
+    """Reading a file ends in one line with these words."""
     with pytest.raises(InputError, match=words) as caught:
         read_robot(path)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "tag",
+    ["extension", "plugin", "attach", "model", "composite", "flexcomp", "flex"],
+)
+def test_what_reaches_beyond_the_file_is_refused_wherever_it_stands(
+    tmp_path: Path, tag: str
+) -> None:
+    path = make(tmp_path, inertial=INERTIAL + f"<body><{tag} name='x'/></body>")
+    assert_refused(path, f"'<{tag}>': is not read here")
+
+
+def test_a_text_has_a_limit_alone_and_with_its_includes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = make(tmp_path, inertial=INERTIAL)
+    sizes = [len(p.read_bytes()) for p in (path, tmp_path / "options.xml")]
+    monkeypatch.setattr(files, "LARGEST_TEXT", sum(sizes))
+    assert read_robot(path).text
+    monkeypatch.setattr(files, "LARGEST_TEXT", sum(sizes) - 1)
+    assert_refused(path, f"'options.xml': and its includes exceed {sum(sizes) - 1} B")
+    monkeypatch.setattr(files, "LARGEST_TEXT", sizes[0] - 1)
+    assert_refused(path, f"must not exceed {sizes[0] - 1}")
+
+
+def test_meshes_have_a_limit_together(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = make(tmp_path, meshdir="", inertial=INERTIAL)
+    for name in ("part.obj", "other.obj"):
+        (tmp_path / name).write_text(TETRAHEDRON)
+    text = path.read_text().replace("</asset>", '<mesh file="other.obj"/></asset>')
+    path.write_text(text)
+    monkeypatch.setattr(files, "LARGEST_ASSETS", 2 * len(TETRAHEDRON))
+    assert len(read_robot(path).assets) == 2
+    limit = 2 * len(TETRAHEDRON) - 1
+    monkeypatch.setattr(files, "LARGEST_ASSETS", limit)
+    assert_refused(path, f"'other.obj': and other meshes exceed {limit} B")
+
+
+def test_includes_have_a_limit_in_number(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = make(tmp_path, inertial=INERTIAL)
+    include = '<include file="options.xml"/>'
+    path.write_text(path.read_text().replace(include, 3 * include))
+    monkeypatch.setattr(files, "MOST_INCLUDES", 3)
+    assert read_robot(path).text
+    monkeypatch.setattr(files, "MOST_INCLUDES", 2)
+    assert_refused(path, "more than 2 files are included")
+
+
+@pytest.mark.slow
+def test_a_million_copies_end_in_one_line(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """A robot may have <replicate>; what it becomes is bounded where it is compiled."""
+    monkeypatch.setattr(guard, "SECONDS", 5.0)
+    scene = ROOT / "models" / "crank_rocker.toml"
+    text, path = write_mjcf(fourbar.load(scene)), tmp_path / "robot.xml"
+    bodies = "<body><geom size='.1'/></body>"
+    copies = f"<replicate count='1000000'>{bodies}</replicate>"
+    path.write_text(text.replace("<worldbody>", f"<worldbody>{copies}"))
+    arguments = ["check-mjcf", str(scene), str(path), "--out", str(tmp_path / "out")]
+    assert status(arguments) == BAD_INPUT
+    message = capsys.readouterr().err.strip().splitlines()[-1]
+    assert message.startswith(f"error: {path}: MJCF = 'robot.xml': ")
+    assert message.endswith("MuJoCo did not come back in 5 s")
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_complaint_of_the_compiler_is_one_line(tmp_path: Path) -> None:
@@ -160,12 +243,15 @@ def test_a_file_with_more_than_three_joints_is_a_robot(tmp_path: Path) -> None:
         assert is_four_bar_alone(read_robot(path)) == alone
 
 
-def test_height_fields_are_left_out_and_said(tmp_path: Path) -> None:
+@pytest.mark.parametrize("rows", ["file='hills.png'", "nrow='60000' ncol='60000'"])
+def test_height_fields_are_left_out_and_said(tmp_path: Path, rows: str) -> None:
+    """However large they are."""
     path = tmp_path / "robot.xml"
     path.write_text(
-        "<mujoco><asset><hfield name='h' file='hills.png' size='1 1 1"
+        f"<mujoco><asset><hfield name='h' {rows} size='1 1 1"
         " 1'/></asset><worldbody><geom type='hfield' hfield='h'/></worldbody></mujoco>"
     )
     file = read_robot(path)
     assert file.notes == ("height fields are left out",)
-    assert compile_robot(file).model.ngeom == 0
+    model = compile_robot(file).model
+    assert model.ngeom == model.nhfield == 0
