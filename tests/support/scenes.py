@@ -6,6 +6,11 @@ import numpy as np
 
 import fourbar
 
+CYLINDER = fourbar.LinearDrive(
+    fourbar.Place(1, (0.25, math.radians(-160.0))), fourbar.Place(2, (0.09, 0.17))
+)
+"""From the ground to the input of the crank-rocker."""
+
 
 def crank_rocker(**changes: object) -> fourbar.Scene:
     """A crank-rocker with gravity, an offset mass centre, a force and a couple."""

@@ -19,7 +19,7 @@ import pytest
 import fourbar
 from fourbar.cli import status
 from fourbar.files import save
-from tests.support.scenes import crank_rocker
+from tests.support.scenes import CYLINDER, crank_rocker
 
 DOCS = Path(__file__).parents[2] / "docs"
 
@@ -295,6 +295,82 @@ def calls() -> dict[str, tuple[Callable[..., object], tuple[Any, ...]]]:
     }
 
 
+def calls_by_name() -> dict[str, tuple[Callable[..., object], tuple[Any, ...]]]:
+    """Arguments that are given by their names, each for itself: what is called, and a good value."""
+    link, base = fourbar.uniform(0.3, 0.1, 0.25, 0.22), fourbar.Motion(1.0, 10.0)
+    ends = (fourbar.Place(2, (0.1, 0.2)), fourbar.Place(4, (0.1, 0.2)))
+    pair, points = (0.1, 0.2), (fourbar.Point("P", 2, (0.1, 0.2)),)
+
+    def solve(motion: fourbar.Motion = base, **parts: Any) -> object:
+        return fourbar.solve(fourbar.Scene(link, motion, points=points, **parts))
+
+    def load(**stated: Any) -> object:
+        return solve(loads=(fourbar.Load(2, (1.0, 0.0), **stated),))
+
+    def bar(**stated: Any) -> object:
+        moving = fourbar.Bar(0.1, **stated), link.coupler, link.output
+        return fourbar.solve(fourbar.Scene(fourbar.FourBar(0.3, *moving), base))
+
+    def pull(**stated: Any) -> object:
+        spring = fourbar.Spring(fourbar.Place(2, **stated), ends[1], 1.0)
+        return solve(effects=(fourbar.Springs((spring,)),))
+
+    def name(**stated: Any) -> object:
+        return fourbar.solve(
+            fourbar.Scene(link, base, points=(fourbar.Point("Q", 3, **stated),))
+        )
+
+    def rise(**stated: Any) -> object:
+        return solve(fourbar.Motion(law=fourbar.Rise("345", pair, steps=8, **stated)))
+
+    def follow(**stated: Any) -> object:
+        law = fourbar.Law((0.0, 1.0, 2.0, 3.0), steps=2, **stated)
+        return solve(fourbar.Motion(law=law))
+
+    def turn(**stated: Any) -> object:
+        return solve(fourbar.Motion(**stated))
+
+    def stroke(**stated: Any) -> object:
+        motion = fourbar.Motion(**({"stroke": 0.25, "side": "left"} | stated))
+        return solve(motion, drive=CYLINDER)
+
+    table = fourbar.Table((0.0, 2.0), (1.0, 1.0))
+    drawn = fourbar.DrawnPins((0.0, 0.0), (0.0, 0.1), (0.175, 0.05), (0.25, 0.05))
+    stated: list[tuple[str, Callable[..., object], dict[str, Any]]] = [
+        *(("Load", load, {place: pair}) for place in ("from_pin", "from_centre")),
+        *(("Load", load, {"arm": pair}), ("Load", load, {"point": "P"})),
+        *(("Load", load, {"moment": 0.1}), ("Load", load, {"frame": "bar"})),
+        ("Load", load, {"table": table}),
+        ("Bar", partial(bar, diameter=0.02), {"density": 7850.0}),
+        ("Bar", partial(bar, density=7850.0), {"section": (0.02, 0.01)}),
+        ("Bar", partial(bar, density=7850.0), {"diameter": 0.02}),
+        *(("Point", name, {"from_centre": pair}), ("Place", pull, {"point": "P"})),
+        ("Place", pull, {"from_centre": pair}),
+        *(("Rise", rise, {"theta_3": 0.4}), ("Rise", rise, {"theta_4": 1.9})),
+        ("Law", follow, {"theta_3": (0.4, 0.5, 0.6, 0.5)}),
+        ("Law", follow, {"theta_4": (1.9, 2.0, 2.1, 2.0)}),
+        *(("Motion", turn, {"theta_3": 0.4}), ("Motion", turn, {"theta_4": 1.9})),
+        ("Motion", partial(turn, theta_3=0.4), {"omega_3": 1.0}),
+        ("Motion", partial(turn, theta_3=0.4, omega_3=1.0), {"alpha_3": 1.0}),
+        ("Motion", partial(turn, theta_4=1.9), {"omega_4": 1.0}),
+        ("Motion", partial(turn, theta_4=1.9, omega_4=1.0), {"alpha_4": 1.0}),
+        ("Motion", stroke, {"stroke": 0.2}),
+        ("Motion", stroke, {"stroke_speed": 0.1}),
+        ("Motion", partial(stroke, stroke_speed=0.1), {"stroke_acceleration": 0.1}),
+        ("Scene", solve, {"drive": fourbar.LinearDrive(*ends)}),
+        ("Scene", solve, {"drawing": drawn}),
+    ]
+    table_of_calls = {}
+    for kind, call, one in stated:
+        ((argument, good),) = one.items()
+        table_of_calls[f"{kind},{argument}"] = (
+            lambda x, call=call, argument=argument: call(**{argument: x}),
+            (good,),
+        )
+    assert len(table_of_calls) == len(stated)
+    return table_of_calls
+
+
 def spoilt(value: Any, wrong: object) -> Iterator[Any]:
     """The wrong value, and tuples in which it stands for one part, at any depth."""
     yield wrong
@@ -310,7 +386,7 @@ def test_whatever_an_argument_is_the_answer_is_a_value_or_one_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    table = calls()
+    table = calls() | calls_by_name()
     public = {name for name in dir(fourbar) if name != "__version__"} - OF_OTHERS
     errors = {name for name in public if name.endswith("Error")}
     assert {re.split(r"[.,]", name)[0] for name in table} - OF_OTHERS == public - errors
