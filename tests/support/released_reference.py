@@ -115,6 +115,9 @@ class Equations:
             [[arb(0), arb(0)] for _ in bars],
         )
         self.couple = [arb(0)] * 3
+        # of forces in the world's axes at places of a bar's own: the couple at its
+        # angles 0 and -90 deg
+        self.turning = [[arb(0), arb(0)] for _ in bars]
         self.damping: list[tuple[int, int, Ball]] = []
         for term in terms:
             self._add(term, mass)
@@ -126,20 +129,34 @@ class Equations:
         elif isinstance(term, Viscous):
             self.damping += [(*PINS[pin], arb(k)) for pin, k in term.coefficients]
         elif isinstance(term, Load):
-            k, (size, angle) = term.bar - 2, term.force or (0.0, 0.0)
-            # force and arm keep their directions in the same axes: so does the couple
-            r, angle_of_place = term.arm or term.from_centre or (0.0, 0.0)
-            _push(
-                (self.own if term.frame == "bar" else self.world)[k],
-                arb(size),
-                arb(angle),
-            )
-            self.couple[k] += (
-                arb(term.moment)
-                + arb(r) * arb(size) * (arb(angle) - arb(angle_of_place)).sin()
-            )
+            self._add_load(term)
         else:
             raise NotImplementedError(type(term).__name__)
+
+    def _add_load(self, load: Load) -> None:
+        """Move the force to G, in the axes that it is stated in, and add its couple about G."""
+        if load.table is not None or load.point is not None:
+            raise NotImplementedError("a load of a table, or at a named point")
+        k = load.bar - 2
+        self.couple[k] += arb(load.moment)
+        if load.force is None:
+            return
+        size, angle = map(arb, load.force)
+        _push((self.own if load.frame == "bar" else self.world)[k], size, angle)
+        force, place = [arb(0), arb(0)], [arb(0), arb(0)]
+        _push(force, size, angle)
+        if load.from_pin is not None:
+            r, phi = load.from_pin
+            place = [-x for x in self.centre[k]]
+        else:
+            r, phi = load.arm or load.from_centre or (0.0, 0.0)
+        _push(place, arb(r), arb(phi))
+        (x, y), (fx, fy) = place, force
+        if load.arm is None and load.frame == "world":  # the place turns alone
+            self.turning[k][0] += x * fy - y * fx
+            self.turning[k][1] += x * fx + y * fy
+        else:
+            self.couple[k] += x * fy - y * fx
 
     def start(
         self, linkage: FourBar, theta_2: float, omega_2: float, branch: int
@@ -229,6 +246,8 @@ class Equations:
                 + (x * fy - y * fx) * C[k]
                 - (x * fx + y * fy) * S[k]
                 + (x * own_y - y * own_x)
+                + self.turning[k][0] * C[k]
+                - self.turning[k][1] * S[k]
             )
         (fx, fy), (own_x, own_y), a = self.world[1], self.own[1], self.lengths[1]
         force = fx + own_x * C[1] - own_y * S[1], fy + own_y * C[1] + own_x * S[1]
