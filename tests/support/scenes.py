@@ -34,6 +34,13 @@ def crank_rocker(**changes: object) -> fourbar.Scene:
     return fourbar.Scene(**{**parts, **changes})  # type: ignore[arg-type]
 
 
+TURN = crank_rocker(
+    motion=fourbar.Motion(fourbar.Sweep(0.1, 0.1 + math.tau, 24), 10.0),
+    points=(fourbar.Point("P", 3, (0.1, 0.7)), fourbar.Point("J", 4, (0.05, 0.2))),
+)
+"""A turn of the crank-rocker with points on coupler and output."""
+
+
 def thesis(theta_2: object = None) -> fourbar.Scene:
     """The thesis's model mechanism, uniform bars 2.54 cm wide (Linares Mendoza, sections 4.12 and 5.7)."""
 

@@ -10,22 +10,18 @@ import pytest
 
 import fourbar
 from fourbar.cli import status
-from fourbar.effects import Place
 from fourbar.scene.motion import Law
 from fourbar.show.block import WIDTH, write_block, write_motor
 from fourbar.show.summary import summarize
 from fourbar.show.units import suit_units
 from fourbar.solving import find_last_stage
-from tests.support.scenes import crank_rocker, thesis
+from tests.support.scenes import CYLINDER, crank_rocker, thesis
 
 LOCATED = 1e-6
 """rad or relative: the top of a parabola through neighbours 0.05 degrees apart leaves the fourth power of that."""
 BENDING = 1e-6
 """Relative, of a largest moment against that of steps of 0.01 degrees: (0.01 deg)^2 times its curvature."""
 PSI = 0.45359237 * 9.80665 / 0.0254**2
-CYLINDER = fourbar.LinearDrive(
-    Place(1, (0.25, math.radians(-160.0))), Place(2, (0.09, 0.17))
-)
 D, A, B, C = 0.3, 0.1, 0.25, 0.22
 TURN = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.0, math.tau, 360), 10.0))
 

@@ -1,6 +1,5 @@
 """Columns by name: sizes, components and ratios."""
 
-import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,13 +9,9 @@ import pytest
 import fourbar
 from fourbar.errors import InputError
 from fourbar.show.columns import read_columns
-from tests.support.scenes import crank_rocker
+from tests.support.scenes import TURN
 
 MODELS = Path(__file__).parents[3] / "models"
-TURN = crank_rocker(
-    motion=fourbar.Motion(fourbar.Sweep(0.1, 0.1 + math.tau, 24), 10.0),
-    points=(fourbar.Point("P", 3, (0.1, 0.7)), fourbar.Point("J", 4, (0.05, 0.2))),
-)
 
 
 def columns(scene: fourbar.Scene, names: str) -> dict[str, np.ndarray]:

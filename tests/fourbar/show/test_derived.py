@@ -1,6 +1,5 @@
 """Derived quantities: ratios and centres by two formulas, and how they are shown."""
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -13,14 +12,10 @@ from fourbar.quantities import DERIVED
 from fourbar.show.derived import derive
 from fourbar.show.tables import print_positions
 from fourbar.solution import DEGREES
-from tests.support.scenes import crank_rocker
+from tests.support.scenes import TURN
 
 ROUND_OFF = 1e-13
 """Relative: two formulas of a few operations each, at transmission angles above 20 deg."""
-TURN = crank_rocker(
-    motion=fourbar.Motion(fourbar.Sweep(0.1, 0.1 + math.tau, 24), 10.0),
-    points=(fourbar.Point("P", 3, (0.1, 0.7)), fourbar.Point("J", 4, (0.05, 0.2))),
-)
 
 
 def test_ratios_and_centres_are_those_of_the_formulas() -> None:

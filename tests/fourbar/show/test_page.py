@@ -15,7 +15,7 @@ from fourbar.files import loads
 from fourbar.show import animate
 from fourbar.show.tolerances import PAGE_SAMPLES
 from tests.fourbar.show.test_animate import HOSTILE, PNG, RELEASED, embedded
-from tests.support.scenes import crank_rocker, thesis
+from tests.support.scenes import CYLINDER, crank_rocker, thesis
 
 pytest.importorskip(
     "selenium", reason="pages are driven by selenium: pip install selenium"
@@ -191,9 +191,6 @@ def test_a_free_motion_plays_once_in_its_own_time(browse) -> None:
     )
 
 
-DRIVE = fourbar.LinearDrive(
-    Place(1, (0.25, math.radians(-160.0))), Place(2, (0.09, 0.17))
-)
 STROKES = fourbar.Motion(
     stroke=fourbar.Sweep(0.17, 0.33, 40), stroke_speed=0.2, side="left"
 )
@@ -223,7 +220,7 @@ OUTPUT = fourbar.Motion(theta_4=fourbar.Sweep(1.75, 2.95, 40), omega_4=4.0)
 def test_another_command_is_the_axis_and_the_linkage_follows(
     browse, motion, name, place, over, pace
 ) -> None:
-    scene = crank_rocker(motion=motion, drive=DRIVE)
+    scene = crank_rocker(motion=motion, drive=CYLINDER)
     driver, s = browse(animate.write_page(scene)), fourbar.solve(scene)
     driver.execute_script("go(20)")
     assert driver.find_element("id", "theta-text").text == place

@@ -11,11 +11,10 @@ import numpy as np
 import pytest
 
 import fourbar
-from fourbar.effects import Place
 from fourbar.scene import Command
 from fourbar.scene.motion import Law
 from fourbar.show.summary import list_sizes, locate_between
-from tests.support.scenes import crank_rocker, thesis
+from tests.support.scenes import CYLINDER, crank_rocker, thesis
 
 LOCATED = 1e-7
 """rad: one of the five steps in which the tests cut a turn, cut down five times by 40, with room."""
@@ -164,16 +163,12 @@ def test_a_motion_law_is_looked_at_between_its_instants_and_a_list_of_angles_is_
 
 
 def test_the_largest_force_of_a_stroke_is_that_of_fine_steps() -> None:
-    drive = fourbar.LinearDrive(
-        Place(1, (0.25, math.radians(-160.0))), Place(2, (0.09, 0.17))
-    )
-
     def of(steps: int) -> fourbar.Scene:
         motion = fourbar.Motion(
             stroke=fourbar.Sweep(0.33, 0.17, steps), stroke_speed=-0.2, side="left"
         )
         return crank_rocker(
-            motion=motion, drive=drive, effects=(fourbar.Friction((("A", 0.01),)),)
+            motion=motion, drive=CYLINDER, effects=(fourbar.Friction((("A", 0.01),)),)
         )
 
     between = locate_between(of(20), fourbar.solve(of(20)))

@@ -7,16 +7,12 @@ import numpy as np
 import pytest
 
 import fourbar
-from fourbar.effects import Place
 from fourbar.show.block import write_block, write_motor
 from fourbar.show.summary import Facts, locate_between, summarize
-from tests.support.scenes import crank_rocker
+from tests.support.scenes import CYLINDER, crank_rocker
 
-CRANK = 0.09
-"""Distance of the cylinder's end from O2, m: the largest lever that its line has about O2."""
-CYLINDER = fourbar.LinearDrive(
-    Place(1, (0.25, math.radians(-160.0))), Place(2, (CRANK, 0.17))
-)
+LEVER = 0.09
+"""Distance of the end of CYLINDER from O2, m: the largest lever about O2."""
 PEAK = 1e-6
 """Relative; five calls locate a peak to 1.6e-6 degrees, and its value to the square of that."""
 AT_A_LIMIT = 1e-6
@@ -71,7 +67,7 @@ def test_speed_and_power_beside_a_pole_of_the_force_are_located() -> None:
     solution = fourbar.solve(scene)
     duty = write_motor(scene, solution, {})
     assert duty is not None and solution.stroke_speed is not None
-    assert duty["peak_speed"] == pytest.approx(10.0 * CRANK, rel=PEAK)
+    assert duty["peak_speed"] == pytest.approx(10.0 * LEVER, rel=PEAK)
     largest = np.abs(solution.stroke_speed).max()
     assert duty["peak_speed"] > (1.0 + 100.0 * PEAK) * largest
     assert "speed peak 0.9 m/s power" in write(scene)

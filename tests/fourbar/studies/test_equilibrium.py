@@ -32,7 +32,7 @@ from fourbar.mjcf import write_mjcf
 from fourbar.scene.motion import Free
 from fourbar.studies.circuit_curve import SAMPLES, CircuitCurve
 from fourbar.studies.equilibrium import Equilibria, Equilibrium, equilibrium
-from tests.support.scenes import crank_rocker
+from tests.support.scenes import CYLINDER, crank_rocker
 from tests.validation.run.derived.test_derived import failing, rows_of
 
 MODELS = Path(__file__).parents[3] / "models"
@@ -529,11 +529,6 @@ def test_a_zero_that_falls_on_a_sample_is_found() -> None:
     assert rest.place.theta_2 == pytest.approx(sample, abs=1e-9)
 
 
-DRIVE = fourbar.LinearDrive(
-    Place(1, (0.25, math.radians(-160.0))), Place(2, (0.09, 0.17))
-)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["theta_3", "theta_4", "stroke"])
 def test_another_command_has_the_equilibria_of_the_positions_that_it_passes(
@@ -545,7 +540,9 @@ def test_another_command_has_the_equilibria_of_the_positions_that_it_passes(
     ]
     side: dict[str, Any] = {"side": "left"} if name == "stroke" else {"branch": -1}
     motion = Motion(**{name: Sweep(*swept, 90)}, **side)
-    commanded = crank_rocker(motion=motion, effects=(fourbar.Gravity(),), drive=DRIVE)
+    commanded = crank_rocker(
+        motion=motion, effects=(fourbar.Gravity(),), drive=CYLINDER
+    )
     theta_2 = fourbar.solve(commanded).theta_2
     same = replace(
         commanded, motion=Motion(Sweep(float(theta_2.min()), float(theta_2.max()), 90))

@@ -1,6 +1,5 @@
 """Instant centres and coupler curves of scenes and solutions."""
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -8,12 +7,7 @@ import pytest
 
 import fourbar
 from fourbar.errors import InputError
-from tests.support.scenes import crank_rocker
-
-TURN = crank_rocker(
-    motion=fourbar.Motion(fourbar.Sweep(0.1, 0.1 + math.tau, 24), 10.0),
-    points=(fourbar.Point("P", 3, (0.1, 0.7)), fourbar.Point("J", 4, (0.05, 0.2))),
-)
+from tests.support.scenes import TURN
 
 
 def test_centres_of_a_scene_and_of_its_solution_are_those_of_its_linkage() -> None:

@@ -9,21 +9,20 @@ import numpy as np
 import pytest
 
 import fourbar
-from fourbar.effects import Place
 from fourbar.show.summary import Facts
 from fourbar_validation.compare.rows import Row
 from fourbar_validation.run.derived import summary as module
 from fourbar_validation.run.derived.summary import summary
 from fourbar_validation.run.judge import ask
 from fourbar_validation.run.question import NotAskedError
-from tests.support.scenes import crank_rocker
+from tests.support.scenes import CYLINDER, crank_rocker
 
 TURN = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.1, 0.1 + 2 * np.pi, 36), 9.0))
-CYLINDER = crank_rocker(
+PUSHED = crank_rocker(
     motion=fourbar.Motion(
         stroke=fourbar.Sweep(0.19, 0.31, 36), stroke_speed=0.2, side="left"
     ),
-    drive=fourbar.LinearDrive(Place(1, (0.25, -2.8)), Place(2, (0.09, 0.17))),
+    drive=CYLINDER,
 )
 
 
@@ -31,12 +30,12 @@ def judge(scene: fourbar.Scene) -> dict[str, Row]:
     return {row.quantity: row for row in summary(ask("scene", scene, ()))}
 
 
-@pytest.mark.parametrize("scene", (TURN, CYLINDER), ids=("turn", "cylinder"))
+@pytest.mark.parametrize("scene", (TURN, PUSHED), ids=("turn", "cylinder"))
 def test_the_summary_of_a_scene_agrees_with_free_bodies(scene: fourbar.Scene) -> None:
     rows = judge(scene)
     assert not [row for row in rows.values() if row.failed]
     names = {"ranges", "peaks", "means", "pins", "bending"}
-    names |= {"bore"} if scene is CYLINDER else {"frame_force"}
+    names |= {"bore"} if scene is PUSHED else {"frame_force"}
     assert rows.keys() == names
 
 
@@ -278,7 +277,7 @@ def test_a_printed_bore_that_is_off_fails_its_row(
         return [re.sub(r"at least (\d)", r"at least 1\1", line) for line in lines]
 
     monkeypatch.setattr(module, "write_block", off)
-    rows = judge(CYLINDER)
+    rows = judge(PUSHED)
     assert {row.quantity for row in rows.values() if row.failed} == {"bore"}
 
 
