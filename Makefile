@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
-LONG := kills package oldest prereleases machines engines simulators problems benchmark free fuzz accuracy suites
+LONG := kills package oldest prereleases machines engines simulators problems benchmark free faults fuzz accuracy suites
 
 .PHONY: validate test test-all check long-test $(LONG:%=long-%) models docs setup clean
 
@@ -60,7 +60,10 @@ long-benchmark:
 	$(BIN)/python -m fourbar_lab findings
 long-free:
 	FREE_MOTIONS=30 $(BIN)/python -m pytest -n 2 tests/fourbar/evaluation/test_free_motion_reference.py
+long-faults:
+	$(BIN)/python -m fourbar_lab faults
 long-fuzz:
+	DRAWINGS=10000 $(BIN)/python -m pytest tests/fourbar/files/test_drawing.py
 	$(BIN)/python -m fourbar_lab fuzz-files --count 100000
 	$(BIN)/python -m fourbar_lab fuzz --scenes 50000
 long-accuracy:

@@ -453,23 +453,40 @@ def guests_of(mark: str, program: str) -> list[int]:
     return guests
 
 
+@pytest.fixture(scope="module")
+def guest(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """The option that has a program judged too."""
+    return f"--guest={write_program(tmp_path_factory.mktemp('guest'), 'plain')}"
+
+
+@pytest.fixture(scope="module")
+def undisturbed_with_guest(
+    guest: str, tmp_path_factory: pytest.TempPathFactory
+) -> bytes:
+    """The results of a run with that program that nothing disturbed."""
+    out = tmp_path_factory.mktemp("undisturbed")
+    assert start(out, COUNT, more=[guest]).wait(timeout=100) == 0
+    return (out / "results.csv").read_bytes()
+
+
 @pytest.mark.slow
 @pytest.mark.linux
 @pytest.mark.timeout(200 + 120 * KILLS)
 @pytest.mark.parametrize("kind", ["guest", "worker", "run"])
 def test_any_process_of_a_run_with_a_guest_killed_changes_no_byte(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    guest: str,
+    undisturbed_with_guest: bytes,
+    kind: str,
 ) -> None:
     """Killed in the middle, with questions left to ask; a run that ended early is resumed."""
     mark = f"MARK_OF_TEST={tmp_path}"
     monkeypatch.setenv("MARK_OF_TEST", str(tmp_path))
-    more = [f"--guest={write_program(tmp_path, 'plain')}"]
-    assert start(tmp_path / "undisturbed", COUNT, more=more).wait(timeout=100) == 0
-    expected = (tmp_path / "undisturbed" / "results.csv").read_bytes()
     rng = np.random.default_rng(SEED + 2)
     for kill in range(KILLS):
         out = tmp_path / str(kill)
-        process = start(out, COUNT, more=more)
+        process = start(out, COUNT, more=[guest])
         wait_for_parts(out, process, at_least=1)
         victims: list[int] = []
         while not victims:
@@ -483,9 +500,9 @@ def test_any_process_of_a_run_with_a_guest_killed_changes_no_byte(
         status = process.wait(timeout=200)
         if kind == "run" or status == BROKEN:
             assert_unfinished(out)
-            status = start(out, COUNT, more=more).wait(timeout=100)
+            status = start(out, COUNT, more=[guest]).wait(timeout=100)
         assert status == 0
-        assert (out / "results.csv").read_bytes() == expected
+        assert (out / "results.csv").read_bytes() == undisturbed_with_guest
     time.sleep(2.0)
     assert not list_processes(mark)
 

@@ -200,7 +200,6 @@ SHOWN = {
     ("triple rocker, longest input", 0): AT_LIMITS,
     ("triple rocker, longest coupler", 0): AT_LIMITS,
     ("triple rocker, longest output", 6): AT_LIMITS,
-    ("change point", 5): AT_CHANGE_POINTS,
     ("change point", 10): AT_CHANGE_POINTS,
     ("parallelogram", 2): AT_CHANGE_POINTS,
 }
