@@ -430,7 +430,7 @@ def make_solution(
         ground=(scene.linkage.ground, scene.linkage.ground_angle),
         scene=solved,
         lengths=scene.linkage.lengths,
-        drive=scene.settled().drive,
+        drive=scene.settled_drive(),
         change_points=change_points,
         at=commanded,
     )

@@ -213,7 +213,7 @@ def _read_drawn(scene: Scene, name: str, text: str) -> float:
 
     drawing = scene.drawing
     drawn = (
-        None if drawing is None else find_drawn(drawing, scene.settled().drive, name)
+        None if drawing is None else find_drawn(drawing, scene.settled_drive(), name)
     )
     if drawn is None:
         raise InputError("--at", text, "needs a scene that states [pins]")

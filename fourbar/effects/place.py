@@ -1,6 +1,6 @@
 """Places of bars: from the bar's first pin, from its mass centre, or at a named point."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import fields
 from functools import cache
 from typing import Any, NamedTuple
@@ -123,6 +123,15 @@ class Place(NamedTuple):
     def locate(self, state: State) -> Any:
         """Return the position of the place, complex, m."""
         return state.foot(self.bar) + self.in_bar * state.direction(self.bar)
+
+
+def settler(linkage: FourBar, points: Iterable[Any]) -> Callable[[Place], Place]:
+    """Return the function that settles a place of a scene, as `Place.settle` does.
+
+    `points`: the scene's, each with its name and place.
+    """
+    places = {point.name: point.place for point in points}
+    return lambda place: place.settle(linkage, places)
 
 
 def require_place(key: str, place: object) -> Place:

@@ -29,7 +29,7 @@ from fourbar.effects import (
 )
 from fourbar.effects.effect import PinRows
 from fourbar.effects.load import FRAMES
-from fourbar.effects.place import AT_FIRST_PIN, STATED_PLACES
+from fourbar.effects.place import AT_FIRST_PIN, STATED_PLACES, settler
 from fourbar.effects.spring import GAS
 from fourbar.errors import InputError, expect
 from fourbar.files.drawing import (
@@ -209,10 +209,9 @@ def read_scene(read: Reader, document: dict[str, Any], folder: str) -> Scene:
     effects = read.table("effects", top.get("effects", {}), list_kinds())
     motion, linkage = top.get("motion", {}), _read_linkage(read, top)
     if drawing is not None:
-        places = {point.name: point.place for point in points}
         line = None
         if isinstance(drive, LinearDrive):
-            line = drive.with_places(lambda place: place.settle(linkage, places))
+            line = drive.with_places(settler(linkage, points))
         motion = state_motion(read, motion, drawing, line)
     scene = Scene(
         linkage,

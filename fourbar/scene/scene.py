@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.effects.effect import Effect
-from fourbar.effects.place import change_each, copy_with
+from fourbar.effects.place import change_each, copy_with, settler
 from fourbar.errors import InputError, LimitError, expect
 from fourbar.formulas.arithmetic import (
     PI_LOW,
@@ -122,17 +122,13 @@ class Scene:
         else:
             self._require_force_drive(self.drive)
         self._require_points()
-        if self.drive is not None:
-            settled = self.settled().drive
-            assert settled is not None
-            settled.require_motion(self.linkage)
+        drive = self.settled_drive()
+        if drive is not None:
+            drive.require_motion(self.linkage)
         if self.motion.stroke is not None:
             object.__setattr__(self, "motion", copy(self.motion))
-            object.__setattr__(
-                self.motion,
-                "bar",
-                find_triangle(self.linkage, self.settled().drive).bar,
-            )
+            bar = find_triangle(self.linkage, drive).bar
+            object.__setattr__(self.motion, "bar", bar)
         if len({picture.bar for picture in self.pictures}) < len(self.pictures):
             raise InputError(
                 "pictures",
@@ -203,8 +199,13 @@ class Scene:
 
     def settled(self) -> "Scene":
         """Return the same scene with every place from the first pin of its bar, as `Place.settle` does."""
-        places = {point.name: point.place for point in self.points}
-        return self.with_places(lambda place: place.settle(self.linkage, places))
+        return self.with_places(settler(self.linkage, self.points))
+
+    def settled_drive(self) -> "ForceDrive | None":
+        """Return the drive as the settled scene has it; None: it is a couple."""
+        if self.drive is None:
+            return None
+        return self.drive.with_places(settler(self.linkage, self.points))
 
     def in_pairs_from_pins(self) -> "Scene":
         """Return the same scene with every place as one pair (distance, angle) from the first pin of its bar."""
@@ -449,7 +450,7 @@ def default_places(scene: Scene, holding: float | None = None) -> Array:
     """List the angles (of the range that holds one), or strokes, that are swept where a scene names none, (n,)."""
     if scene.motion.stroke is not None:
         triangle, half = (
-            find_triangle(scene.linkage, scene.settled().drive),
+            find_triangle(scene.linkage, scene.settled_drive()),
             0.5 * np.array([MARGIN, np.pi - MARGIN]),
         )
         twice_mean = 2.0 * np.sqrt(triangle.length * triangle.reach)
@@ -471,7 +472,7 @@ def compute_bar_motion(
     """
     if scene.motion.stroke is None:
         return place, speed, acceleration, None
-    return find_triangle(scene.linkage, scene.settled().drive).turn_bar(
+    return find_triangle(scene.linkage, scene.settled_drive()).turn_bar(
         place, speed, acceleration, scene.motion.side
     )
 
@@ -487,7 +488,7 @@ def command_stroke(
     if speed is not None:  # what angle, speed and acceleration leave out as doubles
         with np.errstate(all="ignore"):
             longer = find_triangle(
-                *change_numbers((scene.linkage, scene.settled().drive), lengthen)
+                *change_numbers((scene.linkage, scene.settled_drive()), lengthen)
             )
             *turned, _ = longer.turn_bar(
                 lengthen(stroke),
@@ -520,7 +521,7 @@ def command_at(scene: Scene, places: Array) -> Command:
     """Command what the scene's motion commands at other places: angles, strokes, or of a law times."""
     motion, bar = scene.motion, scene.motion.bar
     if motion.stroke is not None:
-        triangle = find_triangle(scene.linkage, scene.settled().drive)
+        triangle = find_triangle(scene.linkage, scene.settled_drive())
         least, most = (
             abs(triangle.length - triangle.reach),
             triangle.length + triangle.reach,
