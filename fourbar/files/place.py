@@ -1,15 +1,14 @@
 """Places of bars in scene files: `from_pin`, `from_centre` or `point`, polar or by x and y."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from typing import Any
 
+from fourbar.effects.load import PLACES_OF_LOADS
 from fourbar.effects.place import STATED_PLACES, Place
 from fourbar.files.fields import Reader
 
-PLACES_OF_POINTS = tuple(STATED_PLACES)
 PLACES_OF_ENDS = (*STATED_PLACES, "point")
 """Keys of which one states where an end of a spring or cylinder lies, or where a force acts."""
-PLACES_OF_A_LOAD = (*PLACES_OF_ENDS, "arm")
 AT_OF_A_LOAD = {
     "bar": "write from_centre, with the same numbers, or from_pin, or point",
     "world": (
@@ -28,8 +27,8 @@ def read_table_with_place(
     `instead`: that, where it is not `from_pin`.
     """
     if isinstance(value, dict) and "at" in value:
-        allowed = instead or "write from_pin = [distance, angle from the bar's line]"
-        raise read.refuse(f"{key}.at", value["at"], f"is no key any more: {allowed}")
+        written = instead or "write from_pin = [distance, angle from the bar's line]"
+        raise read.refuse(f"{key}.at", value["at"], f"is no key any more: {written}")
     return read.table(key, value, allowed)
 
 
@@ -38,18 +37,16 @@ def read_stated_place(
     key: str,
     entry: Mapping[str, Any],
     bars: Mapping[str, int],
-    forms: Sequence[str],
     least: int = 1,
 ) -> Place:
-    """Read the bar of an entry and its place on it, which one of some keys states.
+    """Read the bar of an entry and its place on it, which one key states; none: it is the bar's first pin.
 
     Parameters
     ----------
     bars : the bar of each named point, which the entry need not state again.
-    forms : keys of which one may state the place; none: it is the bar's first pin.
     least : number of the first bar allowed, 1 or 2.
     """
-    stated = [name for name in forms if name in entry]
+    stated = [name for name in PLACES_OF_LOADS if name in entry]
     if len(stated) > 1:
         allowed = f"{stated[0]} states the place already; state one of them"
         raise read.refuse(f"{key}.{stated[1]}", entry[stated[1]], allowed)

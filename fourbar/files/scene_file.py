@@ -41,9 +41,7 @@ from fourbar.files.drawing import (
 from fourbar.files.fields import BARE_KEY, Reader
 from fourbar.files.place import (
     AT_OF_A_LOAD,
-    PLACES_OF_A_LOAD,
     PLACES_OF_ENDS,
-    PLACES_OF_POINTS,
     read_stated_place,
     read_table_with_place,
 )
@@ -249,7 +247,7 @@ def _read_drive(
         return None, LinearDrive(*_read_ends(read, "drive", entry, bars))
     if not entry.keys() & {*PLACES_OF_ENDS, "direction", "frame"}:
         return read.whole("drive.bar", entry.get("bar", 2), 2, 4), None
-    place = read_stated_place(read, "drive", entry, bars, PLACES_OF_ENDS, 2)
+    place = read_stated_place(read, "drive", entry, bars, 2)
     if place == Place(place.bar):
         raise read.refuse("drive.point", None, A_POINT)
     direction = read.quantity("drive.direction", entry.get("direction"), "rad")
@@ -266,7 +264,7 @@ def _read_points(read: Reader, value: object) -> tuple[Point, ...]:
     for name, point in value.items():
         key = f"points.{name}" if BARE_KEY.fullmatch(name) else "points"
         entry = read_table_with_place(read, key, point, ("bar", *STATED_PLACES))
-        place = read_stated_place(read, key, entry, {}, PLACES_OF_POINTS)
+        place = read_stated_place(read, key, entry, {})
         points.append(Point(name, place.bar, place.from_pin, place.from_centre))
     return tuple(points)
 
@@ -480,7 +478,7 @@ def _read_load(read: Reader, key: str, value: object, bars: Mapping[str, int]) -
         )
     if "force" not in entry and "moment" not in entry:
         raise read.refuse(key, value, "must have a force, a moment or both")
-    place = read_stated_place(read, key, entry, bars, PLACES_OF_A_LOAD, 2)
+    place = read_stated_place(read, key, entry, bars, 2)
     numbers = {name: Load.numbers[name] for name in ("force", "arm", "moment")}
     stated = read.numbers(key, entry, numbers)
     frame = read.choice(f"{key}.frame", entry.get("frame", FRAMES[0]), FRAMES)
@@ -571,8 +569,8 @@ def _read_ends(
         path = f"{key}.{name}"
         allowed = ("bar", *PLACES_OF_ENDS)
         entry = read_table_with_place(read, path, row.get(name), allowed)
-        end = read_stated_place(read, path, entry, bars, PLACES_OF_ENDS)
-        ends.append(Place(end.bar, AT_FIRST_PIN) if len(set(end)) == 2 else end)
+        end = read_stated_place(read, path, entry, bars)
+        ends.append(Place(end.bar, AT_FIRST_PIN) if end == Place(end.bar) else end)
     return ends[0], ends[1]
 
 
