@@ -227,7 +227,9 @@ def _cut(low: Array, high: Array) -> Array:
     return low[:, None] + (high - low)[:, None] * np.linspace(0.0, 1.0, CUTS + 1)
 
 
-def _merge(scene: Scene, solution: Solution, places: Array) -> Solution:
+def _merge(
+    scene: Scene, solution: Solution, places: Array, stage: str = "force"
+) -> Solution:
     """Solve at the positions of a solution and at others among them, in the order of the solution."""
     if not len(places):
         return solution
@@ -235,7 +237,7 @@ def _merge(scene: Scene, solution: Solution, places: Array) -> Solution:
     order = np.unique(merged, return_index=True)[1][
         :: 1 if merged[0] < merged[1] else -1
     ]
-    return _solve_at(scene, merged[order])
+    return _solve_at(scene, merged[order], stage)
 
 
 def _compute_slip(solution: Solution, pin: str) -> Array:
@@ -572,12 +574,7 @@ def _solve_finely(
     fine = _solve_at(scene, np.linspace(places[0], places[-1], FINE + 1), "position")
     stretches = _list_stretches(scene, fine)
     ends = [end for stretch in stretches for end in stretch if end is not None]
-    if not ends:
-        return fine, stretches
-    merged = np.sort(np.concatenate([fine.at.places, ends]))
-    if places[0] > places[-1]:
-        merged = merged[::-1]
-    return _solve_at(scene, merged, "position"), stretches
+    return _merge(scene, fine, np.array(ends), "position"), stretches
 
 
 def _join_stretches(solution: Solution, fine: Solution, bar: int) -> Array:
