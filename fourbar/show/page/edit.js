@@ -127,20 +127,18 @@ function show(about, own) {
 }
 
 // ---- the strip beside the drawing: the largest numbers, while one drags -----------------------------------
-const PIN_OF = { F12: "O2", F32: "A", F43: "B", F14: "O4" };
 let typeBefore = null;
 function showStrip() {
-  const t = table(), drive = ["torque", "drive_force"].find(name => name in t), sines = t.transmission ?? [];
-  const sizes = name => t[name].map(v => Array.isArray(v) ? (v[0] === null ? 0 : Math.hypot(...v)) : Math.abs(v ?? 0));
-  const most = name => sizes(name).reduce((a, b) => Math.max(a, b), 0), words = [];
-  if (drive) words.push(`peak ${drive.replace("_", " ")} ${text(inUnit(drive === "torque" ? "N m" : "N", most(drive)))} ${nameOf(drive === "torque" ? "N m" : "N")}`);
+  const t = table(), drive = ["torque", "drive_force"].find(name => name in t);
+  const most = name => Math.abs(peakOf(column(name))), words = [];
+  if (drive) words.push(`peak ${drive.replace("_", " ")} ${text(most(drive))} ${nameOf(drive === "torque" ? "N m" : "N")}`);
   const pins = FORCES.filter(name => name in t);
   if (pins.length) {
     const largest = pins.reduce((a, b) => most(b) > most(a) ? b : a);
-    words.push(`largest pin force ${text(inUnit("N", most(largest)))} ${nameOf("N")} at ${PIN_OF[largest]}`);
+    words.push(`largest pin force ${text(most(largest))} ${nameOf("N")} at ${FORCE_PIN[largest]}`);
   }
-  const angles = sines.filter(v => v !== null);
-  if (angles.length) words.push(`transmission angle at least ${(Math.min(...angles) * DEG).toFixed(1)}\u00b0`);
+  const angles = "transmission" in t ? column("transmission").filter(Number.isFinite) : [];
+  if (angles.length) words.push(`transmission angle at least ${Math.min(...angles).toFixed(1)}\u00b0`);
   byId("strip").textContent = words.join("; ");
   if (typeBefore && typeBefore !== data.type) {
     byId("type-change").textContent = `The type has changed from ${typeBefore} to ${data.type}.`;
