@@ -56,7 +56,7 @@ class Handle(NamedTuple):
         return self._asdict() | plain
 
 
-def list_handles(scene: Scene, document: dict[str, Any]) -> list[Handle]:
+def list_handles(scene: Scene) -> list[Handle]:
     """List everything that can be dragged: mass centres, points, loads, and the ends of what acts on a line."""
     handles = [
         Handle(
@@ -176,7 +176,7 @@ def drag(
             dragged.theta_2,
             "the linkage does not assemble there; choose another position",
         )
-    for handle in list_handles(scene, plain):
+    for handle in list_handles(scene):
         frame = cmath.rect(1.0, turned[handle.bar])
         foot = pins[{1: "O2", 2: "O2", 3: "A", 4: "O4"}[handle.bar]] + frame * handle.at
         own_frame = frame if handle.turns else 1.0 + 0.0j

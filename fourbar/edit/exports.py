@@ -48,7 +48,6 @@ TICK = 0.5
 
 def evaluate_scene(
     scene: Scene,
-    plain: dict[str, Any],
     units: Conversion,
     *,
     settled: bool = False,
@@ -71,7 +70,7 @@ def evaluate_scene(
         "pictures": {},
         "toml": None,
     }
-    data["handles"] = [handle.drawn() for handle in list_handles(scene, plain)]
+    data["handles"] = [handle.drawn() for handle in list_handles(scene)]
     if settled:  # what `analyze` and `classify` print
         block = write_block(scene, solution, {**COMMON, **units}, pressure=pressure)
         limits = write_type(scene.linkage, {**COMMON, **units}, everything=True)

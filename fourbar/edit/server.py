@@ -173,9 +173,7 @@ class Workbench:
         def evaluate() -> dict[str, Any] | None:
             if not is_present():
                 return None
-            return evaluate_scene(
-                state.scene, state.plain, units, settled=True, pressure=pressure
-            )
+            return evaluate_scene(state.scene, units, settled=True, pressure=pressure)
 
         def describe(data: dict[str, Any]) -> dict[str, Any] | None:
             return session.describe(data, settled=True) if is_present() else None

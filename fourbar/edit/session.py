@@ -199,7 +199,7 @@ class Session:
 
     def answer(self) -> dict[str, Any]:
         """Describe the present state, without error bars and summary."""
-        return self.describe(evaluate_scene(self.now.scene, self.now.plain, self.units))
+        return self.describe(evaluate_scene(self.now.scene, self.units))
 
     def describe(
         self, data: dict[str, Any], *, settled: bool = False
@@ -228,7 +228,7 @@ class Session:
         kept = self.read(self.kept[self.reference])
         return {
             "compared": self.reference,
-            "data": evaluate_scene(kept.scene, kept.plain, self.units),
+            "data": evaluate_scene(kept.scene, self.units),
         }
 
     def do(self, asked: dict[str, Any]) -> dict[str, Any]:

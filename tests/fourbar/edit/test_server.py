@@ -379,11 +379,11 @@ def test_a_change_overtakes_a_summary_that_is_being_computed(
         [],
     )
 
-    def slow(scene, plain, units, **options):
+    def slow(scene, units, **options):
         asked_for.set()
         released.wait(20)
         summaries.append(scene.linkage.input.length)
-        return evaluate(scene, plain, units, **options)
+        return evaluate(scene, units, **options)
 
     async def ask(made: Workbench, address: str) -> None:
         line = await page(address)

@@ -515,7 +515,7 @@ def unpacked(data: bytes) -> dict:
 def settled(session: Session) -> dict:
     now = session.now
     return session.describe(
-        evaluate_scene(now.scene, now.plain, session.units, settled=True), settled=True
+        evaluate_scene(now.scene, session.units, settled=True), settled=True
     )
 
 
@@ -766,7 +766,5 @@ def test_new_entries_and_limits_have_the_units_of_the_scene(tmp_path: Path) -> N
     ]
     assert stated["loads"][1]["moment"] == "-8.9 lbf in"
     assert stated["points"]["P"]["from_pin"] == ["2 in", "20 deg"]
-    data = evaluate_scene(
-        session.now.scene, session.now.plain, session.units, settled=True
-    )
+    data = evaluate_scene(session.now.scene, session.units, settled=True)
     assert "s + l = 16 in < p + q = 19 in" in data["summary"]
