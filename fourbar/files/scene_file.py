@@ -392,6 +392,11 @@ def _read_motion(read: Reader, value: object) -> Motion:
     return Motion(**arguments)
 
 
+def _read_steps(read: Reader, key: str, entry: Mapping[str, Any]) -> int:
+    """Read the number of steps of a motion, which has a default."""
+    return read.whole(f"{key}.steps", entry.get("steps", DEFAULT_STEPS), 1, MOST_STEPS)
+
+
 def _read_law(read: Reader, value: object) -> Law | Rise:
     key = "motion.law"
     if isinstance(value, dict) and "kind" in value:
@@ -401,9 +406,7 @@ def _read_law(read: Reader, value: object) -> Law | Rise:
     stated = [name for name in angles if name in entry] or angles[:1]
     return Law(
         read.quantities(f"{key}.time", entry.get("time"), "s"),
-        steps=read.whole(
-            f"{key}.steps", entry.get("steps", DEFAULT_STEPS), 1, MOST_STEPS
-        ),
+        steps=_read_steps(read, key, entry),
         ends=read.choice(f"{key}.ends", entry.get("ends", "free"), SPLINES),
         **{
             name: read.quantities(f"{key}.{name}", entry.get(name), "rad")
@@ -416,7 +419,7 @@ def _read_rise(read: Reader, key: str, value: object) -> Rise:
     """Read a rise, a dwell, a fall and a rest by a standard law."""
     entry = read.table(key, value, ("kind", *Rise.numbers, "steps"))
     kind = read.choice(f"{key}.kind", entry["kind"], KINDS)
-    steps = read.whole(f"{key}.steps", entry.get("steps", DEFAULT_STEPS), 1, MOST_STEPS)
+    steps = _read_steps(read, key, entry)
     return Rise(kind, steps=steps, **read.numbers(key, entry, Rise.numbers))
 
 
@@ -446,11 +449,7 @@ def _read_places(
     start, stop = (
         read.quantity(f"{key}.{end}", sweep.get(end), unit) for end in ("from", "to")
     )
-    return Sweep(
-        start,
-        stop,
-        read.whole(f"{key}.steps", sweep.get("steps", DEFAULT_STEPS), 1, MOST_STEPS),
-    )
+    return Sweep(start, stop, _read_steps(read, key, sweep))
 
 
 def _read_load(read: Reader, key: str, value: object, bars: Mapping[str, int]) -> Load:

@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from fourbar.errors import DependencyError, InputError, expect, say_install
+from fourbar.formulas.mobility import TURN
 from fourbar.linkage import (
     A_BRANCH,
     AT_LEAST_ZERO,
@@ -47,7 +48,6 @@ FEWEST_POINTS = {"free": 4, "rest": 2, "periodic": 3}
 MOST_POINTS = 100_000
 KINDS = ("cycloidal", "345")
 """Standard laws of a rise."""
-TURN = 2.0 * math.pi
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,8 +133,30 @@ def find_bar(key: str, numbers: Mapping[int, tuple[Any, ...]]) -> int | None:
     return stated[0] if stated else None
 
 
+class _OverTime:
+    """A law over time: its bar, and the times at which it is evaluated."""
+
+    __slots__ = ()
+
+    def _require_steps(self: Any) -> None:
+        """Check the number of intervals; InputError for what is none."""
+        steps = require_whole("motion.law.steps", self.steps, *STEPS)
+        object.__setattr__(self, "steps", steps)
+
+    @property
+    def bar(self: Any) -> int:
+        """Number of the bar whose angle the law gives: 2, 3 or 4."""
+        angles = {2: self.theta_2, 3: self.theta_3, 4: self.theta_4}
+        stated = {bar: (angle, None, 0.0) for bar, angle in angles.items()}
+        return find_bar("motion.law", stated) or 2
+
+    def times(self: Any) -> Array:
+        """Return the times at which the law is evaluated, (steps + 1,), s."""
+        return np.linspace(self.time[0], self.time[-1], self.steps + 1)
+
+
 @dataclass(frozen=True, slots=True)
-class Law:
+class Law(_OverTime):
     """theta_2(t) through the points of a table: piecewise cubic, its acceleration continuous.
 
     Parameters
@@ -180,32 +202,15 @@ class Law:
             raise InputError(key, (len(time), len(angles)), allowed)
         if any(b <= a for a, b in pairwise(time)):
             raise InputError(f"{key}.time", time, "must rise")
-        object.__setattr__(
-            self, "steps", require_whole(f"{key}.steps", self.steps, *STEPS)
-        )
+        self._require_steps()
         object.__setattr__(self, "time", time)
         object.__setattr__(self, theta, angles)
-
-    @property
-    def bar(self) -> int:
-        """Number of the bar whose angle the law gives: 2, 3 or 4."""
-        angles = {2: self.theta_2, 3: self.theta_3, 4: self.theta_4}
-        return (
-            find_bar(
-                "motion.law", {bar: (angle, None, 0.0) for bar, angle in angles.items()}
-            )
-            or 2
-        )
 
     @property
     def angle(self) -> tuple[float, ...]:
         """Angles of the law's bar at its times, rad."""
         angles: tuple[float, ...] = getattr(self, f"theta_{self.bar}")
         return angles
-
-    def times(self) -> Array:
-        """Return the times at which the law is evaluated, (steps + 1,), s."""
-        return np.linspace(self.time[0], self.time[-1], self.steps + 1)
 
     def at(self, time: Array) -> tuple[Array, Array, Array]:
         """Compute angle, speed and acceleration of the law's bar at times within the table, each (n,).
@@ -251,7 +256,7 @@ def compute_law(kind: str, u: Array) -> tuple[Array, Array, Array]:
 
 
 @dataclass(frozen=True, slots=True)
-class Rise:
+class Rise(_OverTime):
     """An angle that rises by a standard law, dwells, falls and rests.
 
     Parameters
@@ -298,25 +303,13 @@ class Rise:
             raise InputError(f"{key}.rise", self.rise[1], "must last longer than 0 s")
         if self.rest > 0.0 and self.fall is None:
             raise InputError(f"{key}.rest", self.rest, "needs a fall before it")
-        steps = require_whole(f"{key}.steps", self.steps, *STEPS)
-        object.__setattr__(self, "steps", steps)
-
-    @property
-    def bar(self) -> int:
-        """Number of the bar whose angle the law gives: 2, 3 or 4."""
-        angles = {2: self.theta_2, 3: self.theta_3, 4: self.theta_4}
-        stated = {bar: (angle, None, 0.0) for bar, angle in angles.items()}
-        return find_bar("motion.law", stated) or 2
+        self._require_steps()
 
     @property
     def time(self) -> tuple[float, ...]:
         """Times at which the rise, the dwell, the fall and the rest begin and end, as far as they last, s."""
         durations = (self.rise[1], self.dwell, self.fall or 0.0, self.rest)
         return tuple(accumulate((x for x in durations if x > 0.0), initial=0.0))
-
-    def times(self) -> Array:
-        """Return the times at which the law is evaluated, (steps + 1,), s."""
-        return np.linspace(0.0, self.time[-1], self.steps + 1)
 
     def at(self, time: Array) -> tuple[Array, Array, Array]:
         """Compute angle, speed and acceleration of the law's bar at times, each (n,)."""
