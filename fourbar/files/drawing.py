@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from fourbar.effects import ForceDrive, LinearDrive, Place
+from fourbar.effects import ForceDrive, LinearDrive
 from fourbar.errors import InputError
 from fourbar.files.fields import Reader
 from fourbar.formulas.mobility import count_equalities, meet_change_points
@@ -185,18 +185,18 @@ def find_drawn(drawing: DrawnPins, line: ForceDrive | None, name: str) -> float 
         return drawing.angle(ANGLES[name])
     if name != STROKE_COMMAND[0] or not isinstance(line, LinearDrive):
         return None
-    start, end = (_draw_end(drawing, place) for place in (line.start, line.end))
+    start, end = (
+        drawing.from_bar(place.bar, place.vector()) for place in (line.start, line.end)
+    )
     return abs(end - start)
-
-
-def _draw_end(drawing: DrawnPins, place: Place) -> complex:
-    """Return where a settled end of a line is drawn, m."""
-    return drawing.end(place.bar, *place.polar_from_pin())
 
 
 def _find_side(drawing: DrawnPins, line: LinearDrive) -> str | None:
     """Find the side of a cylinder's end on its bar; None where it does not join the ground to a bar."""
-    ends = {place.bar: _draw_end(drawing, place) for place in (line.start, line.end)}
+    ends = {
+        place.bar: drawing.from_bar(place.bar, place.vector())
+        for place in (line.start, line.end)
+    }
     (bar,) = ends.keys() - {1} or (None,)
     if 1 not in ends or bar is None:
         return None

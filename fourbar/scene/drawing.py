@@ -1,6 +1,5 @@
 """A linkage as it is drawn: the places of its four pins in the plane of the drawing."""
 
-import cmath
 import math
 from dataclasses import dataclass, fields
 
@@ -82,10 +81,6 @@ class DrawnPins:
         return angle + 2.0 * math.pi * round(
             (ground + turned - angle) / (2.0 * math.pi)
         )
-
-    def end(self, bar: int, distance: float, angle: float) -> complex:
-        """Return the place in the drawing of a polar place of a bar, x + i y, m."""
-        return self.from_bar(bar, cmath.rect(distance, angle))
 
     def into_bar(self, bar: int, place: Place) -> complex:
         """Return a place of the drawing in the frame of a bar: from its first pin, along + i across, m."""

@@ -14,9 +14,8 @@ def test_a_place_goes_into_a_bar_and_back() -> None:
     for bar in (1, 2, 3, 4):
         z = DRAWING.into_bar(bar, (3.0, 0.5))
         assert DRAWING.from_bar(bar, z) == pytest.approx(3.0 + 0.5j)
-        assert DRAWING.end(bar, abs(z), math.atan2(z.imag, z.real)) == pytest.approx(
-            3.0 + 0.5j
-        )
+        place = fourbar.Place(bar, (abs(z), math.atan2(z.imag, z.real)))
+        assert DRAWING.from_bar(bar, place.vector()) == pytest.approx(3.0 + 0.5j)
 
 
 @pytest.mark.parametrize("turn", [-3.1, -1.0, 0.4, 2.0, 3.1])
