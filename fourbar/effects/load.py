@@ -203,6 +203,14 @@ class Load(Effect):
             return None
         return Place(self.bar, self.from_pin, self.from_centre, self.point)
 
+    def foot(self, G: Any) -> Any:
+        """Return where the settled load acts in the bar's frame, from its first pin, m: at its place, or else at G.
+
+        G, likewise, is where an arm begins, and where a couple alone is shown.
+        """
+        place = self.place
+        return G if place is None else place.vector()
+
     def with_places(self, change: Callable[[Place], Place]) -> "Load":
         """Return the same load with its place changed."""
         place = self.place
@@ -219,12 +227,9 @@ class Load(Effect):
             force = polar(*self.force)
             if self.frame == "bar":
                 force = force * state.direction(self.bar)
-            if self.arm is not None:
-                G = actions.bodies[self.bar - 2].z
-                actions.force(self.bar, factor * force, G, polar(*self.arm))
-            else:
-                assert self.place is not None
-                actions.force(self.bar, factor * force, self.place.vector())
+            foot = self.foot(actions.bodies[self.bar - 2].z)
+            beyond = None if self.arm is None else polar(*self.arm)
+            actions.force(self.bar, factor * force, foot, beyond)
         if is_any(self.moment != 0.0):
             actions.couple(self.bar, factor * self.moment)
 

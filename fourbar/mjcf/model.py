@@ -455,9 +455,7 @@ class Model:
     def add_load_sites(self, root: ET.Element) -> None:
         """Add the point at which each load acts: its place, or G where an arm becomes a couple or no force acts."""
         for index, load in enumerate(self.loads, 1):
-            z = self.linkage.bar(load.bar).to_centre
-            if load.place is not None:
-                z = load.place.vector()
+            z = load.foot(self.linkage.bar(load.bar).to_centre)
             body = _find_body(root, load.bar)
             self._add_site(body, f"load_{index}", z.real, z.imag)
 

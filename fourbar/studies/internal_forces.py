@@ -315,7 +315,7 @@ def _find_couple(load: Any, G: Any, back: Any) -> Any:
     """Return where the couple of a load acts in the bar's axes: where its force does, or else at G."""
     if load.arm is not None:
         return G + polar(*load.arm) * back
-    return G if load.place is None else load.place.vector()
+    return load.foot(G)
 
 
 def _record_pins(recorder: _Recorder, solution: Solution) -> None:

@@ -131,7 +131,7 @@ def list_acting(scene: Scene) -> list[Symbol]:
                     "force",
                     f"load {number}",
                     load.bar,
-                    G if load.place is None else load.place.vector(),
+                    load.foot(G),
                     arm,
                     cmath.rect(*load.force),
                     load.frame == "bar",
