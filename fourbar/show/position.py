@@ -9,7 +9,7 @@ from fourbar.quantities import DERIVED_NAMES
 from fourbar.scene import Scene
 from fourbar.show.columns import read_column
 from fourbar.show.derived import derive
-from fourbar.show.units import POSITION_DIGITS, ROUND_OFF, choose_unit
+from fourbar.show.units import POSITION_DIGITS, choose_unit, drop_rounding, write_cell
 from fourbar.solution import Array, Conversion, Solution, find_values
 
 LABEL, CELL = 15, 15
@@ -46,7 +46,7 @@ class PositionSheet:
             if letter == "alpha":
                 speeds = [getattr(self.solution, f"omega_{bar}") for bar in MOVING_BARS]
                 largest = max(largest, np.nanmax(np.square(speeds), initial=0.0))
-            numbers = np.where(np.abs(numbers) <= ROUND_OFF * largest, 0.0, numbers)
+            numbers = drop_rounding(numbers, largest)
             factor, name = choose_unit(0.0, unit, self.units)
             form = ".4f" if letter == "theta" else f".{POSITION_DIGITS}g"
             columns[f"{letter}, {name}"] = _write_numbers(factor * numbers, form)
@@ -173,7 +173,7 @@ class PositionSheet:
     ) -> str:
         """Write the components of a vector, and its size."""
         factor, name = choose_unit(largest, unit, self.units)
-        numbers = np.where(np.abs(vector) <= ROUND_OFF * largest, 0.0, vector)
+        numbers = drop_rounding(vector, largest)
         size = [float(np.hypot(*numbers))] if sized else []
         cells = _write_numbers(factor * np.array([*numbers, *size]))
         return _write_row(label, [*cells, *([] if sized else [""]), name])
@@ -182,26 +182,17 @@ class PositionSheet:
         self, label: str, values: Array, unit: str, after: str = ""
     ) -> str:
         factor, name = 1.0, ""
-        if unit == "rad" and abs(float(values[0])) <= ROUND_OFF:
-            values = 0.0 * values
+        if unit in ("rad", "1"):  # of turns and of ratios, which are about 1
+            values = drop_rounding(values, 1.0)
         if unit != "1":
             factor, name = choose_unit(abs(float(values[0])), unit, self.units)
             name = f" {name}"
-        elif abs(float(values[0])) <= ROUND_OFF:  # of ratios of lengths, which are 1
-            factor = 0.0
         (text,) = _write_numbers(factor * values)
         return f"{label:<{NUMBER_LABEL}}{text}{name}{after}"
 
 
 def _write_numbers(numbers: Array, form: str = f".{POSITION_DIGITS}g") -> list[str]:
-    """Write numbers; a dash where there is no value, and 0 without a sign."""
-    texts = []
-    for number in numbers.tolist():
-        text = format(number, form) if np.isfinite(number) else "-"
-        if text != "-" and float(text) == 0.0:
-            text = text.removeprefix("-")
-        texts.append(text)
-    return texts
+    return [write_cell(number, form) for number in numbers.tolist()]
 
 
 def _write_row(label: str, cells: Iterable[str]) -> str:

@@ -13,7 +13,7 @@ from fourbar.quantities import ANGLES, DERIVED_NAMES, OK, PIN_FORCES, UNITS
 from fourbar.show.columns import Column
 from fourbar.show.derived import derive
 from fourbar.show.duty import read_drive
-from fourbar.show.units import ROUND_OFF
+from fourbar.show.units import drop_rounding, write_cell
 from fourbar.solution import (
     DEGREES,
     Array,
@@ -206,8 +206,7 @@ def _list_parts(solution: Solution, name: str) -> dict[str, Array]:
     if values.ndim == 1:
         return {name: values}
     sizes = np.hypot(values[:, 0], values[:, 1])
-    small = np.abs(values) <= ROUND_OFF * sizes[:, None]
-    x, y = np.where(small, 0.0, values).T
+    x, y = drop_rounding(values, sizes[:, None]).T
     size = {f"|{name}|": sizes} if has_size(name) else {}
     return {**size, f"{name}_x": x, f"{name}_y": y}
 
@@ -250,15 +249,7 @@ def write_cells(values: Array, form: str = ".6g") -> list[str]:
     sizes = np.abs(values[np.isfinite(values)])
     # not the largest, which may stand beside a pole
     usual = float(np.percentile(sizes, 90.0)) if sizes.size else 0.0
-    cells = []
-    for value in values.tolist():
-        text = format(0.0 if abs(value) <= ROUND_OFF * usual else value, form)
-        if not math.isfinite(value):
-            text = "-"
-        elif float(text) == 0.0:
-            text = text.removeprefix("-")
-        cells.append(text)
-    return cells
+    return [write_cell(value, form) for value in drop_rounding(values, usual).tolist()]
 
 
 def _count_digits(torque: Array, error: Array) -> list[str]:

@@ -5,9 +5,11 @@ from collections.abc import Mapping
 from functools import cache
 from typing import Any
 
+import numpy as np
+
 from fourbar.errors import InputError
 from fourbar.linkage import MOVING_BARS
-from fourbar.solution import DEGREES, SI, Conversion, find_unit_in
+from fourbar.solution import DEGREES, SI, Array, Conversion, find_unit_in
 
 ALLOWED = 'must be "SI", "imperial" or a list like "mm N N.mm deg rpm"'
 PRESETS = {"si": "", "imperial": "in lbf lbf.in lb deg rpm hp psi"}
@@ -169,6 +171,19 @@ ROUND_OFF = 1e-13
 """Part of the largest number of its kind below which a number is shown as zero."""
 DIGITS, POSITION_DIGITS = 4, 6
 """Significant digits of a number of a summary, and of one about a single position."""
+
+
+def drop_rounding(values: Array, largest: float | Array) -> Array:
+    """Return numbers with zero in place of what is rounding of the largest of their kind."""
+    return np.where(np.abs(values) <= ROUND_OFF * largest, 0.0, values)
+
+
+def write_cell(number: float, form: str) -> str:
+    """Write a number for a table; a dash where there is no value, and 0 without a sign."""
+    if not math.isfinite(number):
+        return "-"
+    text = format(number, form)
+    return text.removeprefix("-") if float(text) == 0.0 else text
 
 
 def write_digits(value: float, digits: int = DIGITS) -> str:
