@@ -122,23 +122,6 @@ def require_numbers(
     return array.astype(float)
 
 
-def require_pair(
-    key: str, value: Any, unit: str, second: str = "rad", bound: str = ANY
-) -> tuple[float, float]:
-    """Return a pair of numbers, mostly a size and an angle, as floats, or raise an InputError.
-
-    `unit`, `second`: of the two; `bound`: of the first, and of the second unless it is
-    an angle.
-    """
-    try:
-        size, other = value
-    except (TypeError, ValueError):
-        names = "size, angle" if second == "rad" else f"{unit}, {second}"
-        raise InputError(key, value, f"must be a pair ({names})") from None
-    of_second = ANY if second == "rad" else bound
-    return require(key, size, unit, bound), require(key, other, second, of_second)
-
-
 def require_bar(key: str, value: object) -> int:
     """Return the number of a moving bar, or raise an InputError."""
     return require_whole(key, value, MOVING_BARS, "must be 2, 3 or 4")
@@ -169,13 +152,24 @@ class Declared(NamedTuple):
         return self.bound, ANY if self.pair == "rad" else self.bound
 
 
+def require_pair(key: str, value: Any, by: Declared) -> tuple[float, float]:
+    """Return a pair of numbers, mostly a size and an angle, as floats, or raise an InputError."""
+    try:
+        size, other = value
+    except (TypeError, ValueError):
+        names = "size, angle" if by.pair == "rad" else ", ".join(by.units)
+        raise InputError(key, value, f"must be a pair ({names})") from None
+    (unit, second), (bound, of_second) = by.units, by.bounds
+    return require(key, size, unit, bound), require(key, other, second, of_second)
+
+
 def check_numbers(description: Any, key: str) -> None:
     """Check the numbers that a frozen description states by its `numbers`, and convert those with units."""
     for name, stated in description.numbers.items():
         value, full_key = getattr(description, name), f"{key}.{name}".strip(".")
         if value is not None or stated.left_out is not None:
             checked = (
-                require_pair(full_key, value, stated.unit, stated.pair, stated.bound)
+                require_pair(full_key, value, stated)
                 if stated.pair
                 else require(full_key, value, *stated[:2])
             )

@@ -156,7 +156,7 @@ def require_place(key: str, place: object) -> Place:
     ((name, pair),) = forms.items()
     if name == "from_centre":
         require_mass_centre(key, bar)
-    checked: Any = {name: require_pair(f"{key}.{name}", pair, STATED_PLACES[name].unit)}
+    checked: Any = {name: require_pair(f"{key}.{name}", pair, STATED_PLACES[name])}
     return Place(bar, **checked)
 
 
