@@ -8,9 +8,10 @@ import cmath
 import math
 from collections.abc import Container
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
+from functools import cache
 from numbers import Integral
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -174,6 +175,30 @@ def check_numbers(description: Any, key: str) -> None:
                 else require(full_key, value, *stated[:2])
             )
             object.__setattr__(description, name, checked)
+
+
+Description = TypeVar("Description")
+
+
+def copy_with(description: Description, /, **changed: Any) -> Description:
+    """Return a frozen description with some fields changed, itself where none is.
+
+    The new values may be arrays; nothing is checked again.
+    """
+    if all(value is getattr(description, name) for name, value in changed.items()):
+        return description
+    kind: Any = description.__class__
+    copied: Description = object.__new__(kind)
+    for name in list_fields(kind):
+        value = changed[name] if name in changed else getattr(description, name)
+        object.__setattr__(copied, name, value)
+    return copied
+
+
+@cache
+def list_fields(kind: type) -> tuple[str, ...]:
+    """List the names of a dataclass's fields."""
+    return tuple(field.name for field in fields(kind))
 
 
 @dataclass(frozen=True, slots=True)

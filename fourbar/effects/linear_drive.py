@@ -12,13 +12,13 @@ import numpy as np
 
 from fourbar.effects.effect import Actions
 from fourbar.effects.force_drive import ForceDrive
-from fourbar.effects.place import Place, copy_with, require_ends
+from fourbar.effects.place import Place, require_ends
 from fourbar.effects.spring import COINCIDE
 from fourbar.errors import InputError
 from fourbar.formulas.arithmetic import Number, is_any
 from fourbar.formulas.motion import State
 from fourbar.formulas.path import NO_DIGIT_LEFT
-from fourbar.linkage import ENDS, MOVING_BARS, PINS, FourBar
+from fourbar.linkage import ENDS, MOVING_BARS, PINS, FourBar, copy_with
 from fourbar.quantities import NO_DIRECTION, NO_LEVER, OK
 
 
@@ -43,7 +43,7 @@ class LinearDrive(ForceDrive):
 
     def with_places(self, change: Callable[[Place], Place]) -> "LinearDrive":
         """Return the same drive with its ends changed."""
-        return copy_with(self, start=change(self.start), end=change(self.end))  # type: ignore[no-any-return]
+        return copy_with(self, start=change(self.start), end=change(self.end))
 
     @property
     def ends(self) -> tuple[tuple[float, Place], tuple[float, Place]]:

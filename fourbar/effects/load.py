@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from fourbar.effects.effect import Actions, Effect
-from fourbar.effects.place import STATED_PLACES, Place, copy_with
+from fourbar.effects.place import STATED_PLACES, Place
 from fourbar.errors import InputError, LimitError, expect
 from fourbar.formulas.arithmetic import (
     PI_LOW,
@@ -25,6 +25,7 @@ from fourbar.linkage import (
     Declared,
     FourBar,
     check_numbers,
+    copy_with,
     require_bar,
     require_numbers,
 )
@@ -216,7 +217,7 @@ class Load(Effect):
         place = self.place
         if place is None or (changed := change(place)) is place:
             return self
-        return copy_with(self, **changed._asdict())  # type: ignore[no-any-return]
+        return copy_with(self, **changed._asdict())
 
     def act(self, actions: Actions, state: State) -> None:
         """Add F at its place, and the couple."""

@@ -1,8 +1,6 @@
 """Places of bars: from the bar's first pin, from its mass centre, or at a named point."""
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import fields
-from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -186,23 +184,3 @@ def change_each(terms: Any, change: Callable[[Place], Place]) -> Any:
     changed = tuple(term.with_places(change) for term in terms)
     same = all(one is other for one, other in zip(changed, terms, strict=True))
     return terms if same else changed
-
-
-def copy_with(description: Any, **changed: Any) -> Any:
-    """Return a frozen description with some fields changed, itself where none is.
-
-    The new values may be arrays; nothing is checked again.
-    """
-    if all(value is getattr(description, name) for name, value in changed.items()):
-        return description
-    copied = object.__new__(type(description))
-    for name in _list_names(description.__class__):
-        value = changed[name] if name in changed else getattr(description, name)
-        object.__setattr__(copied, name, value)
-    return copied
-
-
-@cache
-def _list_names(kind: type) -> tuple[str, ...]:
-    """List the names of a dataclass's fields."""
-    return tuple(field.name for field in fields(kind))

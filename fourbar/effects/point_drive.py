@@ -12,13 +12,13 @@ import numpy as np
 from fourbar.effects.effect import Actions
 from fourbar.effects.force_drive import ForceDrive
 from fourbar.effects.load import require_frame
-from fourbar.effects.place import Place, copy_with, require_place
+from fourbar.effects.place import Place, require_place
 from fourbar.effects.spring import COINCIDE
 from fourbar.errors import InputError
 from fourbar.formulas.arithmetic import Number, is_any, polar
 from fourbar.formulas.motion import State
 from fourbar.formulas.path import NO_DIGIT_LEFT
-from fourbar.linkage import MOVING_BARS, FourBar, require, require_bar
+from fourbar.linkage import MOVING_BARS, FourBar, copy_with, require, require_bar
 from fourbar.quantities import NO_LEVER, OK
 
 
@@ -46,7 +46,7 @@ class PointDrive(ForceDrive):
 
     def with_places(self, change: Callable[[Place], Place]) -> "PointDrive":
         """Return the same drive with its place changed."""
-        return copy_with(self, place=change(self.place))  # type: ignore[no-any-return]
+        return copy_with(self, place=change(self.place))
 
     @property
     def ends(self) -> tuple[tuple[float, Place], ...]:

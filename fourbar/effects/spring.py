@@ -8,13 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.effects.effect import Actions, Effect
-from fourbar.effects.place import (
-    STATED_PLACES,
-    Place,
-    change_each,
-    copy_with,
-    require_ends,
-)
+from fourbar.effects.place import STATED_PLACES, Place, change_each, require_ends
 from fourbar.errors import InputError, expect
 from fourbar.formulas.arithmetic import is_any, select
 from fourbar.formulas.motion import State
@@ -24,6 +18,7 @@ from fourbar.linkage import (
     Declared,
     FourBar,
     check_numbers,
+    copy_with,
     require,
 )
 from fourbar.quantities import NO_DIRECTION, OK
@@ -120,7 +115,7 @@ class Spring:
 
     def with_places(self, change: Callable[[Place], Place]) -> "Spring":
         """Return the same spring with its ends changed."""
-        return copy_with(self, start=change(self.start), end=change(self.end))  # type: ignore[no-any-return]
+        return copy_with(self, start=change(self.start), end=change(self.end))
 
     @property
     def slack(self) -> float:
@@ -161,7 +156,7 @@ class Springs(Effect):
     def with_places(self, change: Callable[[Place], Place]) -> "Springs":
         """Return the same springs with their ends changed."""
         springs = change_each(self.springs, change)
-        return copy_with(self, springs=springs)  # type: ignore[no-any-return]
+        return copy_with(self, springs=springs)
 
     def act(self, actions: Actions, state: State) -> None:
         """Add the tension at `start` along the unit vector to `end`, and its opposite at `end`."""

@@ -10,14 +10,14 @@ Numerische Mathematik 18 (1971).
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import fields, is_dataclass
-from functools import cache
+from dataclasses import is_dataclass
 from typing import Any
 
 import numpy as np
 from numpy.lib.mixins import NDArrayOperatorsMixin
 
 from fourbar.formulas.arithmetic import PI_LOW, Number, split_sum, without_slopes
+from fourbar.linkage import copy_with, list_fields
 
 HAS_LONG_DOUBLES = np.finfo(np.longdouble).nmant > np.finfo(np.float64).nmant
 HALF_PI_LOWEST = -1.4973849048591833e-33
@@ -63,24 +63,16 @@ def change_numbers(value: Any, change: Callable[[Any], Any]) -> Any:
     if isinstance(value, tuple):
         parts = [change_numbers(part, change) for part in value]
         return type(value)(*parts) if hasattr(value, "_fields") else tuple(parts)
-    if not (names := _list_fields(value.__class__)):
+    if not _has_numbers(value.__class__):
         return value
-    changed = object.__new__(
-        type(value)
-    )  # a constructor checks what a user gives, one number at a time
-    for name in names:
-        object.__setattr__(changed, name, change_numbers(getattr(value, name), change))
-    return changed
+    names = list_fields(value.__class__)
+    changed = {name: change_numbers(getattr(value, name), change) for name in names}
+    return copy_with(value, **changed)
 
 
-@cache
-def _list_fields(kind: type) -> tuple[str, ...]:
-    """List the fields of a dataclass whose numbers may be changed."""
-    return (
-        tuple(field.name for field in fields(kind))
-        if is_dataclass(kind) and not getattr(kind, "as_given", False)
-        else ()
-    )
+def _has_numbers(kind: type) -> bool:
+    """Return True for a dataclass whose numbers may be changed."""
+    return is_dataclass(kind) and not getattr(kind, "as_given", False)
 
 
 class Pair(NDArrayOperatorsMixin):

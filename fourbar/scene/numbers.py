@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from fourbar import effects
-from fourbar.effects.place import copy_with
 from fourbar.errors import InputError, expect
 from fourbar.linkage import (
     BAR_NAMES,
@@ -16,6 +15,7 @@ from fourbar.linkage import (
     Declared,
     FourBar,
     check_numbers,
+    copy_with,
     require,
     require_whole,
 )
@@ -82,7 +82,7 @@ class Point:
         stated = self.place
         if (place := change(stated)) is stated:
             return self
-        return copy_with(self, from_pin=place.from_pin, from_centre=place.from_centre)  # type: ignore[no-any-return]
+        return copy_with(self, from_pin=place.from_pin, from_centre=place.from_centre)
 
     @property
     def key(self) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.effects.effect import Effect
-from fourbar.effects.place import change_each, copy_with, settler
+from fourbar.effects.place import change_each, settler
 from fourbar.errors import InputError, LimitError, expect
 from fourbar.formulas.arithmetic import (
     PI_LOW,
@@ -28,7 +28,7 @@ from fourbar.formulas.mobility import (
 )
 from fourbar.formulas.path import prepare_path
 from fourbar.formulas.position import Loop
-from fourbar.linkage import BAR_NAMES, FourBar, require_bar
+from fourbar.linkage import BAR_NAMES, FourBar, copy_with, require_bar
 from fourbar.quantities import Array
 from fourbar.scene.drawing import DrawnPins
 from fourbar.scene.motion import (
@@ -195,7 +195,7 @@ class Scene:
             for name in ("points", "loads", "effects")
         }
         drive = None if self.drive is None else self.drive.with_places(change)
-        return copy_with(self, **changed, drive=drive)  # type: ignore[no-any-return]
+        return copy_with(self, **changed, drive=drive)
 
     def settled(self) -> "Scene":
         """Return the same scene with every place from the first pin of its bar, as `Place.settle` does."""

@@ -1,7 +1,6 @@
 """The numbers of a scene by their keys in its file, and scenes in which they are arrays."""
 
 from collections.abc import Mapping
-from dataclasses import fields
 from difflib import get_close_matches
 from typing import Any, NamedTuple
 
@@ -20,6 +19,7 @@ from fourbar.linkage import (
     Bar,
     Declared,
     FourBar,
+    copy_with,
 )
 from fourbar.scene import Scene
 from fourbar.scene.numbers import Tolerance
@@ -290,14 +290,5 @@ def replace_place(holder: Any, place: Place, values: Any) -> Any:
     old = getattr(holder, name)
     if isinstance(holder, Bar) and name == "centre" and old is None:
         old = holder.mass_centre
-    new = object.__new__(type(holder))
-    for field in fields(holder):
-        value = (
-            replace_place(old, tuple(rest), values)
-            if field.name == name
-            else getattr(holder, field.name)
-        )
-        object.__setattr__(new, field.name, value)
-    if isinstance(new, Bar):
-        object.__setattr__(new, "mass", new.weigh())
-    return new
+    new = copy_with(holder, **{name: replace_place(old, tuple(rest), values)})
+    return copy_with(new, mass=new.weigh()) if isinstance(new, Bar) else new
