@@ -39,7 +39,7 @@ UP = (0.0, 0.0, 1.0)
 
 def find_refusal(scene: Scene) -> str:
     """Name the declared limit that a scene meets, if any."""
-    if reason := find_unknown(scene, has_term, linear=True):
+    if reason := find_unknown(scene, has_term, forces=True):
         return reason
     for number in FIRST_PIN:
         bar = scene.linkage.bar(number)

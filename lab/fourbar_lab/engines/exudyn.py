@@ -66,7 +66,7 @@ class ExudynBars(Loaded):
     )
 
     def __init__(self, scene: Scene) -> None:
-        if reason := find_unknown(scene, has_term, linear=True):
+        if reason := find_unknown(scene, has_term, forces=True):
             raise LimitError(reason)
         if isinstance(scene.drive, PointDrive):
             raise LimitError("a force at a point has no element here")

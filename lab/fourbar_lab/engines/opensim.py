@@ -54,7 +54,7 @@ ENDS = ("start", "end")
 
 def find_refusal(scene: Scene) -> str:
     """Name the declared limit that a scene meets, if any."""
-    if reason := find_unknown(scene, has_term, linear=True):
+    if reason := find_unknown(scene, has_term, forces=True):
         return reason
     for number in MOVING_BARS:
         if scene.linkage.bar(number).mass == 0.0:
@@ -243,8 +243,8 @@ class OpenSimBars(Loaded):
         )
 
     def _drive_column(self) -> Array:
-        """Differentiate the driven bar's direction, or the stroke of a linear drive, by the coordinates, (3,)."""
-        if self.linear is None:
+        """Return the generalized forces of the drive per N m or N, (3,)."""
+        if self.force_drive is None:
             return PER_COORDINATE[self.drive_bar]
         rate = sum(
             sense
@@ -253,7 +253,7 @@ class OpenSimBars(Loaded):
                 if place.bar == 1
                 else self._compute_station_jacobian(name)
             )
-            for name, (sense, place) in zip(ENDS, self.linear.ends, strict=False)
+            for name, (sense, place) in zip(ENDS, self.force_drive.ends, strict=False)
         )
         return np.asarray(self.line()[1] @ rate)
 

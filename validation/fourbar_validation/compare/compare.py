@@ -88,7 +88,9 @@ OF_THE_LINE = {
     "stroke_speed": "v_B",
     LINE.value: COUPLE.value,
 }
-"""Quantities of a linear drive; each is compared if the quantity it maps to is compared or the engine answers it."""
+"""Quantities of a drive that exerts a force; each is compared if the quantity it maps to is compared or the engine
+answers it.
+"""
 OF_FORCES = (*FORCES, *DRY_FRICTION_QUANTITIES)
 MOST_UNDECIDED = 0.5
 """Share of the numbers of a scene that are undecided, beyond which it does not hold."""

@@ -1,4 +1,4 @@
-"""The line of a linear drive from the angles of the bars alone: its stroke, its speed, and its leverage."""
+"""The line of a drive that exerts a force, from the angles of the bars alone: stroke, speed and leverage."""
 
 from typing import TYPE_CHECKING, NamedTuple
 

@@ -201,7 +201,7 @@ TERMS: dict[str, Callable[[str, Sizes], Array]] = {
 
 
 def _compute_drive_arms(scene: Scene) -> dict[int, float]:
-    """Compute the distances of the ends of a linear drive from the first pins of their bars, m."""
+    """Compute the distances from the first pins of the bars to where a force drives them, m."""
     ends = () if scene.drive is None else scene.drive.ends
     return {end.bar: abs(end.distance) for _, end in ends}
 
@@ -300,7 +300,7 @@ def _find_line(
     theta: dict[int, Array],
     known: dict[str, Any],
 ) -> dict[str, Array]:
-    """Find stroke, direction, speed and leverage of a linear drive, from the answer's own angles and speeds."""
+    """Find stroke, direction, speed and leverage of a force that drives, from the answer's own angles and speeds."""
     line = place_line(linkage, drive, theta)
     quantities = {"drive_line": np.stack((line.unit.real, line.unit.imag), axis=1)}
     if drive.has_stroke:

@@ -138,8 +138,8 @@ def hold_simulated(error: float, why: str) -> ErrorBound:
 
 
 OF_DIRECTION = frozenset(("drive_line", "stroke_speed", "drive_condition"))
-"""Quantities that, like every force, follow from the direction of a linear drive: the places of its ends are rounded
-as the lengths are, and their direction by that over the stroke.
+"""Quantities that, like every force, follow from the direction of the force that drives: the places of its ends are
+rounded as the lengths are, and the direction by that over the stroke.
 """
 
 

@@ -218,13 +218,13 @@ def declares(effect: Effect, method: str) -> bool:
 
 
 def find_unknown(
-    scene: Scene, knows: Callable[[Any], bool], *, linear: bool = False
+    scene: Scene, knows: Callable[[Any], bool], *, forces: bool = False
 ) -> str:
     """Give the reason to refuse a scene with an effect that an engine does not know; empty where there is none.
 
-    `linear`: whether a drive that exerts a force is known.
+    `forces`: True if the engine knows drives that exert a force.
     """
-    if scene.drive is not None and scene.motion.free is None and not linear:
+    if scene.drive is not None and scene.motion.free is None and not forces:
         return "a drive that exerts a force has no model here"
     return next(
         (

@@ -3,9 +3,9 @@
 Newton's method solves the two closure equations for the angles. Their first derivative
 is linear in b omega_3 and c omega_4, their second in b alpha_3 and c alpha_4. Forces
 and moments about the first pin of each bar and the two reactions at A and B are
-thirteen linear equations in F12, F32, F23, F43, F34, F14 and the torque, or the force
-of a linear drive (R. L. Norton, Design of Machinery, ch. 11, has them about the mass
-centres). Vectors of the plane are complex numbers, x + i y.
+thirteen linear equations in F12, F32, F23, F43, F34, F14 and the torque or force of
+the drive (R. L. Norton, Design of Machinery, ch. 11, has them about the mass centres).
+Vectors of the plane are complex numbers, x + i y.
 """
 
 from dataclasses import replace
@@ -74,7 +74,7 @@ class FreeBody:
     def answer(self, scene: Scene, command: Command) -> Answer:
         """Answer, or refuse by naming an effect that it does not know."""
         scene = state_from_pins(scene)
-        if reason := find_unknown(scene, has_wrench, linear=True):
+        if reason := find_unknown(scene, has_wrench, forces=True):
             return Answer(NAME, "exact", refusal=reason)
         if command.bar != 2 and scene.counts_turns:
             return Answer(
@@ -387,8 +387,8 @@ def _make_matrix(scene: Scene, motion: BodyMotion) -> Array:
     """Make the matrix of the equations, (n, 13, 13): forces and moments of bars 2, 3, 4, reactions at A and B.
 
     Moments are divided by the bar's length, so that every entry is 0, 1 or a component
-    of a unit vector. The last column is that of the torque, or the effect of 1 N of a
-    linear drive on the two bars that it joins.
+    of a unit vector. The last column is that of the torque, or the effect of 1 N of the
+    drive on the bars that it pushes.
     """
     matrix = np.zeros((len(motion.theta_2), 13, 13))
     for bar, (row, first, second) in ROWS.items():

@@ -87,7 +87,7 @@ class Loaded(EngineBars, Protocol):
     """
 
     drive_bar: int
-    linear: "ForceDrive | None" = None
+    force_drive: "ForceDrive | None" = None
     """The drive, where it exerts a force."""
     driving: str
     """Name of the drive's quantity that is solved for."""
@@ -108,7 +108,7 @@ class Loaded(EngineBars, Protocol):
             scene.drive_bar,
             terms,
         )
-        self.linear, self.driving = scene.drive, name_driving(scene)
+        self.force_drive, self.driving = scene.drive, name_driving(scene)
         self.loaded = [pin for effect in scene.effects for pin in effect.loaded_pins]
 
     # methods that the engine defines
@@ -155,9 +155,9 @@ class Loaded(EngineBars, Protocol):
 
     def cylinder(self, bar: int) -> tuple[complex, complex]:
         """Measure it with the bars laid down along +x."""
-        assert self.linear is not None
+        assert self.force_drive is not None
         self.place((0.0, 0.0, 0.0))
-        ends = [end for _, end in self.linear.ends]
+        ends = [end for _, end in self.force_drive.ends]
         on_bar, on_ground = sorted(ends, key=lambda end: -end.bar)
         on, ground = (
             np.subtract(self.end(point), self.first_pin(bar)).tolist()
@@ -167,14 +167,15 @@ class Loaded(EngineBars, Protocol):
 
     def line(self) -> tuple[list[tuple[float, int, Pair]], Array]:
         """Place the drive: sense, bar and point of each end, m; and its direction."""
-        assert self.linear is not None
+        assert self.force_drive is not None
         ends = [
-            (sense, place.bar, self.end(place)) for sense, place in self.linear.ends
+            (sense, place.bar, self.end(place))
+            for sense, place in self.force_drive.ends
         ]
-        if isinstance(self.linear, PointDrive):
-            along = resolve(1.0, self.linear.direction)
-            if self.linear.frame == "bar":
-                along = self.rotate(self.linear.place.bar, *along)
+        if isinstance(self.force_drive, PointDrive):
+            along = resolve(1.0, self.force_drive.direction)
+            if self.force_drive.frame == "bar":
+                along = self.rotate(self.force_drive.place.bar, *along)
             return ends, np.array(along)
         (*_, one), (*_, second) = ends
         line = np.subtract(second, one)
@@ -182,7 +183,7 @@ class Loaded(EngineBars, Protocol):
 
     def work(self, size: float) -> None:
         """Let the drive act with a torque, N m, or a force, N."""
-        if self.linear is None:
+        if self.force_drive is None:
             self.couple(self.drive_bar, size)
             return
         ends, along = self.line()

@@ -31,7 +31,7 @@ class PinocchioTree(Tree):
     """The open tree, built from the description."""
 
     def __init__(self, scene: Scene) -> None:
-        if reason := find_unknown(scene, has_term, linear=True):
+        if reason := find_unknown(scene, has_term, forces=True):
             raise LimitError(reason)
         self.model = model = pin.Model()
         self.joint, self.frame = {1: 0}, dict[str, int]()

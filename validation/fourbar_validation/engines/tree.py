@@ -125,12 +125,12 @@ class Tree(Loaded, Protocol):
         return self.needed(self.field, self.wrenches)
 
     def drive_column(self) -> Array:
-        """Return what the drive does on the coordinates per N m or N: of a force the derivative of its path, (3,)."""
-        if self.linear is None:
+        """Return the generalized forces of the drive per N m or N, (3,)."""
+        if self.force_drive is None:
             return self.turns[self.drive_bar]
         _, along = self.line()
         rate = sum(
-            sense * self.end_jacobian(place) for sense, place in self.linear.ends
+            sense * self.end_jacobian(place) for sense, place in self.force_drive.ends
         )
         return np.asarray(along @ rate)
 
@@ -154,7 +154,7 @@ class Tree(Loaded, Protocol):
         on = self.carried()
         carry(on, 3, x, y)
         carry(on, 4, -x, -y)
-        if self.linear is not None:
+        if self.force_drive is not None:
             ends, along = self.line()
             for sense, bar, _ in ends:
                 carry(on, bar, *(sense * drive * along).tolist())

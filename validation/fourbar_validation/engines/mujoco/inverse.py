@@ -22,7 +22,7 @@ from fourbar_validation.engines.tree import Tree
 
 def find_refusal(scene: Scene) -> str:
     """Name the declared limit that a scene meets, if any."""
-    if reason := find_unknown(scene, has_term, linear=True):
+    if reason := find_unknown(scene, has_term, forces=True):
         return reason
     for part in list_parts(scene.linkage):
         if min(part.mass, part.inertia) < LIGHTEST.boundary:
