@@ -9,7 +9,9 @@ commanded bar's direction, M the mass matrix and f what acts,
     J_c a = e alpha - (dJ_c/dt) v,
     J^T [F12 F32 F43 F14 drive] = M a - f.
 
-g, J, (dJ/dt) v, M and f are Exudyn's; the three linear systems are solved here.
+g, J, (dJ/dt) v, M and f are Exudyn's; the three linear systems are solved here. A force
+at a point is that of a cylinder from the ground, whose end there is moved at each
+position such that the point lies ahead of it in the direction of the force.
 """
 
 import math
@@ -64,12 +66,14 @@ class ExudynBars(Loaded):
         " its own state; Newton's method on its gap and the linear solves are the"
         " harness's"
     )
+    behind: Any = None
+    """Marker of the end on the ground, where a force at a point drives."""
+    reach: float
+    """Distance of that end, m: of the size of the coordinates, so that the direction keeps its digits."""
 
     def __init__(self, scene: Scene) -> None:
         if reason := find_unknown(scene, has_term, forces=True):
             raise LimitError(reason)
-        if isinstance(scene.drive, PointDrive):
-            raise LimitError("a force at a point has no element here")
         exu.config.printToConsole = False
         self.container = exu.SystemContainer()
         self.mbs = mbs = self.container.AddSystem()
@@ -98,11 +102,15 @@ class ExudynBars(Loaded):
             markers = [bodies.direction(bar) for bar in (1, scene.drive_bar)]
             self.drive = mbs.AddObject(ObjectConnectorCoordinate(markerNumbers=markers))
         else:
-            ends = [end for _, end in scene.drive.ends]
             markers = [
                 bodies.point(end.bar, *place(end, scene.linkage.ground_angle))
-                for end in ends
+                for _, end in scene.drive.ends
             ]
+            if isinstance(scene.drive, PointDrive):
+                away = abs(scene.drive.place.distance)
+                self.reach = sum(scene.linkage.lengths) + away
+                self.behind = bodies.point(1, -self.reach)
+                markers.insert(0, self.behind)
             mbs.AddObject(
                 ObjectConnectorDistance(markerNumbers=markers, distance=1.0)
             )  # any: what is asked is its rate
@@ -223,6 +231,8 @@ class ExudynBars(Loaded):
 
     def move(self, bar: int, speed: float, acceleration: float) -> Values:
         """Return speeds, accelerations and multipliers; nothing where a toggle leaves them 0/0."""
+        if self.behind is not None:
+            self._move_behind()
         of_drive, commanded = (
             self._read_constraint_jacobian(),
             np.eye(SIZE)[-1],
@@ -264,6 +274,12 @@ class ExudynBars(Loaded):
             np.linalg.LinAlgError
         ):  # no torque or force of the drive balances the linkage here
             return values
+
+    def _move_behind(self) -> None:
+        """Move the end on the ground behind the point that a force drives."""
+        [(_, _, point)], along = self.line()
+        x, y = (np.array(point) - self.reach * along).tolist()
+        self.mbs.SetMarkerParameter(self.behind, "localPosition", [x, y, 0.0])
 
     def _sum_applied(self) -> Array:
         """Sum what acts, less what the speeds ask for, (9,)."""

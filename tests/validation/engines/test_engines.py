@@ -19,6 +19,7 @@ from fourbar.effects import (
     Load,
     PinFriction,
     Place,
+    PointDrive,
     Viscous,
 )
 from fourbar.errors import InputError
@@ -181,9 +182,18 @@ def test_random_linkages(name: str) -> None:
     suite = Random(20, 3, tuple(DrawnType))
     for index in range(len(suite)):
         drawn = suite.scene(index)
-        if name == "exudyn-constraints":  # it has no element for a force at a point
-            drawn = replace(drawn, drive=None, drive_bar=drawn.drive_bar or 2)
         assert failures(name, drawn, every=6) == [], suite.name(index)
+
+
+@further
+@pytest.mark.parametrize("frame", ["world", "bar"])
+@pytest.mark.parametrize("bar", [2, 3, 4])
+def test_a_force_at_a_point_drives(name: str, bar: int, frame: str) -> None:
+    drive = PointDrive(Place(bar, (0.17, 0.6)), 1.1, frame)
+    for lengths in MECHANISMS.values():
+        motion = Motion(None, 10.0, 3.0)
+        case = Scene(bars(lengths), motion, None, LOADS, EFFECTS, drive=drive)
+        assert failures(name, case, every=12) == []
 
 
 @pytest.mark.parametrize("name", present(*TREES, "free-body"))
