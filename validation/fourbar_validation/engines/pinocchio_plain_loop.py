@@ -4,13 +4,11 @@ import numpy as np
 import pinocchio as pin
 
 from fourbar.effects import Gravity
-from fourbar.linkage import MOVING_BARS
 from fourbar.scene import Scene
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.engines.pinocchio import WORLD, PinocchioTree
-from fourbar_validation.engines.plain_loop import PlainLoop, carry_loop_force
-
-AT_REST = np.zeros(3)
+from fourbar_validation.engines.plain_loop import PlainLoop
+from fourbar_validation.engines.tree import AT_REST
 
 
 class PinocchioLoop(PlainLoop):
@@ -27,10 +25,6 @@ class PinocchioLoop(PlainLoop):
         )
         tree.act()
         self.model.gravity = pin.Motion(np.array([*tree.field, 0.0]), AT_REST)
-        self.on = [
-            (self.data.oMi[joint].rotation, self.data.f[joint].linear)
-            for joint in (tree.joint[bar] for bar in MOVING_BARS)
-        ]
 
     def look(self, q: Array) -> tuple[float, float, Array]:
         """Return the gap, m, and its derivative, (2, 3)."""
@@ -68,8 +62,3 @@ class PinocchioLoop(PlainLoop):
             force[1] = minus_sine * x + cosine * y
             couple[2] = moment
         return np.asarray(pin.rnea(self.model, self.data, q, v, a, tree.external))
-
-    def read(self, loop_force: Array, forces: dict[str, Array]) -> None:
-        """Write the pin forces, the loop's force carried on to the ground."""
-        on = [(rotation @ force)[:2] for rotation, force in self.on]
-        carry_loop_force(loop_force, on, forces)

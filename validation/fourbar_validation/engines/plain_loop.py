@@ -22,7 +22,7 @@ from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.engines.description import list_speeds, state_from_pins
 from fourbar_validation.engines.loop import Assembler
-from fourbar_validation.engines.tree import solve_closed, solve_multipliers
+from fourbar_validation.engines.tree import put_back, solve_closed, solve_multipliers
 
 MOST_STEPS = 20
 """Newton's steps of one position; from its neighbour two or three are enough."""
@@ -70,7 +70,10 @@ class PlainLoop:
             needed = self.inverse(q, v, a)
             unknowns = solve_multipliers(jacobian, self.drive, needed)
             torque[row] = unknowns[2]
-            self.read(unknowns[:2], {name: at[row] for name, at in forces.items()})
+            forces["F43"][row] = loop_force = unknowns[:2]
+            pins = put_back(self.tree.carried(), *loop_force.tolist())
+            for name, force in pins.items():
+                forces[name][row] = force
         return {"torque": torque, **forces}
 
     def close(self, q: Array) -> Array:
@@ -100,17 +103,3 @@ class PlainLoop:
     def inverse(self, q: Array, v: Array, a: Array) -> Array:
         """Return the generalized forces that the motion needs beside loads and weights."""
         raise NotImplementedError
-
-    def read(self, loop_force: Array, forces: dict[str, Array]) -> None:
-        """Write the pin forces: those of the open tree, and the loop's force carried on to the ground."""
-        raise NotImplementedError
-
-
-def carry_loop_force(
-    loop_force: Array, on: list[Array], forces: dict[str, Array]
-) -> None:
-    """Put the loop's force into the forces on bars 2, 3 and 4 at their first pins."""
-    forces["F43"][:] = loop_force
-    forces["F12"][:] = on[0] - loop_force
-    forces["F32"][:] = loop_force - on[1]
-    forces["F14"][:] = on[2] + loop_force

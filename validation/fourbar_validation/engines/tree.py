@@ -35,6 +35,7 @@ OPEN_AT_B = [(name, point) for name, point in POINTS.items() if name != "A2"]
 """Names of points where bars 2 and 3 share pin A, and of the points of the bars."""
 ACCELERATIONS = [f"a_{name}" for name in ON_BARS]
 AT_REST = np.zeros(3)
+"""Speeds or accelerations of the coordinates, where they are zero."""
 BORNE = {2: (2,), 3: (3, 2), 4: (4,)}
 """Bars whose first pins carry what acts on a bar of the open tree."""
 OMEGAS, ALPHAS = (
@@ -150,16 +151,13 @@ class Tree(Loaded, Protocol):
         bar 4 and the force of a drive are carried on to the ground; a couple asks
         nothing of the pins.
         """
-        x, y = loop_force.tolist()
         on = self.carried()
-        carry(on, 3, x, y)
-        carry(on, 4, -x, -y)
         if self.force_drive is not None:
             ends, along = self.line()
             for sense, bar, _ in ends:
                 carry(on, bar, *(sense * drive * along).tolist())
-        x, y = on[3]
-        return {"F12": on[2], "F32": (-x, -y), "F14": on[4]}
+        x, y = loop_force.tolist()
+        return put_back(on, x, y)
 
     def move(self, bar: int, speed: float, acceleration: float) -> Values:
         """Return velocities, accelerations and forces where the tree is placed; nothing where they are 0/0."""
@@ -204,6 +202,14 @@ def carry(on: dict[int, Pair], bar: int, x: float, y: float) -> None:
     for bearer in BORNE.get(bar, ()):
         f_x, f_y = on[bearer]
         on[bearer] = f_x - x, f_y - y
+
+
+def put_back(on: dict[int, Pair], x: float, y: float) -> dict[str, Pair]:
+    """Return F12, F32, F14, N: what the pins of an open tree carry, with the force (x, y) of bar 4 on bar 3."""
+    carry(on, 3, x, y)
+    carry(on, 4, -x, -y)
+    x, y = on[3]
+    return {"F12": on[2], "F32": (-x, -y), "F14": on[4]}
 
 
 BAR_2 = np.array([1.0, 0.0, 0.0])

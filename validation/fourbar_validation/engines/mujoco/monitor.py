@@ -19,10 +19,11 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
+from fourbar.linkage import BAR_NAMES, MOVING_BARS
 from fourbar.quantities import COUPLE, LINE, PIN_FORCES
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.engines.mujoco.closed_loop import O2, O4, A, ClosedLoop
-from fourbar_validation.engines.tree import solve_multipliers
+from fourbar_validation.engines.tree import put_back, solve_multipliers
 
 
 @dataclass(frozen=True, slots=True)
@@ -210,11 +211,9 @@ class ResidualMonitor:
             d.ctrl[bars.ram] = 0.0
         mujoco.mj_rnePostConstraint(bars.model, d)
         on = bars.carried()
-        return {
-            "F14": on["output"] + loop_force,
-            "F32": -(on["coupler"] - loop_force),
-            "F12": on["input"] - loop_force,
-        }
+        x, y = loop_force.tolist()
+        pins = put_back({bar: on[BAR_NAMES[bar]].tolist() for bar in MOVING_BARS}, x, y)
+        return {name: np.array(force) for name, force in pins.items()}
 
     def _close(self, q: Array, v: Array, a: Array, seen: _Motion) -> _Motion:
         """Close the loop at the same theta_2, omega_2, alpha_2 in position, velocity and acceleration."""

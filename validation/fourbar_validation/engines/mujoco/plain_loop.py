@@ -6,7 +6,7 @@ import numpy as np
 from fourbar.scene import Scene
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.engines.mujoco.inverse import MujocoTree
-from fourbar_validation.engines.plain_loop import PlainLoop, carry_loop_force
+from fourbar_validation.engines.plain_loop import PlainLoop
 
 
 class MujocoInverseLoop(PlainLoop):
@@ -46,7 +46,3 @@ class MujocoInverseLoop(PlainLoop):
         """Return the generalized forces that the motion needs beside what acts."""
         self.data.qacc[:], self.tree.v, self.tree.a = a, v, a
         return np.asarray(self.tree.torques())
-
-    def read(self, loop_force: Array, forces: dict[str, Array]) -> None:
-        """Write the pin forces, the loop's force carried on to the ground."""
-        carry_loop_force(loop_force, list(self.tree.carried().values()), forces)
