@@ -30,15 +30,20 @@ def write_urdf(scene: Scene) -> str:
         turned = " ".join(
             f'{axes}="{part.inertia!r}"' for axes in ("ixx", "iyy", "izz")
         )
-        links.append(
-            f'<link name="{BAR_NAMES[part.bar]}"><inertial><origin'
-            f' xyz="{part.centre[0]!r} {part.centre[1]!r} 0"/><mass'
-            f' value="{part.mass!r}"/><inertia {turned} ixy="0" ixz="0"'
-            f' iyz="0"/></inertial></link><joint name="{FIRST_PIN[part.bar]}"'
-            f' type="continuous"><parent link="{BAR_NAMES[part.bearer]}"/><child'
-            f' link="{BAR_NAMES[part.bar]}"/><origin xyz="{part.first_pin[0]!r}'
-            f' {part.first_pin[1]!r} 0"/><axis xyz="0 0 1"/></joint>'
-        )
+        (x, y), (pin_x, pin_y) = part.centre, part.first_pin
+        links += [
+            f'<link name="{BAR_NAMES[part.bar]}"><inertial>',
+            f'<origin xyz="{x!r} {y!r} 0"/>',
+            f'<mass value="{part.mass!r}"/>',
+            f'<inertia {turned} ixy="0" ixz="0" iyz="0"/>',
+            "</inertial></link>",
+            f'<joint name="{FIRST_PIN[part.bar]}" type="continuous">',
+            f'<parent link="{BAR_NAMES[part.bearer]}"/>',
+            f'<child link="{BAR_NAMES[part.bar]}"/>',
+            f'<origin xyz="{pin_x!r} {pin_y!r} 0"/>',
+            '<axis xyz="0 0 1"/>',
+            "</joint>",
+        ]
     return "".join([*links, "</robot>"])
 
 

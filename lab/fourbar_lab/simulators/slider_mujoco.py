@@ -7,6 +7,8 @@ from fourbar_lab.simulators.slider_engines import SliderBar
 from fourbar_validation.compare.answer import Array
 
 VERSION = mujoco.__version__
+NO_INERTIA = 1e-12
+"""kg m^2; inertia of the slider, which does not turn: MuJoCo holds no body without any."""
 
 
 class MujocoSlider:
@@ -20,23 +22,28 @@ class MujocoSlider:
         push: Array,
     ) -> None:
         crank, rod, offset = lengths
-        inertials = [
-            f'<inertial pos="{b.centre[0]!r} {b.centre[1]!r} 0" mass="{b.mass!r}"'
-            f' diaginertia="{i!r} {i!r} {i!r}"/>'
-            for b, i in (
-                (body, body.inertia or 1e-12) for body in bodies
-            )  # the slider does not turn
-        ]
+        of_crank, of_rod, of_slider = map(_write_inertial, bodies)
         hinge = '<joint type="hinge" axis="0 0 1"/>'
-        self.model = mujoco.MjModel.from_xml_string(
-            f'<mujoco><option gravity="{float(field[0])!r} {float(field[1])!r} 0"><flag'
-            ' constraint="disable"/></option><worldbody><body'
-            f' name="crank">{hinge}{inertials[0]}<body name="rod" pos="{crank!r} 0'
-            f' 0">{hinge}{inertials[1]}<site name="end" pos="{rod!r} 0'
-            f' 0"/></body></body><body name="slider" pos="0 {offset!r} 0"><joint'
-            f' type="slide" axis="1 0 0"/>{inertials[2]}<site'
-            ' name="slider"/></body></worldbody></mujoco>'
-        )
+        gravity_x, gravity_y = field.tolist()
+        lines = [
+            "<mujoco>",
+            f'<option gravity="{gravity_x!r} {gravity_y!r} 0">',
+            '<flag constraint="disable"/>',
+            "</option>",
+            "<worldbody>",
+            f'<body name="crank">{hinge}{of_crank}',
+            f'<body name="rod" pos="{crank!r} 0 0">{hinge}{of_rod}',
+            f'<site name="end" pos="{rod!r} 0 0"/>',
+            "</body>",
+            "</body>",
+            f'<body name="slider" pos="0 {offset!r} 0">',
+            f'<joint type="slide" axis="1 0 0"/>{of_slider}',
+            '<site name="slider"/>',
+            "</body>",
+            "</worldbody>",
+            "</mujoco>",
+        ]
+        self.model = mujoco.MjModel.from_xml_string("\n".join(lines))
         self.data, self.push = mujoco.MjData(self.model), push
         self.bodies = [self.model.body(name).id for name in ("crank", "rod", "slider")]
         self.sites = [self.model.site(name).id for name in ("end", "slider")]
@@ -85,3 +92,12 @@ class MujocoSlider:
         mujoco.mj_rnePostConstraint(self.model, self.data)
         forces = [np.array(self.data.cfrc_int[body][3:5]) for body in self.bodies]
         return forces[0], forces[1], forces[2]
+
+
+def _write_inertial(body: SliderBar) -> str:
+    x, y = body.centre
+    inertia = body.inertia or NO_INERTIA
+    return (
+        f'<inertial pos="{x!r} {y!r} 0" mass="{body.mass!r}"'
+        f' diaginertia="{inertia!r} {inertia!r} {inertia!r}"/>'
+    )

@@ -101,11 +101,11 @@ MOST_DEGREES = 1e6
 LARGEST_FILE = 64 * 2**20
 """Bytes; a table larger than this is not a hand-made comparison."""
 HEADING = re.compile(
-    r"\|?(?P<name>\w[\w"
-    r" ]*?)\|?\s*(?:\[(?P<square>[^\]]*)\]|\((?P<round>.*)\))?(?P<letter>_[xy])?"
+    r"\|?(?P<name>\w[\w ]*?)\|?\s*"
+    r"(?:\[(?P<square>[^\]]*)\]|\((?P<round>.*)\))?"
+    r"(?P<letter>_[xy])?"
 )
-
-
+"""Heading of a column: a name, perhaps between bars, its unit in brackets, and a component."""
 PLACES = frozenset(name for name in VECTORS if UNITS[name] == "m")
 """Quantities that are places, in the coordinates of a scene's drawing."""
 

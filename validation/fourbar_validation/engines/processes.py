@@ -90,8 +90,8 @@ def run_to_end(
 
 SAYS_WHY = (
     re.compile(
-        r"^\s*(Caused by: |Exception in thread |Uncaught"
-        r" )?(\w+[.:/])*\w*(Error|Exception)\b.*: *\S"
+        r"^\s*(Caused by: |Exception in thread |Uncaught )?"
+        r"(\w+[.:/])*\w*(Error|Exception)\b.*: *\S"
     ),
     re.compile(r"\b(what\(\): |panicked at|terminate called)", re.IGNORECASE),
     re.compile(
