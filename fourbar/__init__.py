@@ -1,4 +1,4 @@
-"""Closed formulas of the planar four-bar linkage: from position to driving torque and pin forces."""
+"""Closed formulas of the planar four-bar linkage: driving torque and pin forces."""
 
 from importlib import import_module as _import_module
 from types import ModuleType as _ModuleType
@@ -109,7 +109,9 @@ _ON_FIRST_USE = {
     "in_units": "fourbar.show.notebook",
     "units": "fourbar.show.units",
 }
-"""Modules of the names that many programs never use, or that need more than numpy: `import fourbar` loads none."""
+"""Modules of names that few programs use, or that need more than numpy. `import
+fourbar` loads none of them.
+"""
 
 
 def __getattr__(name: str) -> _Any:

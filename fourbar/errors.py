@@ -1,4 +1,7 @@
-"""Errors: one root, one class per kind of mistake; and how a command ends, with a status and one line."""
+"""Errors with one root, and the exit status and the line with which a command ends.
+
+There is one class for each kind of mistake.
+"""
 
 import io
 import os
@@ -84,7 +87,10 @@ class DependencyError(FourBarError):
 
 
 def say_install(extra: str) -> str:
-    """Return how to install an extra of this package from where it came, as no package index has the package itself."""
+    """Return how to install an extra of this package from where the package came.
+
+    No package index has the package itself.
+    """
     if (Path(__file__).parents[1] / "pyproject.toml").is_file():
         return f'pip install ".[{extra}]" in the checkout'
     from importlib.metadata import requires
@@ -112,7 +118,9 @@ def say_install(extra: str) -> str:
 
 
 HOLDS, FAILED, BAD_INPUT, BROKEN, INTERRUPTED = 0, 1, 2, 3, 130
-"""All holds; a comparison fails or none was made; bad input; the environment or the program failed; interrupted."""
+"""Exit statuses. All holds; a comparison fails or none was made; bad input; the
+environment or the program failed; interrupted.
+"""
 
 
 def run(
@@ -121,7 +129,9 @@ def run(
     arguments: list[str] | None = None,
     extra: str = "all",
 ) -> int:
-    """Run a command of a group; the exit status is what the command returns, or says what went wrong.
+    """Run a command of a group and return its exit status.
+
+    The status is what the command returns, or that of its error.
 
     `extra`: the one that brings what the program needs, named where a module is
     missing.
@@ -192,7 +202,7 @@ def _read_exit(raised: SystemExit, streams: tuple[TextIO, ...]) -> int:
 
 
 def _is_unread(stream: TextIO) -> bool:
-    """Return True if a stream is a pipe that nobody reads any more, or if the system cannot tell."""
+    """Return True if a stream is a pipe without a reader, or if that cannot be told."""
     if not hasattr(select, "poll"):
         return True
     try:
@@ -206,7 +216,10 @@ def _is_unread(stream: TextIO) -> bool:
 
 
 def _flush() -> None:
-    """Write out what was printed while an error can still be reported; a reader that has gone is none."""
+    """Write out what was printed, while an error can still be reported.
+
+    A reader that has gone is no error.
+    """
     try:
         sys.stdout.flush()
     except BrokenPipeError:
@@ -223,7 +236,10 @@ def _say(message: str, status: int) -> int:
 
 
 def clean_line(text: str) -> str:
-    """Return one line without control characters: a title or file name does not steer the terminal."""
+    """Return one line without control characters.
+
+    A title or file name must not control the terminal.
+    """
     return " ".join(
         "".join(letter if letter.isprintable() else " " for letter in text).split()
     )
@@ -232,7 +248,10 @@ def clean_line(text: str) -> str:
 def _report_interruption(
     kind: type[BaseException], error: BaseException, trace: TracebackType | None
 ) -> None:
-    """Print one line also where the libraries are still being imported, and nothing can catch it yet."""
+    """Print one line for an interruption while the libraries are imported.
+
+    Nothing else can catch it at that time.
+    """
     if not issubclass(kind, KeyboardInterrupt):
         sys.__excepthook__(kind, error, trace)
         return
@@ -241,7 +260,9 @@ def _report_interruption(
 
 
 STARTED_AS = [("-m", name) for name in ("fourbar", "validation", "fourbar_validation")]
-"""The commands of this project: another program that imports it reports its own interruptions."""
+"""The commands of this project. A program that imports it reports its own
+interruptions.
+"""
 if Path(sys.argv[0] if sys.argv else "").stem in (
     "fourbar",
     "fourbar-validation",

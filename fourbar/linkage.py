@@ -78,7 +78,10 @@ def require(key: str, value: object, unit: str = "1", bound: str = ANY) -> float
 
 
 def require_whole(key: str, value: object, among: Container[int], allowed: str) -> int:
-    """Return the value as one of some integers, or raise an InputError that says what is allowed."""
+    """Return the value as one of some integers.
+
+    Raises an InputError that says what is allowed.
+    """
     if type(value) is int and value in among:
         return value
     if isinstance(value, bool) or not isinstance(value, Integral) or value not in among:
@@ -87,7 +90,10 @@ def require_whole(key: str, value: object, among: Container[int], allowed: str) 
 
 
 def read_quantity(value: object) -> object:
-    """Return a `pint.Quantity` as text with its unit, in a list if it is an array; other values as they are."""
+    """Return a `pint.Quantity` as text with its unit, in a list if it is an array.
+
+    Other values are returned as they are.
+    """
     if not hasattr(value, "magnitude") or not hasattr(value, "units"):
         return value
     from fourbar.quantities.units import write_quantity
@@ -97,7 +103,10 @@ def read_quantity(value: object) -> object:
 
 
 def convert_to_unit(key: str, value: object, unit: str) -> object:
-    """Convert each text like "48 cm" of a value, in lists too, as `require` does; numbers and arrays stay."""
+    """Convert each text like "48 cm" of a value, in lists too, as `require` does.
+
+    Numbers and arrays stay.
+    """
     if unit != "1":
         value = read_quantity(value)
     if isinstance(value, (list, tuple)):
@@ -110,9 +119,10 @@ def convert_to_unit(key: str, value: object, unit: str) -> object:
 def require_numbers(
     key: str, value: object, allowed: str = "must be finite numbers", unit: str = "1"
 ) -> NDArray[np.float64]:
-    """Return the value as finite floats, shape () or (n,), or raise an InputError that says what is allowed.
+    """Return the value as finite floats, shape () or (n,).
 
-    A text with a unit is converted as by `require`, in a list too.
+    Raises an InputError that says what is allowed. A text with a unit is converted as
+    by `require`, in a list too.
     """
     try:
         array = np.asarray(convert_to_unit(key, value, unit))
@@ -133,14 +143,17 @@ REQUIRED = object()
 
 
 class Declared(NamedTuple):
-    """Declaration of a number of a scene, for constructors, scene files, studies and tolerances."""
+    """Declaration of a number of a scene.
+
+    Constructors, scene files, studies and tolerances follow it.
+    """
 
     unit: str
     bound: str = ANY
     left_out: Any = REQUIRED
     """Value where a scene file leaves it out."""
     pair: str = ""
-    """Unit of the second number of a pair, "rad" of a magnitude's angle; empty for one number."""
+    """Unit of the second number of a pair, "rad" for an angle; empty for one number."""
 
     @property
     def units(self) -> tuple[str, str]:
@@ -154,7 +167,10 @@ class Declared(NamedTuple):
 
 
 def require_pair(key: str, value: Any, by: Declared) -> tuple[float, float]:
-    """Return a pair of numbers, mostly a size and an angle, as floats, or raise an InputError."""
+    """Return a pair of numbers, mostly a size and an angle, as floats.
+
+    Raises an InputError that says what is allowed.
+    """
     try:
         size, other = value
     except (TypeError, ValueError):
@@ -165,7 +181,10 @@ def require_pair(key: str, value: Any, by: Declared) -> tuple[float, float]:
 
 
 def check_numbers(description: Any, key: str) -> None:
-    """Check the numbers that a frozen description states by its `numbers`, and convert those with units."""
+    """Check the numbers that a frozen description declares in `numbers`.
+
+    Those with units are converted.
+    """
     for name, stated in description.numbers.items():
         value, full_key = getattr(description, name), f"{key}.{name}".strip(".")
         if value is not None or stated.left_out is not None:
@@ -211,13 +230,14 @@ class Bar:
     ----------
     length : distance between its two pins, m, > 0.
     mass : kg, >= 0.
-    inertia : about the mass centre G, kg m^2, >= 0; left out: uniform slender bar, m L^2/12.
-    centre : (r, phi), polar position of G from the bar's first pin (O2, A, O4), phi measured
-        from the bar's line, m and rad; left out: mid-bar.
-    density : kg/m^3, > 0, in place of `mass`, which is then that of a uniform bar from pin to pin
-        and follows the length.
-    section : (height, thickness) of a rectangular cross-section, m: the height lies in the plane
-        of motion.
+    inertia : about the mass centre G, kg m^2, >= 0; left out: uniform slender bar,
+        m L^2/12.
+    centre : (r, phi), polar position of G from the bar's first pin (O2, A, O4), phi
+        measured from the bar's line, m and rad; left out: mid-bar.
+    density : kg/m^3, > 0, in place of `mass`, which is then that of a uniform bar from
+        pin to pin and follows the length.
+    section : (height, thickness) of a rectangular cross-section, m: the height lies in
+        the plane of motion.
     diameter : of a round cross-section, m, in place of `section`.
 
     >>> Bar("0.4 m", density="7850 kg/m^3", section=("20 mm", "5 mm")).mass
@@ -272,7 +292,7 @@ class Bar:
 
     @property
     def section_modulus(self) -> Any:
-        """Section modulus of bending in the plane of motion, m^3; None without a cross-section.
+        """Section modulus of bending in the plane, m^3; None without a cross-section.
 
         t h^2/6 of a rectangle of height h and thickness t, pi d^3/32 of a circle.
         """
@@ -284,7 +304,11 @@ class Bar:
         return None
 
     def weigh(self) -> Any:
-        """Return the mass that density and cross-section state, from pin to pin, kg; without a density the mass."""
+        """Return the mass of the bar, kg.
+
+        Density and cross-section state it from pin to pin; without a density it is
+        `mass`.
+        """
         if self.density is None:
             return self.mass
         return self.density * self.area * self.length
@@ -295,7 +319,10 @@ class Bar:
 
     @property
     def moment_of_inertia(self) -> float:
-        """Moment of inertia about the mass centre, kg m^2; if left out, that of a uniform slender bar, m L^2/12."""
+        """Moment of inertia about the mass centre, kg m^2.
+
+        If left out, it is that of a uniform slender bar, m L^2/12.
+        """
         return (
             self.mass * self.length * self.length / 12.0
             if self.inertia is None
@@ -304,7 +331,7 @@ class Bar:
 
     @property
     def mass_centre(self) -> tuple[float, float]:
-        """Polar (r, phi) from the bar's first pin, m and rad; mid-bar where it is left out."""
+        """Polar (r, phi) from the bar's first pin, m and rad; mid-bar if left out."""
         return (0.5 * self.length, 0.0) if self.centre is None else self.centre
 
     @property
@@ -315,7 +342,7 @@ class Bar:
 
 @dataclass(frozen=True, slots=True)
 class FourBar:
-    """A four-bar linkage: ground length d and angle theta_1 (O2 to O4), and three moving bars.
+    """A four-bar linkage: ground length d and angle theta_1 (O2 to O4), three bars.
 
     Raises InputError where the four lengths cannot close anywhere (the longest exceeds
     the sum of the other three).
@@ -379,7 +406,9 @@ def uniform(
     *,
     per_metre: float | str = 1.0,
 ) -> FourBar:
-    """Make a linkage of uniform slender bars of the given lengths (m) and mass per metre (kg/m).
+    """Make a linkage of uniform slender bars.
+
+    The lengths are in m, the mass per metre in kg/m.
 
     >>> uniform("6 in", "2 in", "5 in", "4 in").ground
     0.1524

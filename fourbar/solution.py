@@ -44,35 +44,41 @@ if TYPE_CHECKING:
 
 SCHEMA = "fourbar-analyze/1"
 Conversion = Mapping[str, tuple[str, float]]
-"""Units to show: for an SI unit another unit and the factor to it; a unit that is left out stays."""
+"""Units to show: for an SI unit another unit and the factor to it. A unit that is left
+out stays.
+"""
 SI: Conversion = {}
 DEGREES: Conversion = {"rad": ("deg", 180.0 / math.pi)}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Solution(Quantities):  # noqa: PLW1641 - arrays have no hash
-    """The answer of the formulas at n positions, or at n positions of each of m linkages, SI units and radians.
+    """The answer of the formulas at n positions, in SI units and radians.
 
-    Scalars have shape (n,), vectors (n, 2), of a study (m, n) and (m, n, 2); NaN marks
-    a position where a quantity has no value (see `status`), None a quantity that was
-    not requested.
+    For a study it is at n positions of each of m linkages. Scalars have shape (n,),
+    vectors (n, 2), of a study (m, n) and (m, n, 2); NaN marks a position where a
+    quantity has no value (see `status`), None a quantity that was not requested.
     """
 
     title: str
     drive_bar: int
     """2, 3 or 4; None where the drive exerts a force."""
     status_code: NDArray[np.uint8]
-    """0 ok: every quantity that was requested is a number. 1 not_assembled, 2 singular (velocities are 0/0); of
-    friction that depends on the pin forces: 3 jammed (no forces fulfil it: they are NaN; at rest, where it is the
-    motion that would begin, torque_low or torque_high is), 4 several (more than one set does: those of the least
-    friction); of springs, forces NaN: 5 no_direction (both ends in one point), 6 wound (turned beyond half a turn from
-    rest). 7 no_torque: the two bars that are not driven are in line, no couple on the driven bar holds them in balance,
-    forces are NaN (T3 and T4 have these poles where omega_3, omega_4 are 0). 8 overflow: numbers beyond the range of
-    doubles; from the first stage (position, velocity, ...) that meets them on everything is NaN. 9 invalid: a member of
-    a study with numbers that a scene refuses (a length that is not positive, a mass below 0); all of it is NaN.
-    10 no_lever: the stroke of a linear drive stands still, or the point of a driving force moves across its direction;
-    forces are NaN. 11 change_point: all bars are in line; positions, speeds and the drive are their limits along the
-    assembly, pin forces, which have no bound there, are NaN.
+    """0 ok: every quantity that was requested is a number. 1 not_assembled, 2 singular
+    (velocities are 0/0); of friction that depends on the pin forces: 3 jammed (no
+    forces fulfil it: they are NaN; at rest, where it is the motion that would begin,
+    torque_low or torque_high is), 4 several (more than one set does: those of the least
+    friction); of springs, forces NaN: 5 no_direction (both ends in one point), 6 wound
+    (turned beyond half a turn from rest). 7 no_torque: the two bars that are not driven
+    are in line, no couple on the driven bar holds them in balance, forces are NaN (T3
+    and T4 have these poles where omega_3, omega_4 are 0). 8 overflow: numbers beyond
+    the range of doubles; from the first stage (position, velocity, ...) that meets them
+    on everything is NaN. 9 invalid: a member of a study with numbers that a scene
+    refuses (a length that is not positive, a mass below 0); all of it is NaN. 10
+    no_lever: the stroke of a linear drive stands still, or the point of a driving force
+    moves across its direction; forces are NaN. 11 change_point: all bars are in line;
+    positions, speeds and the drive are their limits along the assembly, pin forces,
+    which have no bound there, are NaN.
     """
     branch: NDArray[np.int8]
     """Sign of sin(theta_4 - theta_3): +1 or -1."""
@@ -83,26 +89,33 @@ class Solution(Quantities):  # noqa: PLW1641 - arrays have no hash
     acceleration: dict[str, Array] = field(default_factory=dict, kw_only=True)
     """Accelerations of the scene's points, m/s^2."""
     ground: tuple[Any, Any] | None = field(default=None, kw_only=True)
-    """Length and angle of the ground bar, m and rad; of a study (m, 1) each where they vary."""
+    """Length and angle of the ground bar, m and rad. Of a study (m, 1) each where they
+    vary.
+    """
     scene: "Scene | None" = field(default=None, kw_only=True)
     """Scene that was solved; None for a study."""
     lengths: tuple[Any, Any, Any, Any] | None = field(default=None, kw_only=True)
-    """Lengths of ground, input, coupler and output, m; of a study (m, 1) each where they vary."""
+    """Lengths of ground, input, coupler and output, m. Of a study (m, 1) each where
+    they vary.
+    """
     drive: "ForceDrive | None" = field(default=None, kw_only=True)
     """Drive of the scene that exerts a force; None: a couple drives a bar."""
     change_points: tuple[float, ...] | None = field(default=None, kw_only=True)
-    """Times at which a free motion passed a change point, s: another motion was possible there."""
+    """Times at which a free motion passed a change point, s. Another motion was
+    possible there.
+    """
 
-    at: Command = field(default=None, kw_only=True)  # type: ignore[assignment]  # `solve` states it
+    at: Command = field(default=None, kw_only=True)  # type: ignore[assignment]  # by `solve`
     """Positions that were solved, with what is commanded."""
 
     def __len__(self) -> int:
         return len(self.theta_2)
 
     def __getitem__(self, name: str) -> Array:
-        """Return a quantity by its name, that of a point of the scene too (`P`, `v_P`, `a_P`), in SI units.
+        """Return a quantity by its name, in SI units.
 
-        InputError for another name, and for a quantity that was not evaluated.
+        The name may be that of a point of the scene (`P`, `v_P`, `a_P`). InputError for
+        another name, and for a quantity that was not evaluated.
         """
         names = _list_quantities(self)
         if not isinstance(name, str) or name not in names:
@@ -163,11 +176,17 @@ class Solution(Quantities):  # noqa: PLW1641 - arrays have no hash
 
     @property
     def status(self) -> Any:
-        """One of `STATUS_NAMES` for each position, as a list; of a study a list of such lists."""
+        """Status of each position, one of `STATUS_NAMES`, as a list.
+
+        Of a study it is a list of such lists.
+        """
         return np.array(STATUS_NAMES)[self.status_code].tolist()
 
     def evaluated(self) -> list[str]:
-        """List the names of the quantities that were evaluated, theta_2 first; without the scene's own points."""
+        """List the names of the quantities that were evaluated, theta_2 first.
+
+        Those of the scene's points are left out.
+        """
         return [name for name in UNITS if getattr(self, name) is not None]
 
     def to_csv(
@@ -178,13 +197,17 @@ class Solution(Quantities):  # noqa: PLW1641 - arrays have no hash
         units: Conversion = SI,
         decimal: str = ".",
     ) -> str | None:
-        """Write one line per position with every digit: returned as text, or written to a file atomically.
+        """Write one line per position with every digit.
+
+        The text is returned, or written to a file atomically.
 
         Parameters
         ----------
         degrees : theta in deg.
-        units : other units, as `fourbar.units("mm N.mm")` makes them; every heading then names its unit.
-        decimal : "," writes decimal commas, and semicolons between the columns, as many spreadsheets expect.
+        units : other units, as `fourbar.units("mm N.mm")` makes them; every heading
+            then names its unit.
+        decimal : "," writes decimal commas, and semicolons between the columns, as many
+            spreadsheets expect.
         """
         expect("path", path, str, Path, type(None))
         expect("degrees", degrees, bool)
@@ -199,9 +222,10 @@ class Solution(Quantities):  # noqa: PLW1641 - arrays have no hash
         return None
 
     def to_pandas(self, units: Conversion = SI) -> "DataFrame":
-        """Make a table of what was evaluated, a row per position, vectors as `A_x`, `A_y`; SI and radians by default.
+        """Make a table of what was evaluated, a row per position.
 
-        `attrs["units"]` of the table is the unit of each column of numbers.
+        Vectors are `A_x`, `A_y`; the default is SI units and radians. `attrs["units"]`
+        of the table is the unit of each column of numbers.
 
         Raises DependencyError where pandas is not installed.
         """
@@ -216,7 +240,10 @@ class Solution(Quantities):  # noqa: PLW1641 - arrays have no hash
 
 
 def _read_unit(heading: str) -> str:
-    """Return the unit of a column of numbers: the one that its heading names, else the SI unit."""
+    """Return the unit of a column of numbers.
+
+    It is that of the heading, otherwise the SI unit.
+    """
     name, _, unit = heading.partition(" [")
     if unit:
         return unit.removesuffix("]")
@@ -255,7 +282,7 @@ def split_parts(name: str, values: Array) -> dict[str, Array]:
 def list_parts(
     values: Mapping[str, Array | None], scalars: tuple[str, ...]
 ) -> dict[str, Array]:
-    """List the given scalars and the magnitudes of the pin forces, as far as they have values."""
+    """List the given scalars and the magnitudes of the pin forces that have values."""
     parts: dict[str, Array] = {}
     for name in (*scalars, *PIN_FORCES):
         if (quantity := values.get(name)) is not None:
@@ -268,9 +295,10 @@ def list_parts(
 
 
 def write_json(solution: Solution, units: Conversion = SI, **more: Any) -> str:
-    """Write one object: arrays over the positions in the given units, vectors as [x, y], null for no value.
+    """Write one object: arrays over the positions in the given units.
 
-    Entries of other names follow as they are given.
+    Vectors are [x, y]; null stands for no value. Entries of other names follow as they
+    are given.
     """
     names = _list_quantities(solution)
     return write_object(
@@ -298,7 +326,9 @@ def write_csv(
     decimal: str = ".",
     chosen: Mapping[str, Array] | None = None,
 ) -> str:
-    """Write one line per position; vectors as columns `A_x`, `A_y`, empty where there is no value.
+    """Write one line per position.
+
+    Vectors are columns `A_x`, `A_y`; a missing value is empty.
 
     `chosen`: the columns by heading, in these units; left out: all quantities.
     """
@@ -329,7 +359,10 @@ def write_csv(
 
 
 def list_leading(solution: Solution) -> dict[str, list[Any]]:
-    """List the first columns of a table, one entry for each position; of a study also the number of the member."""
+    """List the first columns of a table, one entry for each position.
+
+    Of a study the number of the member is one.
+    """
     size = solution.theta_2.size
     first = {
         "status": np.array(STATUS_NAMES)[solution.status_code.ravel()].tolist(),
@@ -345,10 +378,11 @@ def list_leading(solution: Solution) -> dict[str, list[Any]]:
 
 
 def list_scalars(solution: Solution, units: Conversion = SI) -> dict[str, Array | None]:
-    """List every quantity as columns of numbers, vectors as `A_x`, `A_y`; None for what was not evaluated.
+    """List every quantity as columns of numbers.
 
-    Of a pin force the magnitude too, and where it is known the time. In other units
-    than SI every heading names its own: `F12_x [lbf]`.
+    Vectors are `A_x`, `A_y`; None stands for what was not evaluated. Of a pin force the
+    magnitude too, and where it is known the time. In other units than SI every heading
+    names its own: `F12_x [lbf]`.
     """
     columns: dict[str, Array | None] = {}
     for name in _list_quantities(solution):
@@ -390,7 +424,10 @@ def is_scalar(name: str) -> bool:
 
 
 def has_size(name: str) -> bool:
-    """Return True if a table has the size of a vector besides its components: a force."""
+    """Return True if a table has the size of a vector besides its components.
+
+    Forces have it.
+    """
     return name in PIN_FORCES or name == "shaking_force"
 
 
@@ -433,12 +470,15 @@ def require_units(units: object) -> Conversion:
 
 
 def find_unit_in(unit: str, units: Conversion) -> tuple[str, float]:
-    """Return the unit in which a quantity of an SI unit is given, and the factor to it."""
+    """Return the unit in which a quantity of an SI unit is given, and the factor."""
     return units.get(unit, (unit, 1.0))
 
 
 def _list_quantities(solution: "Solution") -> list[str]:
-    """List every quantity of a solution, evaluated or not; time and those of a force drive only where there is one."""
+    """List every quantity of a solution, evaluated or not.
+
+    Time and those of a force drive are listed only if there is one.
+    """
     left_out: tuple[str, ...] = LINE_QUANTITIES
     if solution.drive is not None:
         left_out = () if solution.drive.has_stroke else (STROKE,)
@@ -454,16 +494,20 @@ def _list_quantities(solution: "Solution") -> list[str]:
 
 
 def find_unit(name: str) -> str:
-    """Return the SI unit of a quantity, or of a point of the scene: its path, velocity or acceleration."""
+    """Return the SI unit of a quantity or of a point of the scene.
+
+    Of a point it is that of its path, velocity or acceleration.
+    """
     if name in DERIVED_NAMES:
         return DERIVED_NAMES[name].unit
     return UNITS.get(name) or {"v_": "m/s", "a_": "m/s^2"}.get(name[:2], "m")
 
 
 def find_values(solution: Solution, name: str, units: Conversion = SI) -> Any:
-    """Return a quantity by its name, those of the scene's own points too; None where it was not evaluated.
+    """Return a quantity by its name, those of the scene's points too.
 
-    Places are those in the coordinates of the scene's drawing.
+    It is None if it was not evaluated. Places are those in the coordinates of the
+    scene's drawing.
     """
     values = _find_si(solution, name)
     unit = find_unit(name)
@@ -473,7 +517,10 @@ def find_values(solution: Solution, name: str, units: Conversion = SI) -> Any:
 
 
 def _find_si(solution: Solution, name: str) -> Array | None:
-    """Return a quantity, or a point's, in SI units and from O2; None where it was not evaluated."""
+    """Return a quantity, or a point's, in SI units and from O2.
+
+    It is None if it was not evaluated.
+    """
     values: Array | None
     if name in UNITS:
         values = getattr(solution, name)
@@ -489,7 +536,9 @@ def shift_to_drawing(solution: Solution, places: Array) -> Array:
 
 
 def unwrap(angles: Array) -> None:
-    """Make angles in [-pi, pi] continuous along a sweep, in place: the first in (-pi, pi]; NaN is stepped over.
+    """Make angles in [-pi, pi] continuous along a sweep, in place.
+
+    The first lies in (-pi, pi]; NaN is stepped over.
 
     `angles`: (n,), or (m, n) for as many sweeps.
     """

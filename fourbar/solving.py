@@ -1,4 +1,7 @@
-"""Solver of a scene: block by block over the positions, stage by stage, as far as is asked."""
+"""Solver of a scene, as far as it is asked.
+
+It goes block by block over the positions, stage by stage.
+"""
 
 import cmath
 from collections.abc import Iterator, KeysView, Mapping
@@ -38,7 +41,8 @@ from fourbar.scene.scene import Independent, with_signs
 from fourbar.solution import Array, Solution, unwrap
 
 LONG_BLOCK = BLOCK // 4
-"""Positions with error bars evaluated at a time: longer numbers fill the cache sooner."""
+"""Positions with error bars evaluated at a time. Longer numbers fill the cache sooner.
+"""
 Part = tuple[Any, ...]
 """Index of some positions in the arrays of all."""
 
@@ -64,22 +68,28 @@ def solve(
     out: Mapping[str, Array] | None = None,
     side: int = 0,
 ) -> Solution:
-    """Evaluate a scene, or a study of m linkages, with the closed formulas as far as a stage.
+    """Evaluate a scene, or a study of m linkages, with the closed formulas.
+
+    The evaluation goes as far as a stage.
 
     Parameters
     ----------
-    stage : "position", "velocity", "acceleration", "force" or "error"; each includes those before
-        it. Left out: "force", or "position" where the scene states no omega_2.
-    at : other positions, velocities and accelerations than the scene's own, of a bar of its own.
-    out : arrays to write into, by name, (n,) or (n, 2), of a study (m, n) or (m, n, 2), which share no memory; only the
-        quantities named are evaluated, with the stages they need, and the others are None in the result.
-    side : in which sense pins at rest are about to turn where dry friction acts: +1 as the commanded angle grows, -1 as
-        it falls, 0 neither.
+    stage : "position", "velocity", "acceleration", "force" or "error"; each includes
+        those before it. Left out: "force", or "position" where the scene states no
+        omega_2.
+    at : other positions, velocities and accelerations than the scene's own, of a bar of
+        its own.
+    out : arrays to write into, by name, (n,) or (n, 2), of a study (m, n) or (m, n, 2),
+        which share no memory; only the quantities named are evaluated, with the stages
+        they need, and the others are None in the result.
+    side : in which sense pins at rest are about to turn where dry friction acts: +1 as
+        the commanded angle grows, -1 as it falls, 0 neither.
 
     Raises
     ------
-    InputError : the stage or a name in `out` is unknown, its array has the wrong shape, the scene does not state
-        the omega_2 that is needed, or a study, which states its own positions, is given others.
+    InputError : the stage or a name in `out` is unknown, its array has the wrong shape,
+        the scene does not state the omega_2 that is needed, or a study, which states
+        its own positions, is given others.
     """
     require_whole("side", side, (-1, 0, 1), "must be -1, 0 or 1")
     if not isinstance(scene, Scene):
@@ -143,7 +153,10 @@ class Results:
             self.arrays[name] = given[name] if name in given else np.empty(shape_of_one)
 
     def store(self, case: Case, evaluated: Evaluated, part: Part) -> None:
-        """Write what was evaluated; where it is no number, with the status that says so."""
+        """Write what was evaluated.
+
+        What is no number has the status that says so.
+        """
         withhold_infinite(case, evaluated)
         shape = self.codes[part].shape
         self.codes[part] = evaluated.codes.reshape(shape)
@@ -161,7 +174,10 @@ class Results:
 
 
 def _make_case(scene: Scene, commanded: Command, request: Requested, side: int) -> Case:
-    """Make the case of one linkage, with effects that count turns from where the motion begins."""
+    """Make the case of one linkage.
+
+    Its effects count turns from where the motion begins.
+    """
     case = Case.of(scene, commanded.bar)._replace(side=side)
     if not request.asks_forces or not scene.counts_turns:
         return case
@@ -170,10 +186,11 @@ def _make_case(scene: Scene, commanded: Command, request: Requested, side: int) 
 
 
 def _solve_alone(case: Case, commanded: Command, request: Requested) -> Results | None:
-    """Solve a single position in plain numbers, for arrays of one entry cost several times as much.
+    """Solve a single position in plain numbers.
 
-    None for several positions, and where any result is no number: there NumPy goes on
-    with inf and NaN, and statuses follow.
+    Arrays of one entry cost several times as much. None for several positions, and
+    where any result is no number: there NumPy goes on with inf and NaN, and statuses
+    follow.
     """
     if request.shape != (1,) or request.out is not None:
         return None
@@ -288,7 +305,10 @@ def _require_command(commanded: Command) -> None:
 
 
 def find_last_stage(scene: Scene) -> str:
-    """Return the last stage that a scene states enough for: error bars and all, or positions only."""
+    """Return the last stage for which a scene states enough.
+
+    It is that of the error bars, or the positions alone.
+    """
     motion = scene.motion
     return (
         "position"
@@ -437,7 +457,10 @@ def make_solution(
 
 
 def unwrap_angles(arrays: Mapping[str, Array], bar: int) -> None:
-    """Make every angle that was found continuous along its sweep; the commanded one is as it is stated."""
+    """Make every computed angle continuous along its sweep.
+
+    The commanded angle stays as it is stated.
+    """
     commanded = COMMANDS[bar][0]
     for name in ("theta_2", *ANGLES):
         if name in arrays and name != commanded:
@@ -452,7 +475,11 @@ def _list_foreign(scene: Scene) -> tuple[str, ...]:
 
 
 def _list_absent(scene: Scene) -> tuple[str, ...]:
-    """List quantities of the other kind of drive, and those of dry or load-dependent friction where there is none."""
+    """List the quantities that a solution lacks.
+
+    These are those of the other kind of drive, and those of dry or load-dependent
+    friction if there is none.
+    """
     absent = _list_foreign(scene)
     if not any(effect.dry for effect in scene.effects):
         absent = (*absent, *DRY_FRICTION_QUANTITIES)

@@ -1,4 +1,7 @@
-"""Read files within a bound and write them atomically; write what a result says of itself."""
+"""Read files within a bound and write them atomically.
+
+What a result says of itself is written too.
+"""
 
 import json
 import math
@@ -21,7 +24,9 @@ if TYPE_CHECKING:
 TEMPORARY = ".part"
 """Suffix of the name of an unfinished file."""
 STANDARD_STREAM = Path("-")
-"""Path that stands for standard input where a file is read, for standard output where one is written."""
+"""Path that stands for standard input or standard output. The former if a file is read,
+the latter if one is written.
+"""
 
 
 def read_bytes(
@@ -39,10 +44,11 @@ def read_bytes(
     key : what names the file, for the error.
     largest : bytes.
     shown : how the error names it; left out: by its path.
-    pipes : read standard input for the path `-`, and pipes (those of a shell's `<(...)` too) until they end.
+    pipes : read standard input for the path `-`, and pipes (those of a shell's `<(...)`
+        too) until they end.
 
-    Raises InputError for a file that is missing, too large or unreadable, for a directory, for devices, and for pipes
-    where they are not read.
+    Raises InputError for a file that is missing, too large or unreadable, for a
+    directory, for devices, and for pipes where they are not read.
     """
 
     def refuse(allowed: str) -> InputError:
@@ -73,7 +79,9 @@ def read_bytes(
 
 
 def read_text(path: str | Path, key: str, largest: int, *, pipes: bool = False) -> str:
-    """Read a file as text in UTF-8, with or without a byte order mark, line ends as they are.
+    """Read a file as text in UTF-8, with or without a byte order mark.
+
+    Line ends stay as they are.
 
     Raises InputError as `read_bytes` does, and for what is no UTF-8.
     """
@@ -87,7 +95,10 @@ def read_text(path: str | Path, key: str, largest: int, *, pipes: bool = False) 
 
 @contextmanager
 def name_file(path: Path) -> Iterator[None]:
-    """Name the file in what goes wrong while it is open (a full disk), not the temporary one, which no reader knows."""
+    """Name the file in what goes wrong while it is open (a full disk).
+
+    No reader knows the temporary file.
+    """
     try:
         yield
     except OSError as error:
@@ -103,9 +114,10 @@ def name_file(path: Path) -> Iterator[None]:
 
 
 def require_file(target: Path, *read: Path) -> None:
-    """Raise InputError for what can name no output: a folder, a file in a missing folder, one that is read.
+    """Raise InputError for what can name no output.
 
-    `-` names standard output.
+    That is a folder, a file in a missing folder, or one that is read. `-` names
+    standard output.
     """
     if target == STANDARD_STREAM:
         return
@@ -227,12 +239,18 @@ def make_html(title: str, head: Sequence[str], rows: Iterable[Sequence[str]]) ->
 
 
 def write_object(schema: str, **entries: Any) -> str:
-    """Write one JSON object: named tuples as objects, arrays as lists, null for what is not finite."""
+    """Write one JSON object.
+
+    Named tuples are objects, arrays lists, null what is not finite.
+    """
     return json.dumps({"schema": schema, **null_nan(entries)}, allow_nan=False) + "\n"
 
 
 def null_nan(value: Any) -> Any:
-    """Make lists, tables and numbers of Python of a value, None for what is not finite."""
+    """Make lists, tables and numbers of Python of a value.
+
+    None stands for what is not finite.
+    """
     if isinstance(value, np.ndarray):
         plain = value.tolist()
         return (

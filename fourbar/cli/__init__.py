@@ -52,7 +52,7 @@ class SectionedGroup(click.Group):
 )
 @click.pass_context
 def group(context: click.Context, traceback: bool) -> None:
-    """Evaluate closed formulas of the planar four-bar: from a scene file to torque and pin forces.
+    """Evaluate the closed formulas of a scene: torque and pin forces of a four-bar.
 
     The checks against MuJoCo and Pinocchio are fourbar-validation, with the extra
     "validation".
@@ -76,5 +76,8 @@ def main(arguments: list[str] | None = None) -> None:
 
 
 def status(arguments: list[str] | None = None) -> int:
-    """Run a command; what goes wrong becomes one line on standard error and an exit status."""
+    """Run a command and return its exit status.
+
+    An error becomes one line on standard error.
+    """
     return run(group, "fourbar", arguments)

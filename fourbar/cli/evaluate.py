@@ -83,7 +83,7 @@ def new(
     pins: str | None,
     unit: str | None,
 ) -> None:
-    """Write a new scene file with these lengths, or these pins, and comments that explain the rest.
+    """Write a new scene file with these lengths or pins; comments explain the rest.
 
     Each number has a unit, like 300mm; or --unit mm is the unit of all.
     """
@@ -114,7 +114,10 @@ def new(
 
 
 def _add_unit(option: str, text: str, unit: str | None) -> str:
-    """Add the unit of all numbers to one without its own; InputError where there is none."""
+    """Add the unit of all numbers to a number that states none.
+
+    Raises InputError if there is no such unit.
+    """
     if not given.is_bare(text):
         return text
     if unit is None:
@@ -145,7 +148,10 @@ def _read_pins(text: str, unit: str | None) -> dict[str, tuple[str, str]]:
 
 
 def _choose_form(table: bool, as_json: bool, as_csv: bool, out: Path | None) -> str:
-    """Choose between "summary", "table", "json" and "csv", by the options or by the ending of the file."""
+    """Choose between "summary", "table", "json" and "csv".
+
+    The options decide, or the ending of the file.
+    """
     if as_json and as_csv:
         raise click.UsageError(
             "--json and --csv are two forms of the output; give one of them"
@@ -208,8 +214,8 @@ def _choose_form(table: bool, as_json: bool, as_csv: bool, out: Path | None) -> 
     "--sensitivity",
     is_flag=True,
     help=(
-        "Rank the numbers of the scene by how far each changes the results, in SI units;"
-        " without --at, --units and --degrees."
+        "Rank the numbers of the scene by how far each changes the results, in SI"
+        " units; without --at, --units and --degrees."
     ),
 )
 @given.text_option(*given.TABLES, ".csv")
@@ -267,7 +273,10 @@ def analyze(  # noqa: PLR0913 - one for each option
 def _choose_units(
     form: str, units: Conversion | None, degrees: bool | None
 ) -> Conversion:
-    """Choose the units of the output: those asked for, otherwise those of the file; JSON and CSV are in SI."""
+    """Choose the units of the output.
+
+    They are those asked for, otherwise those of the file; JSON and CSV are in SI.
+    """
     shown = dict(units or {})
     if form in ("summary", "table"):
         shown = {**DEGREES, **shown}
@@ -333,7 +342,10 @@ def _write_positions(
 
 
 def _list_chosen(columns: "list[Column]", units: Conversion) -> dict[str, Array]:
-    """List chosen columns of CSV by heading; in other units than SI each names its own."""
+    """List the chosen columns of the CSV by heading.
+
+    In units other than SI each heading names its unit.
+    """
     chosen = dict[str, Array]()
     for column in columns:
         label = column.label(units)
@@ -414,7 +426,7 @@ def tolerance(
     units: Conversion,
     out: Path | None,
 ) -> None:
-    """Compute what the [tolerances] do to the results, and which dimension does most."""
+    """Compute what the [tolerances] do to the results, and which does most."""
     from fourbar.show import tolerances as shown
     from fourbar.show.plot import draw_tolerances, format_of
     from fourbar.show.tables import show_running
@@ -456,7 +468,7 @@ def _refuse_units_of_json(as_json: bool, units: Conversion) -> None:
 @given.json_option
 @given.text_option(*given.TABLES)
 def equilibrium(scene: Path, as_json: bool, out: Path | None) -> None:
-    """Find the positions of rest, their stability and frequency, and what holds the others."""
+    """Find positions of rest, stability, frequency, and what holds the others."""
     from fourbar.show.studies import write_equilibria, write_equilibria_json
     from fourbar.show.tables import show_running
     from fourbar.studies.equilibrium import equilibrium as found

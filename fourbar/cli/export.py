@@ -101,7 +101,10 @@ def plot(
 
 
 def _find_place(scene: Scene, text: str) -> float:
-    """Return what is commanded at a position, rad or m; of a motion over time its angle there."""
+    """Return what is commanded at a position, rad or m.
+
+    For a motion over time it is the angle at that time.
+    """
     from fourbar.studies.passing import find_positions
 
     positions = find_positions(scene, [given.read_position(scene, text)])
@@ -279,7 +282,7 @@ def usd(scene: Path, without_loads: bool, plane: "Plane", out: Path) -> None:
     "--no-browser", is_flag=True, help="Print the address and open no browser."
 )
 def edit(scene: Path | None, port: int, exports: Path | None, no_browser: bool) -> None:
-    """Edit a scene in the browser while torque and forces follow; without SCENE a new one.
+    """Edit a scene, or a new one, in the browser; torque and forces follow each change.
 
     Ctrl-C ends it, and so does a minute and a half without a page.
     """

@@ -1,4 +1,4 @@
-"""Readers of the commands' arguments: scenes, numbers with units, places to write to."""
+"""Readers of the commands' arguments: scenes, numbers with units, output files."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -14,7 +14,9 @@ from fourbar.scene import Scene
 from fourbar.solution import Conversion
 
 SCENE_TEXT = "fourbar.scene_text"
-"""Key of the scene file's text in the context of a command: standard input is read once."""
+"""Key of the scene file's text in the context of a command. Standard input is read
+once.
+"""
 MOST_POSITIONS = 1_000_000
 """Positions that `analyze` prints: about a gigabyte of text."""
 FILE = click.Path(path_type=Path)
@@ -65,7 +67,10 @@ def own_units_option(default: str = "those of the file") -> Callable[..., Any]:
 
 
 def text_option(*endings: str, required: bool = False) -> Callable[..., Any]:
-    """Make -o of a command that writes text: no reader takes it under the ending of another form."""
+    """Make the option -o of a command that writes text.
+
+    An ending that belongs to another form is refused.
+    """
 
     def require_ending(
         context: click.Context, parameter: click.Parameter, out: Path | None
@@ -110,10 +115,11 @@ def ends_in(out: Path | None, suffix: str) -> bool:
 
 @contextmanager
 def open_scene(path: Path) -> Iterator[Scene]:
-    """Read the scene of a file; InputError where it cannot be printed, or not to the file of -o.
+    """Read the scene of a file.
 
-    The output is looked at before anything is solved, which may take minutes. Mistakes
-    that show only then name the file too.
+    Raises InputError if it cannot be printed, or not to the file of -o. The output is
+    looked at before anything is solved, which may take minutes. Mistakes that show only
+    then name the file too.
     """
     from fourbar.files import loads, read_text
     from fourbar.scene.motion import require_steps
@@ -179,7 +185,10 @@ def read_number(key: str, text: str, unit: str, bound: str = ANY) -> float:
 
 
 def read_position(scene: Scene, text: str) -> tuple[str, float]:
-    """Read a position like "60 deg" (of what the scene commands) or "theta_4=30 deg"."""
+    """Read a position like "60 deg" or "theta_4=30 deg".
+
+    Without a name the number is what the scene commands.
+    """
     from fourbar.studies.passing import PLACES
 
     name, equals, value = text.rpartition("=")
@@ -199,7 +208,10 @@ def read_position(scene: Scene, text: str) -> tuple[str, float]:
 
 
 def read_three(key: str, text: str, unit: str = "m") -> tuple[float, float, float]:
-    """Read a vector of the command line: three numbers, bare or with units, between spaces or commas."""
+    """Read a vector of the command line.
+
+    It is three numbers, bare or with units, between spaces or commas.
+    """
     parts = text.replace(",", " ").split()
     if len(parts) != 3:
         raise InputError(key, text, 'must be three numbers, like "0.3 0 1"')

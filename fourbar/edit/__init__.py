@@ -1,1 +1,4 @@
-"""The workbench: a scene file changed in the browser, answered by the formulas in Python at each change."""
+"""The workbench: a scene file changed in the browser.
+
+The formulas answer each change in Python.
+"""

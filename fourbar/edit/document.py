@@ -1,4 +1,7 @@
-"""A scene file that is changed entry by entry: comments, order and units of the rest stay as they were."""
+"""A scene file that is changed entry by entry.
+
+Comments, order and units of the rest stay as they were.
+"""
 
 import tomllib
 from collections.abc import Iterable, Sequence
@@ -102,7 +105,7 @@ def _offer_bars(offers: dict[str, Any]) -> None:
 
 
 def _offer_commands() -> dict[str, Any]:
-    """List what can be commanded by its name: label, and the fields that apply to it."""
+    """List the names that can be commanded: label, and the fields that apply to it."""
     angles = {
         names: (
             f"angle \u03b8{chr(0x2080 + bar)} of the {BAR_NAMES[bar]}",
@@ -152,7 +155,10 @@ class SceneDocument:
         return entry
 
     def set(self, path: Path, text: str) -> None:
-        """State one entry as it is typed: a text, or a number where the file has one; an empty text takes it away."""
+        """State one entry as it is typed; an empty text removes it.
+
+        The value is a text, or a number where the file has one.
+        """
         if len(text) > LONGEST_TEXT:
             raise InputError(
                 name_entry(path),
@@ -176,7 +182,7 @@ class SceneDocument:
             )
 
     def put(self, path: Path, value: Any) -> None:
-        """State an entry, with the tables that it stands in; an index of -1 appends to a list."""
+        """State an entry and the tables that contain it; an index of -1 appends."""
         *into, last = path
         holder = self._find_holder(into)
         if isinstance(last, int) and last < 0:
@@ -247,7 +253,10 @@ def _find_table(table: Any, path: Path) -> Any:
 
 
 def _read_number(text: str) -> int | float | str:
-    """Return a number without a unit; what is none stays a text, which the reader of the file refuses."""
+    """Return a number without a unit.
+
+    A text that is no number stays a text, which the reader of the file refuses.
+    """
     for kind in (int, float):
         try:
             return kind(text)
@@ -257,7 +266,7 @@ def _read_number(text: str) -> int | float | str:
 
 
 def _make_like(old: Any, value: Any) -> Any:
-    """Return the value as an item with the comment and the blanks of what it replaces."""
+    """Return the value as an item, with the comment and blanks of the old item."""
     made = tomlkit.item(_write_inline(value))
     if isinstance(old, Item):
         made.trivia.comment_ws, made.trivia.comment = (

@@ -1,8 +1,8 @@
-"""Dragging in the drawing: from a place in the plane to the lengths, angles and forces of the file.
+"""Dragging in the drawing: from a place in the plane to the numbers of the file.
 
-A pin changes the lengths that meet in it, a point its distance and angle, an arrow its
-force; each number keeps the unit that it has in the file and gets no more digits than a
-pixel is worth.
+The numbers are lengths, angles and forces. A pin changes the lengths that meet in it, a
+point its distance and angle, an arrow its force; each number keeps the unit that it has
+in the file and gets no more digits than a pixel is worth.
 """
 
 import cmath
@@ -37,7 +37,8 @@ class Handle(NamedTuple):
     """Path of the handle's pair (distance, angle) in the file."""
     bar: int
     at: complex
-    """Vector from the bar's first pin to the point that the pair is measured from, in the bar's frame, m."""
+    """Vector from the bar's first pin to the origin of the pair, in the bar's frame, m.
+    """
     beyond: complex = 0.0j
     """The pair itself, m."""
     turns: bool = True
@@ -57,7 +58,10 @@ class Handle(NamedTuple):
 
 
 def list_handles(scene: Scene) -> list[Handle]:
-    """List everything that can be dragged: mass centres, points, loads, and the ends of what acts on a line."""
+    """List everything that can be dragged.
+
+    These are mass centres, points, loads, and the ends of what acts on a line.
+    """
     handles = [
         Handle(
             f"mass centre of {name}",
@@ -113,7 +117,10 @@ def _hold_ends(name: str, path: Path, line: Any, scene: Scene) -> list[Handle]:
 
 
 def _hold_place(name: str, path: Path, place: Place | None, scene: Scene) -> Handle:
-    """Make the handle of a place by the form in which it is stated; of a named point, by the point's."""
+    """Make the handle of a place by the form in which it is stated.
+
+    The handle of a named point is that of the point.
+    """
     assert place is not None
     if place.point is not None:
         path = ("points", place.point)
@@ -144,7 +151,9 @@ class Dragged(NamedTuple):
 def drag(
     document: SceneDocument, scene: Scene, plain: dict[str, Any], dragged: Dragged
 ) -> None:
-    """Change the numbers of the file for a drag that began in `scene`, whose entries are `plain`.
+    """Change the numbers of the file for a drag that began in `scene`.
+
+    `plain`: entries of the file of that scene.
 
     Raises InputError where nothing of that name can be dragged, or the linkage does not
     assemble there.
@@ -239,7 +248,10 @@ def _drag_pin(
 def _drag_drawn_pin(
     document: SceneDocument, dragged: Dragged, drawing: DrawnPins
 ) -> None:
-    """Move a pin of the drawing; InputError at another position than the one that is drawn."""
+    """Move a pin of the drawing.
+
+    Raises InputError at another position than the one that is drawn.
+    """
     if dragged.what not in PINS:
         raise InputError("drag", dragged.what, "must be one of " + ", ".join(PINS))
     drawn = drawing.angle(2)
@@ -257,7 +269,10 @@ def _drag_drawn_pin(
 
 
 def parse_place(stated: Any, drawing: DrawnPins | None = None, bar: int = 1) -> complex:
-    """Return the place of a bar that an entry of the file states: polar, by x and y, or as drawn, m."""
+    """Return the place of a bar that an entry of the file states, m.
+
+    The entry is polar, by x and y, or as drawn.
+    """
     if isinstance(stated, dict) and DRAWN in stated:
         assert drawing is not None  # the scene was read
         x, y = (to_si(text, "m") for text in stated[DRAWN])
@@ -270,9 +285,10 @@ def parse_place(stated: Any, drawing: DrawnPins | None = None, bar: int = 1) -> 
 def put_place(
     document: SceneDocument, path: Path, place: complex, grain: float, by: str = ""
 ) -> None:
-    """State a place as the file does, by distance and angle or by x and y, in its units; `by` "xy" or "polar" changes.
+    """State a place as the file does, in its units.
 
-    Where the file has no place yet, its unit is that of the ground's length.
+    `by`: "xy" or "polar" changes between distance and angle, and x and y. Where the
+    file has no place yet, its unit is that of the ground's length.
     """
     old = document.at(path)
     before = "xy" if isinstance(old, dict) else "polar"
@@ -314,7 +330,10 @@ def _write_angle(old: object, angle: float, grain: float) -> str:
 def _write_like(
     old: object, value: float, grain: float, si: str, otherwise: str
 ) -> str:
-    """Write a number of an SI unit in the unit that an older text of it has, or in another one where it has none."""
+    """Write a number of an SI unit in the unit of its older text.
+
+    If the older text has no unit, another unit of that kind is used.
+    """
     unit = find_unit(old, otherwise)
     factor = to_si(f"1 {si}", unit)
     return write_rounded(value * factor, grain * factor, unit)

@@ -1,4 +1,4 @@
-"""What the workbench makes of a scene: the reply to a page, exports, and the harness's report.
+"""What the workbench makes of a scene: replies to a page, exports, reports.
 
 The frame of a reply: four bytes with the length of its JSON (little-endian), the JSON
 padded to a multiple of eight bytes, then columns of doubles one after the other, as the
@@ -53,7 +53,9 @@ def evaluate_scene(
     settled: bool = False,
     pressure: float | None = None,
 ) -> dict[str, Any]:
-    """Evaluate a scene for the page; `settled`: with error bars and summary, which cost more than the rest.
+    """Evaluate a scene for the page.
+
+    `settled`: with error bars and summary, which cost more than the rest.
 
     `pressure`: of a cylinder, Pa; the summary then has the bore that it needs.
 
@@ -143,7 +145,10 @@ class Exports:
 
 
 def find_harness() -> list[str]:
-    """Return the command of the harness: installed, or of this checkout; DependencyError where there is none."""
+    """Return the command of the harness: installed, or of this checkout.
+
+    Raises DependencyError if there is none.
+    """
     engines = all(importlib.util.find_spec(name) for name in ("mujoco", "pinocchio"))
     if engines and importlib.util.find_spec(HARNESS):
         return [sys.executable, "-m", HARNESS]

@@ -1,9 +1,9 @@
-"""A private page next to the scene file: it leads a browser to the workbench, and a second `fourbar edit` to the first.
+"""A private page next to the scene file that leads a browser to the workbench.
 
-The address of the workbench holds its token. A browser gets the name of this page
-instead, for the arguments of a program are seen by every user of the machine. The page
-is locked while its server runs: two servers on one file would share its state file and
-lose work.
+It leads a second `fourbar edit` to the first one too. The address of the workbench
+holds its token. A browser gets the name of this page instead, for the arguments of a
+program are seen by every user of the machine. The page is locked while its server runs:
+two servers on one file would share its state file and lose work.
 """
 
 import os
@@ -20,11 +20,12 @@ ENDING = ".edit.html"
 ADDRESS = re.compile(r"url=(http://127\.0\.0\.1:\d+/[A-Za-z0-9_-]+/)\"")
 PAGE = """<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8"><meta name="referrer" content="no-referrer">
-<meta http-equiv="refresh" content="0; url={address}"><title>The workbench</title></head>
+<meta http-equiv="refresh" content="0; url={address}">
+<title>The workbench</title></head>
 <body><a href="{address}">The workbench</a></body></html>
 """
 LOCKED_BYTE = 1 << 30
-"""Byte of the page that Windows locks, far behind its text, which others are to read."""
+"""Byte of the page that Windows locks: far behind its text, which others read."""
 PATIENCE = 10.0
 """Time that a server may take from locking its page to writing it, s."""
 
@@ -37,7 +38,7 @@ class Redirect:
         self.handle: int | None = None
 
     def claim(self) -> bool:
-        """Lock the page, made where there is none; False where another server holds it."""
+        """Lock the page, and make it if needed; return False if another holds it."""
         while self.handle is None:
             try:
                 handle = os.open(
@@ -75,7 +76,10 @@ class Redirect:
         os.write(self.handle, PAGE.format(address=address).encode())
 
     def read(self) -> str:
-        """Return the address that another server has written; InputError where it writes none."""
+        """Return the address that another server has written.
+
+        Raises InputError if it writes none.
+        """
         deadline = time.monotonic() + PATIENCE
         while time.monotonic() < deadline:
             if self.path.exists() and (

@@ -1,4 +1,7 @@
-"""The server of the workbench: on the loopback address alone, for pages that know its token."""
+"""The server of the workbench.
+
+It listens on the loopback address alone, for pages that know its token.
+"""
 
 import asyncio
 import hmac
@@ -40,11 +43,15 @@ IDLE = 10.0
 PAUSE = 0.5
 """Time without new connections where the process can open no more files, s."""
 GONE = 90.0
-"""Time from the last page's going to the server's end, s: a page in the background looks for it once a minute."""
+"""Time from the last page's leaving to the server's end, s. A page in the background
+looks for the server once a minute.
+"""
 SETTLED = 0.15
 """s without a change, after which error bars follow."""
 STILL = 1.0
-"""s without a change, after which the spreads of tolerances are sampled: that takes seconds."""
+"""Time without a change after which the spreads of tolerances are sampled, s. Sampling
+takes seconds.
+"""
 KEPT = 0.3
 """s, after which a change is written to the state file."""
 
@@ -99,7 +106,10 @@ class Workbench:
                 )
 
     def take(self, line: "PageLine", asked: dict[str, Any]) -> None:
-        """Put a request in the queue; a later one of the same gesture takes the place of one that waits."""
+        """Put a request in the queue.
+
+        A later request of the same gesture replaces one that waits.
+        """
         if self.ended.is_set():  # a page may go on sending while the server ends
             return
         if asked.get("do") in ("check", "stop"):
@@ -159,7 +169,10 @@ class Workbench:
             )
 
     async def _settle(self) -> None:
-        """Send error bars and summary, unless something has changed again; changes are answered meanwhile."""
+        """Send error bars and summary, unless something has changed again.
+
+        Changes are answered meanwhile.
+        """
         session = self.session
         state, units, pressure = session.now, session.units, session.pressure
         chosen = (session.unit_names, session.pressure_text)
@@ -214,7 +227,10 @@ class Workbench:
     async def serve(
         self, port: int, redirect: Redirect | None = None, *, browse: bool = False
     ) -> None:
-        """Serve until all pages have gone, or until Ctrl-C; `redirect` leads browsers and other servers here."""
+        """Serve until all pages have gone, or until Ctrl-C.
+
+        `redirect`: page that leads browsers and other servers here.
+        """
         try:
             listening = socket.create_server((LOOPBACK, port))
         except (OSError, OverflowError) as error:
@@ -254,7 +270,10 @@ class Workbench:
 
 
 class Entrance:
-    """The listening socket: connections that say nothing are closed after a while, the oldest where they are many."""
+    """The listening socket, which closes connections that say nothing for a while.
+
+    If there are many, the oldest is closed.
+    """
 
     def __init__(self, application: Application, listening: socket.socket) -> None:
         self.server = HTTPServer(
@@ -276,7 +295,8 @@ class Entrance:
             connection, peer = self.listening.accept()
         except (BlockingIOError, ConnectionAbortedError):
             return
-        except OSError:  # no more files (EMFILE, ENFILE): the socket would offer the connection again and again
+        except OSError:
+            # no more files (EMFILE, ENFILE): the socket would offer the connection again
             IOLoop.current().remove_handler(self.listening)
             IOLoop.current().call_later(PAUSE, self._open)
             self._close_oldest(MOST_CONNECTIONS // 4)
@@ -343,7 +363,10 @@ class Guarded(RequestHandler):
         self.finish(f"{status_code}\n")
 
     def log_exception(self, kind: Any, error: Any, traceback: Any) -> None:
-        """Say in one line what went wrong here; what was wrong with the request was its sender's."""
+        """Say in one line what went wrong in the server.
+
+        The sender of a wrong request is told instead.
+        """
         if not isinstance(error, HTTPError):
             print(f"error: {kind.__name__}: {error}", file=sys.stderr)
 
@@ -366,7 +389,10 @@ class Page(Guarded):
 
 
 class Report(Guarded):
-    """The report of the harness, in a sandbox: its origin is none, so it reaches nothing here."""
+    """The report of the harness, in a sandbox without an origin.
+
+    It reaches nothing here.
+    """
 
     def get(self, token: str) -> None:
         """Write the report; 404 before there is one."""

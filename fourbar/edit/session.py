@@ -1,4 +1,4 @@
-"""One scene that is being changed: its text, its history, and what is kept of it next to the file."""
+"""One scene that is being changed: its text, its history and its kept states."""
 
 import hashlib
 import json
@@ -37,11 +37,15 @@ ENDING = ".edit"
 MOST_STATES = 500
 """Number of states that undo and redo reach."""
 MOST_CHARACTERS = 10_000_000
-"""Characters of all these states; with those that are kept to compare they stay below `LARGEST_STATE` as JSON."""
+"""Characters of all these states. With those kept to compare they stay below
+`LARGEST_STATE` as JSON.
+"""
 MOST_KEPT = 20
 """Number of states that are kept to compare with, the one at the start among them."""
 MOST_POSITIONS = 100_000
-"""Largest number of positions solved anew on a change, in a second; a mistyped step count must not fill the memory."""
+"""Largest number of positions that are solved anew on a change, in a second. A mistyped
+step count must not fill the memory.
+"""
 LARGEST_STATE = 100_000_000
 """Bytes of a state file."""
 NEW = ("300 mm", "100 mm", "250 mm", "220 mm")
@@ -69,7 +73,10 @@ class SceneState(NamedTuple):
 
 
 class Session:
-    """The scene file at `path`, changed step by step; whatever is refused leaves the last good state."""
+    """The scene file at `path`, changed step by step.
+
+    A change that is refused leaves the last good state.
+    """
 
     def __init__(self, path: Path, exports: Path) -> None:
         self.path, self.exports = (
@@ -150,7 +157,10 @@ class Session:
         )
 
     def end(self, *, gone: bool) -> None:
-        """Take the state file away where all is saved, or nothing was changed, and no page is left (`gone`)."""
+        """Remove the state file if everything is saved and no page is left.
+
+        It is removed too if nothing was changed. `gone`: no page is left.
+        """
         if gone and (self.saved or len(self.texts) == 1):
             self.state_file.unlink(missing_ok=True)
         else:
@@ -170,7 +180,10 @@ class Session:
 
     @property
     def fresh(self) -> bool:
-        """Return True if nothing has been stated yet; a page then begins with an empty drawing."""
+        """Return True if nothing is stated yet.
+
+        A page then shows an empty drawing.
+        """
         return self.disk is None and len(self.texts) == 1
 
     @property
@@ -204,7 +217,10 @@ class Session:
     def describe(
         self, data: dict[str, Any], *, settled: bool = False
     ) -> dict[str, Any]:
-        """Describe the present state, whose numbers are `data`; `settled`: with error bars and summary."""
+        """Describe the present state.
+
+        `data`: its numbers. `settled`: with error bars and summary.
+        """
         return {
             "data": data,
             "settled": settled,
@@ -232,7 +248,10 @@ class Session:
         }
 
     def do(self, asked: dict[str, Any]) -> dict[str, Any]:
-        """Do what a page asks for and describe the state after it; what is refused changes nothing."""
+        """Do what a page asks for and describe the state after it.
+
+        A request that is refused changes nothing.
+        """
         action = ACTIONS.get(str(asked.get("do")))
         before = (self.texts, self.place, self.now)
         try:
@@ -257,7 +276,10 @@ class Session:
             return {"refused": words, "text": self.now.text, "plain": self.now.plain}
 
     def change(self, alter: Callable[[SceneDocument], None], gesture: str = "") -> None:
-        """Alter the document; what belongs to one gesture begins from the same state and is one step to undo."""
+        """Alter the document.
+
+        Changes of one gesture begin from the same state and are one step to undo.
+        """
         goes_on = bool(gesture) and gesture == self.gesture
         if not goes_on:
             self.base = self.now
@@ -273,7 +295,8 @@ class Session:
         ):
             self.texts, self.place = self.texts[1:], self.place - 1
         self.now, self.gesture = now, gesture
-        if not gesture:  # what was put in then stands as in a file; for each step of a gesture this is too slow
+        if not gesture:
+            # entries that were put in then stand as in a file; too slow for each step
             self.document = SceneDocument(now.text)
 
 
@@ -402,7 +425,10 @@ def _state_pressure(session: Session, asked: dict[str, Any]) -> None:
 
 
 def _command(session: Session, asked: dict[str, Any]) -> None:
-    """Command another bar, or the cylinder, over what the present motion covers of it without turning back."""
+    """Command another bar, or the cylinder.
+
+    The range is what the present motion covers of it without turning back.
+    """
     place = str(asked["command"])
     names = {
         **{names[0]: names for names in COMMANDS.values()},
@@ -479,7 +505,7 @@ def _read_pose(solution: Solution, index: int) -> Any:
 
 
 def _find_shown(theta_2: Any, asked: dict[str, Any]) -> int | None:
-    """Return the position that the page shows, by its theta_2; None where it says none."""
+    """Return the position that the page shows, by its theta_2, or None."""
     if asked.get("theta_2") is None:
         return None
     turned = np.abs(np.exp(1j * theta_2) - np.exp(1j * float(asked["theta_2"])))
@@ -517,7 +543,7 @@ def _restate(session: Session, asked: dict[str, Any]) -> None:
 
 
 def _draw(session: Session, asked: dict[str, Any]) -> None:
-    """State four pins in the plane, given in a unit, in place of what the file states of them."""
+    """State four pins in the plane, given in a unit, in place of those of the file."""
     unit, grain = str(asked["unit"]), float(asked["grain"])
     pins = {
         pin: tuple(write_rounded(float(x), grain, unit) for x in place)

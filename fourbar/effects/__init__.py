@@ -1,8 +1,8 @@
-"""The effects a scene can call for, one per file; what a scene does not name does not exist.
+"""The effects that a scene can name, one module each.
 
-An effect is a frozen subclass of `Effect` and holds physics alone; docs/extending.md
-shows one being added. Each file is imported when its effect is first named. A file that
-is not listed here is found in the folder.
+Only the effects listed here act. An effect is a frozen subclass of `Effect` and holds
+physics alone; docs/extending.md shows one being added. Each file is imported when its
+effect is first named. A file that is not listed here is found in the folder.
 """
 
 from functools import cache
@@ -39,7 +39,8 @@ FILE_OF = {
     "Springs": "spring",
     "Flywheel": "flywheel",
 }
-"""The effects that come with the package, in the order in which they are listed, and their files."""
+"""The effects of the package, in the order in which they are listed, and their files.
+"""
 OTHER_FILES = {
     "Effect": "effect",
     **dict.fromkeys(("Load", "Table"), "load"),
@@ -82,6 +83,6 @@ def list_further() -> "dict[str, type[Effect]]":
 
 
 def list_kinds() -> "dict[str, type[Effect]]":
-    """List the effects by their keys under ``[effects]``, in the order in which they are listed."""
+    """List the effects by their keys under ``[effects]``, in their order."""
     kinds = [*map(__getattr__, FILE_OF), *list_further().values()]
     return {kind.key: kind for kind in kinds}

@@ -1,4 +1,4 @@
-"""Base classes of effects, and the sums of the forces and moments that loads and effects apply to the bars."""
+"""Base classes of effects, and the sums of what loads and effects apply to the bars."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import fields
@@ -18,11 +18,16 @@ from fourbar.quantities import Array
 Joints = tuple[float, float, float]
 """Angles of pins O2, A, O4, rad."""
 AT_REST = 50.0 * 2.0**-52
-"""A slip below this part of the input's coefficient and of those it is made of is what rounding leaves of zero."""
+"""Largest slip that counts as zero, relative to the coefficients it is made of. The
+slip is a difference of these, and of the input's coefficient; less is round-off.
+"""
 
 
 def list_bodies(linkage: FourBar, effects: Iterable[Any] = ()) -> Bodies:
-    """List the inertial properties of bars 2, 3, 4, with the inertia that effects (a flywheel) add."""
+    """List the inertial properties of bars 2, 3, 4.
+
+    The inertia that effects add, such as that of a flywheel, is included.
+    """
     bodies = [
         Body(bar.mass, bar.moment_of_inertia, polar(*bar.mass_centre))
         for bar in linkage.moving
@@ -40,8 +45,9 @@ class Actions:
     ----------
     state : positions and motion.
     bodies : of bars 2, 3, 4.
-    side : the sense in which pins at rest are about to turn: +1 as theta_2 grows, -1 as it falls, 0 neither; between
-        them the part of its torque that dry friction holds them with.
+    side : the sense in which pins at rest are about to turn: +1 as theta_2 grows, -1 as
+        it falls, 0 neither; between them the part of its torque that dry friction holds
+        them with.
     """
 
     def __init__(self, state: State, bodies: Bodies, side: Number = 0) -> None:
@@ -51,16 +57,24 @@ class Actions:
         self.forces: dict[int, Any] = {}
         """Resultants of the bars on which any acts, complex, N."""
         self.moments: dict[int, Any] = {}
-        """Moments about the first pins O2, A, O4, N m, without the couples between two bars."""
+        """Moments about the first pins O2, A, O4, N m, without the couples between two
+        bars.
+        """
         self.on_coupler: list[tuple[Any, Any, Any, Any]] = []
         """Forces on the coupler with where they act, as in `force`, and moments."""
         self.couples: dict[str, Any] = {}
-        """Couples between the two bars that meet at a pin, on the second of them, N m."""
+        """Couples between the two bars that meet at a pin, on the second of them, N m.
+        """
         self.through: dict[str, Any] = {}
-        """Forces between bars 2 and 3, 3 and 4, as if through their pin, on the second of them, complex, N."""
+        """Forces between bars 2 and 3, and 3 and 4, on the second of them, complex, N.
+        They act as if through the pin of the two bars.
+        """
 
     def add(self, terms: Iterable[Any]) -> Self:
-        """Add what loads and effects do, but for what depends on the pin forces; return these sums."""
+        """Add what loads and effects do; return these sums.
+
+        What depends on the pin forces is left out.
+        """
         for term in terms:
             term.act(self, self.state)
         return self
@@ -73,7 +87,8 @@ class Actions:
         Parameters
         ----------
         point : of the bar's frame at its first pin, complex, m.
-        beyond : vector from there to where the force acts, complex, m, world axes; left out: it acts there.
+        beyond : vector from there to where the force acts, complex, m, world axes; left
+            out: it acts there.
         """
         if bar != 1:
             self.forces[bar] = self.forces[bar] + force if bar in self.forces else force
@@ -98,17 +113,21 @@ class Actions:
         )
 
     def pin_couple(self, pin: str, couple: Number) -> None:
-        """Add a couple on the second of the two bars that meet at a pin, and its opposite on the first, N m."""
+        """Add a couple on the second of the two bars at a pin, N m.
+
+        Its opposite acts on the first bar.
+        """
         self.couples[pin] = (
             self.couples[pin] + couple if pin in self.couples else couple
         )
 
     def pull(self, start: Any, end: Any, force: Number) -> None:
-        """Add a force (complex, N, world axes) at a point of a bar, and its opposite at one of another bar.
+        """Add a force at a point of a bar, and its opposite at one of another bar.
 
-        It acts along the line of the two points. Between bars that meet at a pin it
-        goes through the pin and leaves a couple, by the arm of the point that is nearer
-        to the pin; between moving bars it is in no sum of another bar.
+        The force is complex, N, in world axes. It acts along the line of the two
+        points. Between bars that meet at a pin it goes through the pin and leaves a
+        couple, by the arm of the point that is nearer to the pin; between moving bars
+        it is in no sum of another bar.
         """
         pin = find_common_pin(start.bar, end.bar)
         if pin is None:
@@ -144,7 +163,10 @@ class Actions:
             self.force(point.bar, sense * force, point.in_bar)
 
     def plus(self, unit: "Actions", size: Number) -> "Actions":
-        """Make the sum of these and of what a drive of a size does that does `unit` per newton."""
+        """Return the sum of these actions and those of a drive.
+
+        `unit`: what the drive does per newton.
+        """
         total = Actions(self.state, self.bodies, self.side)
         for name in ("forces", "moments", "couples", "through"):
             sums = dict(getattr(self, name))
@@ -159,9 +181,10 @@ class Actions:
         return total
 
     def work(self) -> tuple[Number, Number]:
-        """Compute the generalised force Q (power over the independent angle's speed) of all and of bars 3, 4, N m.
+        """Compute the generalised force Q of all bars, and of bars 3 and 4, N m.
 
-        That of bars 3 and 4 is without what goes through pin A.
+        Q is the power over the speed of the independent angle. That of bars 3 and 4 is
+        without what goes through pin A.
         """
         k = self.state.k
         parts = [
@@ -187,7 +210,10 @@ class Actions:
         return total, others
 
     def about_B(self) -> Number:
-        """Compute the moment on the coupler about pin B, N m, which is small where forces act near B."""
+        """Compute the moment on the coupler about pin B, N m.
+
+        It is small where forces act near B.
+        """
         total = self.couples.get("A", 0.0) - self.couples.get("B", 0.0)
         for force, point, beyond, moment in self.on_coupler:
             total = total + moment
@@ -197,10 +223,11 @@ class Actions:
         return total
 
     def sense(self, pin: str) -> Number:
-        """Return the sign of omega_j - omega_i at a pin; at rest the one that a motion beginning to `side` would have.
+        """Return the sign of omega_j - omega_i at a pin.
 
-        A linkage at rest begins to move as theta_2 grows or falls; a pin that is at
-        rest in a linkage that moves turns in either sense.
+        At rest it is the sign that a motion beginning to `side` would have. A linkage
+        at rest begins to move as theta_2 grows or falls; a pin that is at rest in a
+        linkage that moves turns in either sense.
         """
         slip, turning = self.state.slip(pin), self.turning(pin)
         if not is_any(self.side != 0):
@@ -211,13 +238,19 @@ class Actions:
         )
 
     def turning(self, pin: str) -> Number:
-        """Mark where the two bars rotate relative to each other in a motion, as far as round-off can tell."""
+        """Mark where two bars rotate relative to each other.
+
+        Relative rotation within round-off does not count.
+        """
         i, j = PINS[pin]
         h = self.state.coefficient
         return abs(self.state.slip(pin)) > AT_REST * (abs(h(2)) + abs(h(i)) + abs(h(j)))
 
     def wrenches(self, inertia: Wrenches) -> Wrenches:
-        """Sum everything that acts on each bar, with d'Alembert's forces and moments."""
+        """Sum everything that acts on each bar.
+
+        D'Alembert's forces and moments are included.
+        """
         R, M = [*inertia[:3]], [*inertia[3:6]]
         for bar, force in self.forces.items():
             R[bar - 2] = R[bar - 2] + force
@@ -279,11 +312,14 @@ class Effect:
     in_balls: ClassVar[bool] = False
     """True if the reference in ball arithmetic has a model of it."""
     joint_elements: ClassVar[Mapping[str, str]] = {}
-    """Elements of an SDF joint that state its number at a pin, by reader ("gazebo", "drake")."""
+    """Elements of an SDF joint that state its number, by reader ("gazebo", "drake")."""
 
     @classmethod
     def draw(cls, rng: np.random.Generator, couple: float) -> Self | None:
-        """Draw one for a random scene, about as strong as a couple, N m; None: random scenes have none."""
+        """Draw an effect for a random scene, about as strong as a couple, N m.
+
+        None: random scenes have none.
+        """
         return None
 
     def add_to_mjcf(self, model: Any) -> None:
@@ -303,11 +339,13 @@ class Effect:
         return 0.0
 
     def unwind(self, linkage: FourBar, q: Joints) -> Joints:
-        """Move the angles of pins O2, A, O4 by the whole turns that it tells apart, rad."""
+        """Move the angles of pins O2, A, O4 by the whole turns that count, rad."""
         return q
 
     def act_on_engine(self, bars: Any) -> None:
-        """Apply it to an engine's bars, from the engine's own motion: a second derivation, with nothing of `act`.
+        """Apply the effect to an engine's bars, from the engine's own motion.
+
+        It is a second derivation and uses nothing of `act`.
 
         `bars`: of `engines.loaded.Loaded`, with `push`, `couple`, `angle`, `velocity`,
         `alpha`, `rotate`, `point`.
@@ -322,9 +360,10 @@ class Effect:
         raise NotImplementedError
 
     def size(self, linkage: FourBar, solution: Any) -> Any:
-        """Return the size of its forces, N, one number or (n,): the scale of what vanishes.
+        """Return the size of its forces, N, one number or (n,).
 
-        Effects of this package have none: the harness states theirs itself.
+        It is the scale by which a force counts as zero. Effects of this package have
+        none: the harness states theirs itself.
         """
         raise NotImplementedError
 
@@ -344,7 +383,7 @@ class Effect:
         return ()
 
     def with_places(self, change: Callable[[Any], Any]) -> Self:
-        """Return the same effect with each `Place` of it changed; most effects have none."""
+        """Return the effect with each `Place` of it changed; most have none."""
         return self
 
     def act(self, actions: Actions, state: State) -> None:
@@ -353,7 +392,9 @@ class Effect:
     def solve_friction(
         self, actions: Actions, pins: PinForces, eliminate: Callable[..., PinForces]
     ) -> SolvedFriction:
-        """Solve for what depends on the pin forces, where there are `loaded_pins`, and add it to the actions.
+        """Solve for what depends on the pin forces, and add it to the actions.
+
+        It is asked of effects with `loaded_pins`.
 
         `pins`: pin forces under the actions, without it. `eliminate`: computes the pin
         forces under some actions, and under inertia if `with_inertia`.
@@ -361,21 +402,27 @@ class Effect:
         raise NotImplementedError
 
     def act_known(self, actions: Actions, forces: Mapping[str, Array]) -> None:
-        """Add what `act` leaves to the solution of the pin forces, once these are computed (name: (n, 2), N)."""
+        """Add what `act` leaves to the solution of the pin forces.
+
+        `forces`: by name, (n, 2), N; they are known by now.
+        """
 
     def begin_at(self, start: State, branch: Number) -> Self:
-        """Return the same effect in a motion that begins at this position, on this branch."""
+        """Return the effect in a motion that begins at this position and branch."""
         return self
 
     def status(
         self, state: State, branch: NDArray[np.int8] | None
     ) -> NDArray[np.uint8] | None:
-        """Return status codes, (n,): other than `OK` where it has no value; None: it has one everywhere."""
+        """Return status codes, (n,): other than `OK` where the effect has no value.
+
+        None: it has a value everywhere.
+        """
         return None
 
 
 class PinRows(Effect):
-    """An effect whose first field holds rows (pin, number, ...), in the order of the pins.
+    """An effect whose first field holds rows (pin, number, ...), in the pins' order.
 
     The one number that a pin has is called "".
     """
@@ -384,7 +431,10 @@ class PinRows(Effect):
 
     @classmethod
     def at(cls, **values: Any) -> Self:
-        """Make it from the numbers of each pin: ``Viscous.at(O2=0.01)``, ``PinFriction.at(A=(mu, radius))``."""
+        """Make the effect from the numbers of each pin.
+
+        As ``Viscous.at(O2=0.01)`` or ``PinFriction.at(A=(mu, radius))``.
+        """
         rows = (
             (pin, *(value if isinstance(value, (tuple, list)) else (value,)))
             for pin, value in values.items()

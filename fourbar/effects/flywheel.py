@@ -43,5 +43,8 @@ class Flywheel(Effect):
         return {self.bar: self.inertia}
 
     def add_to_mjcf(self, model: Any) -> None:
-        """Add it as inertia of the body, because MuJoCo's armature of pin O2 is the drive."""
+        """Add the flywheel as inertia of the body.
+
+        MuJoCo's armature of pin O2 is the drive.
+        """
         model.inertia[self.bar] += self.inertia

@@ -36,12 +36,18 @@ class ForceDrive(ABC):
     @property
     @abstractmethod
     def ends(self) -> tuple[tuple[float, Place], ...]:
-        """Places at which it acts, each with the sense of the force along the drive's direction."""
+        """Places at which the drive acts, each with the sense of its force there.
+
+        The sense is along the drive's direction.
+        """
 
     @property
     @abstractmethod
     def apart(self) -> tuple[int, ...]:
-        """Bars of which one may be left out so that the moments of the other two give the force between them."""
+        """Return the bars of which one may be left out.
+
+        The moments of the other two then give the force between them.
+        """
 
     @abstractmethod
     def with_places(self, change: Callable[[Place], Place]) -> Self:
@@ -53,7 +59,7 @@ class ForceDrive(ABC):
 
     @abstractmethod
     def line(self, state: State) -> tuple[Any, Number]:
-        """Compute the stroke, m (None: there is none), and the unit vector of the direction."""
+        """Compute the stroke, m (None: there is none), and the force's unit vector."""
 
     @abstractmethod
     def act(self, actions: Actions, force: Number) -> None:
@@ -64,7 +70,10 @@ class ForceDrive(ABC):
         """Return the status of positions at which there is no force; None: nowhere."""
 
     def gain(self, state: State) -> Number:
-        """Compute ds/dq, m: the work of 1 N over the change of the independent angle."""
+        """Compute ds/dq, m.
+
+        It is the work of 1 N over the change of the independent angle.
+        """
         return self.per_newton(Actions(state, MASSLESS)).work()[0]
 
     def per_newton(self, actions: Actions) -> Actions:
@@ -74,10 +83,10 @@ class ForceDrive(ABC):
         return single
 
     def leverage(self, state: State, sines: dict[int, Number]) -> tuple[Number, Number]:
-        """Compute P and the most that it could be: L, the sum of what each end could move, m.
+        """Compute P and the largest value that it could have.
 
-        That is r on bar 2, a + r a/b on bar 3, r a/c on bar 4, r its distance from the
-        bar's first pin.
+        The latter is L, the sum of what each end could move, m. That is r on bar 2, a +
+        r a/b on bar 3, r a/c on bar 4, r its distance from the bar's first pin.
 
         `sines`: of theta_4 - theta_3, theta_4 - theta_2, theta_3 - theta_2, as of a
         drive on bar 2, 3, 4.

@@ -1,4 +1,4 @@
-"""Dry pin friction of given torque: constant magnitude, against the relative rotation at a pin."""
+"""Dry pin friction of constant torque, against the relative rotation at a pin."""
 
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -37,7 +37,10 @@ class Friction(PinRows):
             actions.pin_couple(pin, -f * actions.sense(pin))
 
     def add_to_mjcf(self, model: Any) -> None:
-        """Set the attribute ``frictionloss`` of the hinge (of a tendon at the cut pin B)."""
+        """Set the attribute ``frictionloss`` of the hinge.
+
+        At the cut pin B it is that of a tendon.
+        """
         for pin, f in self.torques:
             model.add_dry_friction(pin, f)
 

@@ -12,7 +12,7 @@ from fourbar.linkage import MOVING_BARS, Declared, FourBar, check_numbers
 
 @dataclass(frozen=True, slots=True)
 class Gravity(Effect):
-    """A uniform field of the given magnitude (m/s^2) and direction (rad, from +x, counter-clockwise)."""
+    """A uniform field of some magnitude (m/s^2) and direction (rad, from +x, ccw)."""
 
     magnitude: float = 9.81
     angle: float = -math.pi / 2

@@ -1,7 +1,8 @@
-"""A drive along the line between two points of two bars: a cylinder, a spindle, a linear actuator.
+"""A drive along the line between two points of two bars, such as a cylinder.
 
-Per newton that it pushes its ends apart the bars get the unit vector of the line at one
-end, its opposite at the other; s is the stroke, the distance of the ends.
+A spindle or a linear actuator is one too. Per newton that it pushes its ends apart the
+bars get the unit vector of the line at one end, its opposite at the other; s is the
+stroke, the distance of the ends.
 """
 
 from collections.abc import Callable
@@ -24,7 +25,7 @@ from fourbar.quantities import NO_DIRECTION, NO_LEVER, OK
 
 @dataclass(frozen=True, slots=True)
 class LinearDrive(ForceDrive):
-    """A force along the line between two points, N, positive where it pushes them apart.
+    """A force along the line between two points, N, positive where it pushes.
 
     Parameters
     ----------
@@ -47,21 +48,25 @@ class LinearDrive(ForceDrive):
 
     @property
     def ends(self) -> tuple[tuple[float, Place], tuple[float, Place]]:
-        """Return both ends, each with the sense in which the drive pushes it along its line."""
+        """Return both ends, each with the sense in which the drive pushes it."""
         return (-1.0, self.start), (1.0, self.end)
 
     @property
     def apart(self) -> tuple[int, ...]:
-        """Bars of which one may be left out so that the moments of the other two give the force between them.
+        """Return the bars of which one may be left out.
 
-        From the ground to bar 2 or 4 it is in the moment of that bar alone, as a couple
-        is; else it is in any pair's.
+        The moments of the other two then give the force between them. From the ground
+        to bar 2 or 4 it is in the moment of that bar alone, as a couple is; else it is
+        in any pair's.
         """
         bars = {self.start.bar, self.end.bar}
         return (*bars - {1},) if bars in ({1, 2}, {1, 4}) else MOVING_BARS
 
     def require_motion(self, linkage: FourBar) -> None:
-        """Raise InputError where no motion changes the distance of the ends, as where one bar holds both."""
+        """Raise InputError if no motion changes the distance of the ends.
+
+        One bar may hold both, for instance.
+        """
         if common := _list_bars(linkage, self.start) & _list_bars(linkage, self.end):
             allowed = (
                 f"keeps its distance from `from` at every position: bar {min(common)}"
@@ -72,7 +77,10 @@ class LinearDrive(ForceDrive):
             )
 
     def line(self, state: State) -> tuple[Number, Number]:
-        """Compute the stroke, m, and the unit vector from `start` to `end`, no number where they coincide."""
+        """Compute the stroke, m, and the unit vector from `start` to `end`.
+
+        The vector is NaN where they coincide.
+        """
         across = self.end.locate(state) - self.start.locate(state)
         stroke = np.abs(across)
         return stroke, across / stroke
@@ -82,10 +90,11 @@ class LinearDrive(ForceDrive):
         actions.pull(self.end, self.start, force * self.line(actions.state)[1])
 
     def status(self, state: State, sines: dict[int, Number]) -> Number:
-        """Return NO_DIRECTION where the ends coincide, NO_LEVER where P lies within its rounding; None: nowhere.
+        """Return NO_DIRECTION where the ends coincide, NO_LEVER where P vanishes.
 
-        Places are rounded by the lengths over which they are reached, the line's
-        direction by that over the stroke.
+        P vanishes within its rounding. None: there is no such position. Places are
+        rounded by the lengths over which they are reached, the line's direction by that
+        over the stroke.
         """
         stroke, (lever, most) = self.line(state)[0], self.leverage(state, sines)
         away = (
@@ -101,7 +110,10 @@ class LinearDrive(ForceDrive):
 
 
 def _list_bars(linkage: FourBar, point: Place) -> set[int]:
-    """List the bars that hold a point: its own, and at one of its pins the other one too."""
+    """List the bars that hold a point.
+
+    These are its bar and, at a pin of it, the other bar.
+    """
     length = linkage.lengths[point.bar - 1]
     places = zip({1: ("O2", "O4"), **ENDS}[point.bar], (0.0, length), strict=True)
     pins = [

@@ -1,4 +1,7 @@
-"""External loads: a force at a point of a bar, or a pure couple on it, constant or a table over theta_2."""
+"""External loads: a force at a point of a bar, or a couple on it.
+
+It is constant or a table over theta_2.
+"""
 
 import math
 from collections.abc import Callable
@@ -41,7 +44,7 @@ PLACES_OF_LOADS = ("from_pin", "from_centre", "point", "arm")
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """Factor of a load over theta_2, linear between its points; theta_2 is taken modulo a turn.
+    """Factor of a load over theta_2, linear between its points, modulo a turn.
 
     Parameters
     ----------
@@ -85,10 +88,11 @@ class Table:
         return math.isclose(self.theta_2[-1] - self.theta_2[0], TURN, rel_tol=1e-12)
 
     def at(self, theta_2: Any) -> Any:
-        """Interpolate the factor; InputError for a position that the table does not cover.
+        """Interpolate the factor.
 
-        What the angle is beyond the table's last point before it is theta_2 less the
-        point and whole turns, of which nothing is rounded but the result.
+        Raises InputError for a position that the table does not cover. What the angle
+        is beyond the table's last point before it is theta_2 less the point and whole
+        turns, of which nothing is rounded but the result.
         """
         first = self.theta_2[0]
         place = first + np.remainder(shorten(angle(polar(1.0, theta_2))) - first, TURN)
@@ -110,7 +114,10 @@ class Table:
         return before + rise * (past / width)
 
     def _require_covered(self, place: Any) -> Any:
-        """Return angles within a turn from the first, or raise an InputError for one that the table does not cover."""
+        """Return angles within a turn from the first.
+
+        Raises InputError for one that the table does not cover.
+        """
         first, last = self.theta_2[0], self.theta_2[-1]
         beyond = place > last + 1e-12 * TURN
         if not beyond.any():
@@ -205,7 +212,9 @@ class Load(Effect):
         return Place(self.bar, self.from_pin, self.from_centre, self.point)
 
     def foot(self, G: Any) -> Any:
-        """Return where the settled load acts in the bar's frame, from its first pin, m: at its place, or else at G.
+        """Return where the settled load acts in the bar's frame, m.
+
+        It is its place, or else G, from the bar's first pin.
 
         G, likewise, is where an arm begins, and where a couple alone is shown.
         """
@@ -235,7 +244,10 @@ class Load(Effect):
             actions.couple(self.bar, factor * self.moment)
 
     def greatest_force(self, linkage: FourBar) -> float:
-        """Return the force with its lever, and the couple divided by the bar's length, N; of a settled load."""
+        """Return the force with its lever, and the couple over the bar's length, N.
+
+        The load is a settled one.
+        """
         bar = linkage.bar(self.bar)
         total = abs(self.moment) / bar.length
         if self.force is not None:

@@ -1,7 +1,9 @@
-"""Coulomb friction in the pins: a couple mu r |F| against the rotation, with F the pin force it helps to make.
+"""Coulomb friction in the pins: a couple mu r |F| against the rotation.
 
-x_p = k_p |F_p + sum over q of C_pq x_q|, x >= 0: sliding friction couples that make the
-pin forces they depend on.
+F is the pin force, which depends on the couple. The couples x >= 0 of sliding friction
+fulfil
+
+    x_p = k_p |F_p + sum over q of C_pq x_q|.
 
 With K_pq = k_p |C_pq| the right-hand side is a contraction in a weighted maximum norm
 where the spectral radius of K is below 1 (Perron): exactly one solution. For one pin
@@ -31,24 +33,31 @@ ONE, NONE, MANY = range(3)
 ROUNDING = 32.0 * 2.0**-52
 """Change of x, relative, that is the rounding of its evaluation."""
 STEPS = 200
-"""Each halves the error where the spectral radius is 1/2; Newton's steps end it long before."""
+"""Steps of the contraction, each of which halves the error at a spectral radius of 1/2.
+Newton's steps end it long before.
+"""
 SAME = 1e-6
 """Two solutions found by the search are the same if they differ by less, relative."""
 SETTLED = 1e-12
-"""Relative change by which a start of the search has settled; the last two steps take back what that leaves."""
+"""Relative change by which a start of the search has settled. The last two steps remove
+what that leaves.
+"""
 STARTS = 64
 SEARCHED = 256
-"""Problems of which those that are the same are searched once, as where many ranges are cut at one dead point."""
+"""Least number of problems among which equal ones are searched once. Many are equal
+where many ranges are cut at one dead point.
+"""
 
 
 @dataclass(frozen=True, slots=True)
 class PinFriction(PinRows):
-    """Pins as (pin, coefficient of friction mu, pin radius r in m): couple mu r |F| where the pin turns.
+    """Pins as (pin, coefficient of friction mu, pin radius r in m).
 
-    At a pin that does not turn the couple may have any value up to that; 0, the middle,
-    is taken, and `torque_low`, `torque_high` of the solution are the torques at which
-    the motion would begin. Where no couples fulfil the equations the status is
-    "jammed", where several do it is "several".
+    The couple is mu r |F| where the pin turns. At a pin that does not turn the couple
+    may have any value up to that; 0, the middle, is taken, and `torque_low`,
+    `torque_high` of the solution are the torques at which the motion would begin. Where
+    no couples fulfil the equations the status is "jammed", where several do it is
+    "several".
     """
 
     pins: tuple[tuple[str, float, float], ...]
@@ -80,7 +89,10 @@ class PinFriction(PinRows):
     def per_unit(
         self, actions: Actions, eliminate: Callable[..., PinForces]
     ) -> dict[str, PinForces]:
-        """Compute the pin forces that a couple of 1 N m makes at each pin, against its rotation."""
+        """Compute the pin forces that a couple of 1 N m at each pin causes.
+
+        The couple is against the pin's rotation.
+        """
         forces = {}
         for pin in self.loaded_pins:
             single = Actions(actions.state, actions.bodies)
@@ -91,7 +103,10 @@ class PinFriction(PinRows):
     def solve_friction(
         self, actions: Actions, pins: PinForces, eliminate: Callable[..., PinForces]
     ) -> SolvedFriction:
-        """Add the couples that fulfil x_p = mu_p r_p |F_p(x)|, F_p = F0_p + sum over q of C_pq x_q."""
+        """Add the couples that fulfil x_p = mu_p r_p |F_p(x)|.
+
+        The pin forces are F_p = F0_p + sum over q of C_pq x_q.
+        """
         names, arms = self.loaded_pins, {pin: mu * r for pin, mu, r in self.pins}
         senses, per_unit = (
             {pin: actions.sense(pin) for pin in names},
@@ -149,7 +164,9 @@ class PinFriction(PinRows):
     def _refine(
         self, couples: dict[str, Any], pins: PinForces, per_unit: dict[str, PinForces]
     ) -> dict[str, Any]:
-        """Take Newton's steps from couples in doubles, in whatever numbers the forces are.
+        """Take Newton's steps from couples in doubles.
+
+        The numbers are of the kind that the forces are.
 
         (1 - J) dx = mu r |F + C x| - x, J the slope of the right-hand side by x: of
         numbers that carry their derivatives the same steps are the theorem of the
@@ -184,7 +201,7 @@ class PinFriction(PinRows):
         return couples
 
     def act_known(self, actions: Actions, forces: Mapping[str, Array]) -> None:
-        """Add the friction couples for pin forces that are known already (name: (n, 2), N)."""
+        """Add the friction couples for pin forces that are known (name: (n, 2), N)."""
         for pin, mu, r in self.pins:
             load = np.hypot(*np.asarray(forces[PIN_FORCE[pin]]).T)
             actions.pin_couple(pin, -actions.sense(pin) * (mu * r * load))
@@ -202,7 +219,10 @@ class Sliding(NamedTuple):
 
 
 def solve_sliding(F: Array, C: Array, k: Array) -> Sliding:
-    """Solve n problems in p unknowns: F (n, p, 2) in N, C (n, p, p, 2) in 1/m, k (n, p) in m."""
+    """Solve n problems in p unknowns.
+
+    F (n, p, 2) is in N, C (n, p, p, 2) in 1/m, k (n, p) in m.
+    """
     n, p = F.shape[:2]
     finite = np.isfinite(F).all(axis=(1, 2)) & np.isfinite(C).all(axis=(1, 2, 3))
     x = np.full((n, p), np.nan)
@@ -291,7 +311,7 @@ def compute_step(gap: Array, slope: Array) -> Array:
 
 
 def _iterate(F: Array, C: Array, k: Array, x: Array) -> Array:
-    """Take Newton's step where it lessens the gap, else the plain one of the contraction."""
+    """Take Newton's step if it lessens the gap, otherwise that of the contraction."""
     done = np.zeros(len(x), dtype=bool)
     for _ in range(STEPS):
         right, slope = _compute_right_side(F, C, k, x)
@@ -314,7 +334,10 @@ def _iterate(F: Array, C: Array, k: Array, x: Array) -> Array:
 
 
 def _search(F: Array, C: Array, k: Array) -> tuple[Array, NDArray[np.int_]]:
-    """Find the least solution of each problem, and how many there are, from starts over many magnitudes."""
+    """Find the least solution of each problem, and how many there are.
+
+    The starts cover many magnitudes.
+    """
     n, p = k.shape
     size = np.max(k * np.hypot(F[..., 0], F[..., 1]), axis=1)
     directions = np.vstack(

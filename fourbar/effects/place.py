@@ -1,4 +1,4 @@
-"""Places of bars: from the bar's first pin, from its mass centre, or at a named point."""
+"""Places of bars: from the first pin, from the mass centre, or at a named point."""
 
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, NamedTuple
@@ -70,13 +70,19 @@ class Place(NamedTuple):
         return Place(self.bar, self.polar_from_pin())
 
     def vector(self) -> Any:
-        """Compute the vector from the bar's first pin to a settled place, in the bar's frame, complex, m."""
+        """Compute the vector from the bar's first pin to a settled place.
+
+        It is complex, m, in the bar's frame.
+        """
         assert self.from_pin is not None
         z = polar(*self.from_pin)
         return z if self.from_centre is None else z + polar(*self.from_centre)
 
     def polar_from_pin(self) -> tuple[Any, Any]:
-        """Return distance (m) and angle (rad) of a settled place from the bar's first pin."""
+        """Return distance (m) and angle (rad) of a settled place.
+
+        They are from the bar's first pin.
+        """
         assert self.from_pin is not None
         if self.from_centre is None:
             return self.from_pin
@@ -97,12 +103,18 @@ class Place(NamedTuple):
 
     @property
     def in_bar(self) -> Any:
-        """Vector in the bar's frame, along + i across its line, m; an array, so products round alike."""
+        """Vector in the bar's frame, along + i across its line, m.
+
+        It is an array, so that products round alike.
+        """
         z = self.vector()
         return np.asarray(z) if isinstance(z, complex) else z
 
     def arm_from(self, pin: str, state: State) -> tuple[Any, Any]:
-        """Return the vector from one of the bar's pins in the bar's frame, complex, m, and the square of its length."""
+        """Return the vector from a pin of the bar, and the square of its length.
+
+        It is complex, m, in the bar's frame.
+        """
         arm = self.in_bar
         if pin != SECOND_PIN[self.bar]:
             return arm, self.distance * self.distance
@@ -167,7 +179,10 @@ def require_mass_centre(key: str, bar: int) -> None:
 
 
 def require_ends(key: str, start: object, end: object) -> tuple[Place, Place]:
-    """Return the ends of a line between two bars, checked; InputError for what is none."""
+    """Return the ends of a line between two bars, checked.
+
+    Raises InputError for a value that is none.
+    """
     ends = tuple(
         require_place(f"{key}.{name}", place)
         for name, place in (("from", start), ("to", end))

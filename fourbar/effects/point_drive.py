@@ -1,7 +1,8 @@
-"""A drive that pushes a point of a bar in a direction: a hand on a lid, the handle of pliers.
+"""A drive that pushes a point of a bar in a direction, like a hand on a lid.
 
-Per newton the bar gets the unit vector of the direction at the point; ds/dq is the
-component in that direction of the point's derivative by the independent angle.
+The handle of pliers is another example. Per newton the bar gets the unit vector of the
+direction at the point; ds/dq is the component in that direction of the point's
+derivative by the independent angle.
 """
 
 from collections.abc import Callable
@@ -30,7 +31,8 @@ class PointDrive(ForceDrive):
     ----------
     place : where the force acts, which turns with its bar.
     direction : angle of the force, rad.
-    frame : "world": the direction is from +x; "bar": from the bar's line, and turns with it.
+    frame : "world": the direction is from +x; "bar": from the bar's line, and turns
+        with it.
     """
 
     place: Place
@@ -55,10 +57,11 @@ class PointDrive(ForceDrive):
 
     @property
     def apart(self) -> tuple[int, ...]:
-        """Bars of which one may be left out so that the moments of the other two give the force between them.
+        """Return the bars of which one may be left out.
 
-        The force on bar 2 or 4 is in the moment of that bar alone, as a couple is; on
-        bar 3 it is in any pair's.
+        The moments of the other two then give the force between them. The force on bar
+        2 or 4 is in the moment of that bar alone, as a couple is; on bar 3 it is in any
+        pair's.
         """
         return MOVING_BARS if self.place.bar == 3 else (self.place.bar,)
 

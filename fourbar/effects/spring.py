@@ -24,7 +24,9 @@ from fourbar.linkage import (
 from fourbar.quantities import NO_DIRECTION, OK
 
 COINCIDE = 16.0 * 2.0**-52
-"""Two points nearer than this part of their paths from O2, bar by bar, have no direction between them."""
+"""Part of the paths from O2, bar by bar, below which two points count as one. There is
+no direction between them.
+"""
 GAS = {
     **dict.fromkeys(("extended", "stroke"), Declared("m", POSITIVE)),
     **dict.fromkeys(
@@ -36,9 +38,10 @@ GAS = {
 
 @dataclass(frozen=True, slots=True)
 class Spring:
-    """A spring that pulls its two points together with preload + stiffness (distance - length), N.
+    """A spring that pulls its two points together.
 
-    Where that is negative it pushes them apart: a compression spring is shorter than `length`, a gas spring has a
+    The pull is preload + stiffness (distance - length), N. Where that is negative it
+    pushes them apart: a compression spring is shorter than `length`, a gas spring has a
     negative preload. With stiffness 0 the force is constant.
 
     Parameters
@@ -79,9 +82,10 @@ class Spring:
         extended_force: float,
         compressed_force: float | None = None,
     ) -> "Spring":
-        """Make a gas spring, which pushes its two points apart with a force that grows evenly over the stroke.
+        """Make a gas spring, which pushes its two points apart.
 
-        It has no end stops: beyond the stroke the force goes on along the same line.
+        The force grows evenly over the stroke. It has no end stops: beyond the stroke
+        the force goes on along the same line.
 
         Parameters
         ----------
@@ -119,11 +123,17 @@ class Spring:
 
     @property
     def slack(self) -> float:
-        """Tension less stiffness times distance, N; 0: the force is proportional to the distance vector."""
+        """Return tension less stiffness times distance, N.
+
+        0: the force is proportional to the distance vector.
+        """
         return self.preload - self.stiffness * self.length
 
     def greatest_tension(self, linkage: FourBar) -> float:
-        """Return a bound of the tension, N: the points stay within the linkage and their own arms."""
+        """Return a bound of the tension, N.
+
+        The points stay within the linkage and the arms to them.
+        """
         reach = sum(linkage.lengths) + abs(self.start.distance) + abs(self.end.distance)
         return float(abs(self.preload) + self.stiffness * (reach + self.length))
 
@@ -159,7 +169,7 @@ class Springs(Effect):
         return copy_with(self, springs=springs)
 
     def act(self, actions: Actions, state: State) -> None:
-        """Add the tension at `start` along the unit vector to `end`, and its opposite at `end`."""
+        """Add the tension at `start` towards `end`, and its opposite at `end`."""
         for spring in self.springs:
             across = spring.end.locate(state) - spring.start.locate(state)
             by_distance = spring.stiffness

@@ -58,7 +58,10 @@ class Torsion(PinRows):
         return sum(abs(preload) + k * math.pi for _, k, _, preload in self.springs)
 
     def act(self, actions: Actions, state: State) -> None:
-        """Add M on bar j = -(preload + k (theta_j - theta_i - rest)), its opposite on bar i."""
+        """Add M on bar j and its opposite on bar i.
+
+        M = -(preload + k (theta_j - theta_i - rest)).
+        """
         for pin, k, rest, preload in self.springs:
             i, j = PINS[pin]
             turned = angle(state.direction(j) * state.direction(i).conjugate())
@@ -92,7 +95,10 @@ class Torsion(PinRows):
         return np.where(wound, WOUND, OK).astype(np.uint8)
 
     def add_to_mjcf(self, model: Any) -> None:
-        """Write the ``stiffness`` of the hinge (of a tendon at the cut pin B), its rest shifted by the preload."""
+        """Write the ``stiffness`` of the hinge, its rest shifted by the preload.
+
+        At the cut pin B it is that of a tendon.
+        """
         for pin, k, rest, preload in self.springs:
             turned = model.linkage.ground_angle if pin in ("O2", "O4") else 0.0
             model.pin[pin]["stiffness"] = k
@@ -134,17 +140,20 @@ class Torsion(PinRows):
         return q2, q3, q4
 
     def _follow_angles(self, state: State, branch: Number) -> list[Array]:
-        """Compute theta_j - theta_i of each sprung pin, continuous in the commanded angle on one branch."""
+        """Compute theta_j - theta_i of each sprung pin.
+
+        They are continuous in the commanded angle on one branch.
+        """
         angles = _remove_jumps(state, branch)
         return [angles[PINS[pin][1]] - angles[PINS[pin][0]] for pin, *_ in self.springs]
 
 
 def _remove_jumps(state: State, branch: Number) -> dict[int, Number]:
-    """Compute theta_1 .. theta_4 without jumps at whole turns, on one branch of the loop read from the commanded bar.
+    """Compute theta_1 .. theta_4 without jumps at whole turns, on one branch.
 
-    The diagonal from A to O4 swings about the ground's line where a < d, and otherwise
-    about the input's, never by more than a quarter turn; bars 3 and 4 make angles with
-    it that stay between 0 and half a turn.
+    The loop is read from the commanded bar. The diagonal from A to O4 swings about the
+    ground's line where a < d, and otherwise about the input's, never by more than a
+    quarter turn; bars 3 and 4 make angles with it that stay between 0 and half a turn.
     """
     bar, theta_1, theta_2 = (
         state.bar,

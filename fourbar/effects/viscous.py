@@ -1,4 +1,4 @@
-"""Viscous pin damping: a couple proportional to the relative angular velocity at a pin."""
+"""Viscous pin damping: a couple proportional to the relative angular velocity."""
 
 from dataclasses import dataclass
 from typing import Any, ClassVar

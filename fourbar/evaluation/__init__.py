@@ -1,1 +1,1 @@
-"""The evaluation of what a scene asks for: stage by stage, block by block, with error bars."""
+"""The evaluation of a scene: stage by stage, block by block, with error bars."""

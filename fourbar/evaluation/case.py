@@ -1,4 +1,4 @@
-"""A scene in the numbers of the formulas: positions, motion, and the forces under everything that acts."""
+"""A scene as the numbers of the formulas, and its forces under all that acts."""
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -30,17 +30,18 @@ if TYPE_CHECKING:
 
 
 BLOCK = 8000
-"""Positions evaluated at a time, measured: fewer pay for calls, more leave the cache. Of 8192 an array of complex
-numbers is a little more than the C library hands out again without asking the system for fresh pages, and from 10 000
-on OpenBLAS starts threads for the squares by which `is_finite` looks for what is no number.
+"""Positions evaluated at a time, measured: fewer pay for calls, more leave the cache.
+Of 8192 an array of complex numbers is a little more than the C library hands out again
+without asking the system for fresh pages, and from 10 000 on OpenBLAS starts threads
+for the squares by which `is_finite` looks for what is no number.
 """
 UNDECIDED = 32.0 * U
-"""A factor of Heron's formula smaller than this times its terms is evaluated in many digits: in doubles it is wrong
-by at most about 12 U times them.
+"""A factor of Heron's formula smaller than this times its terms is evaluated in many
+digits: in doubles it is wrong by at most about 12 U times them.
 """
 A_PERTURBATION = 1e-3
-"""Part of the sum of the lengths: a member of a study that misses a change point of the nominal linkage by more is a
-linkage of its own.
+"""Part of the sum of the lengths: a member of a study that misses a change point of the
+nominal linkage by more is a linkage of its own.
 """
 NO_POSITIONS = np.empty(0, dtype=np.intp)
 NO_MOTION = Coefficients(*[np.nan] * 8)
@@ -50,7 +51,10 @@ NO_MOTION = Coefficients(*[np.nan] * 8)
 def find_undecided(
     factor: Any, constant: Any, size: Any, part: float = UNDECIDED
 ) -> Any:
-    """Mark where doubles cannot decide the sign of a factor of Heron's formula, a constant and 4 a d times a square."""
+    """Mark where doubles cannot decide the sign of a factor of Heron's formula.
+
+    The factor is a constant and 4 a d times a square.
+    """
     return (constant < 0.0) & (abs(factor) < part * (abs(constant) + size))
 
 
@@ -62,12 +66,18 @@ def find_sign(branch: NDArray[np.int8]) -> Any:
 
 
 def find_margin(commanded: Command) -> float:
-    """Return the sine at or below which a commanded position is singular; 0 where its angle is known in many digits."""
+    """Return the sine at or below which a commanded position is singular.
+
+    It is 0 where the angle is known in many digits.
+    """
     return NO_DIGIT_LEFT if commanded.remainder is None else 0.0
 
 
 class Dynamics(NamedTuple):
-    """Pin forces and what friction that depends on them was solved to, as `SolvedFriction`, and what the drive does."""
+    """Pin forces, what the drive does, and the friction that depends on the pin forces.
+
+    The latter is a `SolvedFriction`.
+    """
 
     pins: PinForces
     from_jamming: Any
@@ -76,7 +86,9 @@ class Dynamics(NamedTuple):
     drive: Any
     """Torque of the drive, N m, or its force, N."""
     work: Any
-    """Power of the drive over the commanded angle's speed, N m; it has no pole where the driven bar rests."""
+    """Power of the drive over the commanded angle's speed, N m. It has no pole where
+    the driven bar rests.
+    """
 
 
 class Case(NamedTuple):
@@ -89,15 +101,22 @@ class Case(NamedTuple):
     drive_bar: int
     path: Path
     points: tuple[tuple[str, int, Any], ...] = ()
-    """The scene's own: name, bar, and place in the bar's frame at its first pin, complex, m."""
+    """Points of the scene: name, bar, and place in the bar's frame, complex, m. The
+    frame begins at the bar's first pin.
+    """
     side: Any = 0
-    """Impending direction of rotation at pins at rest, or the fraction of its torque with which friction holds them."""
+    """Impending direction of rotation at pins at rest. Or the fraction of its torque
+    with which friction holds them.
+    """
     drive: "ForceDrive | None" = None
     """Drive that exerts a force in place of the couple on the driven bar."""
 
     @classmethod
     def of(cls, scene: Scene, bar: int = 2) -> "Case":
-        """Collect the numbers that stay the same over the positions, for a command of bar 2, 3 or 4."""
+        """Collect the numbers that stay the same over the positions of a command.
+
+        The command is that of bar 2, 3 or 4.
+        """
         scene = scene.settled()
         terms, linkage = (*scene.loads, *scene.effects), scene.linkage
         path = prepare_path(Loop(*linkage.lengths, 0.0, 0.0), linkage.ground_angle, bar)
@@ -117,9 +136,10 @@ class Case(NamedTuple):
         )
 
     def beside(self, nominal: Scene) -> "Case":
-        """Return the case of members near a nominal linkage, in the assembly nearest to its own at each position.
+        """Return the case of members near a nominal linkage.
 
-        Of a nominal linkage with a change point a root changes its sign there. A member
+        At each position the assembly is the nearest to that of the nominal linkage. Of
+        a nominal linkage with a change point a root changes its sign there. A member
         that misses this change point by less than a perturbation keeps that sign, so
         that it lies beside the nominal one on either side.
         """
@@ -136,7 +156,7 @@ class Case(NamedTuple):
         return self._replace(path=self.path._replace(passing=passing))
 
     def lengthened(self) -> "Case":
-        """Return the same case in longer numbers, all that is computed of the scene's own numbers too."""
+        """Return the case in longer numbers, with all that follows from the scene."""
         linkage, terms, drive = change_numbers(
             (self.linkage, self.terms, self.drive), lengthen
         )
@@ -161,11 +181,14 @@ class Case(NamedTuple):
         return COUPLE if self.drive is None else LINE
 
     def sines(self, position: Position) -> dict[int, Any]:
-        """Compute the sines of the angles between two moving bars, keyed by the third one's number."""
+        """Compute the sines between two moving bars, by the number of the third bar."""
         return {bar: self.path.drive_sine(position, bar) for bar in MOVING_BARS}
 
     def drive_speed(self, state: State) -> Any:
-        """Compute the speed at which the drive works: of the driven bar, rad/s, or of the stroke, m/s."""
+        """Compute the speed of the drive.
+
+        It is that of the driven bar, rad/s, or that of the stroke, m/s.
+        """
         return (
             state.omega(self.drive_bar)
             if self.drive is None
@@ -173,7 +196,7 @@ class Case(NamedTuple):
         )
 
     def drive_condition(self, state: State) -> Any:
-        """Compute the drive's leverage as a part of the most it could have, in [0, 1]."""
+        """Compute the drive's leverage over the largest possible one, in [0, 1]."""
         if self.drive is None:
             return abs(self.path.drive_sine(state.position, self.drive_bar))
         lever, most = self.drive.leverage(state, self.sines(state.position))
@@ -191,7 +214,9 @@ class Case(NamedTuple):
         condition: Any = None,
         margin: float = NO_DIGIT_LEFT,
     ) -> State:
-        """Close the loop at a half angle: the one way from an angle to what forces act on.
+        """Close the loop at a half angle.
+
+        Every path from an angle to the forces uses it.
 
         Parameters
         ----------
@@ -243,18 +268,27 @@ class Case(NamedTuple):
 
     @classmethod
     def of_released(cls, scene: Scene, bar: int, side: Any) -> "Case":
-        """Collect the numbers of a released linkage, read in the angle of bar 2 or 4, which no couple drives."""
+        """Collect the numbers of a released linkage, which no couple drives.
+
+        It is read in the angle of bar 2 or 4.
+        """
         return cls.of(scene, bar)._replace(drive_bar=bar, drive=None, side=side)
 
     def begin_at(self, start: Command) -> "Case":
-        """Return a copy whose path-dependent effects begin at this position; it may hold many linkages."""
+        """Return a copy whose path-dependent effects begin at this position.
+
+        The copy may hold many linkages.
+        """
         state, _ = self.at(start)
         return self._replace(
             terms=tuple(term.begin_at(state, start.branch) for term in self.terms)
         )
 
     def begin_with(self, motion: Command) -> "Case":
-        """Let the effects begin where the linkage first assembles in a motion, if that keeps its branch."""
+        """Let the effects begin where the linkage first assembles in a motion.
+
+        They do if that keeps its branch.
+        """
         half, _ = self.half_angle(motion.angle, motion.remainder)
         assembled = (half.outer >= 0.0) & (half.inner >= 0.0)
         if not assembled.any() or np.ptp(motion.branch) != 0:
@@ -269,7 +303,7 @@ class Case(NamedTuple):
     def half_angle(
         self, q: Array, remainder: Any
     ) -> tuple[HalfAngle, NDArray[np.intp]]:
-        """Compute the half angles, and the indices of those evaluated in many digits."""
+        """Compute the half angles, and the indices of those in many digits."""
         lengths, half = self.path.lengths, self.path.half_angle(q)
         close: Any = remainder is not None
         if remainder is None:
@@ -296,7 +330,7 @@ class Case(NamedTuple):
     def _compute_inertia(
         self, state: State, acceleration: Any, sine: Any
     ) -> "_Inertia":
-        """Compute d'Alembert's forces and moments, and what they add to the generalized force.
+        """Compute d'Alembert's forces and moments, and their generalized force.
 
         `sine`: of theta_3 - theta_2 if the moment about pin B is wanted, otherwise
         None.
@@ -327,7 +361,10 @@ class Case(NamedTuple):
         return _Inertia(inertial, others, wrenches, mass_at_A, about_B)
 
     def dynamics(self, state: State, acceleration: Any, side: Any = 0) -> Dynamics:
-        """Compute pin forces and the drive under everything that acts; for the parameters see `Actions`."""
+        """Compute pin forces and the drive under everything that acts.
+
+        For the parameters see `Actions`.
+        """
         actions = Actions(state, self.bodies, side).add(self.terms)
         driven = (self.drive_bar,) if self.drive is None else self.drive.apart
         sines = {bar: self.path.drive_sine(state.position, bar) for bar in driven}
@@ -351,12 +388,13 @@ class Case(NamedTuple):
     def drive_interval(
         self, state: State, acceleration: Any, drive: Any
     ) -> tuple[Any, Any, Any]:
-        """Compute the least and greatest torque or force of the drive; equal unless dry friction holds a pin at rest.
+        """Compute the least and greatest torque or force of the drive.
 
-        The third is where one of them is NaN because friction jams the motion that
-        would begin; None: nowhere. The ends are those at which the linkage would begin
-        to move forwards or backwards, or, where only a pin comes to rest while the
-        linkage moves, those just before and after its reversal.
+        They are equal unless dry friction holds a pin at rest. The third is where one
+        of them is NaN because friction jams the motion that would begin; None: nowhere.
+        The ends are those at which the linkage would begin to move forwards or
+        backwards, or, where only a pin comes to rest while the linkage moves, those
+        just before and after its reversal.
         """
         actions = Actions(state, self.bodies)
         pins = {pin for term in self.terms for pin in term.dry_pins}
@@ -392,18 +430,20 @@ class _Inertia(NamedTuple):
     mass_at_A: Any = 0.0j
     """Force of the coupler's mass at pin A, as from `inertia_wrenches`."""
     about_B: Any = 0.0
-    """Moment on the coupler about pin B, N m; of a drive for which bar 4 is left out."""
+    """Moment on the coupler about pin B, N m, for a drive that leaves bar 4 out."""
 
 
 class _FreeBodies(NamedTuple):
-    """The free bodies at some positions, and the drive that balances what acts on them."""
+    """The free bodies at some positions, and the drive that balances what acts."""
 
     state: State
     inertia: _Inertia
     sines: dict[int, Any]
     """Sines between the two other bars, by the bar whose moment is left out."""
     drive: Actions | None
-    """Actions of a drive that exerts a force, per newton; None: the drive is a couple on a bar."""
+    """Actions of a drive that exerts a force, per newton. None: the drive is a couple
+    on a bar.
+    """
     gain: Any
     """h of the driven bar, or ds/dq of the drive that exerts a force, m."""
 

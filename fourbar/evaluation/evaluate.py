@@ -1,9 +1,10 @@
-"""Positions of a case evaluated stage by stage: kinematics, forces, error bars, and what has no value.
+"""Positions of a case, evaluated stage by stage.
 
-The error bar of a force is its distance to the value that the same formulas give in
-longer numbers, or what these resolve there, if that is more. The stated numbers of
-bars, loads, effects and command are taken as exact; everything else is computed again,
-in numbers that round at most a thousandth as much as doubles.
+The stages are kinematics, forces and error bars; what has no value has a status. The
+error bar of a force is its distance to the value that the same formulas give in longer
+numbers, or what these resolve there, if that is more. The stated numbers of bars,
+loads, effects and command are taken as exact; everything else is computed again, in
+numbers that round at most a thousandth as much as doubles.
 """
 
 import cmath
@@ -52,13 +53,19 @@ FORCE, ERROR = STAGES.index("force"), STAGES.index("error")
 LONG_EPS = float(np.finfo(np.longdouble).eps)
 """Distance of long doubles beside 1."""
 ROUNDINGS = 16.0
-"""Roundings of a chain of formulas that count in full: some fifty move a result by sqrt(50) = 7, here twice that."""
+"""Roundings of a chain of formulas that count in full. Some fifty move a result by
+sqrt(50) = 7; here that is doubled.
+"""
 STEP = 2.0**-14
-"""Part of s^2 by which an angle is moved for a slope: a force changes by that part, of which doubles leave digits."""
+"""Part of s^2 by which an angle is moved for a slope. A force changes by that part, of
+which doubles keep digits.
+"""
 LEAST_STEP = 2.0**-46
-"""Part of the angle, at least 1 rad: a shorter step is rounded to less than two digits."""
+"""Step as a part of the angle, at least of 1 rad. A shorter step is rounded to less
+than two digits.
+"""
 WITHOUT_FORCES = (NO_DIRECTION, WOUND, NO_LEVER)
-"""Statuses of positions at which an effect or the drive has no value, and so the forces have none."""
+"""Statuses of positions without forces, because an effect or the drive has no value."""
 
 
 class Evaluated(NamedTuple):
@@ -75,7 +82,9 @@ class Evaluated(NamedTuple):
 def evaluate(
     case: Case, command: Command, last_stage: int, wanted: Set[str]
 ) -> Evaluated:
-    """Evaluate the named quantities at the positions of a command, up to the last stage that they need.
+    """Evaluate the named quantities at the positions of a command.
+
+    The evaluation ends with the last stage that they need.
 
     `command`: positions (n,), or one in plain numbers.
     """
@@ -126,7 +135,10 @@ def evaluate_released(
 def _compute_codes(
     path: Path, sine: Any, half: HalfAngle, command: Command, unit: float = 1.0
 ) -> Any:
-    """Compute the status of each position from the sine of the transmission angle, times `unit`."""
+    """Compute the status of each position from the sine of the transmission angle.
+
+    `sine`: times `unit`.
+    """
     size, margin = abs(sine), find_margin(command) * unit
     if command.condition is not None:
         size = np.where(np.isnan(size), size, np.minimum(size, command.condition))
@@ -146,7 +158,7 @@ def _compute_codes(
 
 
 def _asks_angles_alone(case: Case, command: Command, wanted: Set[str]) -> bool:
-    """Return True if theta_3 and theta_4 are all that is wanted, for which bars need no vectors."""
+    """Return True if only theta_3 and theta_4 are wanted; bars then need no vectors."""
     angles_alone = len(wanted) <= len(ANGLES) and wanted <= set(ANGLES)
     of_input = command.bar == 2 and command.remainder is None
     return angles_alone and of_input and not case.path.may_stay_parallel
@@ -171,7 +183,10 @@ def _list_forces(
     dynamics: Dynamics,
     error_bars: dict[str, Any],
 ) -> tuple[Any, dict[str, Any]]:
-    """List the quantities of the force stage, error bars included, and the statuses with those of the effects."""
+    """List the quantities of the force stage, and the statuses with those of effects.
+
+    Error bars are included.
+    """
     drive_names = case.drive_names
     values: dict[str, Any] = {
         **dynamics.pins._asdict(),
@@ -218,7 +233,10 @@ def _list_forces(
 
 
 def _withhold_forces(case: Case, codes: Any, values: dict[str, Any]) -> None:
-    """Put NaN where an effect or the drive has no value, and in the pin forces on change points."""
+    """Put NaN where an effect or the drive has no value.
+
+    Pin forces are NaN at change points too.
+    """
     gone = np.isin(codes, WITHOUT_FORCES)
     of_pins = {*PIN_FORCES, "force_error"}
     if any(term.loaded_pins for term in case.terms):
@@ -237,12 +255,15 @@ def compute_error_bars(
     dynamics: Dynamics,
     refined_rows: NDArray[np.intp],
 ) -> dict[str, Any]:
-    """Compute the error bars of the drive (N m or N) and of the pin forces (N, the worst of the four), by name, (n,).
+    """Compute the error bars of the drive and of the pin forces, by name, (n,).
+
+    They are N m or N; that of the pin forces is the worst of the four.
 
     Parameters
     ----------
     state, dynamics : evaluation in doubles, to which the error bars belong.
-    refined_rows : indices of the positions whose half angle is evaluated in many digits.
+    refined_rows : indices of the positions whose half angle is evaluated in many
+        digits.
     """
     longer, branch = case.lengthened(), find_sign(command.branch)
     lost, remainder = command.lost, command.remainder
@@ -298,7 +319,9 @@ def compute_error_bars(
 def _compute_unresolved(
     case: Case, command: Command, state: State, dynamics: Dynamics
 ) -> tuple[Any, Any]:
-    """Compute what long doubles do not resolve of the pin forces and of the drive, N and N m or N.
+    """Compute what long doubles do not resolve of the pin forces and of the drive.
+
+    The units are N, and N m or N.
 
     Near a limit, or beside a spring's free length, their own rounding shows in a
     double's digits. Where a double is as far off by coincidence, its distance to the
@@ -336,17 +359,20 @@ def _compute_unresolved(
 
 
 def compute_error_bar(gap: Any, size: Any) -> Any:
-    """Compute the error bar from the distance to the longer number and the size of the value.
+    """Compute the error bar from the distance to the longer number.
 
-    The error bar is the size of the value, so that no digit is left, where the longer
-    number is not finite as a double.
+    The size of the value has a part in it. The error bar is the size of the value, so
+    that no digit is left, where the longer number is not finite as a double.
     """
     width = np.maximum(gap, U * size)  # the value itself was rounded by as much
     return select(np.isfinite(width), width, size)
 
 
 def is_finite(values: Mapping[str, Any]) -> bool:
-    """Return True if the sum of the squares of each quantity is finite: False too where a square overflows."""
+    """Return True if the sum of the squares of each quantity is finite.
+
+    It is False too if a square overflows.
+    """
     squares = (
         np.vdot(value, value) if isinstance(value, np.ndarray) else value
         for value in values.values()
@@ -368,7 +394,9 @@ def withhold_infinite(case: Case, evaluated: Evaluated) -> None:
 def withhold(
     values: dict[str, Any], code: NDArray[np.uint8], in_line: NDArray[np.bool_]
 ) -> None:
-    """Set the status of each position at which a promised quantity is not finite, and NaN from that stage on.
+    """Set the status of each position at which a promised quantity is not finite.
+
+    From that stage on the quantities become NaN.
 
     `code`: status of each position, changed in place. `in_line`: True where the two
     bars that are not driven are in line, so that no finite forces hold them in balance.
@@ -424,11 +452,11 @@ SCALAR_FORMULAS: dict[str, Callable[[State], Any]] = {
 PLACES = frozenset(
     start + name for start in POINT_STAGES for name in ("A", "B", "G2", "G3", "G4")
 )
-"""Names of the vectors that come before the forces, at the pins and mass centres of the linkage."""
+"""Names of the vectors before the forces, at the pins and mass centres."""
 
 
 def list_kinematics(case: Case, state: State, wanted: Set[str]) -> dict[str, Any]:
-    """List the named quantities that come before the forces, those of the scene's own points included."""
+    """List the named quantities before the forces, and those of the scene's points."""
     values = {
         name: formula(state)
         for name, formula in SCALAR_FORMULAS.items()

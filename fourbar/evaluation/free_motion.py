@@ -1,4 +1,6 @@
-"""Free motion: the linkage released and moved by loads and effects alone, integrated by SciPy.
+"""Free motion: the linkage released and moved by loads and effects alone.
+
+SciPy integrates it.
 
 The reduced equation
     J q'' + J'/2 q'^2 = Q
@@ -40,17 +42,21 @@ from fourbar.scene import Command, Scene, command
 from fourbar.scene.scene import Independent
 
 RELATIVE, ABSOLUTE = 3e-15, 3e-15
-"""Tolerances of a step of DOP853: below them a long fast motion errs by its round-off."""
+"""Tolerances of a step of DOP853. Below them a long fast motion errs by its round-off.
+"""
 SCIPY_LEAST = 100.0 * 2.0**-52
-"""The least relative tolerance that SciPy's constructor takes without a warning; the solver itself works with less."""
+"""Least relative tolerance that SciPy's constructor takes without a warning. The solver
+works with a smaller one.
+"""
 CHANGE_OVER = 0.5
-"""The angle is changed when its sine falls below this times the sine of the other one."""
+"""Part of the other angle's sine below which the angle is changed."""
 STEPS = 200_000
-"""A motion that needs more steps than this is given up, after a few minutes: some hundred turns of the fastest bar
-take a thousand, so it is thousands of turns long, or something makes it infinitely fast.
+"""A motion that needs more steps than this is given up, after a few minutes: some
+hundred turns of the fastest bar take a thousand, so it is thousands of turns long, or
+something makes it infinitely fast.
 """
 VANISHING = 2.0**-300
-"""A speed at which a couple of viscous damping is nothing and dry friction has its sense."""
+"""Speed at which viscous damping vanishes and dry friction has its direction."""
 
 
 @dataclass(slots=True, eq=False)
@@ -58,11 +64,17 @@ class Released:
     """Motion of a released linkage at the times of the scene."""
 
     command: Command
-    """theta_2 (continuous), branch, omega_2, alpha_2, time and the independent angle, for `solve(scene, at=...)`."""
+    """theta_2 (continuous), branch, omega_2, alpha_2, time and the independent angle.
+    They are the command of `solve(scene, at=...)`.
+    """
     energy_drift: float
-    """Largest |kinetic energy - work done| over the motion, by the largest of either; 0 where nothing moves."""
+    """Largest |kinetic energy - work done| over the motion, over the larger of both.
+    It is 0 where nothing moves.
+    """
     change_points: tuple[float, ...] = ()
-    """Times at which the motion passed a change point, s: another motion was possible there."""
+    """Times at which the motion passed a change point, s. Another motion was possible
+    there.
+    """
 
     @property
     def time(self) -> Array:
@@ -87,17 +99,22 @@ class Released:
 
 
 def release(scene: Scene) -> Released:
-    """Compute the motion that a linkage makes when it is released, as its scene says (`free`), by SciPy.
+    """Compute the motion of a linkage that is released, as its scene says (`free`).
+
+    SciPy integrates it.
 
     Raises
     ------
-    InputError : the scene says nothing of a release, or names more than one angle; and as of `integrate`.
-    LimitError : it winds a spring beyond half a turn from its rest; and as of `integrate`.
+    InputError : the scene says nothing of a release, or names more than one angle; and
+        as of `integrate`.
+    LimitError : it winds a spring beyond half a turn from its rest; and as of
+        `integrate`.
 
     >>> import fourbar
     >>> free = fourbar.Free(duration=0.2, steps=2)
     >>> linkage = fourbar.uniform(0.3, 0.1, 0.25, 0.22)
-    >>> scene = fourbar.Scene(linkage, fourbar.Motion(1.0, 5.0, free=free), effects=(fourbar.Gravity(),))
+    >>> motion = fourbar.Motion(1.0, 5.0, free=free)
+    >>> scene = fourbar.Scene(linkage, motion, effects=(fourbar.Gravity(),))
     >>> released = release(scene)
     >>> fourbar.solve(scene, at=released.command).torque
     array([0., 0., 0.])
@@ -141,7 +158,10 @@ def release(scene: Scene) -> Released:
 
 
 def _make_plain(numbers: Any) -> Any:
-    """Convert numbers to Python's own, with which a formula of one position is several times quicker."""
+    """Convert numbers to those of Python.
+
+    With these a formula of one position is several times quicker.
+    """
     return type(numbers)(
         *(x.item() if isinstance(x, np.generic | np.ndarray) else x for x in numbers)
     )
@@ -163,7 +183,7 @@ class _Reading:
         )
 
     def evaluate(self, q: float) -> tuple[Position, Coefficients]:
-        """Compute the position and its coefficients by q; what is wanted again is kept."""
+        """Compute the position and its coefficients by q; the last results are kept."""
         if self.last is None or self.last[0] != (q, self.branch):
             self.last = (q, self.branch), self._at(q)
         return self.last[1]
@@ -187,7 +207,10 @@ class _Reading:
 
 
 def _compute_sines(position: Position) -> dict[int, float]:
-    """Compute the sines between two bars by the number of the third, at whose limits they are zero."""
+    """Compute the sines between two bars by the number of the third.
+
+    At the limits of that bar they are zero.
+    """
     return {bar: float(drive_sine(position, bar)) for bar in MOVING_BARS}
 
 
@@ -201,20 +224,23 @@ def integrate(
     *,
     bar: int = 2,
 ) -> Released:
-    """Integrate the motion from theta_2 with omega_2 under the effects, with no driving torque.
+    """Integrate the motion from theta_2 with omega_2, without a driving torque.
 
-    To 1e-9 rad over 5 s wherever the motion itself does not amplify errors by more than 1000.
+    To 1e-9 rad over 5 s wherever the motion itself does not amplify errors by more than
+    1000.
 
     Parameters
     ----------
     terms : loads and effects.
-    theta, omega, branch : of the bar that is released, at the start; its assembly is +1 or -1.
+    theta, omega, branch : of the bar that is released, at the start; its assembly is +1
+        or -1.
     times : (n,) rising from 0, s.
     bar : 2, or 3 or 4.
 
     Raises
     ------
-    InputError : the linkage does not assemble at theta_2, or the motion takes more than STEPS steps.
+    InputError : the linkage does not assemble at theta_2, or the motion takes more than
+        STEPS steps.
     LimitError : friction that depends on the pin forces acts.
     FourBarError : nothing that moves has inertia, or the motion cannot be continued.
     DependencyError : SciPy is not installed.
@@ -280,7 +306,10 @@ class _Run:
     def _require_directions(
         self, q: float, position: Position, k: Coefficients, rate: float
     ) -> None:
-        """Raise a LimitError where a force has no direction at the start, which rounding would give it at each step."""
+        """Raise a LimitError if a force has no direction at the start.
+
+        Rounding would give it a direction at each step.
+        """
         state = self._make_state(q, position, k, rate)
         for term in self.terms:
             codes = term.status(state, None)
@@ -302,14 +331,17 @@ class _Run:
     def _compute_generalised_force(
         self, q: float, position: Position, k: Coefficients, rate: float
     ) -> float:
-        """Compute Q under everything that acts, at a speed that is not zero where friction has to have a sense."""
+        """Compute Q under everything that acts.
+
+        The speed is not zero where friction needs a direction.
+        """
         state = self._make_state(q, position, k, rate)
         return float(Actions(state, self.bodies).add(self.terms).work()[0])
 
     def _make_state(
         self, q: float, position: Position, k: Coefficients, rate: float
     ) -> State:
-        """Make the state of the linkage at an angle and a speed of the bar that it is read from."""
+        """Make the state at an angle and a speed of the bar that is read."""
         return State(
             self.lengths,
             self.linkage.ground_angle,
@@ -344,7 +376,10 @@ class _Run:
         ]
 
     def _change_over(self) -> bool:
-        """Take the other angle where it is further from its limit; keeps position, velocity and work."""
+        """Take the other angle if it is further from its limit.
+
+        Position, velocity and work are kept.
+        """
         position, k = self._at()
         sines, bar = _compute_sines(position), 6 - self.reading.bar
         if self.reading.bar == 3:  # only at the start
@@ -358,7 +393,7 @@ class _Run:
         return True
 
     def _turn(self, position: Position) -> None:
-        """Bring theta_2 and theta_4 up to date, continuous from one step to the next."""
+        """Bring theta_2 and theta_4 up to date, continuous over the steps."""
         for bar, u in ((2, position.u2), (4, position.u4)):
             now = cmath.phase(u)
             self.theta[bar] = now + 2.0 * math.pi * round(
@@ -366,7 +401,10 @@ class _Run:
             )
 
     def _starts(self) -> bool:
-        """Return True if the linkage moves on; at a standstill dry friction holds it against any weaker force."""
+        """Return True if the linkage moves on.
+
+        At a standstill dry friction holds it against any weaker force.
+        """
         self.side = 0.0
         rate = float(self.y[1])
         if not self.dry:
@@ -421,7 +459,10 @@ class _Run:
         )
 
     def _follow_solver(self, solver: Any) -> bool:
-        """Take steps until the motion ends, or another solver is needed; return True if the linkage moves then."""
+        """Take steps until the motion ends or another solver is needed.
+
+        Return True if the linkage moves then.
+        """
         while solver.status == "running":
             self.steps += 1
             message = solver.step()
@@ -457,7 +498,10 @@ class _Run:
     def _note_change_points(
         self, start: float, stop: float, dense: Callable[[float], Array]
     ) -> None:
-        """Note the times within a step at which all bars are in line: another motion is possible there."""
+        """Note the times within a step at which all bars are collinear.
+
+        Another motion is possible there.
+        """
         path = self.reading.path
         beginning = path.theta_1 + (math.pi if path.bar == 4 else 0.0)
         for passes, psi in ((path.passing.inner, 0.0), (path.passing.outer, math.pi)):
@@ -483,7 +527,10 @@ class _Run:
             self.rows.append(self._make_row(dense(float(self.times[len(self.rows)]))))
 
     def _make_row(self, y: Array) -> tuple[float, ...]:
-        """Return theta_2, omega_2, alpha_2, branch and what belongs to the independent angle, of one instant."""
+        """Return theta_2, omega_2, alpha_2, branch and the independent angle's numbers.
+
+        They belong to one instant.
+        """
         q, rate = float(y[0]), float(y[1])
         position, k = self.reading.evaluate(q)
         now = cmath.phase(position.u2)
@@ -522,7 +569,10 @@ def _find_root(
     low: float,
     high: float,
 ) -> float:
-    """Find the time at which f of the motion is zero; the start of the step where it is zero there already."""
+    """Find the time at which f of the motion is zero.
+
+    It is the start of the step if f is zero there.
+    """
     from scipy.optimize import brentq
 
     if f(dense(low)) * f(dense(high)) >= 0.0:
@@ -531,7 +581,10 @@ def _find_root(
 
 
 def _interpolate(solver: Any) -> Callable[[float], Array]:
-    """Return the motion within the last step of the solver, whose three more evaluations wait for the first call."""
+    """Return the motion within the last step of the solver.
+
+    Three more evaluations of it wait for the first call.
+    """
     dense_output = cache(solver.dense_output)
 
     def motion(t: float) -> Array:

@@ -1,4 +1,7 @@
-"""A scene file that states a drawing: `[pins]`, places `{ drawn = [x, y] }`, and the word "drawn" in the motion."""
+"""A scene file that states a drawing: `[pins]`, and places `{ drawn = [x, y] }`.
+
+The motion may use the word "drawn".
+"""
 
 import math
 from dataclasses import replace
@@ -18,10 +21,12 @@ from fourbar.scene.motion import BRANCH_NAMES, COMMANDS, STROKE_COMMAND, Motion
 from fourbar.solving import solve
 
 DRAWN = "drawn"
-"""Word that stands for the drawn angle, stroke or side; key of a place of the drawing."""
+"""Word that stands for the drawn angle, stroke or side; key of a drawn place."""
 STANDS_ALONE = "must be left out: `drawn` states the place"
 APART = 0.05
-"""Part of the longest bar by which pins lie off the drawing if no motion of the commanded bar has that assembly."""
+"""Distance of the pins from the drawing above which no motion has that assembly. It is
+a part of the longest bar.
+"""
 ANGLES = {names[0]: bar for bar, names in COMMANDS.items()}
 """Bars by the names of their angles."""
 NUMBERS_OF_BARS = {name: bar for bar, name in BAR_NAMES.items()}
@@ -30,7 +35,7 @@ NUMBERS_OF_BARS = {name: bar for bar, name in BAR_NAMES.items()}
 def from_pins(
     O2: tuple[Any, Any], A: tuple[Any, Any], B: tuple[Any, Any], O4: tuple[Any, Any]
 ) -> Scene:
-    """Make the scene of a linkage from the places of its four pins, at the position that is drawn.
+    """Make the scene of a linkage from the places of its pins, at the drawn position.
 
     The bars have no mass; the branch is the assembly that is drawn.
 
@@ -80,7 +85,7 @@ def read_point(read: Reader, key: str, value: object) -> tuple[float, float]:
 def state_lengths(
     read: Reader, top: dict[str, Any], drawing: DrawnPins
 ) -> dict[str, Any]:
-    """State the tables of a drawing by lengths, and each place of it in its bar's frame."""
+    """State a drawing by lengths, and each place of it in its bar's frame."""
     met = meet_lengths(drawing, top["pins"])
     lengths = {name: f"{met[bar - 1]!r} m" for name, bar in NUMBERS_OF_BARS.items()}
     lengths["ground_angle"] = f"{drawing.angle(1)!r} rad"
@@ -93,7 +98,9 @@ def state_lengths(
 
 
 def meet_lengths(drawing: DrawnPins, pins: dict[str, Any]) -> tuple[float, ...]:
-    """Return the lengths of a drawing, of a parallelogram or a kite without the rounding of its coordinates.
+    """Return the lengths of a drawing.
+
+    Those of a parallelogram or a kite come without the rounding of its coordinates.
 
     `pins`: x and y of each pin as they are written.
     """
@@ -113,7 +120,7 @@ def meet_lengths(drawing: DrawnPins, pins: dict[str, Any]) -> tuple[float, ...]:
 def _state_places(
     read: Reader, key: str, value: Any, drawing: DrawnPins, bar: int | None = None
 ) -> Any:
-    """State each `{ drawn = [x, y] }` of an entry by its coordinates in the frame of its bar."""
+    """State each `{ drawn = [x, y] }` of an entry in the frame of its bar."""
     if isinstance(value, list):
         return [
             _state_places(read, f"{key}[{index}]", entry, drawing, bar)
@@ -158,7 +165,7 @@ def _state_place(
 def state_motion(
     read: Reader, motion: Any, drawing: DrawnPins, line: LinearDrive | None
 ) -> Any:
-    """State the word "drawn" of a motion by the angle, the stroke or the side that is drawn."""
+    """Replace the word "drawn" of a motion by the drawn angle, stroke or side."""
     if not isinstance(motion, dict):
         return motion
     stated = dict(motion)
@@ -180,7 +187,7 @@ def state_motion(
 
 
 def find_drawn(drawing: DrawnPins, line: ForceDrive | None, name: str) -> float | None:
-    """Return the drawn angle or stroke of this name, rad or m; None where there is none."""
+    """Return the drawn angle or stroke of this name, rad or m, or None."""
     if name in ANGLES:
         return drawing.angle(ANGLES[name])
     if name != STROKE_COMMAND[0] or not isinstance(line, LinearDrive):
@@ -192,7 +199,10 @@ def find_drawn(drawing: DrawnPins, line: ForceDrive | None, name: str) -> float 
 
 
 def _find_side(drawing: DrawnPins, line: LinearDrive) -> str | None:
-    """Find the side of a cylinder's end on its bar; None where it does not join the ground to a bar."""
+    """Find the side of a cylinder's end on its bar.
+
+    It is None if the cylinder does not join the ground to a bar.
+    """
     ends = {
         place.bar: drawing.from_bar(place.bar, place.vector())
         for place in (line.start, line.end)
@@ -206,7 +216,7 @@ def _find_side(drawing: DrawnPins, line: LinearDrive) -> str | None:
 
 
 def choose_assembly(scene: Scene, drawing: DrawnPins) -> Scene:
-    """Put a scene on the assembly that is drawn: the one whose pins lie where the drawing has them."""
+    """Put a scene on the assembly whose pins lie where the drawing has them."""
     bar = scene.motion.bar
     O2 = complex(*drawing.place("O2"))
     wanted = np.array([complex(*drawing.place(pin)) - O2 for pin in ("A", "B")])

@@ -1,4 +1,7 @@
-"""Entries of a scene file, read and written: every mistake names the file, the key, the value and what is allowed."""
+"""Entries of a scene file, read and written.
+
+Every error names the file, the key, the value and what is allowed.
+"""
 
 import difflib
 import math
@@ -32,14 +35,16 @@ MEANT = {
 }
 """Words that are no keys, and the keys that may be meant by them."""
 LIKELY = {"rad": "deg", "m": "mm", "rad/s": "rpm"}
-"""Units that a number without one may have been meant in, where that is not the SI unit."""
+"""Units that a number without one may have been meant in, other than the SI unit."""
 
 
 class Reader:
     """Reads entries of one file; effects are read through it too."""
 
     QUANTITY = 'with a unit, like "1 {}"'
-    """The form of a number of a unit, as errors say it; likewise of several, and of a polar pair."""
+    """The form of a number of a unit, as errors say it. Likewise of several, and of a
+    polar pair.
+    """
     QUANTITIES = '["1 {0}", "2 {0}"]'
     POLAR = '["1 {}", "0 deg"]'
     COORDINATES = 'or {{ x = "1 {0}", y = "0 {0}" }}'
@@ -48,10 +53,11 @@ class Reader:
     def __init__(self, file: str) -> None:
         self.file = file
         self.coordinates: dict[str, tuple[float, float]] = {}
-        """x and y of the places (m) and forces that are stated by them, by their keys."""
+        """x and y of the places (m) and forces that are stated by them, by their keys.
+        """
 
     def refuse(self, key: str, value: object, allowed: str) -> InputError:
-        """Make the error for an entry, or for one that is left out (None), with the file's name."""
+        """Make the error for an entry, or a missing one (None), with the file."""
         return InputError(
             key,
             _shorten(value),
@@ -60,7 +66,10 @@ class Reader:
         )
 
     def table(self, key: str, value: object, allowed: Iterable[str]) -> dict[str, Any]:
-        """Read a table that holds no other keys than those allowed; `key` is "" for the top of the file."""
+        """Read a table that holds no keys but those allowed.
+
+        `key`: "" for the top of the file.
+        """
         names = list(allowed)
         if not isinstance(value, dict):
             raise self.refuse(
@@ -123,7 +132,10 @@ class Reader:
         bound: str = ANY,
         default: float | None = None,
     ) -> float:
-        """Read a number with a unit, in `unit`; of unit "1" one without. `default`: what a value of None stands for."""
+        """Read a number in `unit`; with unit "1" it has none.
+
+        `default`: what a value of None stands for.
+        """
         if value is None and default is not None:
             return default
         if unit == "1":
@@ -173,7 +185,7 @@ class Reader:
         }
 
     def pair(self, key: str, value: object, by: Declared) -> tuple[float, float]:
-        """Read a pair as it is declared: a magnitude with its angle, or two numbers of one kind."""
+        """Read a declared pair: magnitude and angle, or two numbers of a kind."""
         if by.pair == "rad":
             return self.polar(key, value, by.unit)
         if not isinstance(value, list) or len(value) != 2:
@@ -197,7 +209,7 @@ class Reader:
         )
 
     def polar(self, key: str, value: object, unit: str) -> tuple[float, float]:
-        """Read a pair [magnitude, angle], in `unit` and rad, or its components { x, y }."""
+        """Read a pair [magnitude, angle], in `unit` and rad, or { x, y }."""
         if isinstance(value, dict) and self.COORDINATES:
             entry = self.table(key, value, ("x", "y"))
             x, y = (
@@ -277,7 +289,10 @@ def _suggest(word: object, names: list[str]) -> str:
 
 
 def _join_key(key: str, name: str) -> str:
-    """Join the dotted key; a name that is not a plain word is quoted, so that it stays on one line."""
+    """Join the dotted key.
+
+    A name that is not a plain word is quoted, so that it stays on one line.
+    """
     if not BARE_KEY.fullmatch(name):
         name = repr(
             name if len(name) <= LONGEST_SHOWN else name[:LONGEST_SHOWN] + "..."

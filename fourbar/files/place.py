@@ -1,4 +1,7 @@
-"""Places of bars in scene files: `from_pin`, `from_centre` or `point`, polar or by x and y."""
+"""Places of bars in scene files: `from_pin`, `from_centre` or `point`.
+
+They are polar or by x and y.
+"""
 
 from collections.abc import Iterable, Mapping
 from typing import Any
@@ -8,7 +11,7 @@ from fourbar.effects.place import STATED_PLACES, Place
 from fourbar.files.fields import Reader
 
 PLACES_OF_ENDS = (*STATED_PLACES, "point")
-"""Keys of which one states where an end of a spring or cylinder lies, or where a force acts."""
+"""Keys of which one states an end of a spring or cylinder, or the point of a force."""
 AT_OF_A_LOAD = {
     "bar": "write from_centre, with the same numbers, or from_pin, or point",
     "world": (
@@ -22,7 +25,9 @@ AT_OF_A_LOAD = {
 def read_table_with_place(
     read: Reader, key: str, value: object, allowed: Iterable[str], instead: str = ""
 ) -> dict[str, Any]:
-    """Read a table in which a place is stated; `at`, of old files, is refused with what to write.
+    """Read a table in which a place is stated.
+
+    The key `at` of old files is refused, with what to write.
 
     `instead`: that, where it is not `from_pin`.
     """
@@ -39,7 +44,9 @@ def read_stated_place(
     bars: Mapping[str, int],
     least: int = 1,
 ) -> Place:
-    """Read the bar of an entry and its place on it, which one key states; none: it is the bar's first pin.
+    """Read the bar of an entry and its place on it, which one key states.
+
+    An entry without such a key is at the bar's first pin.
 
     Parameters
     ----------

@@ -76,7 +76,9 @@ from fourbar.studies.keys import (
 LARGEST_FILE = 500_000
 """Bytes; a scene takes about a thousand."""
 MOST_DOTS = 100
-"""Largest number of dots in one line: the TOML reader's time grows with the square of a dotted key's parts."""
+"""Largest number of dots in one line. The TOML reader's time grows with the square of a
+dotted key's parts.
+"""
 LONGEST_LINE = 60
 """Characters shown of a line that cannot be read."""
 MOST_LOADS = 1000
@@ -102,7 +104,7 @@ MOST_POINTS = 1000
 
 
 def load(path: str | Path | IO[str] | IO[bytes]) -> Scene:
-    """Read the scene of a TOML file, of standard input for `-`, of a pipe, or of an open file.
+    """Read the scene of a TOML file, of standard input (`-`), a pipe or an open file.
 
     Raises InputError, in one line with file, key, value and what is allowed, for a file
     that is missing, not a file, too large, not text or not TOML, and for every entry
@@ -137,7 +139,10 @@ def read_text(path: str | Path) -> str:
 
 
 def loads(text: str, name: str = "scene") -> Scene:
-    """Read the scene of a TOML text; `name` stands for the file in errors, its folder is that of pictures."""
+    """Read the scene of a TOML text.
+
+    `name`: stands for the file in errors; pictures lie in its folder.
+    """
     shown = name if name.isprintable() else repr(name)
     for number, line in enumerate(text.split("\n"), 1):
         if line.count(".") > MOST_DOTS:
@@ -272,7 +277,10 @@ def _read_points(read: Reader, value: object) -> tuple[Point, ...]:
 def _read_pictures(
     read: Reader, bars: dict[str, Any], folder: str
 ) -> tuple[Picture, ...]:
-    """Read the names of the bars' pictures; the files themselves are read when they are shown."""
+    """Read the names of the bars' pictures.
+
+    The files themselves are read when they are shown.
+    """
     return tuple(
         Picture(
             number, read.text(f"bars.{name}.picture", bars[name]["picture"]), folder
@@ -308,7 +316,7 @@ def _read_linkage(read: Reader, top: dict[str, Any]) -> FourBar:
 def _meet_change_points(
     length: dict[str, float], stated: dict[str, Any]
 ) -> dict[str, float]:
-    """Return the lengths with the equalities that they miss by the rounding of their last decimals."""
+    """Return the lengths with the equalities that their last decimals miss."""
     names = tuple(BAR_NAMES.values())
     d, a, b, c = (length[name] for name in names)
     if not math.isfinite(d + a + b + c):  # refused where they are put together
@@ -426,7 +434,10 @@ def _read_rise(read: Reader, key: str, value: object) -> Rise:
 def _read_places(
     read: Reader, key: str, value: object, unit: str
 ) -> float | Array | Sweep | FromLimit:
-    """Read angles or strokes: one, a list of them, a sweep; an angle from a limit position too."""
+    """Read angles or strokes: one, a list of them, or a sweep.
+
+    An angle may be stated from a limit position.
+    """
     if value is None or isinstance(value, (str, int, float)):
         return read.quantity(key, value, unit)
     if isinstance(value, list) and value:
@@ -562,7 +573,10 @@ def _read_springs(
 def _read_ends(
     read: Reader, key: str, row: dict[str, Any], bars: Mapping[str, int]
 ) -> tuple[Place, Place]:
-    """Read the entries `from` and `to` of a line between two bars; an end without a place is at its bar's first pin."""
+    """Read the entries `from` and `to` of a line between two bars.
+
+    An end without a place is at its bar's first pin.
+    """
     ends = []
     for name in ("from", "to"):
         path = f"{key}.{name}"
@@ -576,7 +590,10 @@ def _read_ends(
 def _read_tolerances(
     read: Reader, scene: Scene, value: object
 ) -> tuple[Tolerance, ...]:
-    """Read ``"lengths.input" = "0.05 mm"`` (plus or minus) or ``["0.02 mm", "sigma"]``."""
+    """Read ``"lengths.input" = "0.05 mm"`` or ``["0.02 mm", "sigma"]``.
+
+    The first is plus or minus, the second a standard deviation.
+    """
     entries, tolerances = list_entries(scene), []
     for key, stated in _flatten(read, value).items():
         name = f'tolerances."{key}"'

@@ -1,4 +1,7 @@
-"""A scene as the text of its file: SI and radians, every digit, so that it reads back bit for bit."""
+"""A scene as the text of its file, in SI units and radians, with every digit.
+
+The text reads back bit for bit.
+"""
 
 import json
 import re
@@ -58,7 +61,9 @@ def save(scene: Scene, path: str | Path) -> None:
 
 
 def dump(scene: Scene) -> str:
-    """Write the scene as TOML text, in SI and radians; `loads` gives the same numbers back, bit for bit.
+    """Write the scene as TOML text, in SI and radians.
+
+    `loads` gives the same numbers back, bit for bit.
 
     Raises InputError for a scene that a file cannot hold: two effects of one kind, a
     title that is no valid text, a tolerance of a number that the scene leaves out or
@@ -95,7 +100,10 @@ def dump(scene: Scene) -> str:
 def _write_lengths(
     scene: Scene, lengths: dict[str, Any], motion: dict[str, Any]
 ) -> list[tuple[str, dict[str, Any]]]:
-    """Write the pins of a scene that still is as it was drawn, otherwise its lengths; pins state the branch too."""
+    """Write the pins of a scene that still is as it was drawn, otherwise its lengths.
+
+    Pins state the branch too.
+    """
     drawing = scene.drawing
     if drawing is None:
         return [("lengths", lengths)]
@@ -132,7 +140,9 @@ def _restore_coordinates(
 
 
 def describe(scene: Scene) -> dict[str, Any]:
-    """Write lengths, bars, drive, loads and effects as a file's tables; a bar that states nothing is left out.
+    """Write lengths, bars, drive, loads and effects as a file's tables.
+
+    A bar that states nothing is left out.
 
     Raises InputError where a file cannot hold the effects.
     """
@@ -235,7 +245,10 @@ def _load_entry(load: Load) -> dict[str, Any]:
 
 
 def _write_effect(effect: Effect) -> Any:
-    """Write the value of an effect under its key; InputError where a scene file has no form of it."""
+    """Write the value of an effect under its key.
+
+    Raises InputError if a scene file has no form of it.
+    """
     if list_kinds().get(effect.key) is not type(effect):
         raise InputError(
             f"effects.{effect.key}",
@@ -327,7 +340,9 @@ def _write_value(key: str, value: object) -> str:
 
 
 def _write_tolerances(scene: Scene) -> dict[str, Any]:
-    """Write the table of tolerances in their order, which dotted keys would not keep: TOML gathers their tables.
+    """Write the table of tolerances in their order.
+
+    Dotted keys would not keep it: TOML gathers their tables.
 
     Raises InputError for a tolerance that reading the file would refuse.
     """
@@ -347,7 +362,9 @@ def _write_tolerances(scene: Scene) -> dict[str, Any]:
 
 
 def write_new_scene(lengths: tuple[str, ...] | list[str]) -> str:
-    """Write a scene file for four lengths (ground, input, coupler, output), each with its unit, as it was given.
+    """Write a scene file for four lengths (ground, input, coupler, output).
+
+    Each is written with its unit, as it was given.
 
     Raises InputError for what is no length, and for bars that cannot close.
     """
@@ -382,7 +399,10 @@ def write_drawn_scene(pins: dict[str, tuple[str, str]]) -> str:
 
 
 def _quote(text: str) -> str:
-    """Write a quantity as a text of TOML, which the mark of inches would end: 12" as "12 in"."""
+    """Write a quantity as a text of TOML.
+
+    The mark of inches would end the text: 12" becomes "12 in".
+    """
     inches = re.fullmatch(r"([^'′’]*\d)\s*[\"”″]", text)
     return json.dumps(f"{inches[1]} in" if inches else text, ensure_ascii=False)
 

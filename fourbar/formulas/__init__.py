@@ -1,1 +1,4 @@
-"""The closed formulas of the planar four-bar linkage; each file states one step and its source."""
+"""The closed formulas of the planar four-bar linkage.
+
+Each file states one step and its source.
+"""

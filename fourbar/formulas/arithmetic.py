@@ -1,4 +1,7 @@
-"""Arithmetic over floats, arrays, longer numbers and numbers with slopes; sums that lose nothing."""
+"""Arithmetic over floats, arrays, longer numbers and numbers with slopes.
+
+Sums lose nothing.
+"""
 
 import cmath
 import math
@@ -26,7 +29,10 @@ def make_like(values: Number, model: Number) -> Number:
 
 
 def is_any(mask: Number) -> bool:
-    """Return True if a mask holds anywhere; for one value `np.any` takes fifty times as long."""
+    """Return True if a mask holds anywhere.
+
+    For one value `np.any` takes fifty times as long.
+    """
     return bool(mask) if isinstance(mask, PLAIN) else bool(mask.any())
 
 
@@ -41,7 +47,10 @@ def without_slopes(x: Number) -> Number:
 
 
 def select(mask: Number, x: Number, y: Number) -> Number:
-    """Select x where a mask holds and y elsewhere; a single truth value returns one of them as it is."""
+    """Select x where a mask holds and y elsewhere.
+
+    A single truth value returns one of them as it is.
+    """
     if isinstance(mask, PLAIN):
         return x if mask else y
     return np.where(mask, x, y)
@@ -67,7 +76,10 @@ def exact_difference(p: Number, q: Number, r: Number, s: Number) -> Number:
 
 
 def vector(x: Number, y: Number) -> Number:
-    """Make x + i y, each part written once: over arrays the sum takes three times as long."""
+    """Make x + i y, each part written once.
+
+    Over arrays the sum takes three times as long.
+    """
     if type(x) is type(y) is float:
         return complex(x, y)
     if not (
@@ -93,7 +105,7 @@ def vector(x: Number, y: Number) -> Number:
 
 
 def polar(r: Number, phi: Number) -> Number:
-    """Compute r e^{i phi} with the cosine and the sine of the library, exact where phi = 0."""
+    """Compute r e^{i phi} by the library's cosine and sine, exact where phi = 0."""
     if type(r) is type(phi) is float:
         return cmath.rect(r, phi)
     return r * np.cos(phi) + 1j * (r * np.sin(phi))
@@ -121,7 +133,10 @@ def tangent(x: Number) -> Number:
 
 
 def square_root(x: Number) -> Number:
-    """Compute sqrt(x), NaN where x < 0; a Python float gives a Python float where x >= 0."""
+    """Compute sqrt(x), NaN where x < 0.
+
+    A Python float gives a Python float where x >= 0.
+    """
     return math.sqrt(x) if type(x) is float and x >= 0.0 else np.sqrt(x)
 
 
@@ -133,12 +148,18 @@ def power_of_two(x: Number) -> Number:
 
 
 def sine(u: Number, v: Number) -> Number:
-    """Return the sine of the angle between two directions; exactly zero if they are equal."""
+    """Return the sine of the angle between two directions.
+
+    It is exactly zero if they are equal.
+    """
     return u.real * v.imag - u.imag * v.real
 
 
 def cross(u: Number, v: Number) -> Number:
-    """Compute the z-component of u x v, the imaginary part of u* v; over arrays least work where u is one number."""
+    """Compute the z-component of u x v, the imaginary part of u* v.
+
+    Over arrays it is quickest if u is one number.
+    """
     return (u.conjugate() * v).imag
 
 

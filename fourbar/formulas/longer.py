@@ -25,7 +25,9 @@ HALF_PI_LOWEST = -1.4973849048591833e-33
 SPLITTER = 2.0**27 + 1.0
 """Splits the 53 bits of a double into two halves."""
 TERMS = 27
-"""Number of terms of the series of sine and cosine up to an eighth of a turn; the next ones are below 1e-32."""
+"""Terms of the series of sine and cosine up to an eighth of a turn. The next ones are
+below 1e-32.
+"""
 
 
 def lengthen(number: Number) -> Number:
@@ -57,7 +59,10 @@ def take_doubles(number: Number) -> Number:
 
 
 def change_numbers(value: Any, change: Callable[[Any], Any]) -> Any:
-    """Change each float and array of a value, in tuples and dataclasses too; all else stays."""
+    """Change each float and array of a value, in tuples and dataclasses too.
+
+    All else stays.
+    """
     if isinstance(value, (float, np.ndarray)):
         return change(value)
     if isinstance(value, tuple):
@@ -76,7 +81,10 @@ def _has_numbers(kind: type) -> bool:
 
 
 class Pair(NDArrayOperatorsMixin):
-    """Unevaluated sums of two arrays of doubles, or of complex ones part by part: high is the sum as a double."""
+    """Unevaluated sums of two arrays of doubles, or of complex ones part by part.
+
+    high is the sum as a double.
+    """
 
     def __init__(self, high: Any, low: Any) -> None:
         self.high, self.low = high, np.where(np.isfinite(high), low, 0.0)

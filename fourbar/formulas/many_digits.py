@@ -1,4 +1,7 @@
-"""The half angle in many digits, for the few positions at which doubles cannot decide whether the loop closes."""
+"""The half angle in many digits, where doubles cannot decide if the loop closes.
+
+Few positions need it.
+"""
 
 from typing import Any
 
@@ -17,7 +20,8 @@ from fourbar.linkage import FourBar
 DIGITS = 120
 """The angle of a limit position near a change point keeps half of them."""
 RESIDUE = 1e-55
-"""Relative: what so many digits leave of a factor that is zero at the limit position itself."""
+"""What so many digits leave of a factor that is zero at the limit position, relative.
+"""
 
 
 def half_angle(
@@ -29,13 +33,15 @@ def half_angle(
     bar: int = 2,
     lost: float = 0.0,
 ) -> HalfAngle:
-    """Compute the five numbers of `formulas.position.half_angle` that depend on digits (mpmath).
+    """Compute the numbers of `formulas.position.half_angle` that depend on digits.
+
+    They are five, of mpmath.
 
     Parameters
     ----------
     theta_2 : rad.
-    offset : what theta_2 as a double leaves out of the angle meant (rad, mpmath), where that is known. A position
-        beyond the limit then does not assemble, however near.
+    offset : what theta_2 as a double leaves out of the angle meant (rad, mpmath), where
+        that is known. A position beyond the limit then does not assemble, however near.
     unit : of the lengths, m.
     member : index into numbers of the linkage that are arrays.
     bar : from which the loop is read; theta_2 is its angle.
@@ -84,7 +90,9 @@ def decide_half_angles(
     bar: int = 2,
     lost: Any = 0.0,
 ) -> HalfAngle:
-    """Replace the half angles of some positions (an index), each number rounded once to the kind that it has.
+    """Replace the half angles of some positions (an index).
+
+    Each number is rounded once to its own kind.
 
     `lost`: what a theta_2 that was computed leaves out as a double, rad; for the others
     see `half_angle`.
@@ -116,7 +124,9 @@ def decide_half_angles(
 def limit_remainder(
     linkage: FourBar, limit: float, theta_2: float, offset: float, bar: int = 2
 ) -> Any:
-    """Compute (limit position + offset) - theta_2 in many digits, for the limit position whose double is `limit`.
+    """Compute (limit position + offset) - theta_2 in many digits.
+
+    `limit`: the double of the limit position.
 
     Where bars 3, 4 are collinear,
         cos(theta_2 - theta_1) = (a^2 + d^2 - (b +- c)^2)/(2 a d);

@@ -1,4 +1,6 @@
-"""Mobility: limit positions of each moving bar, ranges, change points, swing, time ratio.
+"""Mobility: limit positions of the moving bars, ranges, change points, swing.
+
+The time ratio follows from these.
 
 Let bar k (length l) close the loop with the ground (d) and the other two moving bars
 (x, y). With e the distance from the bar's free end to the far end of the ground, the
@@ -25,13 +27,17 @@ from fourbar.linkage import BAR_NAMES, MOVING_BARS, FourBar, require_bar
 Array = NDArray[np.float64]
 TURN = 2.0 * math.pi
 MARGIN = math.radians(1.0)
-"""Angle that `choose_range` leaves out at each end of an interval, because no speeds exist at a limit itself."""
+"""Angle that `choose_range` leaves out at each end of an interval. No speeds exist at a
+limit itself.
+"""
 NARROW = 4.0
-"""An interval shorter than NARROW * MARGIN gives up this part of its width at each end instead."""
+"""Part of its width that a short interval gives up at each end instead. An interval is
+short below NARROW * MARGIN.
+"""
 
 
 class LimitPosition(NamedTuple):
-    """A position in which bar k stands at a limit because the other two moving bars are collinear."""
+    """A position in which bar k is at a limit: the other two bars are collinear."""
 
     theta_2: float
     """rad, in [theta_1, theta_1 + 2 pi)."""
@@ -42,11 +48,16 @@ class LimitPosition(NamedTuple):
     branch: int
     """+1 open, -1 crossed, 0 where the two branches meet (every limit of bar 2)."""
     stretched: bool
-    """The other two bars lie along each other's prolongation (e = x + y); otherwise they are folded."""
+    """True if the other two bars lie in each other's prolongation (e = x + y).
+    Otherwise they are folded.
+    """
 
 
 class Reach(NamedTuple):
-    """Bar k against the rest of the loop, in the unit of `choose_unit`; sums within rounding of 0 are 0."""
+    """Bar k against the rest of the loop, in the unit of `choose_unit`.
+
+    Sums within rounding of 0 are 0.
+    """
 
     d: float
     own: float
@@ -64,7 +75,7 @@ class Reach(NamedTuple):
 
     @property
     def beyond_stretched(self) -> float:
-        """(d + l) - (x + y): > 0 where stretched bars stop bar k, 0 at a change point."""
+        """(d + l) - (x + y): > 0 if stretched bars stop bar k, 0 at a change point."""
         return self.sum(1, 1, -1, -1)
 
     @property
@@ -74,7 +85,9 @@ class Reach(NamedTuple):
         return self.sum(-q, q, p, -p)
 
     def triangle(self, stretched: bool) -> tuple[float, float]:
-        """Compute the angles of the triangle d, l, e at both ends of the ground, rad, from its Heron factors.
+        """Compute the angles of the triangle d, l, e at both ends of the ground, rad.
+
+        They come from its Heron factors:
 
             tan^2(psi/2) = (e + l - d)(e + d - l)/((d + l - e)(d + l + e)),
 
@@ -118,18 +131,23 @@ def _wrap(angle: float) -> float:
 
 
 def limit_positions(linkage: FourBar, bar: int = 2) -> tuple[LimitPosition, ...]:
-    """Find the positions in which a bar reverses, all mirror solutions, counter-clockwise in theta_2 from theta_1.
+    """Find the positions in which a bar reverses, all mirror solutions included.
 
-    cos psi = (d^2 + l^2 - (x +- y)^2)/(2 d l), psi the angle between the ground and the bar.
+    They are ordered counter-clockwise in theta_2 from theta_1.
 
-    They are the limits of the input for bar 2 (bars 3, 4 collinear) and of the output for bar 4
-    (bars 2, 3 collinear), and the dead centres of a drive on that bar. A change point is none.
+    cos psi = (d^2 + l^2 - (x +- y)^2)/(2 d l), psi the angle between the ground and the
+    bar.
+
+    They are the limits of the input for bar 2 (bars 3, 4 collinear) and of the output
+    for bar 4 (bars 2, 3 collinear), and the dead centres of a drive on that bar. A
+    change point is none.
 
     Parameters
     ----------
     bar : 2, 3 or 4; InputError otherwise.
 
-    Source: R. L. Norton, Design of Machinery; Linares Mendoza, eqs 3.7-3.15 (one of each mirror pair).
+    Source: R. L. Norton, Design of Machinery; Linares Mendoza, eqs 3.7-3.15 (one of
+    each mirror pair).
     """
     reach = reach_of(linkage, bar)
     theta_1 = linkage.ground_angle
@@ -165,12 +183,12 @@ def limit_positions(linkage: FourBar, bar: int = 2) -> tuple[LimitPosition, ...]
 
 
 def find_intervals(linkage: FourBar, bar: int = 2) -> tuple[tuple[float, float], ...]:
-    """Find the ranges [from, to] of a bar's angle in which the linkage assembles, rad; `to` may exceed 2 pi.
+    """Find the ranges [from, to] of a bar's angle in which the linkage assembles, rad.
 
-    One range where the bar turns fully (a whole turn from the ground's line) or has one
-    pair of limits, two mirror images where it has two pairs; the range that contains
-    the ground's direction (for bar 4: its opposite) or lies first counter-clockwise
-    from it comes first.
+    `to` may exceed 2 pi. One range where the bar turns fully (a whole turn from the
+    ground's line) or has one pair of limits, two mirror images where it has two pairs;
+    the range that contains the ground's direction (for bar 4: its opposite) or lies
+    first counter-clockwise from it comes first.
     """
     reach = reach_of(linkage, bar)
     start = linkage.ground_angle + (math.pi if bar == 4 else 0.0)
@@ -191,7 +209,10 @@ def find_intervals(linkage: FourBar, bar: int = 2) -> tuple[tuple[float, float],
 
 
 def turns_fully(linkage: FourBar, bar: int = 2) -> bool:
-    """Return True if a moving bar can turn through 360 deg against the ground (through change points, if need be)."""
+    """Return True if a moving bar can turn through 360 deg against the ground.
+
+    Change points may lie within the turn.
+    """
     reach = reach_of(linkage, bar)
     return reach.beyond_folded <= 0.0 and reach.beyond_stretched <= 0.0
 
@@ -199,7 +220,7 @@ def turns_fully(linkage: FourBar, bar: int = 2) -> bool:
 def choose_range(
     linkage: FourBar, bar: int = 2, holding: float | None = None
 ) -> tuple[float, float]:
-    """Choose the range of a commanded bar's angle that is swept where a scene names none, rad.
+    """Choose the range of a commanded bar's angle for a scene that names none, rad.
 
     0..2 pi where the bar turns fully; otherwise the first of `find_intervals`, or the
     one that holds an angle, shrunk by MARGIN at each end.
@@ -232,7 +253,9 @@ def find_limit_angles(linkage: FourBar, bar: int = 2) -> tuple[float, ...]:
 
 
 def change_points(linkage: FourBar, bar: int = 2) -> tuple[float, ...]:
-    """Find the angles of a bar (theta_2 if none is named) at which all bars are collinear and both branches cross, rad.
+    """Find the angles of a bar at which all bars are collinear and branches cross, rad.
+
+    Without a bar it is theta_2:
 
         theta_1 where |a - d| = |b - c|,   theta_1 + pi where a + d = b + c,
 
@@ -247,13 +270,18 @@ def change_points(linkage: FourBar, bar: int = 2) -> tuple[float, ...]:
 
 
 def swing(linkage: FourBar, bar: int = 4) -> float:
-    """Compute the angle through which a bar swings between its limits, rad; 2 pi where it turns fully."""
+    """Compute the angle through which a bar swings between its limits, rad.
+
+    It is 2 pi for a bar that turns fully.
+    """
     start, stop = find_intervals(linkage, bar)[0]
     return stop - start
 
 
 def time_ratio(linkage: FourBar) -> float | None:
-    """Compute the quick return of a crank-rocker: time of the slower stroke over the faster, at constant omega_2.
+    """Compute the quick return of a crank-rocker at constant omega_2.
+
+    It is the time of the slower stroke over that of the faster:
 
         (2 pi - delta)/delta,
 
@@ -280,13 +308,16 @@ class Circuit(NamedTuple):
     """Positions that are connected by motion."""
 
     theta_2: tuple[float, float]
-    """The range [from, to] in which it assembles, rad; a whole turn where the input turns fully."""
+    """Range [from, to] in which it assembles, rad; a whole turn if the input turns
+    fully.
+    """
     branches: tuple[int, ...]
-    """Branches of the circuit; two branches meet at the limits of theta_2 or at change points."""
+    """Branches of the circuit; two meet at the limits of theta_2 or at change points.
+    """
 
 
 def circuits(linkage: FourBar) -> tuple[Circuit, ...]:
-    """List the circuits of a linkage, with the range of theta_2 on each and the branches that belong to it.
+    """List the circuits of a linkage, each with its range of theta_2 and its branches.
 
     A Grashof linkage has two: the branches, where the input turns fully, else the two
     ranges of theta_2. Every other linkage has one; at a change point both branches
@@ -304,7 +335,9 @@ def circuits(linkage: FourBar) -> tuple[Circuit, ...]:
 def find_circuit(
     linkage: FourBar, theta_2: Array, branch: int | NDArray[np.int8]
 ) -> NDArray[np.int8]:
-    """Find the circuit (index into `circuits`) of each position, -1 where it does not assemble, (n,).
+    """Find the circuit (index into `circuits`) of each position, (n,).
+
+    It is -1 where the linkage does not assemble.
 
     `theta_2`: (n,), rad. `branch`: +1 or -1, or one of them for each position (n,).
     """
@@ -332,17 +365,21 @@ GRASHOF = {
     3: ("GRCR", "double rocker"),
     4: ("GRRC", "rocker-crank"),
 }
-"""Barker's code and the name by the number of the shortest bar, which turns fully against all others."""
+"""Barker's code and name by the number of the shortest bar. That bar turns fully
+against all others.
+"""
 CHANGE_POINT = {1: "SCCC", 2: "SCRR", 3: "SRCR", 4: "SRRC"}
 PARALLELOGRAM = "parallelogram"
 NEARLY = 1e-3
-"""Part of the sum of the lengths by which a linkage that nearly has a change point misses it, so that it is said."""
+"""Miss of a change point, over the sum of the lengths, up to which it is reported."""
 DIGITS_STATED = 1e-4
-"""Part of the sum of the lengths up to which the last decimal of a length is a rounding; a coarser one is meant as it
-stands.
+"""Part of the sum of the lengths up to which the last decimal of a length is a
+rounding; a coarser one is meant as it stands.
 """
 EQUALITIES = ((-1, -1, 1, 1), (1, -1, -1, 1), (1, -1, 1, -1))
-"""Signs of ground, input, coupler and output in the sums that vanish at change points: of E1, and both of E2."""
+"""Signs of ground, input, coupler, output in the sums that vanish at change points. The
+sums are those of E1, and both of E2.
+"""
 
 
 class LinkageType(NamedTuple):
@@ -353,24 +390,29 @@ class LinkageType(NamedTuple):
     barker: int | None
     """Barker's class 1..14; None for a structure, which cannot move."""
     code: str
-    """Barker's letters: G Grashof, S special (change point), R rocker, C crank, for the bars 2, 3, 4 in turn."""
+    """Barker's letters for bars 2, 3, 4 in turn. G Grashof, S special (change point), R
+    rocker, C crank.
+    """
     name: str
     shortest: int
     """Number of the shortest bar, the lowest of equal ones."""
     longest: int
     """Number of the longest bar, the lowest of equal ones."""
     turning: tuple[int, ...]
-    """Bars among 2, 3, 4 that turn fully against the ground (through change points, if need be)."""
+    """Bars among 2, 3, 4 that turn fully against the ground. Change points may lie
+    within the turn.
+    """
 
 
 def classify(linkage: FourBar, within: float = TOUCHING) -> LinkageType:
-    """Classify a linkage by the Grashof condition s + l < p + q and by which bar is shortest or longest.
+    """Classify a linkage by the Grashof condition s + l < p + q.
 
-    s, l are the shortest and longest lengths, p, q the other two. The sums are exact;
-    equality is decided within the rounding of the four lengths. Which of the three sums
-    of two bars and the other two are equal tells the change-point types apart: one
-    equality 9-12, two 13 (opposite bars equal: parallelogram; adjacent bars equal:
-    kite, also deltoid or Galloway), three 14 (rhombus).
+    The bar that is shortest or longest names the type. s, l are the shortest and
+    longest lengths, p, q the other two. The sums are exact; equality is decided within
+    the rounding of the four lengths. Which of the three sums of two bars and the other
+    two are equal tells the change-point types apart: one equality 9-12, two 13
+    (opposite bars equal: parallelogram; adjacent bars equal: kite, also deltoid or
+    Galloway), three 14 (rhombus).
 
     `within`: part of the sum of the lengths within which sums count as equal.
 
@@ -388,7 +430,7 @@ def classify(linkage: FourBar, within: float = TOUCHING) -> LinkageType:
     perimeter = math.fsum(lengths.values())
 
     def balance(bar: int, partner: int) -> float:
-        """Compute the two bars minus the other two; 0 within the rounding of the lengths."""
+        """Compute the two bars minus the other two; 0 within their rounding."""
         total = math.fsum(
             length if k in (bar, partner) else -length for k, length in lengths.items()
         )
@@ -442,7 +484,8 @@ def name_assembly(linkage: FourBar, bar: int = 2, branch: int = 1) -> str:
     each other and turn together, and one bar stands still.
 
     >>> from fourbar import uniform
-    >>> name_assembly(uniform(3, 1, 3, 1)), name_assembly(uniform(3, 1, 3, 1), branch=-1)
+    >>> linkage = uniform(3, 1, 3, 1)
+    >>> name_assembly(linkage), name_assembly(linkage, branch=-1)
     ('parallelogram', 'antiparallelogram')
     """
     name = classify(linkage).name
@@ -456,7 +499,10 @@ def name_assembly(linkage: FourBar, bar: int = 2, branch: int = 1) -> str:
 
 
 def find_miss(linkage: FourBar) -> tuple[float, str] | None:
-    """Find by how much a linkage misses one with a change point, m, and the name of that one; None if by too much."""
+    """Find by how much a linkage misses one with a change point, m, and its name.
+
+    None: by too much.
+    """
     meant, own = classify(linkage, NEARLY), classify(linkage)
     if meant.name == own.name or meant.barker is None or meant.barker < 9:
         return None
@@ -466,7 +512,10 @@ def find_miss(linkage: FourBar) -> tuple[float, str] | None:
 
 
 def count_equalities(lengths: tuple[float, float, float, float]) -> int:
-    """Count the equalities of change points that hold: two of a parallelogram or a kite, three of a rhombus."""
+    """Count the equalities of change points that hold.
+
+    Two hold for a parallelogram or a kite, three for a rhombus.
+    """
     touching = TOUCHING * math.fsum(lengths)
     gaps = (abs(math.fsum(map(mul, signs, lengths))) for signs in EQUALITIES)
     return sum(gap <= touching for gap in gaps)
@@ -477,17 +526,20 @@ def meet_change_points(
     roundings: tuple[float, float, float, float],
     decimals: tuple[float, float, float, float] | None = None,
 ) -> tuple[float, float, float, float]:
-    """Return the lengths of ground, input, coupler and output with the equalities that they miss by rounding.
+    """Return the four lengths with the equalities that they miss by rounding.
 
-    The equalities b + c = a + d, d + c = a + b, d + b = a + c of change points hold within the sum of the roundings
-    or not; the lengths nearest to the stated ones that fulfil those which hold are returned, the stated ones if none.
+    The lengths are those of ground, input, coupler and output.
+
+    The equalities b + c = a + d, d + c = a + b, d + b = a + c of change points hold
+    within the sum of the roundings or not; the lengths nearest to the stated ones that
+    fulfil those which hold are returned, the stated ones if none.
 
     Parameters
     ----------
     lengths : as stated, m.
     roundings : largest error of each length by the rounding of what was stated, m.
-    decimals : half of the last decimals of what was stated, if not the roundings; too coarse
-        ones round nothing.
+    decimals : half of the last decimals of what was stated, if not the roundings; too
+        coarse ones round nothing.
     """
     largest = DIGITS_STATED * math.fsum(lengths)
     pairs = zip(roundings, decimals or roundings, strict=True)

@@ -16,11 +16,16 @@ from fourbar.formulas.arithmetic import Number, is_any, select, vector
 from fourbar.formulas.position import Loop, Position
 
 FAST = 4.0
-"""|d^2 - a^2|/e^2, of twice 1/2 - t: from there on the triangle's side turns fast against the bars."""
+"""Value of |d^2 - a^2|/e^2, twice |1/2 - t|, from which the triangle turns fast.
+Its side e then turns fast against the bars.
+"""
 
 
 class Coefficients(NamedTuple):
-    """h_k = d theta_k/dq, their differences, which keep their digits where bars turn as one, and h_k' = d h_k/dq."""
+    """h_k = d theta_k/dq, their differences, and h_k' = d h_k/dq.
+
+    The differences keep their digits where bars turn as one.
+    """
 
     h2: Number
     h3: Number
@@ -36,10 +41,13 @@ class Coefficients(NamedTuple):
 
 
 def coefficients(lengths: Loop, position: Position) -> Coefficients:
-    """Compute the coefficients by theta_2 from the triangle A, B, O4: side e turns by t, the angle at B opens by 2 g.
+    """Compute the coefficients by theta_2 from the triangle A, B, O4.
+
+    Its side e turns by t, and the angle at B opens by 2 g:
 
         h3 = n - g,   h4 = n + g,   n = t + (x/e^2) g = 1/2 + w,
-        t = (a (a - d) + 2 a d sin^2 h)/e^2,   g = 2 a d sin h cos h/root,   x = b^2 - c^2.
+        t = (a (a - d) + 2 a d sin^2 h)/e^2,
+        g = 2 a d sin h cos h/root,   x = b^2 - c^2.
 
     Where e is short its sides turn fast and the bars do not; there w comes without e,
     from Heron's formula for both triangles on e:
@@ -48,8 +56,10 @@ def coefficients(lengths: Loop, position: Position) -> Coefficients:
 
     >>> from math import radians
     >>> from fourbar.formulas.position import close_loop, direction, half_angle, loop
-    >>> lengths, theta_2 = loop(100, 40, 120, 80), radians(40)  # mm; Norton, examples 6-7 and 7-1
-    >>> position = close_loop(lengths, 1.0, direction(theta_2), half_angle(lengths, theta_2), 1)
+    >>> lengths = loop(100, 40, 120, 80)  # mm; Norton, examples 6-7 and 7-1
+    >>> theta_2 = radians(40)
+    >>> half = half_angle(lengths, theta_2)
+    >>> position = close_loop(lengths, 1.0, direction(theta_2), half, 1)
     >>> found = rates(coefficients(lengths, position), 25.0, 15.0)
     >>> f"{found.omega_4:.3f} {found.alpha_4:.3f}"
     '6.998 470.134'
@@ -83,7 +93,10 @@ def may_turn_fast(lengths: Loop) -> Number:
 
 
 def find_fast_turns(lengths: Loop, position: Position) -> Number:
-    """Mark where t and x g/e^2 are large and cancel: |d^2 - a^2| > FAST e^2, and x S, y root have the same sign."""
+    """Mark where t and x g/e^2 are large and cancel.
+
+    There |d^2 - a^2| > FAST e^2, and x S and y root have the same sign.
+    """
     d, a, b, c, _, _ = lengths
     y = (d - a) * (d + a)
     return (abs(y) > FAST * position.e2) & (
@@ -92,7 +105,9 @@ def find_fast_turns(lengths: Loop, position: Position) -> Number:
 
 
 def take_sines_of_rates(lengths: Loop, position: Position, k: Coefficients) -> Position:
-    """Take u3 and u4 from the instant centres where the side turns fast, so that small sines keep their digits.
+    """Take u3 and u4 from the instant centres where the side turns fast.
+
+    Small sines keep their digits so.
 
     d sin(theta_4 - theta_1) = b sin(theta_4 - theta_3) (1 - h3),
     d sin(theta_3 - theta_1) = c sin(theta_4 - theta_3) (1 - h4).
@@ -123,7 +138,10 @@ def take_sines_of_rates(lengths: Loop, position: Position, k: Coefficients) -> P
 
 
 def put_parallel_pairs(k: Coefficients, first: Number, second: Number) -> Coefficients:
-    """Put in the exact coefficients of bars that stay parallel: h3, h4 = 0, 1 where `first`, 1, 0 where `second`."""
+    """Put in the exact coefficients of bars that stay parallel.
+
+    h3, h4 = 0, 1 where `first`; 1, 0 where `second`.
+    """
     either = first | second
     h3, h4 = np.where(either, 1.0 * second, k.h3), np.where(either, 1.0 * first, k.h4)
     h23, h43 = (
@@ -154,7 +172,10 @@ class Rates(NamedTuple):
 
 
 def rates(k: Coefficients, speed: Number, acceleration: Number) -> Rates:
-    """Compute omega_k = h_k q', alpha_k = h_k q'' + h_k' q'^2, from speed q' (rad/s) and acceleration q'' (rad/s^2)."""
+    """Compute omega_k = h_k q' and alpha_k = h_k q'' + h_k' q'^2.
+
+    The speed q' is in rad/s, the acceleration q'' in rad/s^2.
+    """
     square = speed * speed
     alpha_2, alpha_3, alpha_4 = k.dh2 * square, k.dh3 * square, k.dh4 * square
     if is_any(acceleration != 0.0):
@@ -165,7 +186,10 @@ def rates(k: Coefficients, speed: Number, acceleration: Number) -> Rates:
 
 
 class Frame(NamedTuple):
-    """A bar's frame at its first pin as it moves; arms r from that pin are complex, m, in world axes."""
+    """A moving bar's frame at its first pin.
+
+    Arms r from that pin are complex, m, in world axes.
+    """
 
     u: Number
     """e^{i theta}, which turns an arm of the frame into the world's axes."""
@@ -182,12 +206,18 @@ class Frame(NamedTuple):
         return self.v_pin + self.i_omega * r
 
     def acceleration(self, r: Number) -> Number:
-        """Compute the acceleration of the end of an arm r, m/s^2: a_pin + (i alpha - omega^2) r."""
+        """Compute the acceleration of the end of an arm r, m/s^2.
+
+        It is a_pin + (i alpha - omega^2) r.
+        """
         return self.a_pin + self.turn * r
 
 
 class State(NamedTuple):
-    """One position of a linkage, or many that broadcast, and how it moves: what loads and effects act on."""
+    """One position of a linkage, or many that broadcast, and its motion.
+
+    Loads and effects act on it.
+    """
 
     lengths: Loop
     theta_1: Number
@@ -202,7 +232,9 @@ class State(NamedTuple):
     q: Number = None
     """Independent angle, rad; None: theta_2."""
     sine: Number = None
-    """Sine between the two other moving bars, zero at the limits of the bar; None: that of theta_4 - theta_3."""
+    """Sine between the two other moving bars, zero at the limits of the bar. None: it
+    is sin(theta_4 - theta_3).
+    """
 
     def direction(self, bar: int) -> Number:
         """Return e^{i theta} of bar 1 (from O2 to O4), 2, 3 or 4."""
@@ -221,13 +253,19 @@ class State(NamedTuple):
         return 0.0 if bar == 1 else self.moving[bar + 1]
 
     def foot(self, bar: int) -> Number:
-        """Return the first pin of a bar, complex, m: O2 of bars 1 and 2, A of bar 3, O4 of bar 4."""
+        """Return the first pin of a bar, complex, m.
+
+        It is O2 of bars 1 and 2, A of bar 3, O4 of bar 4.
+        """
         if bar == 3:
             return self.lengths.a * self.position.u2
         return self.lengths.d * self.position.u1 if bar == 4 else 0.0
 
     def frame(self, bar: int) -> Frame:
-        """Return the frame of bar 1, 2, 3 or 4. Its pin is at rest at O2 and O4; the coupler's pin moves with bar 2."""
+        """Return the frame of bar 1, 2, 3 or 4.
+
+        Its pin is at rest at O2 and O4; the coupler's pin moves with bar 2.
+        """
         pin, v_pin, a_pin = self.foot(bar), 0.0, 0.0
         if bar == 3:
             of_2 = self.frame(2)
@@ -243,11 +281,14 @@ class State(NamedTuple):
         )
 
     def point(self, bar: int, z: Number) -> Number:
-        """Place the point z of a bar's frame at its first pin (complex: along + i across), m."""
+        """Compute where the point z of a bar's frame lies, complex, m.
+
+        z is along + i across.
+        """
         return self.foot(bar) + z * self.direction(bar)
 
     def point_coefficient(self, bar: int, z: Number) -> Number:
-        """Compute the derivative of the position of a bar's point z by the independent angle, m/rad."""
+        """Compute the derivative of a bar's point z by the independent angle, m/rad."""
         turned = (1j * self.coefficient(bar)) * (z * self.direction(bar))
         return turned + (1j * self.k.h2) * self.foot(3) if bar == 3 else turned
 

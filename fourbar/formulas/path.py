@@ -1,4 +1,6 @@
-"""The path of a linkage in one independent angle: theta_2, or that of another bar which is commanded or free.
+"""The path of a linkage in one independent angle.
+
+The angle is theta_2, or that of another bar which is commanded or free.
 
 The loop is a sum of four vectors, in any order. Read from bar 3 or from bar 4 it is one
 of the same kind, whose input is that bar, and every formula of position and motion
@@ -64,20 +66,26 @@ class Path(NamedTuple):
     bar: int
     """2, 3 or 4."""
     lengths: Loop
-    """Loop in the order of this path: ground, the bar itself, coupler, the remaining bar."""
+    """Loop in the order of this path: ground, the bar itself, coupler, the other bar.
+    """
     theta_1: Number
     """Direction of the ground from O2 to O4, rad."""
     u1: Number
     """e^{i theta_1}, its opposite where the loop is read from bar 4."""
     unit: Number = 1.0
-    """Unit of the lengths, a power of two near the longest, m: no product of them leaves the range of doubles."""
+    """Unit of the lengths, a power of two near the longest, m. No product of them
+    leaves the range of doubles.
+    """
     may_stay_parallel: bool = False
     """True if there are two pairs of equal bars."""
     passing: Passing = Passing(False, False)
     """Roots that pass through zero at a change point, with their sign."""
 
     def half_angle(self, q: Number) -> HalfAngle:
-        """Compute the half angle for the independent angle q (rad, not reduced) against the ground."""
+        """Compute the half angle for the independent angle q (rad, not reduced).
+
+        The angle is measured against the ground.
+        """
         psi = q - self.theta_1
         return half_angle(
             self.lengths, psi, opposite=self.bar == 4, passing=self.passing
@@ -94,7 +102,10 @@ class Path(NamedTuple):
         return branch * self.half_angle(q).side
 
     def passes_zero(self, half: HalfAngle) -> Number:
-        """Mark where the smaller root is one that passes through zero: near it lies a change point, and no limit."""
+        """Mark where the smaller root is one that passes through zero.
+
+        Near it lies a change point, and no limit.
+        """
         return select(half.outer < half.inner, self.passing.outer, self.passing.inner)
 
     def input_direction(self, q: Number, half: HalfAngle) -> Number:
@@ -126,8 +137,9 @@ class Path(NamedTuple):
         return position
 
     def angles(self, half: HalfAngle, branch: Number) -> tuple[Number, Number, Number]:
-        """Compute theta_3, theta_4 and the root alone: arguments of what `close_loop` divides by lengths, in (-pi, pi].
+        """Compute theta_3, theta_4 and the root alone.
 
+        The angles are arguments of what `close_loop` divides by lengths, in (-pi, pi].
         In real numbers, against the ground; a turned ground's angle is added.
         """
         d, a, b, c, _, _ = self.lengths
@@ -155,11 +167,12 @@ class Path(NamedTuple):
         condition: Number = None,
         margin: float = NO_DIGIT_LEFT,
     ) -> tuple[Position, Coefficients, Number]:
-        """Close the loop at a half angle; return positions, coefficients by q, and the sine.
+        """Close the loop at a half angle.
 
-        The sine is that between the two other moving bars. Coefficients are NaN where
-        they are 0/0: where it, or the condition of the command, is no larger than
-        `margin`; nowhere if that is negative, and on a change point they are limits.
+        Return positions, coefficients by q, and the sine. The sine is that between the
+        two other moving bars. Coefficients are NaN where they are 0/0: where it, or the
+        condition of the command, is no larger than `margin`; nowhere if that is
+        negative, and on a change point they are limits.
         """
         position = self.position(q, half, branch)
         singular = abs(position.sin_mu) <= margin
@@ -175,7 +188,10 @@ class Path(NamedTuple):
     def motion(
         self, position: Position, branch: Number
     ) -> tuple[Position, Coefficients]:
-        """Compute positions and kinematic coefficients by q with the bars in their usual order, from `position`."""
+        """Compute positions and kinematic coefficients by q, the bars in usual order.
+
+        `position`: of the loop as it is read.
+        """
         k = coefficients(self.lengths, position)
         position = take_sines_of_rates(self.lengths, position, k)
         if self.may_stay_parallel:
@@ -215,7 +231,10 @@ class Path(NamedTuple):
         )
 
     def drive_sine(self, position: Position, drive_bar: int) -> Number:
-        """Compute the sine between the two bars that are not driven; `motion` or `on_curve` made the positions."""
+        """Compute the sine between the two bars that are not driven.
+
+        `motion` or `on_curve` made the positions.
+        """
         if position.half is None:
             return drive_sine(position, drive_bar)
         role = ROLES[self.bar][drive_bar - 2]
@@ -256,7 +275,10 @@ def prepare_path(lengths: Loop, theta_1: Number, bar: int = 2) -> Path:
 
 
 def count_turns(lengths: tuple[Number, Number, Number, Number], bar: int) -> Number:
-    """Count the turns of a bar after which an assembly repeats: two with a single change point, otherwise one."""
+    """Count the turns of a bar after which an assembly repeats.
+
+    They are two with a single change point, otherwise one.
+    """
     passing = find_passing(loop(*reorder_lengths(bar, lengths)))
     return np.where(passing.outer ^ passing.inner, 2, 1)
 
@@ -273,10 +295,11 @@ def compute_state(
     omega_2: Number = 1.0,
     alpha_2: Number = 0.0,
 ) -> State:
-    """Compute positions and motion for a motion of the input; NaN where the loop does not close, or speeds are 0/0.
+    """Compute positions and motion for a motion of the input.
 
-    With omega_2 and alpha_2 left out speeds are first coefficients and accelerations
-    second ones.
+    They are NaN where the loop does not close, and speeds also where they are 0/0. With
+    omega_2 and alpha_2 left out speeds are first coefficients and accelerations second
+    ones.
     """
     with np.errstate(all="ignore"):
         lengths = loop(*linkage.lengths)
@@ -295,17 +318,25 @@ def compute_state(
 
 
 def drive_sine(position: Position, drive_bar: int) -> Number:
-    """Compute sin(theta_4 - theta_3), sin(theta_4 - theta_2), sin(theta_3 - theta_2) for the drive on bar 2, 3, 4."""
+    """Compute the sine between the two bars that are not driven.
+
+    It is sin(theta_4 - theta_3), sin(theta_4 - theta_2), sin(theta_3 - theta_2) for the
+    drive on bar 2, 3, 4.
+    """
     if drive_bar == 2:
         return position.sin_mu
     return sine(position.u2, position.u4 if drive_bar == 3 else position.u3)
 
 
 def drive_sine_of_triangle(lengths: Loop, position: Position, drive_bar: int) -> Number:
-    """Compute the drive's sine from the triangle A, B, O4: nearly equal directions of a short ground lose digits.
+    """Compute the drive's sine from the triangle A, B, O4.
 
-        sin(theta_4 - theta_2) = ((d cos psi - a) root + d sin psi (e^2 - b^2 + c^2))/(2 c e^2),
-        sin(theta_3 - theta_2) = ((d cos psi - a) root - d sin psi (e^2 + b^2 - c^2))/(2 b e^2).
+    Nearly equal directions of a short ground lose digits:
+
+        sin(theta_4 - theta_2)
+            = ((d cos psi - a) root + d sin psi (e^2 - b^2 + c^2))/(2 c e^2),
+        sin(theta_3 - theta_2)
+            = ((d cos psi - a) root - d sin psi (e^2 + b^2 - c^2))/(2 b e^2).
 
     `lengths`: of the loop that the position was closed with.
     """
@@ -324,7 +355,10 @@ def drive_sine_of_triangle(lengths: Loop, position: Position, drive_bar: int) ->
 
 
 def read_from(bar: int, k: Coefficients) -> Coefficients:
-    """Return the coefficients of the loop read from bar 2, 3 or 4, in the usual order of the bars; and back."""
+    """Return the coefficients of the loop read from bar 2, 3 or 4, bars in usual order.
+
+    The same exchange leads back.
+    """
     if bar == 3:
         return Coefficients(
             k.h3, k.h2, k.h4, -k.h23, k.h43 - k.h23, k.dh3, k.dh2, k.dh4

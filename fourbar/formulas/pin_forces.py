@@ -20,7 +20,10 @@ from fourbar.formulas.position import Loop, Position
 
 
 class Body(NamedTuple):
-    """Mass, kg; moment of inertia about G, kg m^2; G from the first pin in the bar's frame, along + i across, m."""
+    """Mass, kg; moment of inertia about G, kg m^2; and the place of G.
+
+    G is complex, m, from the first pin in the bar's frame (along + i across).
+    """
 
     m: Number
     I: Number  # noqa: E741 - the literature's letter
@@ -32,7 +35,10 @@ Bodies = tuple[Body, Body, Body]
 
 
 class Wrenches(NamedTuple):
-    """Resultant forces (complex, N) on bars 2, 3, 4 and moments (N m) about their first pins O2, A, O4."""
+    """Resultant forces (complex, N) and moments (N m) on bars 2, 3, 4.
+
+    The moments are about the first pins O2, A, O4.
+    """
 
     R2: Number = 0j
     R3: Number = 0j
@@ -41,7 +47,9 @@ class Wrenches(NamedTuple):
     M3: Number = 0.0
     M4: Number = 0.0
     C: Number = 0.0
-    """Couple at pin B on bar 4, its opposite on bar 3, in neither M3 nor M4: the small sum M3 + M4 keeps its digits."""
+    """Couple at pin B on bar 4, its opposite on bar 3, N m. It is in neither M3 nor M4,
+    so that the small sum M3 + M4 keeps its digits.
+    """
 
     def on(self, bar: int) -> tuple[Number, Number]:
         """Return the force and the moment on bar 2, 3 or 4."""
@@ -70,10 +78,11 @@ def about_first_pin(body: Body) -> Number:
 def inertia_wrenches(
     a: Number, bodies: Bodies, position: Position, moving: Rates
 ) -> tuple[Wrenches, Number]:
-    """Compute d'Alembert's -m a_G on each bar, and -(I + m r^2) alpha - m r_G x a_pin about its first pin.
+    """Compute d'Alembert's force -m a_G and moment on each bar.
 
-    The force -m a_A of the coupler's mass at pin A is no part of R3; it is returned
-    apart, in the frame of bar 2: m_3 a (omega_2^2 - i alpha_2).
+    About its first pin the moment is -(I + m r^2) alpha - m r_G x a_pin. The force -m
+    a_A of the coupler's mass at pin A is no part of R3; it is returned apart, in the
+    frame of bar 2: m_3 a (omega_2^2 - i alpha_2).
 
     `a`: length of the input, m.
     """
@@ -98,7 +107,9 @@ def inertia_wrenches(
 def coupler_about_B(
     lengths: Loop, three: Body, position: Position, moving: Rates, sine: Number
 ) -> Number:
-    """Compute d'Alembert's moment -I alpha_3 - m (G - B) x a_G of the coupler about B, small where G lies near B.
+    """Compute d'Alembert's moment of the coupler about B, small where G lies near B.
+
+    It is -I alpha_3 - m (G - B) x a_G.
 
     `sine`: of theta_3 - theta_2.
     """
@@ -114,7 +125,10 @@ def coupler_about_B(
 def solve_between(
     M_u: Number, M_v: Number, u: Number, v: Number, sine: Number
 ) -> Number:
-    """Solve u x F = M_u and v x F = M_v for F, unit vectors with u x v = sine: F = (M_u v - M_v u)/sine."""
+    """Solve u x F = M_u and v x F = M_v for F.
+
+    With unit vectors and u x v = sine, F = (M_u v - M_v u)/sine.
+    """
     return (M_u * v - M_v * u) * (1.0 / sine)
 
 
@@ -127,19 +141,24 @@ def pin_forces(
     mass_at_A: Number,
     moment_of_F32: Number,
 ) -> PinForces:
-    """Compute the four pin forces; inf or NaN where the two bars that are not driven lie in one line.
+    """Compute the four pin forces.
 
-    With the drive on bar 2 the force at B is written with the diagonal D from A to O4, which closes the
-    triangle of bars 3 and 4, so that a couple between them keeps its digits:
+    They are inf or NaN where the two bars that are not driven are collinear.
+
+    With the drive on bar 2 the force at B is written with the diagonal D from A to O4,
+    which closes the triangle of bars 3 and 4, so that a couple between them keeps its
+    digits:
         F43 = ((M3 - C) D - (M3 + M4) b u3)/(b c sin(theta_4 - theta_3)).
 
     Parameters
     ----------
     drive_bar : 2, 3 or 4.
-    sine : between the two bars that are not driven, of theta_4 - theta_3, theta_4 - theta_2, theta_3 - theta_2.
+    sine : between the two bars that are not driven, of theta_4 - theta_3,
+        theta_4 - theta_2, theta_3 - theta_2.
     w, mass_at_A : everything that acts, as from `inertia_wrenches`.
-    moment_of_F32 : with the drive on bar 2: a u2 x F32 (N m), which the virtual work of bars 3 and 4 knows; on bar 4:
-        b u3 x F32, the opposite of the coupler's moment about B.
+    moment_of_F32 : with the drive on bar 2: a u2 x F32 (N m), which the virtual work of
+        bars 3 and 4 knows; on bar 4: b u3 x F32, the opposite of the coupler's moment
+        about B.
 
     >>> from math import pi
     >>> from fourbar.formulas.path import compute_state
@@ -147,11 +166,14 @@ def pin_forces(
     >>> from fourbar.linkage import uniform  # below, Norton, example 11-3: in, lbf, s
     >>> s, deg = compute_state(uniform(19, 5, 15, 10), pi / 3, 1, 25.0, -40.0), pi / 180
     >>> G3, P = polar(9, 45 * deg), polar(80, 330 * deg)  # a force on the coupler
-    >>> bars = Body(0.004, 0.4, polar(3, 30 * deg)), Body(0.020, 1.5, G3), Body(0.015, 0.8, 5 + 0j)
+    >>> two, four = Body(0.004, 0.4, polar(3, 30 * deg)), Body(0.015, 0.8, 5 + 0j)
+    >>> bars = two, Body(0.020, 1.5, G3), four
     >>> w, mass_at_A = inertia_wrenches(5, bars, s.position, s.moving)
     >>> moment = cross((G3 + polar(3, 100 * deg)) * s.position.u3, P)
-    >>> w = w._replace(R3=w.R3 + P, M3=w.M3 + moment, M4=w.M4 + 120)  # and a couple on the output
-    >>> f"{pin_forces(s.lengths, s.position, 2, s.position.sin_mu, w, mass_at_A, 0.0).F12:.2f}"
+    >>> # and a couple on the output
+    >>> w = w._replace(R3=w.R3 + P, M3=w.M3 + moment, M4=w.M4 + 120)
+    >>> sine = s.position.sin_mu
+    >>> f"{pin_forces(s.lengths, s.position, 2, sine, w, mass_at_A, 0.0).F12:.2f}"
     '-117.65-107.84j'
     """
     d, a, b, c, _, _ = lengths

@@ -64,7 +64,10 @@ def point_coefficients(
 
 
 class Centre(NamedTuple):
-    """Instant centre in homogeneous coordinates: the point (x, y)/w; at infinity in direction (x, y) where w = 0."""
+    """Instant centre in homogeneous coordinates: the point (x, y)/w.
+
+    It lies at infinity in the direction (x, y) if w = 0.
+    """
 
     x: Array
     y: Array
@@ -82,8 +85,9 @@ def instant_centres(
 ) -> dict[tuple[int, int], Centre]:
     """Locate the six instant centres I_ij, keyed by (i, j) with i < j.
 
-    I12, I23, I34, I14 are the pins; I13 = line O2 A with line B O4, I24 = line A B with line O2 O4
-    (Aronhold-Kennedy). Where two such lines coincide the centre is undetermined: x = y = w = 0.
+    I12, I23, I34, I14 are the pins; I13 = line O2 A with line B O4, I24 = line A B with
+    line O2 O4 (Aronhold-Kennedy). Where two such lines coincide the centre is
+    undetermined: x = y = w = 0.
 
     Parameters
     ----------
@@ -102,7 +106,10 @@ def instant_centres(
 def locate_centres(
     O4: Number, A: Number, B: Number, u1: Number, u2: Number, u3: Number, u4: Number
 ) -> dict[tuple[int, int], Centre]:
-    """Locate the six instant centres from the pins and the directions of the bars, complex."""
+    """Locate the six instant centres, complex.
+
+    They follow from the pins and the directions of the bars.
+    """
     one = np.ones(np.shape(A))
     pins = {(1, 2): 0.0 * A, (2, 3): A, (3, 4): B, (1, 4): O4}
     centres = {bars: Centre(pin.real, pin.imag, one) for bars, pin in pins.items()}
@@ -113,7 +120,10 @@ def locate_centres(
 
 
 class CouplerCurve(NamedTuple):
-    """A closed curve that a point of the coupler draws; the last position repeats the first; each (n,)."""
+    """A closed curve that a point of the coupler draws, each field (n,).
+
+    The last position repeats the first.
+    """
 
     theta_2: Array
     """rad; not wrapped."""
@@ -133,19 +143,21 @@ def coupler_curve(
     branch: int = 1,
     steps: int = 360,
 ) -> CouplerCurve:
-    """Trace the closed coupler curve of one circuit, run smoothly through limits and change points.
+    """Trace the closed coupler curve of one circuit.
 
-    Where the input turns fully theta_2 is spaced evenly, over two turns if the linkage has a single
-    change point; else it goes from limit to limit on one branch and back on the other, spaced by
-    the cosine, so that the curve's points do not thin out at the limits.
+    It runs smoothly through limits and change points. Where the input turns fully
+    theta_2 is spaced evenly, over two turns if the linkage has a single change point;
+    else it goes from limit to limit on one branch and back on the other, spaced by the
+    cosine, so that the curve's points do not thin out at the limits.
 
     Parameters
     ----------
     r_along, r_across : the point in the coupler's frame at A, m.
     circuit : index into `circuits`; InputError where there is none of that number.
     branch : assembly, for a linkage with change points.
-    steps : number of intervals, a multiple of 4 (InputError otherwise): limits and change points,
-        at which directions are undetermined or lose digits, then fall between positions.
+    steps : number of intervals, a multiple of 4 (InputError otherwise): limits and
+        change points, at which directions are undetermined or lose digits, then fall
+        between positions.
     """
     every = circuits(linkage)
     point = complex(require("r_along", r_along), require("r_across", r_across))
@@ -173,9 +185,10 @@ def coupler_curve(
 def list_circuit(
     linkage: FourBar, circuit: int, branch: int, steps: int
 ) -> tuple[Array, NDArray[np.int64], int]:
-    """List the positions of a circuit, (steps,): theta_2, its assembly, and the turns that theta_2 gains.
+    """List the positions of a circuit, (steps,).
 
-    For the parameters see `coupler_curve`.
+    They are theta_2, its assembly, and the turns that theta_2 gains. For the parameters
+    see `coupler_curve`.
     """
     (start, stop), branches = circuits(linkage)[circuit]
     branch = branch if branch in branches else branches[0]

@@ -37,19 +37,25 @@ from fourbar.formulas.arithmetic import (
 )
 
 TOUCHING = 4.0 * U
-"""Bars that miss each other, or a change point, by up to this times the sum of the lengths count as touching: lengths
-that are computed, as distances of points are, are rounded by a few U each.
+"""Bars that miss each other, or a change point, by up to this times the sum of the
+lengths count as touching: lengths that are computed, as distances of points are, are
+rounded by a few U each.
 """
 VISIBLE = 1e-9
 """Part of a length that is no rounding of it."""
 VISIBLE_AT_A = 1e-11
 """The same of d - a: bars 3 and 4 are as much too long or short where A passes O4."""
 TINY_TANGENT = 1e-100
-"""Added to the size of tan h: on a change point everything takes the limit to which it tends along the assembly."""
+"""Added to the size of tan h. On a change point everything takes the limit to which it
+tends along the assembly.
+"""
 
 
 class Loop(NamedTuple):
-    """The lengths (m) of ground, input, coupler and output, and what they decide together (m^2)."""
+    """The lengths (m) of ground, input, coupler and output, and two sums (m^2).
+
+    The sums E1 and E2 decide where the loop closes.
+    """
 
     d: Number
     a: Number
@@ -60,7 +66,10 @@ class Loop(NamedTuple):
 
 
 class HalfAngle(NamedTuple):
-    """sin^2 h, cos^2 h, sin h cos h and the two factors: all of a position that may need more digits than doubles."""
+    """sin^2 h, cos^2 h, sin h cos h and the two factors of Heron's formula.
+
+    These alone may need more digits than doubles have.
+    """
 
     ss: Number
     kk: Number
@@ -72,10 +81,11 @@ class HalfAngle(NamedTuple):
 
 
 class Passing(NamedTuple):
-    """The roots that pass through zero at a change point of the linkage, with their sign."""
+    """The roots that pass through zero at a change point, with their sign."""
 
     outer: Number
-    """True if E1 = 0: bars 3, 4 are stretched there, and theta_2 - theta_1 is 180 deg."""
+    """True if E1 = 0: bars 3, 4 are stretched there, and theta_2 - theta_1 is 180 deg.
+    """
     inner: Number
     """True if E2 = 0: bars 3, 4 are folded there, and theta_2 - theta_1 is 0."""
 
@@ -92,27 +102,35 @@ class Position(NamedTuple):
     diagonal: Number
     """Vector from A to O4, complex, m."""
     e2: Number
-    """Square e^2 of the diagonal; like the root, in the unit of the lengths that the loop was closed with."""
+    """Square e^2 of the diagonal, in the unit of the lengths of the loop. The root has
+    the same unit.
+    """
     root: Number
-    """sigma sqrt(outer) sqrt(inner), as `signed_root`; NaN where the loop does not close."""
+    """sigma sqrt(outer) sqrt(inner), as `signed_root`; NaN where the loop does not
+    close.
+    """
     half: HalfAngle
 
 
 def reorder_lengths(
     bar: int, lengths: tuple[Number, Number, Number, Number]
 ) -> tuple[Any, Any, Any, Any]:
-    """Return the lengths of ground, the bar itself, coupler and output, as the loop is read from bar 2, 3 or 4."""
+    """Return the four lengths as the loop is read from bar 2, 3 or 4.
+
+    The order is ground, the bar itself, coupler and output.
+    """
     d, a, b, c = lengths
     return (d, b, a, c) if bar == 3 else (d, c, b, a) if bar == 4 else (d, a, b, c)
 
 
 def loop(d: Number, a: Number, b: Number, c: Number) -> Loop:
-    """Return the lengths with E1 = (b + c - a - d)(a + b + c + d) and E2 = (d - a - b + c)(d - a + b - c).
+    """Return the lengths with E1 and E2.
 
-    A difference within the rounding of the lengths is zero. Where two of them vanish
-    the lengths are equal in pairs, and are returned so.
+    E1 = (b + c - a - d)(a + b + c + d) and E2 = (d - a - b + c)(d - a + b - c). A
+    difference within the rounding of the lengths is zero. Where two of them vanish the
+    lengths are equal in pairs, and are returned so.
 
-    >>> loop(0.3, 0.1, 0.3, 0.1).E1  # a parallelogram, whose bars come to lie in one line
+    >>> loop(0.3, 0.1, 0.3, 0.1).E1  # a parallelogram, which has change points
     0.0
     """
     parallelogram = _are_equal(c, a) & _are_equal(b, d)
@@ -136,17 +154,20 @@ def _are_equal(length: Number, other: Number) -> Number:
 
 
 def _replace(length: Number, other: Number, mask: Number) -> Number:
-    """Return a length, where a mask holds with the value of another one; its slopes stay."""
+    """Return a length, with the value of another one where a mask holds.
+
+    Its slopes stay.
+    """
     return length - select(mask, without_slopes(length - other), 0.0)
 
 
 def _vanish(
     difference: Number, lengths: tuple[Number, ...], diagonal: Number | None = None
 ) -> Number:
-    """Return a difference of lengths, zero if it is within the rounding of their sum; its slopes stay.
+    """Return a difference of lengths, or zero if it is within their rounding.
 
-    It stays where it is a visible part of a bar, or of the least length of the
-    diagonal, d - a.
+    The rounding is that of their sum; the slopes stay. It stays where it is a visible
+    part of a bar, or of the least length of the diagonal, d - a.
     """
     d, a, b, c = lengths
     square, rounding = difference * difference, TOUCHING * (d + a + b + c)
@@ -180,7 +201,9 @@ def half_angle(
     opposite: bool = False,
     passing: Passing | None = None,
 ) -> HalfAngle:
-    """Compute the half angle h of psi = theta_2 - theta_1 (rad, not reduced), and the factors of Heron's formula.
+    """Compute the half angle h of psi = theta_2 - theta_1, and Heron's factors.
+
+    psi is in rad and not reduced.
 
     `opposite`: h of psi - pi, from the same tangent: there the ground is read from O4
     to O2. `passing`: roots that pass through zero with their sign; left out: those of
@@ -207,7 +230,9 @@ def half_angle(
 
 
 def signed_root(half: HalfAngle, branch: Number) -> Number:
-    """Compute sigma sqrt(outer) sqrt(inner), each root with its sign; NaN where the loop does not close.
+    """Compute sigma sqrt(outer) sqrt(inner), each root with its sign.
+
+    It is NaN where the loop does not close.
 
     `branch`: sigma, +1 or -1, the assembly.
     """
@@ -239,19 +264,23 @@ def close_loop(
 ) -> Position:
     """Compute the directions of coupler and output.
 
-        u3 = (O4 - A) ((e^2 + b^2 - c^2) + i root)/(2 b e^2),   e^2 = (d - a)^2 + 4 a d sin^2 h,
-        u4 = (O4 - A) ((b^2 - e^2 - c^2) + i root)/(2 c e^2),   sin(theta_4 - theta_3) = root/(2 b c).
+        u3 = (O4 - A) ((e^2 + b^2 - c^2) + i root)/(2 b e^2),
+        u4 = (O4 - A) ((b^2 - e^2 - c^2) + i root)/(2 c e^2),
+        e^2 = (d - a)^2 + 4 a d sin^2 h,   sin(theta_4 - theta_3) = root/(2 b c).
 
     Parameters
     ----------
     lengths : of the loop, m.
     u1, u2 : e^{i theta_1} and e^{i theta_2}.
     half : of theta_2 - theta_1.
-    branch : assembly, +1 (B lies left of the diagonal from A to O4 for 0 < theta_2 - theta_1 < 180 deg) or -1.
+    branch : assembly, +1 (B lies left of the diagonal from A to O4 for
+        0 < theta_2 - theta_1 < 180 deg) or -1.
     unit : of the lengths, m; the diagonal is found in m.
 
-    >>> lengths, theta_2 = loop(100, 40, 120, 80), np.radians(40)  # mm; Norton, example 4-1
-    >>> position = close_loop(lengths, 1.0, direction(theta_2), half_angle(lengths, theta_2), 1)
+    >>> lengths = loop(100, 40, 120, 80)  # mm; Norton, example 4-1
+    >>> theta_2 = np.radians(40)
+    >>> half = half_angle(lengths, theta_2)
+    >>> position = close_loop(lengths, 1.0, direction(theta_2), half, 1)
     >>> [f"{np.angle(u, deg=True):.3f}" for u in (position.u3, position.u4)]
     ['20.298', '57.325']
     """
@@ -271,7 +300,9 @@ def close_loop(
 
 
 def find_parallel_pairs(lengths: Loop, branch: Number) -> tuple[Number, Number]:
-    """Mark assemblies in which two pairs of bars stay parallel: E1 = E2 = 0, root = +- 4 a d sin h cos h.
+    """Mark assemblies in which two pairs of bars stay parallel.
+
+    There E1 = E2 = 0 and root = +- 4 a d sin h cos h.
 
     First: the coupler keeps the ground's direction and bars 2, 4 turn together
     (a = c, b = d).
@@ -282,7 +313,10 @@ def find_parallel_pairs(lengths: Loop, branch: Number) -> tuple[Number, Number]:
 
 
 def put_parallel_pairs(position: Position, first: Number, second: Number) -> Position:
-    """Put in the exact directions u3 = u1, u4 = u2 where `first`, u3 = -u2, u4 = -u1 where `second`."""
+    """Put in the exact directions of bars that stay parallel.
+
+    u3 = u1, u4 = u2 where `first`; u3 = -u2, u4 = -u1 where `second`.
+    """
     u3 = np.where(first, position.u1, np.where(second, -position.u2, position.u3))
     u4 = np.where(first, position.u2, np.where(second, -position.u1, position.u4))
     sine = 2.0 * position.half.sk

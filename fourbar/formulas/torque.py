@@ -20,7 +20,9 @@ from fourbar.formulas.position import Position
 def inertia(
     a: Number, bodies: Bodies, position: Position, k: Coefficients
 ) -> tuple[Number, Number]:
-    """Compute the equivalent inertia J = sum of m |dG/dq|^2 + I h_k^2 of bar 2, and of bars 3 and 4, kg m^2.
+    """Compute the equivalent inertia J = sum of m |dG/dq|^2 + I h_k^2, kg m^2.
+
+    It is returned for bar 2, and for bars 3 and 4.
 
     `a`: length of the input, m.
     """
@@ -37,11 +39,14 @@ def inertia(
 def half_slope(
     a: Number, bodies: Bodies, position: Position, k: Coefficients
 ) -> Number:
-    """Compute J'/2 = sum of m G'.G'' + I h_k h_k', kg m^2/rad; bar 2 has no part of it where q = theta_2.
+    """Compute J'/2 = sum of m G'.G'' + I h_k h_k', kg m^2/rad.
+
+    Bar 2 has no part of it where q = theta_2.
 
     About the pins O2, O4 of bars 2, 4 that is (I + m r^2) h_k h_k'; of the coupler,
     with G = A + R,
-        G'.G'' = a^2 h2 h2' + r^2 h3 h3' + (h2 h3' + h3 h2') A.R + h2 h3 (h2 - h3) A x R.
+        G'.G'' = a^2 h2 h2' + r^2 h3 h3' + (h2 h3' + h3 h2') A.R
+            + h2 h3 (h2 - h3) A x R.
     """
     two, three, four = bodies
     # m h2 (A.R + i A x R)
@@ -59,7 +64,9 @@ def half_slope(
 
 
 def driving_torque(by: Number, inertial: Number, Q: Number) -> Number:
-    """Compute T_k = (J q'' + J'/2 q'^2 - Q)/h_k, N m, or the force of a drive with ds/dq for h_k, N.
+    """Compute T_k = (J q'' + J'/2 q'^2 - Q)/h_k, N m.
+
+    With ds/dq for h_k it is the force of a drive, N.
 
     Parameters
     ----------
@@ -74,8 +81,10 @@ def driving_torque(by: Number, inertial: Number, Q: Number) -> Number:
     >>> from fourbar.linkage import uniform  # below, Norton, example 11-3: in, lbf, s
     >>> s, deg = compute_state(uniform(19, 5, 15, 10), pi / 3, 1, 25.0, -40.0), pi / 180
     >>> G3, P = polar(9, 45 * deg), polar(80, 330 * deg)
-    >>> bars = Body(0.004, 0.4, polar(3, 30 * deg)), Body(0.020, 1.5, G3), Body(0.015, 0.8, 5 + 0j)
-    >>> inertial = sum(inertia(5, bars, s.position, s.k)) * -40 + half_slope(5, bars, s.position, s.k) * 25**2
+    >>> two, four = Body(0.004, 0.4, polar(3, 30 * deg)), Body(0.015, 0.8, 5 + 0j)
+    >>> bars = two, Body(0.020, 1.5, G3), four
+    >>> inertial = sum(inertia(5, bars, s.position, s.k)) * -40
+    >>> inertial += half_slope(5, bars, s.position, s.k) * 25**2
     >>> Q = dot(P, s.point_coefficient(3, G3 + polar(3, 100 * deg))) + 120 * s.k.h4
     >>> f"{driving_torque(s.k.h2, inertial, Q):.2f}"
     '243.23'

@@ -1,4 +1,7 @@
-"""Transmission quality: transmission angle, speed ratio, mechanical advantage, nearest singular position."""
+"""Transmission: transmission angle, speed ratio, mechanical advantage.
+
+The distance to the nearest singular position belongs to it.
+"""
 
 import math
 from typing import Any, NamedTuple
@@ -22,7 +25,9 @@ from fourbar.linkage import FourBar
 
 
 def transmission_angle(state: State) -> Array:
-    """Compute mu, the acute angle between coupler and output, rad, in [0, pi/2], (n,); NaN where not assembled.
+    """Compute mu, the acute angle between coupler and output, rad, in [0, pi/2], (n,).
+
+    It is NaN where the linkage does not assemble.
 
         tan mu = |sin(theta_4 - theta_3)| / |cos(theta_4 - theta_3)|,
 
@@ -40,14 +45,19 @@ def transmission_angle(state: State) -> Array:
 
 
 class TransmissionExtremes(NamedTuple):
-    """The angle A-B-O4 between coupler and output at its extremes over all the positions that assemble."""
+    """Extremes of the angle A-B-O4 between coupler and output.
+
+    They are taken over all positions that assemble.
+    """
 
     least: float
     """rad, in [0, pi]; 0 where bars 3, 4 fold."""
     greatest: float
     """rad, in [0, pi]; pi where bars 3, 4 are stretched."""
     theta_2_least: float
-    """rad, in [theta_1, theta_1 + pi]; where the input has limits the mirror position has the same angle."""
+    """rad, in [theta_1, theta_1 + pi]. If the input has limits, the mirror position has
+    the same angle.
+    """
     theta_2_greatest: float
     """rad; likewise."""
 
@@ -58,7 +68,9 @@ class TransmissionExtremes(NamedTuple):
 
 
 def transmission_extremes(linkage: FourBar) -> TransmissionExtremes:
-    """Find the extremes of the angle at B: bars 1, 2 collinear, or a limit of the input; the same on both branches.
+    """Find the extremes of the angle at B, which are the same on both branches.
+
+    They lie where bars 1, 2 are collinear, or at a limit of the input:
 
         tan^2(mu/2) = (e + b - c)(e - b + c)/((b + c - e)(b + c + e))
 
@@ -76,7 +88,10 @@ def transmission_extremes(linkage: FourBar) -> TransmissionExtremes:
 
 
 def _angle_at_B(reach: Reach, d: int, a: int) -> float:
-    """Compute the angle between the sides b, c of the triangle b, c, e with e = d (ground) + own (input), signed."""
+    """Compute the angle between the sides b, c of the triangle b, c, e, signed.
+
+    Its third side is e = d (ground) + own (input).
+    """
     opposite = (
         max(reach.sum(d, a, 1, -1), 0.0) ** 0.5
         * max(reach.sum(d, a, -1, 1), 0.0) ** 0.5
@@ -88,17 +103,21 @@ def _angle_at_B(reach: Reach, d: int, a: int) -> float:
 
 
 def speed_ratio(state: State) -> Array:
-    """Return omega_4/omega_2 = a sin(theta_2 - theta_3)/(c sin(theta_4 - theta_3)), (n,); NaN where singular."""
+    """Return omega_4/omega_2, (n,); NaN at singular positions.
+
+    It is a sin(theta_2 - theta_3)/(c sin(theta_4 - theta_3)).
+    """
     return np.asarray(state.k.h4)
 
 
 def mechanical_advantage(
     state: State, radius_in: float = 1.0, radius_out: float = 1.0
 ) -> Array:
-    """Compute F_out/F_in = (omega_2/omega_4)(r_in/r_out) of a linkage without losses, (n,).
+    """Compute F_out/F_in = (omega_2/omega_4)(r_in/r_out), (n,).
 
-    The signed ratio of torques where the radii are equal; +-inf where the output stands still (bars
-    2, 3 collinear), NaN at a singular position.
+    The linkage has no losses. The signed ratio of torques where the radii are equal;
+    +-inf where the output stands still (bars 2, 3 collinear), NaN at a singular
+    position.
 
     Parameters
     ----------
@@ -116,18 +135,20 @@ def distance_to_singular(
     drive_bar: int = 2,
     branch: int | NDArray[Any] | None = None,
 ) -> Array:
-    """Compute the angle of the input to the nearest singular position, rad, in [0, pi], (n,); inf where there is none.
+    """Compute the angle of the input to the nearest singular position, rad, (n,).
 
-    Singular are the limits of theta_2 and the change points (speeds are 0/0), and for a drive on bar 3
-    or 4 its dead centres, where no torque on it holds the linkage. Error at most about
-    eps (|theta_2| + |theta_1| + 2 pi). Not counted is the kite whose input and coupler coincide: there
-    a drive on bar 4 is dead at every position of that motion.
+    It lies in [0, pi], and is inf if there is no such position. Singular are the limits
+    of theta_2 and the change points (speeds are 0/0), and for a drive on bar 3 or 4 its
+    dead centres, where no torque on it holds the linkage. Error at most about eps
+    (|theta_2| + |theta_1| + 2 pi). Not counted is the kite whose input and coupler
+    coincide: there a drive on bar 4 is dead at every position of that motion.
 
     Parameters
     ----------
     theta_2 : (n,), rad.
     drive_bar : 2, 3 or 4.
-    branch : assembly, +1 or -1, or one for each position; left out: dead centres of both count.
+    branch : assembly, +1 or -1, or one for each position; left out: dead centres of
+        both count.
     """
     theta_2 = np.asarray(theta_2, dtype=float)
     path = prepare_path(Loop(*linkage.lengths, 0.0, 0.0), linkage.ground_angle)

@@ -1,4 +1,7 @@
-"""Files that hold no drive at a speed: SDF for Gazebo and Drake, USD for Newton, the bars standing assembled."""
+"""Files that hold no drive at a speed: SDF for Gazebo and Drake, USD for Newton.
+
+The bars stand assembled.
+"""
 
 import cmath
 import json
@@ -28,7 +31,7 @@ class Assembly(NamedTuple):
     numbers: tuple[float, ...]
     """theta_2, theta_3, theta_4, and the speeds of joints O2, A, O4."""
     inertia: dict[int, float]
-    """Inertia of each moving bar about its mass centre, with that of a flywheel, kg m^2."""
+    """Inertia of each moving bar about its mass centre, with a flywheel's, kg m^2."""
     gravity: tuple[float, float]
     """m/s^2."""
     dynamics: dict[str, dict[str, float]]
@@ -48,11 +51,13 @@ def assemble(
     Parameters
     ----------
     form : the file's, for errors.
-    reader : whose joints state what acts at the pins, as in `Effect.joint_elements`; None: they state nothing.
+    reader : whose joints state what acts at the pins, as in `Effect.joint_elements`;
+        None: they state nothing.
     without_loads : leave the loads out, instead of refusing them.
 
-    Raises LimitError for a load, a motion law or an effect without a counterpart there, InputError for a bar without
-    mass or inertia, NotAssembledError where the linkage closes at none of the scene's positions.
+    Raises LimitError for a load, a motion law or an effect without a counterpart there,
+    InputError for a bar without mass or inertia, NotAssembledError where the linkage
+    closes at none of the scene's positions.
     """
     require_input(scene, "the drive of an SDF or a USD")
     if scene.motion.law is not None:
@@ -136,13 +141,17 @@ def write_sdf(
     without_loads: bool = False,
     plane: Plane = LEVEL,
 ) -> str:
-    """Write the SDF 1.9 text of a scene: a world with gravity, four links, and the pins as joints.
+    """Write the SDF 1.9 text of a scene.
+
+    It holds a world with gravity, four links, and the pins as joints.
 
     Parameters
     ----------
-    reader : who closes the loop how: "gazebo" by a fourth joint, "drake" by its own ball constraint.
+    reader : who closes the loop how: "gazebo" by a fourth joint, "drake" by its own
+        ball constraint.
     start : the assembled state to stand in; None: that of `find_start`.
-    without_loads : leave the scene's loads out, for the program to apply; otherwise they are refused.
+    without_loads : leave the scene's loads out, for the program to apply; otherwise
+        they are refused.
     plane : where the linkage, or the drawing that states its pins, stands in the world.
 
     Raises
@@ -271,7 +280,10 @@ def write_usd(
     without_loads: bool = False,
     plane: Plane = LEVEL,
 ) -> str:
-    """Write the USD text (.usda) of a scene: three rigid bodies, four revolute joints, the fourth closing the loop.
+    """Write the USD text (.usda) of a scene.
+
+    It holds three rigid bodies and four revolute joints, the fourth of which closes the
+    loop.
 
     Parameters and errors as of `write_sdf`; of the effects it has gravity and flywheel.
 

@@ -40,24 +40,34 @@ NOTES: dict[str, Any] = tomllib.loads(
 AT_REST = 1.0
 """rad/s that flywheel and timestep are laid out for where the scene states no speed."""
 SETTLING = 2.0
-"""Time constant, in timesteps, with which the servo starts the input from rest; its angle lags by as many."""
+"""Time constant with which the servo starts the input from rest, in timesteps. The
+angle of the input lags by as many.
+"""
 RELEASED_STEPS = 6280
-"""Number of timesteps, without a flywheel, in the time in which weights and loads would turn the linkage once."""
+"""Timesteps in the time in which weights and loads would turn the linkage once. It
+holds without a flywheel.
+"""
 RELEASED_CLOSURE = 2.0
-"""Time constant of the closure of a released linkage, in timesteps: measured, 2 takes the least energy out of it."""
+"""Time constant of the closure of a released linkage, in timesteps. Measured: 2 takes
+the least energy out of it.
+"""
 STIFF_PAD, SOFT_PAD = 1e-4, 2e-3
-"""Pads of `Settings.pad`. Stiff: the closure's softness matters less than 1e-9. Soft: 7 digits after one iteration."""
+"""Pads of `Settings.pad`. Stiff: the closure's softness matters less than 1e-9. Soft: 7
+digits after one iteration.
+"""
 QUICK = 1.0
-"""rad/s^2. MuJoCo's Newton solver stops where an iteration changes the accelerations by less than 1e-15 rad/s^2
-(mjMINVAL): below about this acceleration there is no second one, and stiff pads leave errors of up to 1e-3.
+"""rad/s^2. MuJoCo's Newton solver stops where an iteration changes the accelerations by
+less than 1e-15 rad/s^2 (mjMINVAL): below about this acceleration there is no second
+one, and stiff pads leave errors of up to 1e-3.
 """
 LIGHT = 100.0
-"""Mass ratio of coupler and output above which `fit_pad` makes the pad smaller. The closure then softens by the ratio
-more than by the loads: the error of the inertial torque was 3e-5 for 10 g against 14.5 kg, and 3e-3 for 1 g.
+"""Mass ratio of coupler and output above which `fit_pad` makes the pad smaller. The
+closure then softens by the ratio more than by the loads: the error of the inertial
+torque was 3e-5 for 10 g against 14.5 kg, and 3e-3 for 1 g.
 """
 Drive = Literal["flywheel", "motor", "none"]
-"""Kind of drive: a flywheel that keeps omega_2 or alpha_2; a motor on the driven bar whose control is its couple;
-none. A free motion has none.
+"""Kind of drive: a flywheel that keeps omega_2 or alpha_2; a motor on the driven bar
+whose control is its couple; none. A free motion has none.
 """
 
 
@@ -76,19 +86,24 @@ def write_mjcf(
 
     Parameters
     ----------
-    settings : of MuJoCo; the default ones carry every linkage above MuJoCo's floor of mass.
-    reader : one of `SIMULATORS`: the comments say where torque and pin force are read there.
-    keyframe : False leaves it out, and with it the assembled pose and the servo that starts it from rest; then
-        `settings.timestep` must be given and no position is computed.
+    settings : of MuJoCo; the default ones carry every linkage above MuJoCo's floor of
+        mass.
+    reader : one of `SIMULATORS`: the comments say where torque and pin force are read
+        there.
+    keyframe : False leaves it out, and with it the assembled pose and the servo that
+        starts it from rest; then `settings.timestep` must be given and no position is
+        computed.
     start : the assembled state to open with; None: that of `find_start`.
-    drive : "flywheel" keeps the input at omega_2; "motor" leaves the driven bar to a controller, "none" likewise
-        without an actuator: then nothing is added to the linkage's inertia.
+    drive : "flywheel" keeps the input at omega_2; "motor" leaves the driven bar to a
+        controller, "none" likewise without an actuator: then nothing is added to the
+        linkage's inertia.
     plane : where the linkage stands in the world.
     origin : place of O2 in the linkage's plane, m.
 
     Raises
     ------
-    InputError : a bar has less mass or inertia than MuJoCo carries, or nothing sets the timestep.
+    InputError : a bar has less mass or inertia than MuJoCo carries, or nothing sets the
+        timestep.
     LimitError : an effect or the motion has no counterpart in MJCF.
     NotAssembledError : the linkage closes at none of the scene's positions.
     """
@@ -166,7 +181,7 @@ def _move(root: ET.Element, plane: Plane) -> None:
 
 
 def _shift_world(root: ET.Element, origin: tuple[float, float]) -> None:
-    """Shift everything that stands in the world from O2 = (0, 0) to where the drawing has it."""
+    """Move the whole world from O2 = (0, 0) to where the drawing has O2."""
     if not any(origin):
         return
     world = root.find("worldbody")
@@ -195,7 +210,10 @@ def _is_passive(drive: Drive, reader: str) -> bool:
 
 
 def _size_control(scene: Scene) -> float:
-    """Return twice the largest couple (N m) or push (N) of the scene's drive; where there is none, its scale."""
+    """Return twice the largest couple (N m) or push (N) of the scene's drive.
+
+    If there is no drive, it is the scale of one.
+    """
     motion = scene.motion.replace(speed=scene.motion.speed or 0.0)
     solution = solve(replace(scene, motion=motion), "force")
     driving = solution.torque if scene.drive is None else solution.drive_force
@@ -257,7 +275,10 @@ def _write_comments(
 
 
 def _list_left_out_by_genesis(scene: Scene) -> list[str]:
-    """List what Genesis leaves out: loads, springs, effects at B, and the rest angles of torsion springs."""
+    """List what Genesis leaves out.
+
+    These are loads, springs, effects at B, and the rest angles of torsion springs.
+    """
     names = ["loads"] if scene.loads else []
     for effect in scene.effects:
         pins = (
@@ -274,10 +295,11 @@ def _list_left_out_by_genesis(scene: Scene) -> list[str]:
 
 
 def size_flywheel(scene: Scene, settings: Settings = RECIPE) -> float:
-    """Compute the armature of pin O2, kg m^2: `settings.flywheel` times the sum of m L^2 + I + (m g L + F L + M)/q.
+    """Compute the armature of pin O2, kg m^2.
 
-    L is the longest lever arm, and q the greater of omega_2^2 and |alpha_2|. The work
-    of weights and loads in a revolution is then a small part of the flywheel's energy.
+    It is `settings.flywheel` times the sum of m L^2 + I + (m g L + F L + M)/q. L is the
+    longest lever arm, and q the greater of omega_2^2 and |alpha_2|. The work of weights
+    and loads in a revolution is then a small part of the flywheel's energy.
     """
     return float(
         f"{settings.flywheel * (_sum_inertia(scene.linkage) + _sum_load_inertia(scene)):.3g}"
@@ -285,13 +307,20 @@ def size_flywheel(scene: Scene, settings: Settings = RECIPE) -> float:
 
 
 def compute_load_ratio(scene: Scene) -> float:
-    """Return (m g L + F L + M)/(q (m L^2 + I)): loads and weights against the inertia of the bars."""
+    """Return (m g L + F L + M)/(q (m L^2 + I)).
+
+    It relates loads and weights to the inertia of the bars.
+    """
     inertia = _sum_inertia(scene.linkage)
     return _sum_load_inertia(scene) / inertia if inertia else math.inf
 
 
 def _leave_out_flywheel(scene: Scene, settings: Settings) -> Settings:
-    """Choose the timestep by the speed that loads can cause, and a closure that takes little energy out if released."""
+    """Choose timestep and closure without a flywheel.
+
+    The timestep follows from the speed that loads can cause; the closure of a released
+    linkage takes little energy out.
+    """
     by_loads = compute_load_ratio(scene) * _compute_acceleration_scale(scene)
     speed = math.sqrt((scene.motion.omega_2 or 0.0) ** 2 + by_loads) or AT_REST
     settings = replace(
@@ -305,10 +334,11 @@ def _leave_out_flywheel(scene: Scene, settings: Settings) -> Settings:
 
 
 def fit_pad(scene: Scene) -> float:
-    """Choose the pad that leaves the closure stiff enough for the loads, and soft enough for one iteration.
+    """Choose the pad that leaves the closure stiff enough for the loads.
 
-    The sag of the closure grows as pad^2 times the loads, the rounding of one iteration
-    of MuJoCo's Newton solver as 1/(pad^2 times the loads).
+    It is soft enough for one iteration. The sag of the closure grows as pad^2 times the
+    loads, the rounding of one iteration of MuJoCo's Newton solver as 1/(pad^2 times the
+    loads).
     """
     _, a, b, c = scene.linkage.lengths
     least_sag = SOFT_PAD / math.sqrt(
@@ -322,14 +352,20 @@ def fit_pad(scene: Scene) -> float:
 
 
 def compute_mass_ratio(linkage: FourBar) -> float:
-    """Return the ratio of (I + m r^2)/L^2 of coupler and output, the greater over the less; 1 if one has no mass."""
+    """Return the ratio of (I + m r^2)/L^2 of coupler and output, at least 1.
+
+    It is 1 if one of them has no mass.
+    """
     masses = [(bar.moment_of_inertia + bar.mass * bar.mass_centre[0] ** 2) / bar.length**2
               for bar in (linkage.coupler, linkage.output)]  # fmt: skip
     return max(masses) / min(masses) if min(masses) > 0.0 else 1.0
 
 
 def _compute_acceleration_scale(scene: Scene) -> float:
-    """Return the greater of omega_2^2 and |alpha_2|, rad/s^2, with which the accelerations of all bars grow."""
+    """Return the greater of omega_2^2 and |alpha_2|, rad/s^2.
+
+    The accelerations of all bars grow with it.
+    """
     return float(max((scene.motion.omega_2 or AT_REST) ** 2, abs(scene.motion.alpha_2)))
 
 
@@ -345,7 +381,10 @@ def _sum_inertia(linkage: FourBar) -> float:
 
 
 def _sum_load_inertia(scene: Scene) -> float:
-    """Sum the couples of loads and effects on the drive, divided by the acceleration scale, kg m^2."""
+    """Sum the couples of loads and effects on the drive, as an inertia, kg m^2.
+
+    They are divided by the acceleration scale.
+    """
     scene = scene.settled()
     acceleration = _compute_acceleration_scale(scene)
     speed = math.sqrt(acceleration)
@@ -384,7 +423,10 @@ class WindowMotion:
         )
 
     def time(self, theta_2: float) -> float:
-        """Return the time when the input passes an angle, s; LimitError where alpha_2 stops it before."""
+        """Return the time at which the input passes an angle, s.
+
+        Raises LimitError if alpha_2 stops it before.
+        """
         angle = theta_2 - self.start
         squared = self.omega**2 + 2.0 * self.alpha * angle
         if squared <= 0.0:
@@ -396,7 +438,10 @@ class WindowMotion:
         )
 
     def timestep(self, settings: Settings = RECIPE, at_least: int = 0) -> float:
-        """Choose a timestep that divides the turn: at least so many steps per revolution, per window and in all, s."""
+        """Choose a timestep that divides the turn, s.
+
+        There are at least so many steps per revolution, per window and in all.
+        """
         if settings.timestep is not None:
             return settings.timestep * settings.timestep_scale
         duration = self.time(self.stop)
@@ -425,7 +470,10 @@ class Start(NamedTuple):
 
 
 def choose_run(theta_2: Array, omega: float, alpha: float) -> WindowMotion:
-    """Choose the motion through positions: counter-clockwise from the least, or clockwise from the greatest."""
+    """Choose the motion through positions.
+
+    It is counter-clockwise from the least, or clockwise from the greatest.
+    """
     least, most = float(np.min(theta_2)), float(np.max(theta_2))
     return (
         WindowMotion(least, most, omega, alpha)
@@ -435,7 +483,7 @@ def choose_run(theta_2: Array, omega: float, alpha: float) -> WindowMotion:
 
 
 def find_start(scene: Scene) -> Start:
-    """Find the start of the motion: the first position, in the direction of motion, that assembles."""
+    """Find the start of the motion: its first position that assembles."""
     commanded = command(scene)
     alpha = scene.motion.alpha_2
     speed = scene.motion.omega_2 or 0.0
@@ -474,9 +522,13 @@ def _compute_span(linkage: FourBar) -> float:
 
 
 SINGLE = replace(RECIPE, flywheel=1e3, pad=None)
-"""Settings for single precision, where a flywheel of 1e8 and fitted pads lose the closing force entirely."""
+"""Settings for single precision. A flywheel of 1e8 and fitted pads lose the closing
+force entirely there.
+"""
 FAST = replace(RECIPE, time_constant_steps=2.0)
-"""Settings for a `connect` without (dJ/dt) v: with a short time constant the position error soon makes up for it."""
+"""Settings for a `connect` without (dJ/dt) v. With a short time constant the position
+error soon makes up for it.
+"""
 SIMULATORS = {
     "mujoco": RECIPE,
     "warp": SINGLE,
@@ -486,7 +538,9 @@ SIMULATORS = {
 }
 """Who reads the file, and the settings that carry the loop best there."""
 OWN_MOTORS = ("genesis", "newton")
-"""Who puts couples on joints itself, and takes none from the controls of a file; Genesis takes no actuator at all."""
+"""Simulators that put couples on joints themselves. They take none from the controls of
+a file; Genesis takes no actuator at all.
+"""
 
 
 def write_mjcf_for(
@@ -495,7 +549,9 @@ def write_mjcf_for(
     drive: Drive = "flywheel",
     plane: Plane = LEVEL,
 ) -> str:
-    """Write the MJCF text of a scene for one simulator, its comments naming where torque and pin force are read.
+    """Write the MJCF text of a scene for one simulator.
+
+    Its comments name where torque and pin force are read.
 
     Raises InputError for no such simulator, or a motor for one that does not take it,
     and as `write_mjcf` does.
@@ -527,7 +583,10 @@ OMEGA = 1.0
 def make_scene(
     ground: float, input: float, coupler: float, output: float, omega: float = OMEGA
 ) -> Scene:
-    """Make a scene of uniform slender bars of 1 kg/m, the input at omega (rad/s) from mid-range; lengths in m."""
+    """Make a scene of uniform slender bars of 1 kg/m; lengths in m.
+
+    The input turns at omega (rad/s) from the middle of its range.
+    """
     linkage = uniform(ground, input, coupler, output, per_metre=PER_METRE)
     title = f"four-bar {ground!r} {input!r} {coupler!r} {output!r}"
     # half a turn from the ground's line would start a parallelogram in its change point

@@ -21,23 +21,28 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """Settings of MuJoCo in the file; the defaults carry a linkage of 5 mm to 100 m at any speed.
+    """Settings of MuJoCo in the file.
+
+    The defaults carry a linkage of 5 mm to 100 m at any speed.
 
     Parameters
     ----------
     timestep : s; None: from the two numbers of steps.
-    steps_per_window : at least so many where the input does not turn fully: towards a limit position
-        bars 3 and 4 speed up without bound, and 628 steps per revolution are too few there.
+    steps_per_window : at least so many where the input does not turn fully: towards a
+        limit position bars 3 and 4 speed up without bound, and 628 steps per revolution
+        are too few there.
     timestep_scale : factor on the timestep.
     integrator : "RK4", "Euler", "implicit" or "implicitfast".
     time_constant_steps : solref's time constant of the loop's closure, in timesteps.
     impedance : solimp's impedance d; MuJoCo clamps it at 0.9999.
-    pad : where the inertial frame of the massless pads that carry the closure lies, as a part of
-        the bar's length: the softness of the closure goes as its square. None: no pads; "fitted": to
-        the speed and the loads (`fit_pad`).
-    solver, tolerance, iterations : of the constraint solver. MuJoCo divides the tolerance by the
-        flywheel's inertia, so only 0 is tight, and the number of iterations is then what stops it.
-    flywheel : inertia on pin O2 relative to the linkage's own; the speed ripples by about its inverse.
+    pad : where the inertial frame of the massless pads that carry the closure lies, as
+        a part of the bar's length: the softness of the closure goes as its square.
+        None: no pads; "fitted": to the speed and the loads (`fit_pad`).
+    solver, tolerance, iterations : of the constraint solver. MuJoCo divides the
+        tolerance by the flywheel's inertia, so only 0 is tight, and the number of
+        iterations is then what stops it.
+    flywheel : inertia on pin O2 relative to the linkage's own; the speed ripples by
+        about its inverse.
     """
 
     timestep: float | None = None
@@ -84,7 +89,10 @@ class CameraView(NamedTuple):
 
 
 def compute_frame(linkage: FourBar) -> CameraView:
-    """Compute the box around the circle of A about O2 and of B about O4: no position leaves it."""
+    """Compute the box around the circle of A about O2 and of B about O4.
+
+    No position leaves it.
+    """
     d, a, _, c = linkage.lengths
     x, y = d * math.cos(linkage.ground_angle), d * math.sin(linkage.ground_angle)
     left, right = min(-a, x - c), max(a, x + c)
@@ -154,12 +162,13 @@ COLOURS = {
     4: "0.17 0.63 0.17 1",
 }
 SLIP_DAMPING = 1e6
-"""Damping of dry friction, per timestep: the greater, the slower the slip that it still softens. The drive prescribes
-the slip itself, so it makes nothing stiff; measured, a reversal is then as exact as any other position.
+"""Damping of dry friction, per timestep: the greater, the slower the slip that it still
+softens. The drive prescribes the slip itself, so it makes nothing stiff; measured, a
+reversal is then as exact as any other position.
 """
 NEVER_NEEDED = ("contact", "limit", "island", "sensor")
-"""Features that a closed loop of bars never uses; without contacts there is no midphase, and MuJoCo Warp does not load
-a file that switches it off.
+"""Features that a closed loop of bars never uses; without contacts there is no
+midphase, and MuJoCo Warp does not load a file that switches it off.
 """
 THICKNESS = 0.02
 """Radius of a bar's capsule, as a part of the longest bar."""
@@ -181,18 +190,24 @@ UNCONTROLLED = {"gaintype": "fixed", "gainprm": "0", "biastype": "affine"}
 
 
 PASSIVE = {"input": "none", "motorconst": "0", "resistance": "1"}
-"""A motor without a control and without back-EMF: what is left is its cogging, which here does not depend on the angle.
-To MuJoCo, and so to Gymnasium, it is no control.
+"""A motor without a control and without back-EMF: what is left is its cogging, which
+here does not depend on the angle. To MuJoCo, and so to Gymnasium, it is no control.
 """
 
 
 def make_passive(force: float) -> dict[str, str]:
-    """Return the attributes of a `dcmotor` that exerts a constant force (N, or factor on its gear)."""
+    """Return the attributes of a `dcmotor` that exerts a constant force.
+
+    The force is in N, or a factor on the gear of the motor.
+    """
     return {**PASSIVE, "cogging": join(force, 0.0, math.pi / 2.0)}
 
 
 def make_constant_motor(force: float) -> dict[str, str]:
-    """Make the drive a motor on pin O2 that ignores its control; none where the force is 0."""
+    """Make the drive a motor on pin O2 that ignores its control.
+
+    There is none if the force is 0.
+    """
     return (
         {**UNCONTROLLED, "joint": "O2", "biasprm": join(force, 0.0, 0.0)}
         if force
@@ -201,12 +216,17 @@ def make_constant_motor(force: float) -> dict[str, str]:
 
 
 def make_servo(gain: float, omega: float) -> dict[str, str]:
-    """Make the drive a speed servo, gain (omega - speed): without a control it turns at omega, and there it is idle."""
+    """Make the drive a speed servo, gain (omega - speed).
+
+    Without a control it turns at omega, and there it is idle.
+    """
     return {**UNCONTROLLED, "joint": "O2", "biasprm": join(gain * omega, 0.0, -gain)}
 
 
 def make_motor(bar: int | None, most: float) -> dict[str, str]:
-    """Make the drive a motor whose control is the couple of ground on a bar, N m, or the push of the cylinder, N.
+    """Make the drive a motor whose control is its effort.
+
+    The effort is the couple of ground on a bar, N m, or the push of the cylinder, N.
 
     `most`: its `ctrlrange` reaches from -most to most; it bounds no control, and tells
     others the size of one.
@@ -220,13 +240,18 @@ def make_motor(bar: int | None, most: float) -> dict[str, str]:
 
 
 A_MILLIONTH = 1e-6
-"""Fraction of the heaviest bar's mass: simulations hold down to 1e-11 of it, and forces move by about this part."""
+"""Least mass of a bar as a fraction of the heaviest one. Simulations hold down to 1e-11
+of it, and forces move by about this part.
+"""
 ALONE = 1e-3
 """kg, where no bar has a mass."""
 
 
 def require_carriable(linkage: FourBar) -> None:
-    """Raise an InputError where a bar is lighter than MuJoCo carries; it says which mass does instead."""
+    """Raise an InputError if a bar is lighter than MuJoCo carries.
+
+    The error says which mass it carries.
+    """
     heaviest = max(linkage.bar(number).mass for number in MOVING_BARS)
     enough = max(A_MILLIONTH * heaviest, 2.0 * FLOOR) if heaviest else ALONE
     part = (
@@ -247,7 +272,10 @@ def require_carriable(linkage: FourBar) -> None:
 
 
 class Model:
-    """Contents of the model to which loads and effects add: options, attributes of the pins, loads."""
+    """Content of the model to which loads and effects add.
+
+    It is options, attributes of the pins, and loads.
+    """
 
     def __init__(self, linkage: FourBar, settings: Settings, timestep: float) -> None:
         self.linkage, self.settings = linkage, settings
@@ -259,14 +287,21 @@ class Model:
         self.loads: list[Load] = []
         self.springs: list[Spring] = []
         self.cylinder: LinearDrive | None = None
-        """A tendon of this name, and unless the drive is "none" an actuator on it whose control is its force, N."""
+        """Tendon of this name. Unless the drive is "none" an actuator on it has its
+        force as control, N.
+        """
         self.inertia = dict.fromkeys(MOVING_BARS, 0.0)
         """Inertia added to that of each bar, kg m^2."""
         self.rest: tuple[float, float, float] | None = None
-        """The angles of pins O2, A, O4 in which the bodies are put down, rad; None: every bar along its parent."""
+        """Angles of pins O2, A, O4 in which the bodies are put down, rad. None: every
+        bar lies along its parent.
+        """
 
     def add_dry_friction(self, pin: str, torque: float) -> None:
-        """Write a ``frictionloss`` that reaches its full torque at once, not over 0.02 s of slip as by default."""
+        """Write a ``frictionloss`` that reaches its full torque at once.
+
+        MuJoCo's default reaches it over 0.02 s of slip.
+        """
         impedance = self.settings.impedance
         self.pin[pin] |= {
             "frictionloss": torque,
@@ -295,7 +330,10 @@ class Model:
         return any(attribute in attributes for attributes in self.pin.values())
 
     def add_option(self, root: ET.Element) -> None:
-        """Add integrator, solver, and flags that switch off what a closed loop does not need."""
+        """Add integrator, solver, and flags that switch off the superfluous.
+
+        A closed loop does not need what they switch off.
+        """
         s = self.settings
         options = {
             "timestep": join(self.timestep),
@@ -330,7 +368,10 @@ class Model:
     def _add_bar(
         self, parent: ET.Element, number: int, at: tuple[float, float], **drive: float
     ) -> ET.Element:
-        """Add a bar turning about its first pin; bars 3 and 4 end in the sites that the loop's closure joins."""
+        """Add a bar that turns about its first pin.
+
+        Bars 3 and 4 end in the sites that the loop's closure joins.
+        """
         bar, pin = self.linkage.bar(number), FIRST_PIN[number]
         body = ET.SubElement(parent, "body", name=BAR_NAMES[number], pos=join(*at, 0.0))
         if self.rest is not None:
@@ -407,7 +448,10 @@ class Model:
         )
 
     def add_tendons(self, root: ET.Element) -> None:
-        """Add a tendon theta_4 - theta_3 for what acts at the cut pin B, and one between two sites for each spring."""
+        """Add a tendon theta_4 - theta_3 for what acts at the cut pin B.
+
+        Each spring has a tendon between two sites.
+        """
         if not self.pin["B"] and not self.springs and self.cylinder is None:
             return
         tendons = ET.SubElement(root, "tendon")
@@ -453,7 +497,10 @@ class Model:
         return tendon
 
     def add_load_sites(self, root: ET.Element) -> None:
-        """Add the point at which each load acts: its place, or G where an arm becomes a couple or no force acts."""
+        """Add the point at which each load acts.
+
+        It is the load's place, or G where an arm becomes a couple or no force acts.
+        """
         for index, load in enumerate(self.loads, 1):
             z = load.foot(self.linkage.bar(load.bar).to_centre)
             body = _find_body(root, load.bar)
@@ -462,7 +509,9 @@ class Model:
     def add_actuators(
         self, root: ET.Element, drive: dict[str, str], *, cylinder: bool, passive: bool
     ) -> None:
-        """Add actuators: the drive, if it has attributes; loads and some springs, which ignore their controls.
+        """Add actuators: the drive, if it has attributes; loads; and some springs.
+
+        Those of loads and springs ignore their controls.
 
         `passive`: these have no controls.
         """
@@ -518,7 +567,10 @@ class Model:
 
 
 def _is_slack_somewhere(spring: "Spring") -> bool:
-    """Return True if a rest length of a tendon can express the spring; any other needs an actuator on the tendon."""
+    """Return True if a rest length of a tendon can express the spring.
+
+    Any other spring needs an actuator on the tendon.
+    """
     return spring.stiffness > 0.0 and spring.slack <= 0.0
 
 

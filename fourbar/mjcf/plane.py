@@ -1,4 +1,7 @@
-"""The plane of the linkage in the world of a model file: tilted about an axis and moved to an origin."""
+"""The plane of the linkage in the world of a model file.
+
+It is tilted about an axis and moved to an origin.
+"""
 
 import math
 from dataclasses import dataclass
@@ -13,7 +16,7 @@ from fourbar.quantities import Array
 
 Vector = tuple[float, float, float]
 OPPOSITE = 1e-12
-"""Sum of 1 and the cosine of the tilt below which the axis points down: x stays x there."""
+"""Sum of 1 and the tilt's cosine below which the axis points down; x stays x there."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +85,10 @@ class Plane:
 
     @property
     def roll_pitch_yaw(self) -> Vector:
-        """Return the angles about x, y and z, applied in this order about fixed axes, rad."""
+        """Return the angles about x, y and z, rad.
+
+        They are applied in this order about fixed axes.
+        """
         turn = self.rotation
         pitch = math.atan2(-turn[2, 0], math.hypot(turn[0, 0], turn[1, 0]))
         roll = math.atan2(turn[2, 1], turn[2, 2])
@@ -100,11 +106,14 @@ class Plane:
         return self.origin[0] + dx, self.origin[1] + dy, self.origin[2] + dz
 
     def moved(self, x: float, y: float) -> "Plane":
-        """Return the frame with its origin at a point of this one: that of a drawing has O2 there, m."""
+        """Return the frame with its origin at a point of this one, m.
+
+        A drawing has O2 there.
+        """
         return Plane(self.axis, self.place(x, y)) if x or y else self
 
     def turn_on(self, angle: float) -> tuple[float, float, float, float]:
-        """Return the quaternion of a body that is turned by an angle (rad) in the plane."""
+        """Return the quaternion of a body that is turned in the plane (rad)."""
         w, x, y, z = self.quaternion
         cos, sin = math.cos(0.5 * angle), math.sin(0.5 * angle)
         return (
@@ -115,7 +124,10 @@ class Plane:
         )
 
     def move_mjcf(self, root: ET.Element) -> None:
-        """Move an MJCF that was written for the plane x-y: its ground, gravity, light and camera."""
+        """Move an MJCF that was written for the plane x-y.
+
+        Ground, gravity, light and camera move.
+        """
         option, statistic = root.find("option"), root.find("statistic")
         assert option is not None
         assert statistic is not None

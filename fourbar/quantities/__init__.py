@@ -1,4 +1,7 @@
-"""The quantities of a solution, one line each, and the statuses of a position: every other list of them follows."""
+"""The quantities of a solution, one line each, and the statuses of a position.
+
+Every other list of them follows from these.
+"""
 
 # ruff: noqa: RUF009 - the lines are fields
 from dataclasses import dataclass, field, fields
@@ -21,8 +24,9 @@ class Quantity(NamedTuple):
     """Stage that computes the quantity; None: it is commanded."""
     meaning: str
     group: str = ""
-    """unknown: of the equations of a position, which an engine can be held to; dry friction, pin loads, linear drive:
-    exists only where the scene has dry friction, friction that depends on the pin forces, a drive that exerts a force.
+    """unknown: of the equations of a position, which an engine can be held to; dry
+    friction, pin loads, linear drive: exists only where the scene has dry friction,
+    friction that depends on the pin forces, a drive that exerts a force.
     """
 
 
@@ -38,10 +42,11 @@ def _vector(*line: str | None) -> Any:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Quantities:
-    """The quantities, one line each; `Solution` inherits them as fields, tables have them in this order.
+    """The quantities, one line each.
 
-    The positions are None only where `out` of `solve` named other quantities, which
-    then are all that is wanted.
+    `Solution` inherits them as fields, and tables have them in this order. The
+    positions are None only where `out` of `solve` named other quantities, which then
+    are all that is wanted.
     """
 
     theta_2: Array = _scalar("rad", None, "angle of the input")

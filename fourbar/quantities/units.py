@@ -1,8 +1,8 @@
-"""Quantities as text, "48 cm" or "0.01 N m s/rad", to SI numbers: converted exactly, rounded once.
+"""Quantities as text, "48 cm" or "0.01 N m s/rad", to SI numbers.
 
-The units are a short list rather than all that the units library knows, because the
-angle is a dimension here: rad/s is not 1/s, so neither Hz nor a forgotten "deg" slips
-through.
+They are converted exactly and rounded once. The units are a short list rather than all
+that the units library knows, because the angle is a dimension here: rad/s is not 1/s,
+so neither Hz nor a forgotten "deg" slips through.
 """
 
 import difflib
@@ -35,7 +35,9 @@ SWAPS = (
     },
     {"lbf": "lb", "ozf": "oz", "kgf": "kg"},
 )
-"""Names that stand for each other in ordinary speech; here a pound is a mass, and the angle is a dimension."""
+"""Names that stand for each other in ordinary speech. Here a pound is a mass, and the
+angle is a dimension.
+"""
 SIGNS = str.maketrans(
     {
         "⋅": "·",
@@ -51,9 +53,9 @@ SIGNS = str.maketrans(
         "˚": "°",
     }
 )
-"""Other signs of a product, marks of inches and feet, and signs that look like that of a degree."""
+"""Other signs of a product, of inches and feet, and signs like that of a degree."""
 PREFIXED_ANGLE = re.compile(r"(?<![A-Za-z])(?!m|µ|u|grad)[A-Za-zµ]{1,2}rad(?![A-Za-z])")
-"""Grad, krad: a prefix before an angle, which nobody means but for milli- and micro-."""
+"""Grad, krad: a prefix before an angle. Nobody means one but milli- and micro-."""
 TURNING = re.compile(r"\s*\b(c?cw|(?:anti|counter)?-?clockwise)$", re.IGNORECASE)
 """A sense of turning after a unit: the sign states it."""
 GLUED = re.compile(r"(kg|g|N)(m|mm|cm)(?=$|[\^²*])")
@@ -67,13 +69,16 @@ FRACTION = re.compile(
 FEET = re.compile(r"([0-9]{1,6}) ?['′’][ -]?(?=[0-9.][^'′’]*[\"″”]$)")
 """The feet of 1'6", 1' 6 1/2" or 1'-6.5"."""
 NUMBER = re.compile(
-    r"[+-]?(?:[0-9]{1,100}(?:\.[0-9]{0,100})?|\.[0-9]{1,100})(?:[eE][+-]?[0-9]{1,3})?(?![0-9.])"
+    r"[+-]?(?:[0-9]{1,100}(?:\.[0-9]{0,100})?|\.[0-9]{1,100})"
+    r"(?:[eE][+-]?[0-9]{1,3})?(?![0-9.])"
 )
 UNIT = re.compile(
-    r"(?:[A-Za-zµμ°_]++(?:0(?![0-9]))?(?:(?:\^|\*\*)-?[1-9](?![0-9])|[²³])?|[·*/()]|\s)++"
+    r"(?:[A-Za-zµμ°_]++(?:0(?![0-9]))?"
+    r"(?:(?:\^|\*\*)-?[1-9](?![0-9])|[²³])?|[·*/()]|\s)++"
 )
-"""Names, each with at most one small exponent, and operators: nothing else reaches the parser, no tower of powers.
-Names are taken whole (`++`), so that a text which does not fit is refused in one pass.
+"""Names, each with at most one small exponent, and operators: nothing else reaches the
+parser, no tower of powers. Names are taken whole (`++`), so that a text which does not
+fit is refused in one pass.
 """
 LONGEST_UNIT = 60
 UNIT_MISSING = "the unit is missing"
@@ -81,7 +86,10 @@ UNIT_MISSING = "the unit is missing"
 
 
 class UnitError(ValueError):
-    """A text that is not a quantity of another dimension than wanted; says why in one phrase."""
+    """A text that is not a quantity, or is one of another dimension.
+
+    It says why in one phrase.
+    """
 
 
 def to_si(text: str, unit: str) -> float:
@@ -143,10 +151,11 @@ def to_si(text: str, unit: str) -> float:
 
 
 def write_quantity(quantity: Any) -> Any:
-    """Write a quantity of the units library as text like "48 cm", an array of numbers as a list of such texts.
+    """Write a quantity of the units library as text like "48 cm".
 
-    The text is read as any other is: an angle is a dimension here, which it is not in
-    the library, so that 10 Hz stay no speed.
+    An array of numbers becomes a list of such texts. The text is read as any other is:
+    an angle is a dimension here, which it is not in the library, so that 10 Hz stay no
+    speed.
     """
     unit = f"{quantity.units:~C}"
     numbers = np.asarray(quantity.magnitude, dtype=float).tolist()
@@ -165,7 +174,10 @@ def find_unit(text: object, otherwise: str) -> str:
 
 
 def find_rounding(text: object, unit: str) -> float:
-    """Return half a unit of the last decimal of the number in a text, in `unit`; 0 for a number without decimals."""
+    """Return half a unit of the last decimal of the number in a text, in `unit`.
+
+    It is 0 for a number without decimals.
+    """
     last = FEET.sub("", str(text).strip())
     number_text = None if FRACTION.match(last) else NUMBER.match(last)
     if number_text is None:
@@ -190,7 +202,10 @@ def find_factor(unit: str, given: str) -> float:
 
 
 def _suggest(number: str, name: str, unit: str) -> str:
-    """Suggest what may have been meant by a unit that is unknown or of another dimension than `unit`."""
+    """Suggest the unit that may have been meant.
+
+    The unit stated is unknown, or of another dimension than `unit`.
+    """
     if len(name) > LONGEST_UNIT:
         return ""
     names = {

@@ -71,7 +71,10 @@ class DrawnPins:
         return math.hypot(vector.real, vector.imag)
 
     def angle(self, bar: int) -> float:
-        """Return the direction of a bar, rad; theta_2 less that of the ground lies in (-pi, pi]."""
+        """Return the direction of a bar, rad.
+
+        theta_2 less that of the ground lies in (-pi, pi].
+        """
         vector = self.vector(bar)
         angle = math.atan2(vector.imag, vector.real)
         if bar != 2:
@@ -83,7 +86,10 @@ class DrawnPins:
         )
 
     def into_bar(self, bar: int, place: Place) -> complex:
-        """Return a place of the drawing in the frame of a bar: from its first pin, along + i across, m."""
+        """Return a place of the drawing in the frame of a bar, m.
+
+        It is from the first pin, along + i across.
+        """
         x, y = self.place("O2" if bar == 1 else FIRST_PIN[bar])
         vector = self.vector(bar)
         return complex(place[0] - x, place[1] - y) * vector.conjugate() / abs(vector)

@@ -1,4 +1,7 @@
-"""The command to one moving bar: angles, a sweep, a limit position, a law over time, or release."""
+"""The command to one moving bar.
+
+It is angles, a sweep, a limit position, a law over time, or release.
+"""
 
 import math
 import sys
@@ -28,7 +31,9 @@ from fourbar.quantities import Array
 OPEN, CROSSED = 1, -1
 BRANCH_NAMES = {OPEN: "open", CROSSED: "crossed"}
 FASTEST = math.sqrt(sys.float_info.max)
-"""rad/s. The square of any greater speed is beyond the range of a double, and with it every acceleration."""
+"""Largest speed, rad/s. The square of a greater one is beyond the range of a double,
+and so is every acceleration.
+"""
 COMMANDS = {
     bar: (f"theta_{bar}", f"omega_{bar}", f"alpha_{bar}") for bar in MOVING_BARS
 }
@@ -36,13 +41,15 @@ COMMANDS = {
 STROKE_COMMAND = ("stroke", "stroke_speed", "stroke_acceleration")
 """Names of the commanded stroke, speed and acceleration of a cylinder."""
 SIDES = {"left": 1.0, "right": -1.0}
-"""Signs of the moving end's side of the line from the bar's pivot to the end on the ground, seen towards the latter."""
+"""Signs of the side on which the moving end of a cylinder lies. The line runs from the
+bar's pivot to the end on the ground, and is seen towards the latter.
+"""
 DEFAULT_STEPS = 360
 """Number of steps of the default range, which is swept if a motion names no angle."""
 STEPS = (range(1, MOST_STEPS + 1), f"must be a whole number from 1 to {MOST_STEPS}")
 """Allowed numbers of intervals of any motion, and how an error says so."""
 SPLINES = {"free": "not-a-knot", "rest": "clamped", "periodic": "periodic"}
-"""End conditions of a law's spline: none, at rest, or one period of a motion that goes on."""
+"""End conditions of a law's spline: none, at rest, or one period of a motion."""
 FEWEST_POINTS = {"free": 4, "rest": 2, "periodic": 3}
 """Number of points that determine the cubic pieces."""
 MOST_POINTS = 100_000
@@ -52,7 +59,10 @@ KINDS = ("cycloidal", "345")
 
 @dataclass(frozen=True, slots=True)
 class Sweep:
-    """The commanded angle from `start` to `stop` (rad) in `steps` equal intervals, both ends included."""
+    """The commanded angle from `start` to `stop` (rad) in `steps` equal intervals.
+
+    Both ends are included.
+    """
 
     start: float
     stop: float
@@ -75,7 +85,10 @@ class Sweep:
 
 @dataclass(frozen=True, slots=True)
 class FromLimit:
-    """Limit position number `limit` of the commanded bar (1, 2, ... from theta_1 on) + `offset` (rad)."""
+    """Limit position number `limit` of the commanded bar, plus `offset` (rad).
+
+    The numbers are 1, 2, ... from theta_1 on.
+    """
 
     limit: int
     offset: float = 0.0
@@ -95,7 +108,10 @@ class FromLimit:
 
 @dataclass(frozen=True, slots=True)
 class Free:
-    """Released motion: moved by loads and effects alone for `duration` (s), reported at `steps` equal intervals."""
+    """Released motion for `duration` (s), reported at `steps` equal intervals.
+
+    Loads and effects alone move the linkage.
+    """
 
     duration: float
     steps: int
@@ -112,7 +128,10 @@ class Free:
 
 
 def find_bar(key: str, numbers: Mapping[int, tuple[Any, ...]]) -> int | None:
-    """Return the bar of which numbers (angle, speed, acceleration) are stated, or None; InputError for two bars."""
+    """Return the bar of which numbers (angle, speed, acceleration) are stated, or None.
+
+    Raises InputError for two bars.
+    """
     stated = [
         bar
         for bar, (angle, speed, acceleration) in numbers.items()
@@ -157,15 +176,19 @@ class _OverTime:
 
 @dataclass(frozen=True, slots=True)
 class Law(_OverTime):
-    """theta_2(t) through the points of a table: piecewise cubic, its acceleration continuous.
+    """theta_2(t) through the points of a table.
+
+    It is piecewise cubic, and its acceleration is continuous.
 
     Parameters
     ----------
     time : rising, s.
-    theta_2, theta_3, theta_4 : one angle of the commanded bar for each time, rad; the others are left out.
+    theta_2, theta_3, theta_4 : one angle of the commanded bar for each time, rad; the
+        others are left out.
     steps : the law is evaluated at the ends of so many equal intervals of time.
-    ends : "free", "rest" (speed 0 at both ends) or "periodic" (the speed and acceleration at the end
-        are those at the start; the angle may have gained whole turns).
+    ends : "free", "rest" (speed 0 at both ends) or "periodic" (the speed and
+        acceleration at the end are those at the start; the angle may have gained whole
+        turns).
     """
 
     time: tuple[float, ...]
@@ -213,7 +236,9 @@ class Law(_OverTime):
         return angles
 
     def at(self, time: Array) -> tuple[Array, Array, Array]:
-        """Compute angle, speed and acceleration of the law's bar at times within the table, each (n,).
+        """Compute angle, speed and acceleration of the law's bar at times, each (n,).
+
+        The times lie within the table.
 
         Raises DependencyError where SciPy is not installed.
         """
@@ -237,9 +262,10 @@ class Law(_OverTime):
 
 
 def compute_law(kind: str, u: Array) -> tuple[Array, Array, Array]:
-    """Compute a law from 0 to 1 and its two derivatives at u in [0, 1]; speed and acceleration are 0 at both ends.
+    """Compute a law from 0 to 1 and its two derivatives at u in [0, 1].
 
-    cycloidal: u - sin(2 pi u)/(2 pi);   345: 10 u^3 - 15 u^4 + 6 u^5.
+    Speed and acceleration are 0 at both ends. cycloidal: u - sin(2 pi u)/(2 pi);   345:
+    10 u^3 - 15 u^4 + 6 u^5.
     """
     v = 1.0 - u
     if kind == "cycloidal":
@@ -262,9 +288,10 @@ class Rise(_OverTime):
     Parameters
     ----------
     kind : "cycloidal" or "345".
-    rise : (angle, duration): how far the bar turns from its first angle and in which time, rad
-        and s; a negative angle turns clockwise.
-    theta_2, theta_3, theta_4 : first angle of the commanded bar, rad; the others are left out.
+    rise : (angle, duration): how far the bar turns from its first angle and in which
+        time, rad and s; a negative angle turns clockwise.
+    theta_2, theta_3, theta_4 : first angle of the commanded bar, rad; the others are
+        left out.
     dwell : time at the end of the rise, s, >= 0.
     fall : time in which the bar returns by the same law, s; left out: it does not.
     rest : time at the first angle after the fall, s, >= 0.
@@ -307,12 +334,15 @@ class Rise(_OverTime):
 
     @property
     def time(self) -> tuple[float, ...]:
-        """Times at which the rise, the dwell, the fall and the rest begin and end, as far as they last, s."""
+        """Times at which rise, dwell, fall and rest begin and end, s.
+
+        Parts that last no time have none.
+        """
         durations = (self.rise[1], self.dwell, self.fall or 0.0, self.rest)
         return tuple(accumulate((x for x in durations if x > 0.0), initial=0.0))
 
     def at(self, time: Array) -> tuple[Array, Array, Array]:
-        """Compute angle, speed and acceleration of the law's bar at times, each (n,)."""
+        """Compute angle, speed and acceleration of the law's bar, each (n,)."""
         time = require_numbers("time", time)
         (angle, duration), first = self.rise, getattr(self, f"theta_{self.bar}")
         place, speed, acceleration = _part(self.kind, time, duration)
@@ -327,14 +357,20 @@ class Rise(_OverTime):
 
 
 def _part(kind: str, time: Array, duration: float) -> tuple[Array, Array, Array]:
-    """Compute a law from 0 to 1 over a duration, and its rates by time; before and after it stands still."""
+    """Compute a law from 0 to 1 over a duration, and its rates by time.
+
+    Before and after it the law stands still.
+    """
     u = np.clip(time / duration, 0.0, 1.0)
     place, speed, acceleration = compute_law(kind, u)
     return place, speed / duration, acceleration / (duration * duration)
 
 
 def _read_number(name: str, place: int) -> Any:
-    """Make the property that reads a number of the command by its name; None (an acceleration: 0) if it has another."""
+    """Make the property that reads a number of the command by its name.
+
+    It is None (an acceleration: 0) if the command has another name.
+    """
     field, otherwise = (
         ("angle", "speed", "acceleration")[place],
         0.0 if place == 2 else None,
@@ -356,26 +392,34 @@ class Motion:
 
     Parameters
     ----------
-    theta_2 : one angle, an array of them (n,), a Sweep, a FromLimit, or None (the default range), rad.
+    theta_2 : one angle, an array of them (n,), a Sweep, a FromLimit, or None (the
+        default range), rad.
     omega_2 : rad/s; None: positions only.
     alpha_2 : rad/s^2.
-    branch : "open" or +1, "crossed" or -1: the assembly. Open has sin(theta_4 - theta_3) > 0 for
-        0 < theta_2 - theta_1 < 180 deg, and at every other angle that it reaches smoothly from there, through change
-        points too. Where bar 3 is commanded it is sin(theta_4 - theta_2), by theta_3; where bar 4 is, it is
-        sin(theta_3 - theta_2), for 180 deg < theta_4 - theta_1 < 360 deg.
+    branch : "open" or +1, "crossed" or -1: the assembly. Open has
+        sin(theta_4 - theta_3) > 0 for 0 < theta_2 - theta_1 < 180 deg, and at every
+        other angle that it reaches smoothly from there, through change points too.
+        Where bar 3 is commanded it is sin(theta_4 - theta_2), by theta_3; where bar 4
+        is, it is sin(theta_3 - theta_2), for 180 deg < theta_4 - theta_1 < 360 deg.
     free : released motion instead of a prescribed one.
-    law : an angle over time instead of theta_2, omega_2 and alpha_2: a Law through points, or a Rise.
-    theta_3, omega_3, alpha_3, theta_4, omega_4, alpha_4 : of the coupler or the output instead.
-    stroke, stroke_speed, stroke_acceleration : of the scene's cylinder between the ground and bar 2 or 4 instead: one
-        stroke, an array of them or a Sweep, m; m/s; m/s^2.
-    side : "left" or "right", with a stroke: on which side of the line from the bar's ground pin to the cylinder's end
-        on the ground, seen towards that end, its end on the bar lies.
+    law : an angle over time instead of theta_2, omega_2 and alpha_2: a Law through
+        points, or a Rise.
+    theta_3, omega_3, alpha_3, theta_4, omega_4, alpha_4 : of the coupler or the output
+        instead.
+    stroke, stroke_speed, stroke_acceleration : of the scene's cylinder between the
+        ground and bar 2 or 4 instead: one stroke, an array of them or a Sweep, m; m/s;
+        m/s^2.
+    side : "left" or "right", with a stroke: on which side of the line from the bar's
+        ground pin to the cylinder's end on the ground, seen towards that end, its end
+        on the bar lies.
     """
 
     commanded: str
     """Name of what is commanded: "theta_2", "theta_3", "theta_4" or "stroke"."""
     bar: int
-    """Number of the commanded bar, 2, 3 or 4; if a stroke is commanded, the scene's drive determines it."""
+    """Number of the commanded bar, 2, 3 or 4. If a stroke is commanded, the scene's
+    drive determines it.
+    """
     angle: float | Array | Sweep | FromLimit | None
     """Commanded angle, rad, or stroke, m, as it is stated."""
     speed: float | None
@@ -482,10 +526,10 @@ class Motion:
             )  # the class is frozen; this is its constructor
 
     def replace(self, **changes: Any) -> "Motion":
-        """Return a copy with other values of fields: angle, speed, acceleration, branch, free, law, side.
+        """Return a copy with other values of fields.
 
-        angle, speed and acceleration are those of what this motion commands, a bar or a
-        stroke.
+        These are angle, speed, acceleration, branch, free, law and side. angle, speed
+        and acceleration are those of what this motion commands, a bar or a stroke.
         """
         keywords = dict(
             zip(("angle", "speed", "acceleration"), self.names, strict=True)
@@ -518,7 +562,10 @@ class Motion:
         return hash(self._list_without_angle())
 
     def _list_without_angle(self) -> tuple[object, ...]:
-        """List what a hash can be made of: everything but the angle; the bar of a stroke is the scene's."""
+        """List what a hash can be made of: everything but the angle.
+
+        The bar of a stroke belongs to the scene.
+        """
         return (
             self.names,
             self.side,
@@ -531,7 +578,10 @@ class Motion:
 
     @property
     def names(self) -> tuple[str, str, str]:
-        """Names of the commanded position, speed and acceleration: of bar 2, 3 or 4, or of the stroke."""
+        """Names of the commanded position, speed and acceleration.
+
+        They are those of bar 2, 3 or 4, or of the stroke.
+        """
         return STROKE_COMMAND if self.commanded == "stroke" else COMMANDS[self.bar]
 
 
@@ -571,7 +621,10 @@ def _require_command(
 
 
 def require_steps(motion: Motion, most: int, place: str, file: str) -> None:
-    """Raise InputError for as many steps or more: of a sweep, a law or a release each is a position in the memory."""
+    """Raise InputError for as many steps or more.
+
+    Of a sweep, a law or a release each is a position in the memory.
+    """
     for name, stated in (
         (motion.commanded, motion.angle),
         ("law", motion.law),

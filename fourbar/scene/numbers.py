@@ -1,4 +1,7 @@
-"""Points that a scene wants, and its numbers by their keys: units, declared where they belong, and tolerances."""
+"""Points that a scene wants, and its numbers by their keys, with tolerances.
+
+Units are declared where the numbers belong.
+"""
 
 import math
 from collections.abc import Callable
@@ -35,7 +38,8 @@ class Point:
     ----------
     name : letters, digits and underlines; no name of a quantity, as v_ and a_ with it.
     bar : 1, 2, 3 or 4.
-    from_pin : (distance, angle), from the bar's first pin (O2, O2, A, O4), the angle from its line, m and rad.
+    from_pin : (distance, angle), from the bar's first pin (O2, O2, A, O4), the angle
+        from its line, m and rad.
     from_centre : likewise from the bar's mass centre, in place of `from_pin`.
     """
 
@@ -118,7 +122,10 @@ LENGTHS = {
 
 
 def find_unit(key: str) -> str | None:
-    """Return the unit of the number that a key of a scene file names; None where no scene has such a number."""
+    """Return the unit of the number that a key of a scene file names.
+
+    None: no scene has such a number.
+    """
     table, *names = key.split(".")
     tables = {
         "lengths": LENGTHS,
@@ -145,8 +152,8 @@ class Tolerance:
     Parameters
     ----------
     key : of the number, as in the scene file, pairs and lists by index.
-    width : in its SI unit or a text like "0.1 mm", > 0: plus or minus, evenly distributed, or the standard deviation
-        of a normal distribution.
+    width : in its SI unit or a text like "0.1 mm", > 0: plus or minus, evenly
+        distributed, or the standard deviation of a normal distribution.
     sigma : whether it is that.
     """
 

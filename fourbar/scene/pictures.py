@@ -17,7 +17,9 @@ LARGEST = 2_000_000
 """Bytes of one picture: a page with three of them still opens quickly."""
 LONGEST_NAME = 200
 RASTER = {b"\x89PNG\r\n\x1a\n": "image/png", b"\xff\xd8\xff": "image/jpeg"}
-"""First bytes of the formats that may be attached; SVG may not, because it can carry scripts."""
+"""First bytes of the formats that may be attached. SVG may not, because it can carry
+scripts.
+"""
 ALLOWED = (
     "must be the name of a PNG or JPEG file next to the scene file or below its folder,"
     ' like "coupler.png"'
@@ -34,7 +36,8 @@ class Picture:
     name : path relative to the scene file, parts joined by "/", none of them "..".
     folder : where the scene file is.
 
-    Raises InputError for a bar that does not move and for a name that leads out of the folder.
+    Raises InputError for a bar that does not move and for a name that leads out of the
+    folder.
     """
 
     bar: int

@@ -1,4 +1,7 @@
-"""A scene: linkage, motion, drive, loads and effects; `solve` evaluates only the stages requested."""
+"""A scene: linkage, motion, drive, loads and effects.
+
+`solve` evaluates only the stages requested.
+"""
 
 from collections.abc import Callable
 from copy import copy
@@ -51,13 +54,18 @@ A_DRIVE = "a drive is a couple on a bar or a force: state drive_bar or drive"
 
 
 def load_show(module: str) -> Any:
-    """Import a module of `fourbar.show`, the one step up: scenes and solutions display themselves when asked to."""
+    """Import a module of `fourbar.show`.
+
+    It lies above this layer: scenes and solutions display themselves when asked to.
+    """
     return import_module(f"fourbar.show.{module}")
 
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """A linkage and everything that is stated about it; two that state the same are equal.
+    """A linkage and everything that is stated about it.
+
+    Two scenes that state the same are equal.
 
     Parameters
     ----------
@@ -71,8 +79,10 @@ class Scene:
     points : points of bars whose paths are wanted, `Point`.
     tolerances : of numbers by their keys in a scene file, `Tolerance`.
     drive : a force in place of a torque on a bar: `LinearDrive` or `PointDrive`.
-    drawing : the pins as they are drawn, `DrawnPins`: places are shown in its coordinates.
-    coordinates : keys of the places that a scene file states by x and y, with these, m; a file is written likewise.
+    drawing : the pins as they are drawn, `DrawnPins`: places are shown in its
+        coordinates.
+    coordinates : keys of the places that a scene file states by x and y, with these, m;
+        a file is written likewise.
     """
 
     linkage: FourBar
@@ -149,17 +159,20 @@ class Scene:
 
         Parameters
         ----------
-        figure : "overview", "linkage", "coupler", "kinematics", "points", "torque", "stroke", "forces", "hodograph",
-            "energy", "transmission", "shaking", "ratios", "centres", "freebody", "bars" or "sensitivity".
-        position : what is commanded where linkage and free bodies are drawn, rad or m; left out: the scene's own.
+        figure : "overview", "linkage", "coupler", "kinematics", "points", "torque",
+            "stroke", "forces", "hodograph", "energy", "transmission", "shaking",
+            "ratios", "centres", "freebody", "bars" or "sensitivity".
+        position : what is commanded where linkage and free bodies are drawn, rad or m;
+            left out: the scene's own.
         branches : "one" (the scene's) or "both" (open and crossed, to the same scales).
-        units : in which numbers are drawn, as `fourbar.units` makes them; left out: SI with the prefix that suits, deg.
+        units : in which numbers are drawn, as `fourbar.units` makes them; left out: SI
+            with the prefix that suits, deg.
         dimensions : write the lengths of the bars at them.
 
         Raises
         ------
-        InputError : unknown figure or choice of branches; a figure of forces without omega_2; a position or dimensions
-            for a figure that shows none.
+        InputError : unknown figure or choice of branches; a figure of forces without
+            omega_2; a position or dimensions for a figure that shows none.
         NotAssembledError : there is no position to draw.
         DependencyError : matplotlib is missing.
         """
@@ -177,7 +190,7 @@ class Scene:
         return load_show("notebook").show_scene(self)
 
     def _require_force_drive(self, drive: object) -> None:
-        """Raise InputError where the drive does not exert a force, or a driven bar is stated too."""
+        """Raise InputError if the drive exerts no force, or a bar is driven too."""
         from fourbar.effects.force_drive import ForceDrive
 
         expect("drive", drive, ForceDrive)
@@ -189,7 +202,10 @@ class Scene:
             )
 
     def with_places(self, change: "Callable[[Place], Place]") -> "Scene":
-        """Return the same scene with each place of its points, loads, effects and drive changed."""
+        """Return the scene with each place changed.
+
+        The places are those of its points, loads, effects and drive.
+        """
         changed = {
             name: change_each(getattr(self, name), change)
             for name in ("points", "loads", "effects")
@@ -198,7 +214,10 @@ class Scene:
         return copy_with(self, **changed, drive=drive)
 
     def settled(self) -> "Scene":
-        """Return the same scene with every place from the first pin of its bar, as `Place.settle` does."""
+        """Return the scene with every place from the first pin of its bar.
+
+        `Place.settle` does the same for one place.
+        """
         return self.with_places(settler(self.linkage, self.points))
 
     def settled_drive(self) -> "ForceDrive | None":
@@ -208,11 +227,14 @@ class Scene:
         return self.drive.with_places(settler(self.linkage, self.points))
 
     def in_pairs_from_pins(self) -> "Scene":
-        """Return the same scene with every place as one pair (distance, angle) from the first pin of its bar."""
+        """Return the scene with every place as a pair (distance, angle).
+
+        The pair is from the first pin of the place's bar.
+        """
         return self.settled().with_places(lambda place: place.in_one_pair())
 
     def _require_points(self) -> None:
-        """Raise InputError for a place at a point that the scene does not have, or that another bar has."""
+        """Raise InputError for a place at a missing point, or another bar's."""
         bars = {point.name: point.bar for point in self.points}
 
         def check(place: "Place") -> "Place":
@@ -238,10 +260,10 @@ class Scene:
 
 
 class Independent(NamedTuple):
-    """The angle in which a released motion is read at each of n instants, that of bar 2 or 4, whichever does not stop.
+    """The angle in which a released motion is read at each of n instants.
 
-    At a limit of theta_2 bar 4's alone holds the forces, and dry friction at a
-    standstill has a side of its own.
+    It is that of bar 2 or 4, whichever does not stop. At a limit of theta_2 bar 4's
+    alone holds the forces, and dry friction at a standstill has a side of its own.
     """
 
     bar: NDArray[np.int8]
@@ -255,10 +277,15 @@ class Independent(NamedTuple):
     sign: Array
     """Sign of the root on the path."""
     side: Array
-    """Fraction of its torque, -1 to 1, with which dry friction holds at a standstill; +-1: it moves on; else 0."""
+    """Fraction of its torque, -1 to 1, with which dry friction holds at a standstill.
+    +-1: the linkage moves on; otherwise 0.
+    """
 
     def commands(self) -> "list[tuple[NDArray[np.intp], Command, Array]]":
-        """List the commands of bars 2 and 4 that the motion is made of, each with its instants and their side."""
+        """List the commands of bars 2 and 4 that the motion is made of.
+
+        Each has its instants and their side.
+        """
         commands: list[tuple[NDArray[np.intp], Command, Array]] = []
         for bar in (2, 4):
             index = np.flatnonzero(self.bar == bar)
@@ -275,29 +302,40 @@ class Independent(NamedTuple):
 
 
 class Command(NamedTuple):
-    """Command of one bar, the input unless another is named, at each of n independent positions."""
+    """Command of one bar at each of n independent positions.
+
+    It is the input unless another bar is named.
+    """
 
     angle: Array
     """(n,), rad."""
     branch: NDArray[np.int8]
-    """(n,), +1 or -1: the assembly, as `Motion` has it; of a result of `with_signs` the sign at each position."""
+    """(n,), +1 or -1: the assembly, as `Motion` has it. A result of `with_signs` has
+    the sign at each position.
+    """
     speed: float | Array | None
     """rad/s; None: positions only."""
     acceleration: float | Array
     """rad/s^2."""
     remainder: Any = None
-    """Exact angle (mpmath) minus its double, rad, for an angle that is a limit position plus an offset."""
+    """Exact angle (mpmath) minus its double, rad. It is kept for an angle that is a
+    limit position plus an offset.
+    """
     time: Array | None = None
     """(n,), s; where the motion is given over time."""
     bar: int = 2
     condition: Array | None = None
-    """(n,), in [0, 1]: how well the command determines the angle; None: 1, it is the angle itself."""
+    """(n,), in [0, 1]: how well the command determines the angle. None: 1, it is the
+    angle itself.
+    """
     stroke: Array | None = None
     """(n,), m; where a stroke is commanded, from which the others follow."""
     stroke_speed: float | Array | None = None
     """m/s; None where no stroke is commanded, or positions only."""
     lost: Array | None = None
-    """Round-off left out of angle, speed and acceleration as doubles, (n, 3), where they follow from a stroke."""
+    """Round-off left out of angle, speed and acceleration as doubles, (n, 3). There is
+    some where they follow from a stroke.
+    """
     independent: Independent | None = None
     """Independent angle of a released motion."""
 
@@ -308,7 +346,10 @@ class Command(NamedTuple):
 
     @property
     def places(self) -> Array:
-        """Commanded angles or strokes at each position; the times if a law commands them."""
+        """Commanded angles or strokes at each position.
+
+        They are times if a law commands them.
+        """
         places = self.angle if self.stroke is None else self.stroke
         return places if self.time is None else self.time
 
@@ -327,19 +368,28 @@ class Command(NamedTuple):
 
     @property
     def theta_2(self) -> Array:
-        """Commanded angle of the input, rad; InputError if the input is not commanded."""
+        """Commanded angle of the input, rad.
+
+        Raises InputError if the input is not commanded.
+        """
         self._require_input()
         return self.angle
 
     @property
     def omega_2(self) -> float | Array | None:
-        """Commanded speed of the input, rad/s; InputError if the input is not commanded."""
+        """Commanded speed of the input, rad/s.
+
+        Raises InputError if the input is not commanded.
+        """
         self._require_input()
         return self.speed
 
     @property
     def alpha_2(self) -> float | Array:
-        """Commanded acceleration of the input, rad/s^2; InputError if the input is not commanded."""
+        """Commanded acceleration of the input, rad/s^2.
+
+        Raises InputError if the input is not commanded.
+        """
         self._require_input()
         return self.acceleration
 
@@ -349,7 +399,10 @@ class Command(NamedTuple):
 
 
 def require_input(scene: Scene, what: str) -> None:
-    """Raise a LimitError where what is asked for takes a command of the input alone, and another bar has it."""
+    """Raise a LimitError if another bar than the input is commanded.
+
+    What is asked for takes a command of the input alone.
+    """
     if scene.motion.commanded != "theta_2":
         raise LimitError(
             f"motion.{scene.motion.commanded}: {what} takes a command of theta_2 alone"
@@ -357,7 +410,9 @@ def require_input(scene: Scene, what: str) -> None:
 
 
 class Triangle(NamedTuple):
-    """Triangle of a cylinder: pivot of its bar, end on the bar, end on the ground; with the stroke it gives the angle.
+    """Triangle of a cylinder: pivot of its bar, end on the bar, end on the ground.
+
+    With the stroke it gives the angle.
 
     With l from the pivot to the end on the bar, r to the end on the ground, beta the
     angle between them, s the stroke,
@@ -376,10 +431,10 @@ class Triangle(NamedTuple):
     def turn_bar(
         self, stroke: Any, speed: Any, acceleration: Any, side: str | None
     ) -> tuple[Any, Any, Any, Any]:
-        """Compute angle, speed and acceleration of the bar, and the condition: the lever over the longer of l and r.
+        """Compute angle, speed and acceleration of the bar, and the condition.
 
-        NaN where the cylinder cannot have the stroke. All may be arrays, and numbers
-        with slopes.
+        The condition is the lever over the longer of l and r. NaN where the cylinder
+        cannot have the stroke. All may be arrays, and numbers with slopes.
         """
         assert side is not None
         length, reach, zero = self.length, self.reach, 0.0 * self.length
@@ -407,7 +462,10 @@ class Triangle(NamedTuple):
 
 
 def find_triangle(linkage: FourBar, drive: "ForceDrive | None") -> Triangle:
-    """Return the triangle of a cylinder between the ground and bar 2 or 4; InputError for any other drive."""
+    """Return the triangle of a cylinder between the ground and bar 2 or 4.
+
+    Raises InputError for any other drive.
+    """
     from fourbar.effects.linear_drive import LinearDrive
 
     bars, drives = set[int](), "no cylinder"
@@ -447,7 +505,10 @@ def _reverse(point: "Place") -> Any:
 
 
 def default_places(scene: Scene, holding: float | None = None) -> Array:
-    """List the angles (of the range that holds one), or strokes, that are swept where a scene names none, (n,)."""
+    """List the angles or strokes that are swept if a scene names none, (n,).
+
+    The angles are those of the range that holds one.
+    """
     if scene.motion.stroke is not None:
         triangle, half = (
             find_triangle(scene.linkage, scene.settled_drive()),
@@ -465,10 +526,11 @@ def default_places(scene: Scene, holding: float | None = None) -> Array:
 def compute_bar_motion(
     scene: Scene, place: Any, speed: Any, acceleration: Any
 ) -> tuple[Any, Any, Any, Any]:
-    """Compute angle, speed and acceleration of the commanded bar, and the condition of the command (None: 1).
+    """Compute angle, speed and acceleration of the commanded bar, and the condition.
 
-    A stroke and its rates become those of the bar here, angles stay. All may be arrays
-    of any library, and numbers that carry their derivatives.
+    The condition of the command is None for 1. A stroke and its rates become those of
+    the bar here, angles stay. All may be arrays of any library, and numbers that carry
+    their derivatives.
     """
     if scene.motion.stroke is None:
         return place, speed, acceleration, None
@@ -480,7 +542,10 @@ def compute_bar_motion(
 def command_stroke(
     scene: Scene, stroke: Array, speed: Any, acceleration: Any
 ) -> Command:
-    """Command the bar that a cylinder turns, from strokes and their rates; the branch is that of the motion."""
+    """Command the bar that a cylinder turns, from strokes and their rates.
+
+    The branch is that of the motion.
+    """
     angle, omega, alpha, condition = compute_bar_motion(
         scene, stroke, speed, acceleration
     )
@@ -518,7 +583,10 @@ def command_stroke(
 
 
 def command_at(scene: Scene, places: Array) -> Command:
-    """Command what the scene's motion commands at other places: angles, strokes, or of a law times."""
+    """Command what the scene's motion commands at other places.
+
+    They are angles, strokes, or the times of a law.
+    """
     motion, bar = scene.motion, scene.motion.bar
     if motion.stroke is not None:
         triangle = find_triangle(scene.linkage, scene.settled_drive())
@@ -543,10 +611,10 @@ def command_at(scene: Scene, places: Array) -> Command:
 
 
 def with_signs(linkage: FourBar, commanded: Command) -> Command:
-    """Return a command whose branch is the sign of the bar's own sine at each position, as engines are told.
+    """Return a command whose branch is the sign of the bar's sine at each position.
 
-    It follows from the lengths and the angle alone. Of a command with signs this
-    returns the one with assemblies.
+    Engines are told this one. It follows from the lengths and the angle alone. Of a
+    command with signs this returns the one with assemblies.
     """
     path = prepare_path(
         Loop(*linkage.lengths, 0.0, 0.0), linkage.ground_angle, commanded.bar

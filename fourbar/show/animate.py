@@ -46,7 +46,9 @@ from fourbar.solving import solve
 from fourbar.writing import null_nan, write_text
 
 MAX_ROWS = 1441
-"""Positions embedded in a page: a quarter of a degree over a full turn; a finer sweep is thinned out evenly."""
+"""Positions embedded in a page: a quarter of a degree over a full turn. A finer sweep
+is thinned out evenly.
+"""
 WATCHED = (1.5, 60.0)
 """A motion through time that lasts between these, s, is shown in real time."""
 RATES = tuple(f"{letter}_{bar}" for letter in ("omega", "alpha") for bar in MOVING_BARS)
@@ -78,7 +80,9 @@ def collect_page_data(
     *,
     midway: bool = False,
 ) -> dict[str, Any]:
-    """Collect everything the page's script needs: SI units, radians, null where there is no value.
+    """Collect everything the page's script needs.
+
+    Numbers are in SI units and radians, null where there is no value.
 
     `midway`: the page opens in the middle of a motion, not at its beginning.
     """
@@ -113,7 +117,9 @@ def collect_live_data(
     stage: str | None = None,
     midway: bool = False,
 ) -> dict[str, Any]:
-    """Collect what the page's script draws, columns as arrays, without tolerances, pictures and the file.
+    """Collect what the page's script draws, columns as arrays.
+
+    Tolerances, pictures and the file are left out.
 
     `signs`: the branches of a sweep; left out: the scene's. `stage`: the last one
     evaluated; left out: as of `solve`.
@@ -182,7 +188,7 @@ def _write_symbol(symbol: Symbol, theta_2: list[float]) -> dict[str, Any]:
 def _collect_sweep(
     scene: Scene, signs: tuple[int, ...], stage: str | None
 ) -> dict[str, Any]:
-    """Collect both branches over theta_2, or those of another command over the commanded quantity."""
+    """Collect both branches over theta_2, or over another commanded quantity."""
     motion = scene.motion
     swept, commanded = list_sweep(scene), command(scene)
     thinned, start, name = thin_out(swept), None, swept.commanded
@@ -217,7 +223,10 @@ def _collect_sweep(
 def _over(
     name: str, commanded: str, values: Array, speed: float | None = None
 ) -> dict[str, Any]:
-    """Say what curves and slider run over, "time" or what is commanded, with its numbers where it is not theta_2."""
+    """Say what curves and slider run over: "time" or what is commanded.
+
+    Its numbers are given where it is not theta_2.
+    """
     shown = None if name == "theta_2" else values.tolist()
     return {"name": name, "commanded": commanded, "values": shown, "speed": speed}
 
@@ -270,7 +279,10 @@ def thin_out(positions: Command) -> Command:
 
 
 def _choose_rate(duration: float) -> float:
-    """Return the seconds of a motion shown in one second: 1, or a power of ten if that were too short or too long."""
+    """Return the seconds of a motion shown in one second.
+
+    It is 1, or a power of ten if that were too short or too long.
+    """
     if duration <= 0.0:
         return 1.0
     shortest, longest = WATCHED
@@ -284,7 +296,10 @@ def _choose_rate(duration: float) -> float:
 
 
 def _describe_pace(motion: Solution, rate: float, shown: int) -> str:
-    """Say what speed 1 means, when the linkage stops before its time, and whether instants were left out."""
+    """Say what speed 1 means, and when the linkage stops before its time.
+
+    It says too whether instants were left out.
+    """
     words = "At speed 1× it moves in real time"
     if rate < 1.0:
         words = (
@@ -317,7 +332,10 @@ def _collect_columns(solution: Solution) -> dict[str, Any]:
 def _encode_pictures(
     scene: Scene, pictures: Mapping[str, str | Path]
 ) -> dict[int, str]:
-    """Encode the pictures of the bars as data URIs: those of the scene, and those given in their place."""
+    """Encode the pictures of the bars as data URIs.
+
+    Pictures that are given replace those of the scene.
+    """
     encoded = {}
     for name, path in pictures.items():
         if name not in BARS:
@@ -356,16 +374,19 @@ def write(
     Parameters
     ----------
     path : the file; its ending says which of html, gif and mp4 is meant.
-    pictures : for bars "input", "coupler", "output", in place of the scene's own: a PNG or JPEG file
-        that is laid along the bar, its left edge at the bar's first pin (O2, A, O4) and its right
-        edge at the second. Pages only.
+    pictures : for bars "input", "coupler", "output", in place of the scene's own: a PNG
+        or JPEG file that is laid along the bar, its left edge at the bar's first pin
+        (O2, A, O4) and its right edge at the second. Pages only.
     units : in which numbers are shown; left out: SI. Angles are in degrees.
-    vectors : with arrows of velocity and acceleration at the points; a page can show and hide them.
-    seconds : duration of a film; left out: 6 s for a sweep, of a motion through time its own.
+    vectors : with arrows of velocity and acceleration at the points; a page can show
+        and hide them.
+    seconds : duration of a film; left out: 6 s for a sweep, of a motion through time
+        its own.
 
     Raises
     ------
-    InputError : unknown format; a picture that cannot be read, is too large or no PNG or JPEG.
+    InputError : unknown format; a picture that cannot be read, is too large or no PNG
+        or JPEG.
     NotAssembledError : the linkage assembles at none of the scene's positions.
     DependencyError : a film without matplotlib, or MP4 without ffmpeg.
     """
@@ -387,7 +408,10 @@ def write_page(
     vectors: bool = False,
     live: str = "",
 ) -> str:
-    """Write the page as text; `live`: the address of the line to the workbench, which a saved page has not."""
+    """Write the page as text.
+
+    `live`: the address of the line to the workbench, which a saved page does not have.
+    """
     from fourbar import __version__
 
     def asset(*names: str) -> str:
@@ -424,7 +448,10 @@ def write_page(
 
 
 def _hash_content(text: str) -> str:
-    """Hash an inline script or style: by this name the page's own security policy allows it."""
+    """Hash an inline script or style.
+
+    By this name the page's security policy allows it.
+    """
     return "sha256-" + base64.b64encode(
         hashlib.sha256(text.encode("utf-8")).digest()
     ).decode("ascii")

@@ -1,4 +1,7 @@
-"""Output of `analyze`: one block of aligned lines, at most 80 columns wide; and the duty in its JSON."""
+"""Output of `analyze`: one block of aligned lines, at most 80 columns wide.
+
+The duty in its JSON belongs to it.
+"""
 
 import math
 from collections.abc import Iterator
@@ -44,11 +47,17 @@ LABEL = 11
 HALF_OF_LAST = 0.5
 """Part of the last digit shown from which on an error bar changes it."""
 FEW_DIGITS = 1e-8
-"""Error bar as a part of the value from which on the block says where digits are lost: half of those of a double."""
+"""Error bar over the value from which on the block says where digits are lost. It is
+half the digits of a double.
+"""
 ALIKE = 1e-3
-"""Ratio of the smallest to the largest of several quantities from which on they share a prefix."""
+"""Ratio of the smallest to the largest of several quantities that share a prefix. Below
+it each has a prefix of its own.
+"""
 LOCATED = 1e-6
-"""Part of the motion within which the place of a flat maximum is located: nearer to zero it is zero."""
+"""Part of the motion within which the place of a flat maximum is located. A place
+nearer to zero than that is zero.
+"""
 NO_ANGLE = 1e-14
 """rad; rounding of an angle of a turn."""
 LOST = {2: "3 and 4", 3: "2 and 4", 4: "2 and 3"}
@@ -63,7 +72,9 @@ def write_block(
     pressure: float | None = None,
     headed: bool = True,
 ) -> list[str]:
-    """Write the summary of a solved scene, line by line; of one position everything about it.
+    """Write the summary of a solved scene, line by line.
+
+    Of one position it writes everything.
 
     Parameters
     ----------
@@ -101,7 +112,10 @@ class _Block:
         return [line.replace(TIED, " ") for line in lines]
 
     def _write_loads(self, pressure: float | None) -> list[str]:
-        """Write the drive, the loads of pins and bars, and remarks; the rates where nothing acts."""
+        """Write the drive, the loads of pins and bars, and remarks.
+
+        If nothing acts, it writes the rates.
+        """
         if not self._is_acted_on() and self.facts.rates:
             return self._write_rates()
         return [
@@ -112,7 +126,10 @@ class _Block:
         ]
 
     def _write_rates(self) -> list[str]:
-        """Write the largest speed and acceleration of the bars that follow, side by side."""
+        """Write the largest speed and acceleration of the bars that follow.
+
+        They stand side by side.
+        """
         rates = self.facts.rates
         rows = [("rates", [f"bar {bar} ({BAR_NAMES[bar]})" for bar in rates])]
         for label, unit, index in (("omega", "rad/s", 0), ("alpha", "rad/s^2", 1)):
@@ -142,7 +159,10 @@ class _Block:
         yield self._write_remarks()
 
     def _write_place(self) -> str:
-        """Write what is commanded at the position, and the time of a motion over time."""
+        """Write what is commanded at the position.
+
+        Of a motion over time it writes the time too.
+        """
         one = self.facts.solution
         name, unit = one.commanded, "rad" if one.at.stroke is None else "m"
         place = one.at.angle if one.at.stroke is None else one.at.stroke
@@ -152,7 +172,10 @@ class _Block:
         return f"{text}, t = {self._value(float(one.time[0]), 's', 1.0)}"
 
     def _value(self, value: float, unit: str, largest: float | None = None) -> str:
-        """Write a quantity of an SI unit, with the prefix that suits it or the largest of its kind."""
+        """Write a quantity of an SI unit, with the prefix that suits it.
+
+        Or with that of the largest of its kind.
+        """
         text = write_short(value, unit, self.units, largest, self.digits)
         return text.replace(" ", TIED)
 
@@ -216,13 +239,16 @@ class _Block:
         ]
 
     def _is_acted_on(self) -> bool:
-        """Return True if anything acts, or a bar has mass: forces are then of interest."""
+        """Return True if anything acts, or a bar has mass.
+
+        Forces are then of interest.
+        """
         scene = self.facts.scene
         has_mass = any(bar.mass > 0.0 for bar in scene.linkage.moving)
         return bool(scene.loads or scene.effects or has_mass)
 
     def _write_static_hint(self) -> list[str]:
-        """Say what asks for forces, where a scene on which something acts states positions alone."""
+        """Say what asks for forces, if a scene with loads states positions alone."""
         scene = self.facts.scene
         if self.facts.solution.F12 is not None or not self._is_acted_on():
             return []
@@ -232,7 +258,10 @@ class _Block:
         ]
 
     def _write_change_points(self) -> list[str]:
-        """Write where change points lie and what the assembly does there, or how nearly there would be one."""
+        """Write where change points lie and what the assembly does there.
+
+        If there is none, write how nearly there would be one.
+        """
         linkage, motion = self.facts.scene.linkage, self.facts.scene.motion
         if (miss := find_miss(linkage)) is not None:
             gap = self._value(miss[0], "m")
@@ -258,7 +287,10 @@ class _Block:
         return [*lines, line]
 
     def _write_ranges(self) -> str:
-        """Write how far the commanded bar goes, or the stroke, and how far the output, or else the input."""
+        """Write how far the commanded bar goes, or the stroke, and the output.
+
+        If the output is commanded, it is the input.
+        """
         facts = self.facts
         bar, (first, last) = facts.solution.at.bar, facts.commanded
         if facts.kind == "turn":
@@ -351,7 +383,10 @@ class _Block:
         return [f"assembles {', and '.join(parts)}{grows}"]
 
     def _write_drive(self, pressure: float | None) -> list[str]:
-        """Write what drives, its peak and mean, power and energy, and what a motor or a cylinder must have."""
+        """Write what drives: peak and mean, power and energy, and its needs.
+
+        The needs are those of a motor or a cylinder.
+        """
         facts = self.facts
         if facts.drive is None or facts.peak is None:
             return []
@@ -386,7 +421,7 @@ class _Block:
         return lines
 
     def _without_rounding(self, value: float) -> float:
-        """Return zero for a torque or force of the drive that is no larger than its rounding."""
+        """Return zero for a torque or force of the drive within its rounding."""
         drive = self.facts.drive
         if drive is None:
             return value
@@ -396,7 +431,10 @@ class _Block:
         return 0.0 if abs(value) <= error else value
 
     def _find_round_off(self) -> float:
-        """Return the rounding of inertial torques (forces); at a change point an error bar is less."""
+        """Return the rounding of inertial torques (forces).
+
+        At a change point an error bar is less.
+        """
         solution, bars = self.facts.solution, self.facts.scene.linkage.moving
         inertial = 0.0
         for number, bar in zip(MOVING_BARS, bars, strict=True):
@@ -543,7 +581,10 @@ class _Block:
         )
 
     def _write_bending(self) -> list[str]:
-        """Write the largest bending moment of each bar, where along the bar, and where in the motion."""
+        """Write the largest bending moment of each bar.
+
+        It says where along the bar, and where in the motion.
+        """
         facts, bending = self.facts, self.facts.bending.values()
         if not any(bar.peak.value for bar in bending):
             return []
@@ -564,14 +605,20 @@ class _Block:
         return _align(rows)
 
     def _write_stresses(self) -> list[str]:
-        """Write the largest bending stress of each bar; a dash for one without a cross-section."""
+        """Write the largest bending stress of each bar.
+
+        A bar without a cross-section has a dash.
+        """
         stresses = self.facts.stresses
         stated = [value for value in stresses.values() if value is not None]
         cells = iter(self._cells(stated, "Pa"))
         return ["-" if value is None else next(cells) for value in stresses.values()]
 
     def _cells(self, values: list[float], unit: str) -> list[str]:
-        """Write quantities of one kind with the prefix of the largest; each with its own if they lie far apart."""
+        """Write quantities of one kind with the prefix of the largest.
+
+        Each has its own prefix if they lie far apart.
+        """
         sizes = [abs(value) for value in values if value]
         largest = max(sizes, default=0.0)
         alike = min(sizes, default=0.0) >= ALIKE * largest
@@ -585,14 +632,20 @@ class _Block:
         return " (of these positions)" if self._is_rough(name) else ""
 
     def _is_rough(self, name: str) -> bool:
-        """Tell whether a peak is that of the positions alone: between them it grows, or nothing was looked for."""
+        """Tell whether a peak is that of the positions alone.
+
+        Between them it grows, or nothing was looked for.
+        """
         return (
             self.facts.kind not in ("position", "released")
             and name in self.facts.between.growing
         )
 
     def _write_remarks(self) -> list[str]:
-        """Write what grows between the positions, where pin forces jump, and what rounding does."""
+        """Write what grows between the positions, and where pin forces jump.
+
+        It writes what rounding does too.
+        """
         facts, lines = self.facts, list[str]()
         pins = [
             pin
@@ -642,7 +695,10 @@ class _Block:
         return lines
 
     def _warn(self) -> list[str]:
-        """Write where the drive's torque or force has few digits left, and the bars in line that cost them."""
+        """Write where the drive's torque or force has few digits left.
+
+        It names the collinear bars that cost them.
+        """
         solution, drive = self.facts.solution, self.facts.drive
         if (
             drive is None
@@ -713,7 +769,10 @@ def explain_static(scene: Scene) -> str:
 def write_motor(
     scene: Scene, solution: Solution, units: Conversion
 ) -> dict[str, Any] | None:
-    """Write the duty and the loads of the pins as the JSON has them, in the units of the output; as `motor_duty`."""
+    """Write the duty and the loads of the pins as the JSON has them.
+
+    They have the units of the output, and the keys of `motor_duty`.
+    """
     between = locate_between(scene, solution)
     duty = find_duty(between)
     if duty is None:

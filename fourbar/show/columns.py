@@ -1,7 +1,8 @@
-"""Quantities by the names that the command line takes: sizes, components, ratios of any two.
+"""Quantities by the names that the command line takes.
 
-`torque` and `omega_4` are numbers, `F12` and `v_B` the sizes of vectors, `F12_x` a
-component, `A` a place with two coordinates, `omega_4/omega_2` a ratio.
+These are sizes, components, and ratios of any two. `torque` and `omega_4` are numbers,
+`F12` and `v_B` the sizes of vectors, `F12_x` a component, `A` a place with two
+coordinates, `omega_4/omega_2` a ratio.
 """
 
 from dataclasses import replace
@@ -131,7 +132,10 @@ def _find_number(solution: Solution, name: str) -> tuple[str, Array]:
 
 
 def list_quantities(solution: Solution) -> list[str]:
-    """List the quantities that a scene has, its own points among them, without derived ones of another drive."""
+    """List the quantities that a scene has, those of its points among them.
+
+    Derived ones of another drive are left out.
+    """
     names = [name for name in solution.evaluated() if name != "time"]
     points = [
         f"{start}{name}" for start in ("", "v_", "a_") for name in solution.points
@@ -152,7 +156,10 @@ def _is_velocity(name: str) -> bool:
 
 
 def _solve_at_unit_speed(scene: Scene, solution: Solution) -> Solution:
-    """Solve the same positions with speed 1 of the command: ratios of speeds exist at rest too."""
+    """Solve the same positions with speed 1 of the command.
+
+    Ratios of speeds exist at rest too.
+    """
     if solution.at.stroke is not None:
         motion = scene.motion.replace(speed=1.0, acceleration=0.0)
         at = command_at(replace(scene, motion=motion), solution.at.stroke)

@@ -1,7 +1,7 @@
-"""Quantities that follow from those of a solution: shaking, ratios of speeds, instant centres.
+"""Quantities that follow from those of a solution.
 
-`fourbar.quantities.DERIVED` declares them; tables, CSV, plots and the workbench show
-them.
+These are shaking, ratios of speeds, instant centres. `fourbar.quantities.DERIVED`
+declares them; tables, CSV, plots and the workbench show them.
 """
 
 from collections.abc import Callable
@@ -23,10 +23,10 @@ from fourbar.studies.points import instant_centres
 
 
 def derive(solution: Solution, name: str) -> Array | None:
-    """Compute a quantity of `DERIVED`, (n,) or (n, 2); None where its stage was not evaluated.
+    """Compute a quantity of `DERIVED`, (n,) or (n, 2).
 
-    NaN marks a position where it has no value: a ratio at a dead centre of bar 2, a
-    centre at infinity.
+    It is None if its stage was not evaluated. NaN marks a position where it has no
+    value: a ratio at a dead centre of bar 2, a centre at infinity.
     """
     if DERIVED_NAMES[name].stage == "force" and read_drive(solution).values is None:
         return None
@@ -36,7 +36,10 @@ def derive(solution: Solution, name: str) -> Array | None:
 
 
 def _compute_transmission(solution: Solution) -> Array:
-    """Return the acute angle between coupler and output: both its sine and its cosine keep their digits."""
+    """Return the acute angle between coupler and output.
+
+    Both its sine and its cosine keep their digits.
+    """
     cosine = np.cos(solution.theta_4 - solution.theta_3)
     return np.asarray(np.arctan2(np.abs(solution.sin_mu), np.abs(cosine)))
 
@@ -63,7 +66,10 @@ def _compute_ratio(solution: Solution, bar: int) -> Array:
 
 
 def _locate_centre(solution: Solution, bars: tuple[int, int]) -> Array:
-    """Return an instant centre; NaN where its two lines are parallel within rounding."""
+    """Return an instant centre.
+
+    It is NaN where its two lines are parallel within rounding.
+    """
     centre = instant_centres(solution)[bars]
     point = np.stack(centre.point, axis=-1)
     point = shift_to_drawing(solution, point)

@@ -1,4 +1,7 @@
-"""Loads of frame and pins over a motion, and the duty of the drive, to choose bearings and a motor."""
+"""Loads of frame and pins over a motion, and the duty of the drive.
+
+With these one chooses bearings and a motor.
+"""
 
 import warnings
 from typing import Any, NamedTuple
@@ -16,24 +19,31 @@ from fourbar.scene import Command, Scene, with_signs
 from fourbar.solution import Array, Solution
 
 SAME_RATE = 1e-9
-"""Part of its largest value up to which the difference of two rates of a spline is the rounding of its coefficients."""
+"""Difference of two rates of a spline that is round-off, over its largest value. The
+rounding is that of its coefficients.
+"""
 
 
 class BearingLoad(NamedTuple):
-    """Load of one pin over the positions of a solution; of a study each number is an array (m,)."""
+    """Load of one pin over the positions of a solution.
+
+    Of a study each number is an array (m,).
+    """
 
     largest: float
     """N."""
     rms: float
-    """Root mean square over the positions, N; a closed sweep counts its two equal ends once."""
+    """Root mean square over the positions, N. A closed sweep counts its two equal ends
+    once.
+    """
     where: float
     """theta_2 of the largest load, rad."""
 
 
 class MotorDuty(NamedTuple):
-    """Peak and root mean square over the positions (a closed sweep counts its two equal ends once), and the energy.
+    """Peak and root mean square over the positions, and the energy.
 
-    Of a study each is an array (m,).
+    A closed sweep counts its two equal ends once. Of a study each is an array (m,).
     """
 
     peak_torque: float | None
@@ -41,13 +51,17 @@ class MotorDuty(NamedTuple):
     rms_torque: float | None
     """N m."""
     peak_speed: float
-    """Largest size of omega of the driven bar, rad/s, or of the speed of the stroke or of the driven point, m/s."""
+    """Largest size of the speed of the drive. It is omega of the driven bar, rad/s, or
+    the speed of the stroke or of the driven point, m/s.
+    """
     peak_power: float
     """Largest size of T_k omega_k, or of force times speed, W."""
     rms_power: float
     """W."""
     energy_in: float | None
-    """Energy from the drive to the linkage over the sweep, J; None where it does not move through two positions."""
+    """Energy from the drive to the linkage over the sweep, J. None: it does not move
+    through two positions.
+    """
     energy_out: float | None
     """Energy from the linkage back to the drive, J."""
     closed: bool
@@ -67,13 +81,16 @@ DUTY_UNITS = {
     },
     **{"energy_in": "J", "energy_out": "J", "peak_force": "N", "rms_force": "N"},
 }
-"""SI unit of each number of `MotorDuty`; the speed of a drive that exerts a force is in m/s."""
+"""SI unit of each number of `MotorDuty`. The speed of a drive that exerts a force is in
+m/s.
+"""
 
 
 def shaking_force(solution: Solution) -> Array:
-    """Return the force of the bars on the frame, F21 + F41 = -(F12 + F14), N, (n, 2), of a study (m, n, 2).
+    """Return the force of the bars on the frame, N, (n, 2), of a study (m, n, 2).
 
-    A linear drive with an end on the ground adds its own; a spring pulls there besides.
+    It is F21 + F41 = -(F12 + F14). A linear drive with an end on the ground adds its
+    own; a spring pulls there besides.
     """
     return -(_require(solution, "F12") + _require(solution, "F14")) + _find_push(
         solution
@@ -81,9 +98,10 @@ def shaking_force(solution: Solution) -> Array:
 
 
 def shaking_moment(solution: Solution) -> Array:
-    """Return the moment of bars and drive on the frame about O2, -T - O4 x F14, N m, (n,), of a study (m, n).
+    """Return the moment of bars and drive on the frame about O2, N m, (n,).
 
-    The moment of a linear drive with an end on the ground takes the place of -T.
+    It is -T - O4 x F14; of a study it is (m, n). The moment of a linear drive with an
+    end on the ground takes the place of -T.
 
     Couples that effects exert between the bars and ground (pin damping or friction at
     O2, O4) are not part of it.
@@ -119,9 +137,9 @@ def _find_push(solution: Solution) -> Array:
 
 
 def bearing_load(solution: Solution, pin: str) -> BearingLoad:
-    """Return largest and root mean square load of pin "O2", "A", "B" or "O4", and where; of a study arrays (m,).
+    """Return largest and RMS load of pin "O2", "A", "B" or "O4", and the place.
 
-    Positions without a value are left out.
+    Of a study they are arrays (m,). Positions without a value are left out.
     """
     if not isinstance(pin, str) or pin not in PIN_FORCE:
         raise InputError("pin", pin, "must be one of " + ", ".join(PIN_FORCE))
@@ -135,17 +153,21 @@ def bearing_load(solution: Solution, pin: str) -> BearingLoad:
 
 
 def motor_duty(solution: Solution) -> MotorDuty | None:
-    """Return peak and RMS torque and power, peak speed, and the energy in and out by the trapezoidal rule.
+    """Return peak and RMS torque and power, peak speed, and the energy in and out.
 
-    E = integral of P dt, dt = d theta/omega of the commanded bar, or ds/speed of the stroke, in a sweep; E_in of the
-    positive part of P, E_out of the negative.
-    Positions without a value are left out, and so are the steps from and to them.
+    The energy follows by the trapezoidal rule.
 
-    Returns None where no position has a torque or force of the drive: a released linkage, or positions alone.
+    E = integral of P dt, dt = d theta/omega of the commanded bar, or ds/speed of the
+    stroke, in a sweep; E_in of the positive part of P, E_out of the negative. Positions
+    without a value are left out, and so are the steps from and to them.
+
+    Returns None where no position has a torque or force of the drive: a released
+    linkage, or positions alone.
 
     Parameters
     ----------
-    solution : positions of a sweep or of a motion law, to the stage "force"; or of a study of one.
+    solution : positions of a sweep or of a motion law, to the stage "force"; or of a
+        study of one.
     """
     expect("solution", solution, Solution)
     drive = read_drive(solution)
@@ -176,11 +198,11 @@ def motor_duty(solution: Solution) -> MotorDuty | None:
 
 
 def is_once_round(solution: Solution) -> Any:
-    """Return True if a motion covers whole turns, so that its last position repeats the first; for a study (m,).
+    """Return True if a motion covers whole turns; for a study (m,).
 
-    An assembly with a single change point repeats after two turns. Speed and
-    acceleration must repeat too: a motion law may end at another speed than it begins
-    with.
+    Its last position then repeats the first. An assembly with a single change point
+    repeats after two turns. Speed and acceleration must repeat too: a motion law may
+    end at another speed than it begins with.
     """
     angle, bar = solution.at.angle, solution.at.bar
     if angle.shape[-1] == 1:
@@ -200,7 +222,7 @@ def is_once_round(solution: Solution) -> Any:
 
 
 def _repeats(rate: Array) -> Any:
-    """Return True if a speed or an acceleration over the positions ends as it begins."""
+    """Return True if a speed or an acceleration ends as it begins."""
     gap = np.abs(rate[..., -1] - rate[..., 0])
     return gap <= SAME_RATE * np.max(np.abs(rate), axis=-1)
 
@@ -255,7 +277,10 @@ def _find_peak(values: Array) -> Any:
 
 
 def _find_rms(solution: Solution, values: Array) -> Any:
-    """Return the root mean square over the positions; whole turns count their two equal ends once."""
+    """Return the root mean square over the positions.
+
+    Whole turns count their two equal ends once.
+    """
     repeated = np.arange(values.shape[-1]) == values.shape[-1] - 1
     once = np.where(is_once_round(solution)[..., None] & repeated, np.nan, values)
     return _make_plain(np.sqrt(_reduce(np.nanmean, np.square(once))))
@@ -322,7 +347,9 @@ class Energies(NamedTuple):
     kinetic: Array
     """(n,)."""
     work: dict[str, Array]
-    """Done since the first instant, (n,): by all loads together, and by each effect that does any."""
+    """Work since the first instant, (n,). It is that of all loads together, and of each
+    effect that does any.
+    """
 
 
 def compute_energies(scene: Scene, motion: Solution) -> Energies:

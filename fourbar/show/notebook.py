@@ -1,4 +1,4 @@
-"""Display of a scene and a solution in a notebook, and of a solution as a table of pandas."""
+"""Display of a scene and a solution in a notebook, and of a solution by pandas."""
 
 from base64 import b64encode
 from html import escape
@@ -20,7 +20,10 @@ SHOWN = 5
 
 
 def show_scene(scene: Scene, units: Conversion = SI) -> str:
-    """Draw the linkage as `scene.plot("linkage")` does, next to what the scene states."""
+    """Draw the linkage next to what the scene states.
+
+    The drawing is that of `scene.plot("linkage")`.
+    """
     try:
         drawn = b64encode(
             draw_figure(scene, "linkage", units=units)._repr_svg_().encode()
@@ -128,8 +131,11 @@ class InUnits:
 
 
 def in_units(shown: "Scene | Solution", units: str) -> InUnits:
-    """Return a scene or a solution that a notebook shows in other units: "imperial", or a list like "mm N.mm".
+    """Return a scene or a solution that a notebook shows in other units.
 
-    Raises InputError for a word that is no unit of a result, and for two units of one dimension.
+    They are "imperial", or a list like "mm N.mm".
+
+    Raises InputError for a word that is no unit of a result, and for two units of one
+    dimension.
     """
     return InUnits(shown, units)

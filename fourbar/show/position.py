@@ -1,4 +1,7 @@
-"""Everything about one position: bars, points, pin forces, ratios and instant centres, in aligned rows."""
+"""Everything about one position, in aligned rows.
+
+These are bars, points, pin forces, ratios and instant centres.
+"""
 
 from collections.abc import Iterable
 
@@ -57,14 +60,17 @@ class PositionSheet:
         return rows
 
     def _rests(self) -> bool:
-        """Return True if nothing moves or begins to: a static position has no rates to show."""
+        """Return True if nothing moves or begins to move.
+
+        A static position has no rates to show.
+        """
         of_input = self.solution.omega_2, self.solution.alpha_2
         of_output = self.solution.omega_4, self.solution.alpha_4
         rates = [rate for rate in (*of_input, *of_output) if rate is not None]
         return all(rate[0] == 0.0 for rate in rates)
 
     def write_points(self) -> list[str]:
-        """Write place, velocity and acceleration of the pins, mass centres and points."""
+        """Write place, velocity and acceleration of pins, mass centres, points."""
         centres = [
             f"G{bar}" for bar in MOVING_BARS if self.scene.linkage.bar(bar).mass > 0.0
         ]
@@ -108,7 +114,10 @@ class PositionSheet:
         return rows
 
     def write_ratios(self) -> list[str]:
-        """Write what relates the bars' motions: transmission angle, ratios, instant centres."""
+        """Write the transmission angle, the ratios of speeds and the centres.
+
+        The centres are the instant centres.
+        """
         rows = []
         for name in ("transmission", "omega_3/omega_2", "omega_4/omega_2"):
             values = derive(self.solution, name)
@@ -138,7 +147,10 @@ class PositionSheet:
         return self._write_number(label, values, "1", "  (torque of bar 4 to bar 2)")
 
     def _write_force_ratios(self) -> list[str]:
-        """Write the ratio of forces along the paths of a point of the input and one of the output."""
+        """Write the ratio of forces along the paths of two points.
+
+        One is of the input, the other of the output.
+        """
         rows = []
         points = self.scene.points
         of_input, of_output = (

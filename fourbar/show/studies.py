@@ -1,4 +1,7 @@
-"""Output of `classify`, `analyze --sensitivity` and `equilibrium`: text, or one JSON object, SI and rad."""
+"""Output of `classify`, `analyze --sensitivity` and `equilibrium`.
+
+It is text, or one JSON object in SI units and radians.
+"""
 
 import math
 from collections.abc import Callable, Iterator
@@ -38,7 +41,9 @@ from fourbar.writing import write_object
 def write_type(
     linkage: FourBar, units: Conversion | None = COMMON, *, everything: bool = False
 ) -> Iterator[str]:
-    """Write the type of a linkage, the condition that decides it, what turns, how far, and between which limits.
+    """Write the type of a linkage and the condition that decides it.
+
+    It says too what turns, how far, and between which limits.
 
     `units`: of the lengths; None where they are ratios. `everything`: the limits of all
     bars, not of the output alone.
@@ -66,7 +71,10 @@ def write_type(
 
 
 def write_type_json(linkage: FourBar) -> str:
-    """Write the type as JSON: SI and radians, null where there is nothing; positions as `LimitPosition` has them."""
+    """Write the type as JSON in SI units and radians, null for no value.
+
+    Positions are as `LimitPosition` has them.
+    """
     mobility, more = classify(linkage), dict[str, object]()
     if mobility.barker is not None:
         transmission = transmission_extremes(linkage)
@@ -89,7 +97,10 @@ def write_type_json(linkage: FourBar) -> str:
 def _write_mobility(
     linkage: FourBar, write: Callable[[float], str], everything: bool
 ) -> Iterator[str]:
-    """Write what swings and turns, and between which limits; angles in deg, digits as far as a drawing needs them."""
+    """Write what swings and turns, and between which limits.
+
+    Angles are in deg, with the digits that a drawing needs.
+    """
     swings = [
         f"{BAR_NAMES[bar]} {_write_angle(swing(linkage, bar))}"
         for bar in MOVING_BARS
@@ -141,7 +152,10 @@ def _write_mobility(
 def _explain_turning(
     linkage: FourBar, bar: int, write: Callable[[float], str]
 ) -> Iterator[str]:
-    """Say why a bar has no limits: the two others would have to be in line, stretched or folded."""
+    """Say why a bar has no limits.
+
+    The two others would have to be collinear, stretched or folded.
+    """
     reach, d, length = reach_of(linkage, bar), linkage.ground, linkage.lengths[bar - 1]
     (one, x), (two, y) = (
         (BAR_NAMES[k], linkage.lengths[k - 1]) for k in MOVING_BARS if k != bar
@@ -172,21 +186,30 @@ SENSITIVITY_SCHEMA = "fourbar-sensitivity/1"
 
 
 def list_shown(derivatives: Sensitivity) -> list[str]:
-    """List torque and pin forces, or where the scene states no speed the angles; and its own points."""
+    """List torque, pin forces and the scene's points.
+
+    If the scene states no speed, angles replace torque and forces.
+    """
     points = [point.name for point in derivatives.scene.points]
     drive = [name for name in (COUPLE.value, LINE.value) if name in derivatives.by]
     return [*((*drive, *PIN_FORCES) if drive else ("theta_3", "theta_4")), *points]
 
 
 def find_largest(derivatives: Sensitivity, quantity: str) -> float:
-    """Find the largest magnitude of a quantity over the positions that have one; NaN where none has."""
+    """Find the largest magnitude of a quantity over the positions.
+
+    It is NaN if no position has one.
+    """
     value = derivatives.value(quantity)
     size = np.abs(value) if value.ndim == 1 else np.hypot(*value.T)
     return float(np.nanmax(size)) if np.isfinite(size).any() else math.nan
 
 
 def write_sensitivity(derivatives: Sensitivity) -> str:
-    """Write the table of the numbers that matter most, below what each quantity depends on most."""
+    """Write the table of the numbers that matter most.
+
+    Above it stands what each quantity depends on most.
+    """
     names = list_shown(derivatives)
     influences = {name: derivatives.influences(name) for name in names}
     lines = [
@@ -230,7 +253,10 @@ def write_sensitivity(derivatives: Sensitivity) -> str:
 
 
 def rank_numbers(derivatives: Sensitivity, names: list[str]) -> list[str]:
-    """Rank the numbers that any of the quantities depends on, by their largest share of a largest value."""
+    """Rank the numbers that any of the quantities depends on.
+
+    The rank follows from their largest share of a largest value.
+    """
     share: dict[str, float] = {}
     for name in names:
         size = find_largest(derivatives, name)
@@ -242,7 +268,10 @@ def rank_numbers(derivatives: Sensitivity, names: list[str]) -> list[str]:
 
 
 def write_sensitivity_json(derivatives: Sensitivity) -> str:
-    """Write one object, SI and rad: d(quantity)/d(key) over the positions, vectors as [x, y], null for none."""
+    """Write one object in SI units and rad: d(quantity)/d(key) over the positions.
+
+    Vectors are [x, y]; null stands for no value.
+    """
     return write_object(
         SENSITIVITY_SCHEMA,
         title=derivatives.solution.title,

@@ -1,8 +1,9 @@
-"""Summary of a solved scene: ranges, peaks and their places, needs of the drive, ends of the motion.
+"""Summary of a solved scene: ranges, peaks and their places, and more.
 
-`locate_between` finds what the steps of a sweep pass over: reversals of dry friction,
-and the largest torque and pin forces; `locate_bending` the largest bending moments.
-`summarize` computes the facts; `fourbar.show.block` prints them.
+It has the needs of the drive and the ends of the motion. `locate_between` finds what
+the steps of a sweep pass over: reversals of dry friction, and the largest torque and
+pin forces; `locate_bending` the largest bending moments. `summarize` computes the
+facts; `fourbar.show.block` prints them.
 """
 
 import math
@@ -34,27 +35,40 @@ from fourbar.studies.internal_forces import Bending, internal_forces
 CUTS = 40
 """Parts into which one call of `solve` cuts every interval that is looked at."""
 ROUNDS = 5
-"""Calls of `solve`: from steps of 5 degrees a reversal is located to 5e-8 degrees, a peak to 1.6e-6 degrees."""
+"""Calls of `solve` to locate a reversal or a peak. From steps of 5 degrees a reversal
+is located to 5e-8 degrees, a peak to 1.6e-6 degrees.
+"""
 MOST_PEAKS = 6
 """Number of peaks of one quantity that are listed, the highest."""
 BENDING_PEAKS, BENDING_ROUNDS = 3, 3
-"""The same for bending moments: only the largest of a bar is shown, with four digits."""
+"""The same for bending moments. Only the largest of a bar is shown, with four digits.
+"""
 NO_BENDING = 1e-13
-"""Part of the pin forces times the longest bar up to which a bending moment is their rounding."""
+"""Bending moment that is round-off, over the pin forces times the longest bar."""
 GROWING = 1e-3
-"""Growth over the last two calls, as a part of the value, above which a quantity has a pole instead of a maximum."""
+"""Growth over the last two calls above which a quantity has a pole. It is a part of the
+value; less growth is that of a maximum.
+"""
 AT_REST = 1e-12
 """Part of its largest slip below which a pin is at rest at a position."""
 FINE = 7200
 """Positions at which ranges are looked for, by the position formula alone."""
 INSET = 1e-9
-"""Part of a range that is left out at its limit positions, which may not assemble as doubles."""
+"""Part of a range that is left out at its limit positions. These may not assemble as
+doubles.
+"""
 END_ROUNDS = 9
-"""Rounds of cutting the interval in which the assembly ends by 40: down to the last digits of a double."""
+"""Rounds of cutting the interval in which the assembly ends by 40. They go down to the
+last digits of a double.
+"""
 AS_WIDE = 1e-6
-"""rad. Ranges of angles are equally wide if they differ by less: an end in its last digits leaves some 1e-8."""
+"""Difference below which ranges of angles are equally wide, rad. An end in its last
+digits leaves some 1e-8.
+"""
 IN_LINE = 1e-6
-"""rad. Transmission angle that is zero: at a limit, a place in its last digits leaves some 1e-8."""
+"""Transmission angle that counts as zero, rad. At a limit, a place in its last digits
+leaves some 1e-8.
+"""
 Sizes = Callable[[Solution], dict[str, Array]]
 """List magnitudes at the positions of a solution, by name."""
 
@@ -64,7 +78,9 @@ class Peak(NamedTuple):
 
     value: float
     place: float
-    """Commanded angle or stroke at the peak, rad or m; for a motion over time the time, s."""
+    """Commanded angle or stroke at the peak, rad or m. For a motion over time it is the
+    time, s.
+    """
 
 
 class BarBending(NamedTuple):
@@ -77,7 +93,9 @@ class BarBending(NamedTuple):
     row: int
     """Index of the peak's position in `solution`."""
     grows: bool
-    """True if the moment grows without bound between the positions, or nothing was searched between them."""
+    """True if the moment grows without bound between the positions. Or nothing was
+    searched between them.
+    """
 
 
 class Between(NamedTuple):
@@ -86,19 +104,31 @@ class Between(NamedTuple):
     sweep: Solution
     """Solution at the positions of the sweep alone."""
     solution: Solution
-    """Solution at the positions of the sweep, at both sides of each reversal, and at the largest of each magnitude."""
+    """Solution at the positions of the sweep and at those found between them. These are
+    both sides of each reversal, and the largest of each magnitude.
+    """
     reversals: list[tuple[float, str]]
-    """Commanded angle or stroke, rad or m, and the pin at which dry friction reverses there: the pin forces jump."""
+    """Commanded angle or stroke, rad or m, and the pin at which friction reverses. The
+    friction is dry, and the pin forces jump there.
+    """
     growing: set[str]
-    """Names of the magnitudes that grow without bound within a step; all of them where no step was searched."""
+    """Names of the magnitudes that grow without bound within a step. They are all if no
+    step was searched.
+    """
 
     def bounded(self, *names: str) -> Solution:
-        """Return the solution to take the peaks of magnitudes from: the sweep alone if one grows without bound."""
+        """Return the solution to take the peaks of magnitudes from.
+
+        It is the sweep alone if one grows without bound.
+        """
         return self.sweep if self.growing.intersection(names) else self.solution
 
 
 def list_sizes(solution: Solution) -> dict[str, Array]:
-    """List the magnitudes whose largest values are located: torque, power and speed of the drive, and pin forces."""
+    """List the magnitudes whose largest values are located.
+
+    These are torque, power and speed of the drive, and pin forces.
+    """
     drive = read_drive(solution)
     keys = {
         drive.keys.value: drive.keys.value,
@@ -113,10 +143,10 @@ def list_sizes(solution: Solution) -> dict[str, Array]:
 
 
 def locate_between(scene: Scene, solution: Solution) -> Between:
-    """Locate reversals and largest values between the positions of a sweep or motion law, by solving finer positions.
+    """Locate reversals and largest values between the positions.
 
-    Nothing is searched for a released motion, a list of angles, or a scene without a
-    speed.
+    The positions are of a sweep or motion law; finer ones are solved. Nothing is
+    searched for a released motion, a list of angles, or a scene without a speed.
 
     `solution`: of the scene's positions, or of its sweep in rising order, to the stage
     "force".
@@ -144,9 +174,9 @@ def locate_between(scene: Scene, solution: Solution) -> Between:
 
 
 def locate_bending(scene: Scene, between: Between) -> dict[int, BarBending]:
-    """Locate the largest bending moment of each bar, between the positions too: for `analyze` and its figure alone.
+    """Locate the largest bending moment of each bar, between the positions too.
 
-    Empty where no position has forces.
+    Only `analyze` and its figure need it. Empty where no position has forces.
     """
     solution = between.bounded(*between.growing)
     if solution.F12 is None or not np.isfinite(solution.F12).any():
@@ -194,7 +224,10 @@ def locate_bending(scene: Scene, between: Between) -> dict[int, BarBending]:
 def _list_stresses(
     scene: Scene, bending: dict[int, BarBending]
 ) -> dict[int, float | None]:
-    """List the largest bending stresses: the bending moment over the section modulus."""
+    """List the largest bending stresses.
+
+    Each is the bending moment over the section modulus.
+    """
     stresses = dict[int, float | None]()
     for bar, largest in bending.items():
         modulus = scene.linkage.bar(bar).section_modulus
@@ -203,7 +236,10 @@ def _list_stresses(
 
 
 def _drop_rounding(bending: Bending, size: Array) -> Bending:
-    """Return bending moments with zero where they are rounding of the pin forces: a two-force bar has none."""
+    """Return bending moments with zero where they are rounding of the pin forces.
+
+    A two-force bar has none.
+    """
     moment = np.where(np.abs(bending.moment) <= NO_BENDING * size, 0.0, bending.moment)
     return bending._replace(moment=moment)
 
@@ -230,7 +266,10 @@ def _cut(low: Array, high: Array) -> Array:
 def _merge(
     scene: Scene, solution: Solution, places: Array, stage: str = "force"
 ) -> Solution:
-    """Solve at the positions of a solution and at others among them, in the order of the solution."""
+    """Solve at the positions of a solution and at others among them.
+
+    The order is that of the solution.
+    """
     if not len(places):
         return solution
     merged = np.concatenate([solution.at.places, places])
@@ -249,7 +288,10 @@ def _compute_slip(solution: Solution, pin: str) -> Array:
 
 
 def _find_reversing(scene: Scene, solution: Solution) -> tuple[list[str], Array, Array]:
-    """List the steps in which the slip of a pin with dry friction changes sign: pin and ends."""
+    """List the steps in which the slip of a pin with dry friction changes sign.
+
+    Each has the pin and its ends.
+    """
     places, steps = solution.at.places, list[tuple[str, int, int]]()
     for pin in sorted({pin for effect in scene.effects for pin in effect.dry_pins}):
         slip = np.nan_to_num(_compute_slip(solution, pin))
@@ -270,7 +312,10 @@ def _find_largest(
     most: int = MOST_PEAKS,
     rounds: int = ROUNDS,
 ) -> tuple[Array, set[str]]:
-    """Find the places of the local maxima of each magnitude, and the names of those that grow."""
+    """Find the places of the local maxima of each magnitude.
+
+    The names of those that grow are returned too.
+    """
     places, peaks = solution.at.places, list[tuple[str, int, int, int]]()
     passed = _find_dead_points(scene, solution)
     present = sizes(solution)
@@ -336,9 +381,9 @@ def _find_largest(
 
 
 def _find_dead_points(scene: Scene, solution: Solution) -> list[int]:
-    """List the steps within which the drive stands still while the linkage moves: forces have a pole there.
+    """List the steps within which the drive stands still and the linkage moves.
 
-    Its two ends need not be maxima of the positions.
+    Forces have a pole there. Its two ends need not be maxima of the positions.
     """
     at = solution.at
     if at.stroke is not None or (scene.drive is None and scene.drive_bar == at.bar):
@@ -385,38 +430,51 @@ class Facts:
     scene: Scene
     solution: Solution
     kind: str
-    """"position", "list", "sweep", "turn" (whole turns of what is commanded), "law" or "released"."""
+    """"position", "list", "sweep", "turn", "law" or "released". A turn is whole turns
+    of what is commanded.
+    """
     counts: dict[str, int]
     """Number of positions of each status."""
     commanded: tuple[float, float]
-    """First and last commanded angle or stroke, or time of a motion law or a released motion."""
+    """First and last commanded angle or stroke. It is a time for a motion law or a
+    released motion.
+    """
     angles: dict[int, tuple[Peak, Peak]]
     """Smallest and largest angle of bars 2, 3 and 4."""
     transmission: Peak
     """Smallest transmission angle."""
     stretches: list[tuple[float | None, float | None]]
-    """Places from and up to which the linkage assembles, None at the ends of the motion; empty if it always does."""
+    """Places from and up to which the linkage assembles. None at the ends of the
+    motion; empty if it always assembles.
+    """
     drive: Driving | None
     """Drive; None for a released linkage, and where only positions are known."""
     peak: Peak | None
     """Largest torque or force of the drive, signed."""
     duty: MotorDuty | None
     held: tuple[float, float] | None
-    """Least and greatest torque or force while dry friction holds a pin that is at rest."""
+    """Least and greatest torque or force while dry friction holds a pin at rest."""
     pins: dict[str, PinLoad]
     rates: dict[int, tuple[Peak, Peak]]
-    """Largest speed and acceleration, signed, of the bars that follow; empty where no speed is stated."""
+    """Largest speed and acceleration, signed, of the bars that follow. Empty if no
+    speed is stated.
+    """
     bending: dict[int, BarBending]
     stresses: dict[int, float | None]
-    """Largest bending stress of each bar, Pa; None where its cross-section is not stated."""
+    """Largest bending stress of each bar, Pa; None if its cross-section is not stated.
+    """
     stroke_range: tuple[Peak, Peak] | None
     """Smallest and largest stroke of the motion."""
     stroke_limits: tuple[float, float] | None
-    """Smallest and largest stroke that assembles on the branch, and with a stroke commanded on the side."""
+    """Smallest and largest stroke that assembles on the branch. With a stroke commanded
+    it is that of the side.
+    """
     between: Between
     """Events within the steps of the sweep."""
     error: float | None
-    """Largest error bar of the drive and of the pin forces, as a part of the value; None where none was computed."""
+    """Largest error bar of the drive and of the pin forces, over the value. None: no
+    error bar was computed.
+    """
 
     @property
     def linear(self) -> bool:
@@ -425,7 +483,10 @@ class Facts:
 
 
 def summarize(scene: Scene, solution: Solution) -> Facts:
-    """Collect the facts of a scene solved up to the forces or the error bars; at least one position assembles."""
+    """Collect the facts of a scene solved up to the forces or the error bars.
+
+    At least one position assembles.
+    """
     between, kind = locate_between(scene, solution), _find_kind(scene, solution)
     places, codes = _list_places(solution), solution.status_code
     fine, stretches = solution, list[tuple[float | None, float | None]]()
@@ -481,7 +542,10 @@ def summarize(scene: Scene, solution: Solution) -> Facts:
 
 
 def _find_rates(solution: Solution, *, smooth: bool) -> dict[int, tuple[Peak, Peak]]:
-    """Find the largest speed and acceleration of the bars that follow what is commanded."""
+    """Find the largest speed and acceleration of the bars that follow.
+
+    They follow what is commanded.
+    """
     places, rates = _list_places(solution), dict[int, tuple[Peak, Peak]]()
     if solution.omega_4 is None or len(solution) == 1:
         return rates
@@ -519,12 +583,18 @@ def _find_kind(scene: Scene, solution: Solution) -> str:
 
 
 def _list_places(solution: Solution) -> Array:
-    """List the commanded angle or stroke at each position, or the times of a motion over time."""
+    """List the commanded angle or stroke at each position.
+
+    It is the time for a motion over time.
+    """
     return solution.at.places if solution.time is None else solution.time
 
 
 def _find_extreme(values: Array, places: Array, sign: int, smooth: bool) -> Peak:
-    """Find the largest of signed values; of a smooth curve take the top of the parabola through it and neighbours."""
+    """Find the largest of signed values.
+
+    Of a smooth curve it is the top of the parabola through it and its neighbours.
+    """
     i = int(np.nanargmax(values))
     value, place = float(values[i]), float(places[i])
     beside, inside = slice(i - 1, i + 2), 0 < i < len(values) - 1
@@ -547,7 +617,10 @@ def _find_extreme(values: Array, places: Array, sign: int, smooth: bool) -> Peak
 def _list_stretches(
     scene: Scene, fine: Solution
 ) -> list[tuple[float | None, float | None]]:
-    """List where the linkage assembles within a sweep, with ends that the position formula locates."""
+    """List where the linkage assembles within a sweep.
+
+    The position formula locates the ends.
+    """
     closes, places = fine.assembled, fine.at.places
     if closes.all():
         return []
@@ -570,7 +643,10 @@ def _list_stretches(
 def _solve_finely(
     scene: Scene, places: Array
 ) -> tuple[Solution, list[tuple[float | None, float | None]]]:
-    """Solve many positions of a sweep in its sense, with the ends of its stretches; and list the stretches."""
+    """Solve many positions of a sweep in its sense; list the stretches.
+
+    The ends of its stretches are among them.
+    """
     fine = _solve_at(scene, np.linspace(places[0], places[-1], FINE + 1), "position")
     stretches = _list_stretches(scene, fine)
     ends = [end for stretch in stretches for end in stretch if end is not None]
@@ -578,11 +654,12 @@ def _solve_finely(
 
 
 def _join_stretches(solution: Solution, fine: Solution, bar: int) -> Array:
-    """Return the angles of a bar at the fine positions, rad, by the whole turns that belong together.
+    """Return the angles of a bar at the fine positions, rad.
 
-    The first stretch has the angles of the solution. The linkage does not pass from one
-    stretch to the next, so that no turn of a later one follows from the first: it has
-    the one with which all stretches together cover least.
+    Whole turns are added so that they belong together. The first stretch has the angles
+    of the solution. The linkage does not pass from one stretch to the next, so that no
+    turn of a later one follows from the first: it has the one with which all stretches
+    together cover least.
     """
     angles = np.array(getattr(fine, f"theta_{bar}"))
     if bar == fine.at.bar and fine.at.stroke is None:
@@ -605,7 +682,10 @@ def _join_stretches(solution: Solution, fine: Solution, bar: int) -> Array:
 
 
 def _find_turns(start: float, stop: float, low: float, high: float) -> int:
-    """Return the whole turns by which an interval of angles is moved to cover least together with another."""
+    """Return the whole turns by which an interval of angles is moved.
+
+    With them it covers least together with another.
+    """
     between = round((0.5 * (low + high) - 0.5 * (start + stop)) / TURN)
 
     def measure(turns: int) -> tuple[int, int]:
@@ -616,7 +696,10 @@ def _find_turns(start: float, stop: float, low: float, high: float) -> int:
 
 
 def find_duty(between: Between) -> MotorDuty | None:
-    """Return the duty of the drive, with each peak located between the positions where it is bounded."""
+    """Return the duty of the drive, each peak located between the positions.
+
+    A peak without a bound is that of the positions.
+    """
     duty, drive = motor_duty(between.sweep), read_drive(between.sweep)
     if duty is None:
         return None
@@ -665,7 +748,10 @@ def _list_pin_loads(solution: Solution, between: Between) -> dict[str, PinLoad]:
 
 
 def _find_stroke_limits(scene: Scene, solution: Solution) -> tuple[float, float]:
-    """Find the least and the greatest stroke over all angles that the commanded bar reaches on its branch."""
+    """Find the least and the greatest stroke of the commanded bar's angles.
+
+    The angles are all that it reaches on its branch.
+    """
     positions, first = solution.at, int(np.argmax(solution.assembled))
     here = float(positions.angle[first])
     intervals = find_intervals(scene.linkage, positions.bar)
@@ -692,7 +778,10 @@ def _find_stroke_limits(scene: Scene, solution: Solution) -> tuple[float, float]
 
 
 def _find_error(solution: Solution, drive: Driving | None) -> float | None:
-    """Find the largest error bar as a part of its value, or of the median where the value passes through zero."""
+    """Find the largest error bar over its value.
+
+    Where the value passes through zero, it is over the median.
+    """
     if solution.force_error is None:
         return None
     loads = np.max(

@@ -1,4 +1,7 @@
-"""Layout of every printed table, the table of positions of `analyze --table`, and the progress line of long work."""
+"""Layout of every printed table, and the progress line of long work.
+
+The table of positions of `analyze --table` is one.
+"""
 
 import io
 import math
@@ -34,9 +37,11 @@ MOST_DIGITS = 16
 GAP = 2
 """Blanks between two columns of the table, the divider among them."""
 MOST_ROWS = 40
-"""Rows of the table on a terminal where --every does not state them: they can be read at a glance."""
+"""Rows of the table on a terminal if --every does not state them. They can be read at a
+glance.
+"""
 STEPS = (1, 2, 5, 10, 15, 20, 30, 45, 60, 90)
-"""A terminal is shown every so many positions, of a longer sweep a multiple of the last."""
+"""Steps of the rows on a terminal. Of a longer sweep it is a multiple of the last."""
 
 
 def write_table(
@@ -46,7 +51,10 @@ def write_table(
     after: Sequence[str] = (),
     width: int | None = None,
 ) -> str:
-    """Write a table with its title and what stands above it and below, as text; `width` is that of a terminal."""
+    """Write a table with its title and what stands above it and below.
+
+    `width`: that of a terminal.
+    """
     from rich.console import Console
     from rich.text import Text
 
@@ -63,7 +71,10 @@ def make_plain_table(
     left: Iterable[str] = (),
     gap: int = 1,
 ) -> "Table":
-    """Make a table whose columns stand to the right, but for those headed by one of `left`."""
+    """Make a table whose columns are aligned to the right.
+
+    `left`: headings of those that are not.
+    """
     from rich import box
     from rich.table import Table
     from rich.text import Text
@@ -93,7 +104,8 @@ def print_positions(
     Parameters
     ----------
     columns : the columns; left out: all of them, most wanted first.
-    width : columns of a terminal, where the positions are thinned out; None: a file or a pipe, which gets them all.
+    width : columns of a terminal, where the positions are thinned out; None: a file or
+        a pipe, which gets them all.
     every : show every so many positions; left out: as `width` says.
     """
     step = every or (1 if width is None else _choose_step(len(solution)))
@@ -145,7 +157,10 @@ def write_value(number: float, unit: str, units: Conversion) -> str:
 def list_columns(
     solution: Solution, units: Conversion = DEGREES
 ) -> dict[str, list[str]]:
-    """List the columns of the table, most wanted first, a status only if one is not ok: heading with unit -> cells."""
+    """List the columns of the table, most wanted first: heading with unit -> cells.
+
+    A status is among them only if one is not ok.
+    """
     shown: dict[str, list[str]] = {}
     if (solution.status_code != OK).any():
         shown["status\n"] = [status.replace("_", " ") for status in solution.status]
@@ -182,7 +197,10 @@ def list_columns(
 
 
 def _list_motion(solution: Solution) -> Iterator[tuple[str, str, Array]]:
-    """List the points' coordinates, and angles and rates of the bars: name, SI unit, values."""
+    """List the points' coordinates, and angles and rates of the bars.
+
+    Each has its name, SI unit and values.
+    """
     moving = {"": solution.points, "v_": solution.velocity, "a_": solution.acceleration}
     for start, arrays in moving.items():
         for name, vector in arrays.items():
@@ -224,10 +242,10 @@ def make_table(
     every: int = 1,
     cells: dict[str, list[str]] | None = None,
 ) -> "tuple[Table, list[str]]":
-    """Make the table for a terminal of the given width (None: as wide as it needs), and name the columns left out.
+    """Make the table for a terminal of a width, and name the columns left out.
 
-    Every so many positions are shown, the last one always. `cells`: by heading; left
-    out: all columns.
+    A width of None is as wide as the table needs. Every so many positions are shown,
+    the last one always. `cells`: by heading; left out: all columns.
     """
     if cells is None:
         cells = list_columns(solution, units)
@@ -245,7 +263,10 @@ def make_table(
 
 
 def write_cells(values: Array, form: str = ".6g") -> list[str]:
-    """Write six digits, or another form; a dash where there is no value, 0 for what is rounding of the others."""
+    """Write six digits, or another form.
+
+    A dash stands for no value, 0 for the rounding of the others.
+    """
     sizes = np.abs(values[np.isfinite(values)])
     # not the largest, which may stand beside a pole
     usual = float(np.percentile(sizes, 90.0)) if sizes.size else 0.0
@@ -264,10 +285,10 @@ def _count_digits(torque: Array, error: Array) -> list[str]:
 
 @contextmanager
 def show_running(text: str) -> Iterator[Callable[[float], None] | None]:
-    """Move a line on standard error while the body runs; nothing where that is no terminal.
+    """Move a line on standard error while the body runs.
 
-    Yields what the body may report the share that is done to; None where there is no
-    terminal.
+    Nothing is written if it is no terminal. Yields what the body may report the share
+    that is done to; None where there is no terminal.
     """
     from rich.console import Console
 

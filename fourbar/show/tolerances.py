@@ -1,4 +1,7 @@
-"""Output of `fourbar tolerance`: a table where the spread is largest, and one JSON object."""
+"""Output of `fourbar tolerance`: a table and one JSON object.
+
+The table is of the place where the spread is largest.
+"""
 
 import math
 from collections.abc import Callable
@@ -17,14 +20,19 @@ from fourbar.studies.spread import BAND, PARTED, Spread, Tolerances, tolerances
 from fourbar.writing import write_object
 
 PAGE_SAMPLES = 2048
-"""Samples behind the bands of a page: seconds, and a percentile to a fiftieth of the deviation."""
+"""Samples behind the bands of a page. They take seconds, and give a percentile to a
+fiftieth of the deviation.
+"""
 MOST_RUNS = 5
 """Intervals of theta_2 that one line names."""
 SCHEMA = "fourbar-tolerance/1"
 
 
 def list_shown_parts(spreads: Tolerances) -> list[str]:
-    """List torque and magnitudes of pin forces, or where the scene states no speed the angles; and its own points."""
+    """List torque, magnitudes of pin forces and the scene's points.
+
+    If the scene states no speed, angles replace torque and forces.
+    """
     points = [
         f"{point.name}_{letter}" for point in spreads.scene.points for letter in "xy"
     ]
@@ -40,13 +48,19 @@ def list_shown_parts(spreads: Tolerances) -> list[str]:
 
 
 def find_part_unit(part: str) -> str:
-    """Return the unit of a quantity, a magnitude, or a component of a point, which may be called v or a."""
+    """Return the unit of a quantity, a magnitude, or a component of a point.
+
+    A point may be called v or a.
+    """
     unit: str = UNITS.get(part.strip("|"), "m")
     return unit
 
 
 def write_text(spreads: Tolerances, units: Conversion = DEGREES) -> str:
-    """Write one row for each quantity, below what was tried and what the variance of each is due to."""
+    """Write one row for each quantity.
+
+    Above stands what was tried and what the variance of each is due to.
+    """
     lines = [
         *describe_counts(spreads, units),
         (
@@ -94,7 +108,10 @@ def write_text(spreads: Tolerances, units: Conversion = DEGREES) -> str:
 
 
 def describe_counts(spreads: Tolerances, units: Conversion = DEGREES) -> list[str]:
-    """Say what was tried, what of it has no answer, and where first order and samples part."""
+    """Say what was tried and what of it has no answer.
+
+    It says too where first order and samples part.
+    """
     n = len(spreads.theta_2)
     count = f"{len(spreads.scene.tolerances)} tolerance" + (
         "s" if len(spreads.scene.tolerances) > 1 else ""
@@ -164,11 +181,11 @@ def _name_largest(spreads: Tolerances, spread: Spread, worst: int) -> str:
 def collect_tolerances(
     scene: Scene, places: list[float], progress: Callable[[float], None] | None = None
 ) -> dict[str, Any]:
-    """Collect what a page shows of them at places of its axis: deviations from the nominal, shares of the variance.
+    """Collect what a page shows of tolerances at places of its axis.
 
-    A scene that has none of this (a free motion, SciPy not installed) gives the
-    sentence that says so. `progress` is that of `tolerances`; left out, a line in the
-    terminal.
+    These are deviations from the nominal and shares of the variance. A scene that has
+    none of this (a free motion, SciPy not installed) gives the sentence that says so.
+    `progress` is that of `tolerances`; left out, a line in the terminal.
     """
     positions = (
         scene
@@ -220,7 +237,10 @@ def collect_tolerances(
 
 
 def write_json(spreads: Tolerances) -> str:
-    """Write one object, SI and rad; arrays over the positions, null where there is no value."""
+    """Write one object in SI units and rad.
+
+    Arrays are over the positions, null where there is no value.
+    """
     stated = spreads.scene.tolerances
     keys = [tolerance.key for tolerance in stated]
     return write_object(

@@ -1,4 +1,7 @@
-"""The units in which results are shown: a list such as "mm N N.mm deg", those of a scene file, or SI with prefixes."""
+"""The units in which results are shown.
+
+They are a list like "mm N N.mm deg", those of a scene file, or SI with prefixes.
+"""
 
 import math
 from collections.abc import Mapping
@@ -16,7 +19,9 @@ PRESETS = {"si": "", "imperial": "in lbf lbf.in lb deg rpm hp psi"}
 STATED = ("m", "N", "N m", "kg", "rad", "rad/s", "rad/s^2", "m/s", "m/s^2", "W", "Pa")
 """The SI units for which another one can be stated, each of a dimension of its own."""
 DERIVED = {"m/s": ("m", "{}/s"), "m/s^2": ("m", "{}/s^2"), "J": ("N m", "{}")}
-"""Not stated, these follow another one: energy the unit of torque, speeds that of length."""
+"""Units that follow another one if not stated. Energy follows the unit of torque,
+speeds that of length.
+"""
 IMPERIAL = ("in", "inch", "inches", "ft", "foot", "feet")
 """Units of lengths.ground with which a scene is shown in imperial units."""
 POUNDS = ("lb", "lbs", "pound", "pounds", "lbm")
@@ -26,7 +31,9 @@ METRIC = ("mm", "cm", "dm", "m")
 ROTATIONS = ("rpm", "rad/s", "deg/s", "rad/s^2", "deg/s^2", "rad/s²", "deg/s²")
 """Units of omega and alpha in which rates are shown as they are stated."""
 COMMON: Conversion = {**DEGREES, "rad/s": ("rpm", 30.0 / math.pi)}
-"""Units of a summary where nobody asks for others: what is left out has the SI unit with a prefix."""
+"""Units of a summary if no others are asked for. A unit that is left out is the SI unit
+with a prefix.
+"""
 PREFIXES = (
     (1e9, "G"),
     (1e6, "M"),
@@ -39,11 +46,11 @@ PREFIXES = (
 
 
 def units(text: str) -> Conversion:
-    """Read the units of a list, or of "SI" or "imperial" (in, lbf, lbf in, lb, deg, rpm, hp).
+    """Read the units of a list, or of "SI" or "imperial".
 
-    A product is joined by dots ("N.mm"). What the list leaves out stays SI, but for
-    speeds and accelerations of points, which follow the length, and the energy, which
-    follows the torque.
+    The latter are in, lbf, lbf in, lb, deg, rpm and hp. A product is joined by dots
+    ("N.mm"). What the list leaves out stays SI, but for speeds and accelerations of
+    points, which follow the length, and the energy, which follows the torque.
 
     Raises InputError for what is no unit of a result, and for two of one dimension.
     """
@@ -97,7 +104,10 @@ def _explain_refusal(name: str, unit: str) -> str:
 
 
 def suit_units(length: str) -> Conversion:
-    """Return the units that suit a length as it was typed: imperial for inches and feet, otherwise `COMMON`."""
+    """Return the units that suit a length as it was typed.
+
+    They are imperial for inches and feet, otherwise `COMMON`.
+    """
     from fourbar.quantities.units import find_unit
 
     return (
@@ -122,7 +132,7 @@ def units_of_scene(document: Mapping[str, Any]) -> Conversion:
 
 @cache
 def _suit_texts(length: str, rates: tuple[tuple[str, str], ...]) -> Conversion:
-    """Return the units that suit a length and speeds and accelerations as they are written."""
+    """Return the units that suit a length, speeds and accelerations as written."""
     from fourbar.quantities.units import find_unit
 
     name = find_unit(length, "m")
@@ -139,7 +149,7 @@ def _suit_texts(length: str, rates: tuple[tuple[str, str], ...]) -> Conversion:
 
 
 def _suit_rotation(stated: str, unit: str) -> Conversion:
-    """Return the units of speed and acceleration for a rate as it is stated, like "deg/s"."""
+    """Return the units of speed and acceleration for a rate like "deg/s"."""
     turned = stated.removesuffix("^2").removesuffix("²")
     if turned == "rpm":
         return {"rad/s": COMMON["rad/s"]}
@@ -150,14 +160,20 @@ def _suit_rotation(stated: str, unit: str) -> Conversion:
 
 
 def find_length(document: Mapping[str, Any]) -> object:
-    """Return the first length of a scene as it is written: lengths.ground, or a coordinate of a pin."""
+    """Return the first length of a scene as it is written.
+
+    It is lengths.ground, or a coordinate of a pin.
+    """
     if "pins" in document:
         return document["pins"]["A"][0]
     return document["lengths"]["ground"]
 
 
 def choose_unit(largest: float, unit: str, units: Conversion = SI) -> tuple[float, str]:
-    """Choose the factor from SI and the unit given, or the prefix that suits the largest magnitude; a rate has none."""
+    """Choose the factor from SI and the unit, or a suitable prefix.
+
+    The prefix suits the largest magnitude; a rate has none.
+    """
     if unit in units or "/" in unit:
         name, factor = find_unit_in(unit, units)
         return factor, name.replace("^2", "²")
@@ -174,12 +190,12 @@ DIGITS, POSITION_DIGITS = 4, 6
 
 
 def drop_rounding(values: Array, largest: float | Array) -> Array:
-    """Return numbers with zero in place of what is rounding of the largest of their kind."""
+    """Return numbers with zero for what is rounding of the largest of their kind."""
     return np.where(np.abs(values) <= ROUND_OFF * largest, 0.0, values)
 
 
 def write_cell(number: float, form: str) -> str:
-    """Write a number for a table; a dash where there is no value, and 0 without a sign."""
+    """Write a number for a table; a dash for no value, and 0 without a sign."""
     if not math.isfinite(number):
         return "-"
     text = format(number, form)
@@ -187,7 +203,10 @@ def write_cell(number: float, form: str) -> str:
 
 
 def write_digits(value: float, digits: int = DIGITS) -> str:
-    """Write a number with some significant digits, up to a million without an exponent."""
+    """Write a number with some significant digits.
+
+    There is no exponent up to a million.
+    """
     return f"{float(f'{value:.{digits}g}'):.6g}"
 
 
@@ -198,6 +217,9 @@ def write_short(
     largest: float | None = None,
     digits: int = DIGITS,
 ) -> str:
-    """Write a quantity with some significant digits and a unit that suits it, or the largest of its kind."""
+    """Write a quantity with some significant digits and a unit that suits.
+
+    The unit suits it, or the largest of its kind.
+    """
     factor, name = choose_unit(abs(value) if largest is None else largest, unit, units)
     return f"{write_digits(factor * value, digits)} {name}"

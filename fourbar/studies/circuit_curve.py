@@ -1,4 +1,6 @@
-"""The circuit of a scene as a curve that can be walked through its limits, and the generalised force along it.
+"""The circuit of a scene as a curve that can be walked through its limits.
+
+The generalised force along it is computed here too.
 
 With psi = theta_2 - theta_1 and mu = theta_4 - theta_3, the diagonal from A to O4,
 squared, is in both triangles
@@ -38,7 +40,9 @@ from fourbar.studies.sloped import Sloped
 SAMPLES = 3600
 """Positions of a whole branch that are looked at for friction and for zeros."""
 NOTHING = 1e-11
-"""Fraction of the sum of the absolute terms of Q: a Q no larger than this everywhere is zero within round-off."""
+"""Fraction of the sum of the absolute terms of Q that is round-off. A Q no larger than
+this everywhere is zero.
+"""
 AT_END = 1e-12
 """rad; an equilibrium so near to an end of the sweep is in it."""
 
@@ -56,12 +60,18 @@ class RestPosition(NamedTuple):
 def compute_generalised_force(
     scene: Scene, terms: tuple[Any, ...], state: State
 ) -> Any:
-    """Compute Q of loads and effects, by the parameter that the state's coefficients belong to."""
+    """Compute Q of loads and effects.
+
+    It is by the parameter of the state's coefficients.
+    """
     return Actions(state, list_bodies(scene.linkage, terms)).add(terms).work()[0]
 
 
 class _Sizes(Actions):
-    """Sums of the absolute terms of Q, each with the speed of the fastest bar: one that rests has rounding alone."""
+    """Sums of the absolute terms of Q, each with the speed of the fastest bar.
+
+    A bar at rest has rounding alone.
+    """
 
     def __init__(self, state: State, bodies: Any) -> None:
         super().__init__(state, bodies)
@@ -85,7 +95,10 @@ class _Sizes(Actions):
 
 
 def of_input(scene: Scene) -> Command:
-    """Command the input where the scene's motion has it, which may be one of another bar or of a stroke."""
+    """Command the input where the scene's motion has it.
+
+    The motion may command another bar or a stroke.
+    """
     commanded = command(scene)
     if commanded.commanded == "theta_2":
         return commanded
@@ -100,7 +113,9 @@ def of_input(scene: Scene) -> Command:
 
 
 class CircuitCurve:
-    """The circuit of a scene: its branches as closed rows of psi = theta_2 - theta_1 and mu = theta_4 - theta_3.
+    """The circuit of a scene: its branches as closed rows of psi and mu.
+
+    psi = theta_2 - theta_1, mu = theta_4 - theta_3.
 
     A row is sampled by an angle tau: psi itself where the input turns fully, otherwise
         psi = middle - half width cos tau,
@@ -115,7 +130,9 @@ class CircuitCurve:
         self.case = self.case.begin_with(commanded) if scene.counts_turns else self.case
         self.lengths, self.theta_1 = loop(*linkage.lengths), linkage.ground_angle
         self.ratios = self.case.path.lengths
-        """The lengths by a unit near them, of which no product leaves the range of doubles."""
+        """The lengths by a unit near them. No product of them leaves the range of
+        doubles.
+        """
         number = find_circuit(linkage, commanded.theta_2, commanded.branch)
         if (number < 0).all():
             raise NotAssembledError(
@@ -158,7 +175,10 @@ class CircuitCurve:
         return np.asarray(np.abs(away) <= half + radius + AT_END)
 
     def point(self, tau: Array, branch: int) -> Array:
-        """Return psi and mu, (n, 2), at places of a row; `branch` where the input turns fully."""
+        """Return psi and mu, (n, 2), at places of a row.
+
+        `branch`: if the input turns fully.
+        """
         tau = np.asarray(np.remainder(tau, TURN), dtype=float)
         if self.full:
             psi = self.low + tau
@@ -200,14 +220,20 @@ class CircuitCurve:
         return np.asarray(half_angle(self.ratios, psi).side)
 
     def samples(self) -> Array:
-        """Sample all rows at even places within the sweep and at its ends, off the limits and change points, (n, 2)."""
+        """Sample all rows at even places within the sweep and at its ends, (n, 2).
+
+        Limits and change points are left out.
+        """
         tau = np.linspace(0.0, TURN, SAMPLES, endpoint=False) + 0.5 * TURN / SAMPLES
         points = np.concatenate([self.point(tau, branch) for branch in self.rows])
         points = points[self.inside(points[:, 0], np.zeros(1))]
         return np.concatenate([points, self.ends()])
 
     def ends(self) -> Array:
-        """Return the ends of the sweep on each branch, (n, 2); none where there is no sweep or it is a whole turn."""
+        """Return the ends of the sweep on each branch, (n, 2).
+
+        There are none without a sweep, or if it is a whole turn.
+        """
         if self.sweep is None or self.sweep[1] - self.sweep[0] >= TURN:
             return np.empty((0, 2))
         psi = np.array(self.sweep) - self.theta_1
@@ -271,7 +297,10 @@ class CircuitCurve:
         return points
 
     def place(self, point: Array) -> RestPosition:
-        """Describe a point, theta_2 within the sweep, else counted from the circuit's range."""
+        """Describe a point by theta_2 within the sweep.
+
+        Without a sweep theta_2 is counted from the circuit's range.
+        """
         position, from_ = (
             self.state(point[None]).position,
             self.low if self.sweep is None else self.sweep[0] - self.theta_1 - AT_END,
@@ -293,7 +322,10 @@ class CircuitCurve:
 
 
 def closure(lengths: Loop, psi: Number, mu: Number) -> Number:
-    """Compute a d cos psi - b c cos mu - (a^2 + d^2 - b^2 - c^2)/2: zero where the loop closes, m^2."""
+    """Compute how far the loop is from closing: zero where it closes, m^2.
+
+    It is a d cos psi - b c cos mu - (a^2 + d^2 - b^2 - c^2)/2.
+    """
     d, a, b, c = lengths[:4]
     return (
         a * d * np.cos(psi) - b * c * np.cos(mu) - 0.5 * (a * a + d * d - b * b - c * c)
@@ -301,7 +333,9 @@ def closure(lengths: Loop, psi: Number, mu: Number) -> Number:
 
 
 def on_curve(lengths: Loop, theta_1: Number, psi: Number, mu: Number) -> State:
-    """Compute the position, at rest, with the derivatives by s in the place of those by an angle.
+    """Compute the position at rest, with derivatives by s.
+
+    They replace those by an angle.
 
         u3 = (d u1 - a u2)/(b - c e^{i mu}),   u4 = u3 e^{i mu}.
 
@@ -323,7 +357,8 @@ def on_curve(lengths: Loop, theta_1: Number, psi: Number, mu: Number) -> State:
     k = Coefficients(
         h2, h3, h4, h2 - h3, (a / b) * (d / c) * np.sin(psi), 0.0, 0.0, 0.0
     )
-    position = Position(u1, u2, u3, u4, h2, diagonal, None, None, None)  # type: ignore[arg-type]  # what nothing here asks for
+    # the last three are asked for by nothing here
+    position = Position(u1, u2, u3, u4, h2, diagonal, None, None, None)  # type: ignore[arg-type]
     return State(lengths, theta_1, theta_1 + psi, position, k, 0.0, rates(k, 0.0, 0.0))
 
 
@@ -334,7 +369,9 @@ def _less_turned(p: Number, q: Number, angle: Number) -> Number:
 
 
 def transmission(lengths: Loop, psi: Number) -> Number:
-    """Compute theta_4 - theta_3 on the open branch, in [0, pi]; where the loop does not close, the end that is nearest.
+    """Compute theta_4 - theta_3 on the open branch, in [0, pi].
+
+    Where the loop does not close, it is the nearest end.
 
     tan^2(mu/2) = (e^2 - (b - c)^2)/((b + c)^2 - e^2), the factors of Heron's formula.
     """

@@ -1,4 +1,7 @@
-"""Sensitivities: the derivative of every quantity by every number of a scene, from the formulas as they stand."""
+"""Sensitivities: the derivative of every quantity by every number of a scene.
+
+They come from the formulas as they stand.
+"""
 
 import math
 from collections.abc import KeysView
@@ -45,19 +48,30 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
 AT_ONCE = 512
-"""Positions: each number is then as many rows as the scene has numbers, and stays in the cache."""
+"""Positions at a time. Each number is then as many rows as the scene has numbers, and
+stays in the cache.
+"""
 HUNDREDTH, DEGREE = 0.01, math.radians(1.0)
-"""Relative change of a number and change of an angle (rad) for which its influence is reported."""
+"""Change of a number for which its influence is reported. It is relative, or in rad for
+an angle.
+"""
 AT_REST = "at_rest"
-"""Status where dry friction holds a pin at rest: its couple, and all that hangs on it, jumps with the motion."""
+"""Status where dry friction holds a pin at rest. Its couple, and all that follows from
+it, jumps with the motion.
+"""
 
 
 class Influence(NamedTuple):
-    """Largest influence of one number, changed by a hundredth or an angle by a degree, on one quantity."""
+    """Largest influence of one number on one quantity.
+
+    The number is changed by a hundredth, an angle by a degree.
+    """
 
     key: str
     change: float
-    """Change in the quantity's unit, signed; for a vector that is no force the length of its change."""
+    """Change in the quantity's unit, signed. For a vector that is no force it is the
+    length of its change.
+    """
     theta_2: float
     """rad."""
 
@@ -70,18 +84,25 @@ class Sensitivity:
     solution: Solution
     """The quantities themselves."""
     keys: dict[str, SceneNumber]
-    """The p numbers by which they are derived, as in the scene file, pairs and lists by index."""
+    """The p numbers of the derivatives, as in the scene file. Pairs and lists have an
+    index.
+    """
     numbers: Array
-    """Values of the numbers, (p,); of motion.theta_2 and of what a motion law varies NaN."""
+    """Values of the numbers, (p,). Those of motion.theta_2, and of what a motion law
+    varies, are NaN.
+    """
     status: list[str]
-    """Status of each position, as in `Solution.status`; "at_rest": dry friction holds a pin, torque and pin forces have
-    no derivative there. Quantities that a status other than ok concerns are NaN.
+    """Status of each position, as in `Solution.status`; "at_rest": dry friction holds a
+    pin, torque and pin forces have no derivative there. Quantities that a status other
+    than ok concerns are NaN.
     """
     by: dict[str, Array]
     """Derivatives by quantity, (p, n) or (p, n, 2)."""
 
     def of(self, quantity: str, key: str) -> Array:
-        """Return d(quantity)/d(key), (n,) or (n, 2); of a component F12_x or of a magnitude |F12| (n,).
+        """Return d(quantity)/d(key), (n,) or (n, 2).
+
+        Of a component F12_x or a magnitude |F12| it is (n,).
 
         Raises InputError for a quantity or a key that is not known here.
         """
@@ -100,13 +121,18 @@ class Sensitivity:
         return slopes[:, "xy".index(quantity[-1])]
 
     def value(self, quantity: str) -> Array:
-        """Return the quantity itself, or a component or magnitude of it; InputError as `of`."""
+        """Return the quantity, or a component or magnitude of it.
+
+        Raises InputError as `of` does.
+        """
         name = self._find_whole(quantity)
         values: Array = find_values(self.solution, name)
         return values if quantity == name else split_parts(name, values)[quantity]
 
     def to_pandas(self) -> "DataFrame":
-        """Make a table, a row for each number and position: key, theta_2, status and d(quantity)/d(key), SI and rad.
+        """Make a table, a row for each number and position.
+
+        Its columns are key, theta_2, status and d(quantity)/d(key), SI units and rad.
 
         Raises DependencyError where pandas is not installed.
         """
@@ -123,7 +149,10 @@ class Sensitivity:
         return make_data_frame(first | columns)
 
     def _find_whole(self, quantity: str) -> str:
-        """Return the quantity of which one is asked, or a component or the magnitude; InputError for any other."""
+        """Return the quantity that is named, or whose part is named.
+
+        A part is a component or the magnitude. Raises InputError for any other name.
+        """
         if isinstance(quantity, str):
             for name in (quantity, quantity.strip("|"), quantity[:-2]):
                 if name in self.by and (
@@ -135,7 +164,10 @@ class Sensitivity:
         )
 
     def influences(self, quantity: str) -> list[Influence]:
-        """List what the numbers change a quantity by, a pin force in its magnitude, the largest first."""
+        """List by how much the numbers change a quantity, the largest first.
+
+        A pin force counts by its magnitude.
+        """
         value, rows = self.value(quantity), []
         for (key, entry), number in zip(
             self.keys.items(), self.numbers.tolist(), strict=True
@@ -198,17 +230,20 @@ class Sensitivity:
 def sensitivity(scene: Scene) -> Sensitivity:
     """Differentiate every quantity at each position of a scene by each of its numbers.
 
-    d(quantity)/d(key), the other numbers held; what the scene leaves out (the inertia of a uniform bar, its centre
-    at mid-bar) follows the length. What is commanded is held too, and "motion.theta_2" (or theta_3, theta_4, stroke) is
-    the derivative by it.
+    d(quantity)/d(key), the other numbers held; what the scene leaves out (the inertia
+    of a uniform bar, its centre at mid-bar) follows the length. What is commanded is
+    held too, and "motion.theta_2" (or theta_3, theta_4, stroke) is the derivative by
+    it.
 
     Raises
     ------
-    InputError : a free motion, or a position that is described by its distance from a limit.
+    InputError : a free motion, or a position that is described by its distance from a
+        limit.
 
     >>> from fourbar import Motion, Scene, uniform
     >>> found = sensitivity(Scene(uniform(0.3, 0.1, 0.25, 0.22), Motion(1.0, 10.0)))
-    >>> found.of("torque", "motion.omega_2") * 10.0 / found.value("torque")  # it grows with the square of the speed
+    >>> # the torque grows with the square of the speed
+    >>> found.of("torque", "motion.omega_2") * 10.0 / found.value("torque")
     array([2.])
     """
     expect("scene", scene, Scene)
@@ -311,7 +346,10 @@ class _SlopedPath(Path):
     __slots__ = ()
 
     def half_angle(self, q: Number) -> HalfAngle:
-        """Compute the half angle for the independent angle q (rad) against the ground."""
+        """Compute the half angle for the independent angle q against the ground.
+
+        The angle is in rad.
+        """
         h = 0.5 * (q - self.theta_1)
         s, k = np.sin(h), np.cos(h)
         if self.bar == 4:
@@ -336,7 +374,10 @@ def _compute_derivatives(
     names: KeysView[str],
     moving: bool,
 ) -> tuple[dict[str, Any], NDArray[np.bool_]]:
-    """Compute the quantities at some positions, with their slopes; and where dry friction holds a pin at rest."""
+    """Compute the quantities at some positions, with their slopes.
+
+    It returns too where dry friction holds a pin at rest.
+    """
     place = {key: number for number, key in enumerate(keys)}
 
     def seeded(key: str, number: Any) -> Any:

@@ -1,4 +1,6 @@
-"""Equilibria: where a linkage stays by itself under weights, springs and loads, and what holds it elsewhere.
+"""Equilibria: where a linkage stays by itself, and what holds it elsewhere.
+
+Weights, springs and loads act.
 
 With Q the generalised force (its power over q') and J the equivalent inertia, at rest
 and with no drive,
@@ -42,15 +44,19 @@ from fourbar.studies.circuit_curve import (
 )
 
 A_JUMP = 1e-6
-"""Fraction of the sum of the absolute terms: a torsion spring wound by half a turn makes Q jump, which is no zero."""
+"""Fraction of the sum of the absolute terms above which a sign change is a jump. A
+torsion spring wound by half a turn makes Q jump, which is no zero.
+"""
 STILL = 1e-3
-"""Ratio of the turns of bars 2 and 4 below which bar 2 stands at a limit, and theta_4 takes its place."""
+"""Ratio of the turns of bars 2 and 4 below which bar 2 stands at a limit. theta_4 then
+takes the place of theta_2.
+"""
 A_RANGE = 3
 """Samples in a row where Q is nothing: fewer may be a zero that falls on one."""
 AT_CHANGE_POINT = 1e-4
 """rad; nearer to a change point nothing is decided: the curve crosses itself there."""
 HALVINGS = 60
-"""Number of halvings of the distance between two samples, enough to reach its last digits."""
+"""Halvings of the distance between two samples down to its last digits."""
 
 
 class _CircuitRange(NamedTuple):
@@ -78,9 +84,11 @@ class Equilibrium(NamedTuple):
     inertia: float
     """Equivalent inertia J, kg m^2."""
     frequency: float | None
-    """Frequency of small undamped oscillations, Hz; None: not stable, or without inertia."""
+    """Frequency of small undamped oscillations, Hz. None: it is not stable, or without
+    inertia.
+    """
     held: tuple[RestPosition, RestPosition] | None
-    """The ends of the positions around it that dry friction holds; None: there is none."""
+    """Ends of the positions around it that dry friction holds; None: there are none."""
 
 
 class Equilibria(NamedTuple):
@@ -89,31 +97,39 @@ class Equilibria(NamedTuple):
     found: tuple[Equilibrium, ...]
     """Along theta_2, the open branch first; none where the linkage is indifferent."""
     indifferent: tuple[tuple[RestPosition, RestPosition], ...]
-    """Ends of ranges in which Q is zero throughout, to the rounding of the description: it stays wherever it is put."""
+    """Ends of ranges in which Q is zero throughout. Zero is within the rounding of the
+    description: the linkage stays wherever it is put.
+    """
     samples: int
-    """Number of positions of the grid. Every zero of Q at which its sign differs between
-    two neighbours is found, and every one at which Q touches zero or passes it twice
-    between two neighbours whose slopes differ in sign; there may be others between.
+    """Number of positions of the grid. Every zero of Q at which its sign differs
+    between two neighbours is found, and every one at which Q touches zero or passes it
+    twice between two neighbours whose slopes differ in sign; there may be others
+    between.
     """
     not_decided: tuple[RestPosition, ...]
     """Change points, nearer than 1e-4 rad to which nothing is decided."""
     held: tuple[tuple[RestPosition, RestPosition], ...]
     """Ends of all ranges that dry friction holds, those without an equilibrium too."""
     positions: Solution
-    """The scene's positions at rest: `torque` holds them, anything from `torque_low` to `torque_high` with friction."""
+    """The scene's positions at rest. `torque` holds them; with friction anything from
+    `torque_low` to `torque_high` does.
+    """
     moves: NDArray[np.int8]
-    """Sign of the change of theta_2 when each position is released; 0: it stays, or has no speeds."""
+    """Sign of the change of theta_2 when each position is released. 0: it stays, or has
+    no speeds.
+    """
 
 
 def equilibrium(scene: Scene) -> Equilibria:
-    """Find the positions in which a linkage stays by itself, whether they are stable, and what holds the others.
+    """Find the positions in which a linkage stays by itself.
 
-    The search covers the circuit of the scene's first position that assembles, on both
-    branches where the circuit has both. If the scene states a sweep (of theta_2, of
-    another bar or of a stroke) or a motion law, the search stays within it. Speed,
-    acceleration and drive of the scene play no part, nor does viscous damping. Zeros of
-    the generalized force Q are sought between the positions of a grid (3600 a turn, and
-    the ends of the sweep): where Q changes its sign, and where its size is least.
+    It tells whether they are stable, and what holds the others. The search covers the
+    circuit of the scene's first position that assembles, on both branches where the
+    circuit has both. If the scene states a sweep (of theta_2, of another bar or of a
+    stroke) or a motion law, the search stays within it. Speed, acceleration and drive
+    of the scene play no part, nor does viscous damping. Zeros of the generalized force
+    Q are sought between the positions of a grid (3600 a turn, and the ends of the
+    sweep): where Q changes its sign, and where its size is least.
 
     Raises
     ------
@@ -156,7 +172,10 @@ def equilibrium(scene: Scene) -> Equilibria:
 
 
 def _solve_at_rest(scene: Scene, circuit: Circuit) -> Solution:
-    """Solve the scene's positions at rest; of a single one, or a released linkage, those of the circuit."""
+    """Solve the scene's positions at rest.
+
+    For a single position, or a released linkage, these are those of the circuit.
+    """
     commanded = of_input(scene)
     if len(commanded.theta_2) == 1:
         low, high = (
@@ -237,7 +256,10 @@ class _Grid(NamedTuple):
 
 
 def _make_grid(curve: CircuitCurve, points: Array) -> _Grid:
-    """Pair the neighbours in their order along the rows, none across what lies outside the sweep."""
+    """Pair the neighbours in their order along the rows.
+
+    There is no pair across what lies outside the sweep.
+    """
     tau, row = curve.tau(points)
     first = np.lexsort((tau, row))
     second = np.empty_like(first)
@@ -328,7 +350,10 @@ def _find_sign_changes(curve: CircuitCurve, grid: _Grid) -> _Zeros:
 
 
 def _add_friction(curve: CircuitCurve, points: Array, side: int) -> Array:
-    """Compute Q with the friction that opposes impending motion to one side; infinite where friction jams."""
+    """Compute Q with the friction that opposes impending motion to one side.
+
+    It is infinite where friction jams.
+    """
     state, force = curve.state(points), np.empty(len(points))
     along = np.abs(state.k.h2) >= np.abs(
         state.k.h4
@@ -355,7 +380,10 @@ def _holds(curve: CircuitCurve, points: Array) -> NDArray[np.bool_]:
 
 
 def _moves(curve: CircuitCurve, points: Array) -> NDArray[np.int8]:
-    """Find the direction in which positions start to move: sign of the change of theta_2, 0 where they stay."""
+    """Find the direction in which positions start to move.
+
+    It is the sign of the change of theta_2, 0 where they stay.
+    """
     state = curve.state(points)
     ahead, back = _add_friction(curve, points, 1), _add_friction(curve, points, -1)
     level = NOTHING * curve.size(points)
@@ -366,7 +394,10 @@ def _moves(curve: CircuitCurve, points: Array) -> NDArray[np.int8]:
 def _list_ranges(
     curve: CircuitCurve, holds: Callable[[Array], NDArray[np.bool_]], points_held: Array
 ) -> list[_CircuitRange]:
-    """List the ranges within the sweep in which something holds, row by row; it holds at the points known."""
+    """List the ranges within the sweep in which something holds, row by row.
+
+    It is known to hold at some points.
+    """
     ranges = []
     own_tau, own_row = curve.tau(points_held)
     for row, branch in enumerate(curve.rows):
@@ -432,7 +463,10 @@ def _is_inside(curve: CircuitCurve, point: Array, part: _CircuitRange) -> bool:
 def _find_edge(
     held: Callable[[Array], NDArray[np.bool_]], tau: Array, gap: Array, sense: float
 ) -> Array:
-    """Find where a range ends, between a place that is held and the next one, which is not."""
+    """Find where a range ends between a place that is held and a free one.
+
+    The places are neighbours.
+    """
     inside, _ = _bisect(lambda away: held(tau + sense * away), np.zeros(tau.shape), gap)
     return np.asarray(np.remainder(tau + sense * inside, TURN))
 
@@ -440,7 +474,10 @@ def _find_edge(
 def _bisect(
     holds: Callable[[Array], NDArray[np.bool_]], low: Array, high: Array
 ) -> tuple[Array, Array]:
-    """Narrow each interval, at whose lower end alone something holds, to the two neighbours between which it ends."""
+    """Narrow each interval to the two neighbours between which something ends.
+
+    It holds at the lower end of the interval alone.
+    """
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
         held = holds(middle)

@@ -1,7 +1,8 @@
-"""Internal forces of a bar: normal force, shear force and bending moment along the line between its two pins.
+"""Internal forces of a bar along the line between its two pins.
 
-With x from the first pin (O2, A, O4) towards the second and y to the left of it, over
-all that acts at or before x, inertia (d'Alembert) and weight included:
+They are normal force, shear force and bending moment. With x from the first pin (O2, A,
+O4) towards the second and y to the left of it, over all that acts at or before x,
+inertia (d'Alembert) and weight included:
 
     N(x) = -sum F_x  (tension > 0),
     V(x) = sum F_y,
@@ -28,7 +29,9 @@ from fourbar.solution import Array, Solution
 STATIONS = 41
 """Equal stations from pin to pin, where none are given."""
 SAME = 1e-9
-"""Part of the bar's length within which two feet are one: a load and the inertia, both at G, differ by round-off."""
+"""Part of the bar's length within which two feet are one. A load and the inertia, both
+at G, differ by round-off.
+"""
 Complex = NDArray[np.complex128]
 
 
@@ -53,7 +56,9 @@ class InternalForces(NamedTuple):
     M: Array
     """Bending moment, N m, (n, k)."""
     uniform: bool
-    """True if weight and inertia are spread as those of a uniform slender bar; otherwise they act at G."""
+    """True if weight and inertia are spread as those of a uniform slender bar.
+    Otherwise they act at G.
+    """
     largest: Bending
     """Largest |M| of all x, on both sides of every foot and where V = 0."""
 
@@ -63,9 +68,10 @@ def internal_forces(
 ) -> InternalForces:
     """Compute the internal forces of a moving bar.
 
-    A bar counts as uniform where its inertia and centre are left out; the weight and inertia of any other act at G,
-    its rotary inertia as a couple there. A load's couple acts at its place, the drive's at the bar's ground pin (of
-    bar 3 at A), the couples of effects at their pins.
+    A bar counts as uniform where its inertia and centre are left out; the weight and
+    inertia of any other act at G, its rotary inertia as a couple there. A load's couple
+    acts at its place, the drive's at the bar's ground pin (of bar 3 at A), the couples
+    of effects at their pins.
 
     Parameters
     ----------
@@ -94,7 +100,10 @@ def internal_forces(
 
 
 class _Beam(NamedTuple):
-    """Everything that acts on a bar, by its foot on the line: (n, f); and what is spread over it."""
+    """Everything that acts on a bar, by its foot on the line, (n, f).
+
+    It holds too what is spread over the line.
+    """
 
     length: float
     foot: Array
@@ -110,7 +119,10 @@ class _Beam(NamedTuple):
     alpha: Array
 
     def at(self, x: Array, *, before: bool = False) -> tuple[Array, Array, Array]:
-        """Compute N, V, M at x, (n, k); with what acts at x itself, or just `before` it."""
+        """Compute N, V, M at x, (n, k).
+
+        `before`: without what acts at x itself.
+        """
         N, V, M = (np.zeros(x.shape) for _ in range(3))
         end = x + (-SAME if before else SAME) * self.length
         for foot, force, couple in zip(
@@ -135,7 +147,10 @@ class _Beam(NamedTuple):
         return N, V, M
 
     def find_largest(self) -> Bending:
-        """Find the largest |M|: at every foot, on both sides, and where V = 0 between two."""
+        """Find the largest |M|.
+
+        It lies at a foot, on either side of it, or where V = 0 between two.
+        """
         n = len(self.foot)
         ends = np.broadcast_to([0.0, self.length], (n, 2))
         feet = np.sort(np.concatenate([self.foot, ends], axis=1), axis=1)
@@ -212,7 +227,10 @@ class _Recorder(Actions):
                 )
 
     def pull(self, start: Any, end: Any, force: Any) -> None:
-        """Record both forces where they act, between bars that meet too: inside a bar it matters."""
+        """Record both forces where they act.
+
+        Between bars that meet it matters too, inside a bar.
+        """
         self.pull_ends(start, end, force)
 
 
@@ -286,7 +304,10 @@ def _collect(scene: Scene, solution: Solution, bar: int) -> _Beam:
 def _sum_by_foot(
     items: list[tuple[Any, Any, Any]], zero: Array, same: float
 ) -> tuple[Array, Complex, Array]:
-    """Sum what acts at the same foot at every position: feet, forces and couples, each (n, f)."""
+    """Sum what acts at the same foot at every position.
+
+    Feet, forces and couples are (n, f) each.
+    """
     feet, forces, couples = list[Array](), list[Any](), list[Array]()
     for place, force, couple in items:
         foot = zero + np.real(place)
@@ -312,7 +333,10 @@ def _sum_by_foot(
 
 
 def _find_couple(load: Any, G: Any, back: Any) -> Any:
-    """Return where the couple of a load acts in the bar's axes: where its force does, or else at G."""
+    """Return where the couple of a load acts in the bar's axes.
+
+    It is where its force acts, or else G.
+    """
     if load.arm is not None:
         return G + polar(*load.arm) * back
     return load.foot(G)
@@ -332,7 +356,10 @@ def _record_pins(recorder: _Recorder, solution: Solution) -> None:
 
 
 def _record_drive(recorder: _Recorder, scene: Scene, solution: Solution) -> None:
-    """Record the couple of the drive at the bar's first pin, or the force at its points."""
+    """Record the couple of the drive at the bar's first pin.
+
+    If the drive exerts a force, that is recorded at its points.
+    """
     if scene.motion.free is not None:
         return
     if scene.drive is not None:

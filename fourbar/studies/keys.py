@@ -1,4 +1,4 @@
-"""The numbers of a scene by their keys in its file, and scenes in which they are arrays."""
+"""The numbers of a scene by their keys in its file, and scenes of arrays of them."""
 
 from collections.abc import Mapping
 from difflib import get_close_matches
@@ -41,7 +41,9 @@ SAME_FOR_ALL = (
     ),
     *("from", "to", "steps", "limit", "offset"),
 )
-"""Parts of keys that name a word, a whole number, or what has another form in a study."""
+"""Parts of keys that name no number. They name a word, a whole number, or what has
+another form in a study.
+"""
 BY_MATERIAL = ("density", "section", "diameter")
 """Numbers of a bar that are varied only where the scene states them."""
 Place = tuple[str | int, ...]
@@ -64,7 +66,10 @@ class SceneNumber(NamedTuple):
 
 
 def _list_numbers(description: Any, key: str, place: Place) -> dict[str, SceneNumber]:
-    """List the entries of the numbers that a description states, a magnitude and its angle as two."""
+    """List the entries of the numbers that a description states.
+
+    A magnitude and its angle are two.
+    """
     entries = dict[str, SceneNumber]()
     for name, stated in description.numbers.items():
         if stated.pair:
@@ -125,7 +130,10 @@ def _list_drive(drive: Any) -> dict[str, SceneNumber]:
 
 
 def list_place(stated: Any, key: str, place: Place) -> dict[str, SceneNumber]:
-    """List the entries of the form in which a place is stated; a named point has its own."""
+    """List the entries of the form in which a place is stated.
+
+    A named point has its entries elsewhere.
+    """
     entries = dict[str, SceneNumber]()
     for name, declared in STATED_PLACES.items():
         if getattr(stated, name) is not None:
@@ -134,7 +142,10 @@ def list_place(stated: Any, key: str, place: Place) -> dict[str, SceneNumber]:
 
 
 def _list_bar(bar: Bar, number: int) -> dict[str, SceneNumber]:
-    """List the entries of a moving bar: its cross-section as it is stated, and no mass beside a density."""
+    """List the entries of a moving bar.
+
+    Its cross-section is as it is stated; with a density there is no mass.
+    """
     entries = _list_numbers(Bar, "", ("linkage", BAR_NAMES[number]))
     absent = {name for name in BY_MATERIAL if getattr(bar, name) is None}
     if bar.density is not None:
@@ -145,7 +156,10 @@ def _list_bar(bar: Bar, number: int) -> dict[str, SceneNumber]:
 
 
 def list_entries(scene: Scene) -> dict[str, SceneNumber]:
-    """List the numbers of a scene that a study varies, lengths first, by key; what is commanded is not among them."""
+    """List the numbers of a scene that a study varies, by key, lengths first.
+
+    What is commanded is not among them.
+    """
     of_ground = _list_numbers(FourBar, "lengths", ("linkage",))
     bars = {
         BAR_NAMES[bar]: _list_bar(scene.linkage.bar(bar), bar) for bar in MOVING_BARS
@@ -225,7 +239,10 @@ def is_left_out(scene: Scene, entry: SceneNumber) -> bool:
 
 
 def find_misfit(scene: Scene, entry: SceneNumber, tolerance: Tolerance) -> str | None:
-    """Say why a number of a scene cannot have a tolerance, as a file and its samples need it; None: it can."""
+    """Say why a number of a scene cannot have a tolerance; None: it can.
+
+    Its file and its samples need one.
+    """
     if is_left_out(scene, entry):
         return LEFT_OUT
     number = read_place(scene, entry.place)
@@ -255,7 +272,10 @@ def read_place(value: Any, place: Place) -> Any:
 
 
 def read_numbers(scene: Scene) -> dict[str, Any]:
-    """Return the numbers that the scene states, by key: all but what it leaves to a uniform bar."""
+    """Read the numbers that the scene states, by key.
+
+    What it leaves to a uniform bar is left out.
+    """
     return {
         key: read_place(scene, entry.place)
         for key, entry in list_entries(scene).items()

@@ -1,4 +1,7 @@
-"""Positions at which a named angle, the stroke or the time of a scene's motion has a value."""
+"""Positions at which a named quantity of a scene's motion has a value.
+
+The quantity is an angle, the stroke or the time.
+"""
 
 import math
 from collections.abc import Callable
@@ -34,9 +37,9 @@ def find_positions(scene: Scene, wanted: list[tuple[str, float]]) -> Command:
 
     Parameters
     ----------
-    wanted : names among `PLACES` and values, rad, m or s. Each gives the positions of the scene's
-        assembly that have it, of a motion over time those that it passes, of a released one the
-        first.
+    wanted : names among `PLACES` and values, rad, m or s. Each gives the positions of
+        the scene's assembly that have it, of a motion over time those that it passes,
+        of a released one the first.
 
     Raises
     ------
@@ -75,7 +78,10 @@ def _find_places(scene: Scene, name: str, value: float) -> list[float]:
 
 
 def _require_assembled(scene: Scene, name: str, value: float) -> None:
-    """Raise NotAssembledError with the range where the linkage does not assemble at a commanded place."""
+    """Raise NotAssembledError where the linkage does not assemble.
+
+    The error states the range of the commanded quantity.
+    """
     at = command_at(scene, np.array([value]))  # which refuses a stroke out of range
     if solve(scene, "position", at=at).assembled[0]:
         return
@@ -91,7 +97,10 @@ def _require_assembled(scene: Scene, name: str, value: float) -> None:
 
 
 def _list_candidates(scene: Scene, name: str, value: float) -> list[float]:
-    """List what is commanded where a named quantity has a value, of both assemblies and a second turn."""
+    """List what is commanded where a named quantity has a value.
+
+    Both assemblies and a second turn are searched.
+    """
     commanded = scene.motion.commanded
     candidates: list[float] = []
     for branch in (1, -1):

@@ -72,21 +72,25 @@ def coupler_curve(
     branch: int | None = None,
     steps: int = 360,
 ) -> CouplerCurve:
-    """Trace the closed coupler curve of one circuit, run smoothly through limits and change points.
+    """Trace the closed coupler curve of one circuit.
 
-    Where the input turns fully theta_2 is spaced evenly, over two turns if one turn ends on the
-    other branch; else it goes from limit to limit on one branch and back on the other, spaced by
-    the cosine, so that the curve's points do not thin out at the limits.
+    It runs smoothly through limits and change points. Where the input turns fully
+    theta_2 is spaced evenly, over two turns if one turn ends on the other branch; else
+    it goes from limit to limit on one branch and back on the other, spaced by the
+    cosine, so that the curve's points do not thin out at the limits.
 
     Parameters
     ----------
-    of : a linkage; or a scene or a solution, which state the circuit by their first position.
-    r_along, r_across : the point in the coupler's frame at A, m; of a scene or a solution the name
-        of one of its points of the coupler will do.
+    of : a linkage; or a scene or a solution, which state the circuit by their first
+        position.
+    r_along, r_across : the point in the coupler's frame at A, m; of a scene or a
+        solution the name of one of its points of the coupler will do.
     circuit : index into `circuits`; left out: 0, or that of the scene.
-    branch : where to start, for a linkage with change points; left out: open, or that of the scene.
-    steps : number of intervals, a multiple of 4 (InputError otherwise): limits and change points,
-        at which directions are undetermined or lose digits, then fall between positions.
+    branch : where to start, for a linkage with change points; left out: open, or that
+        of the scene.
+    steps : number of intervals, a multiple of 4 (InputError otherwise): limits and
+        change points, at which directions are undetermined or lose digits, then fall
+        between positions.
     """
     expect("of", of, FourBar, Scene, Solution)
     if isinstance(of, Solution):
@@ -118,7 +122,10 @@ def coupler_curve(
 
 
 def _find_in_coupler(scene: Scene, name: str) -> tuple[float, float]:
-    """Return a point of the coupler, along and across at A, m; InputError for another name."""
+    """Return a point of the coupler, along and across at A, m.
+
+    Raises InputError for another name.
+    """
     points = scene.settled().points
     of_coupler = {point.name: point for point in points if point.bar == 3}
     if name not in of_coupler:

@@ -1,4 +1,6 @@
-"""Numbers that carry their slopes: the formulas as they stand, evaluated with these, give both.
+"""Numbers that carry their slopes.
+
+The formulas as they stand, evaluated with these, give both.
 
     z = f(x, y):   dz = f_x dx + f_y dy
 
@@ -76,7 +78,10 @@ class Sloped(NDArrayOperatorsMixin):
         return Sloped(self.values.conjugate(), self.slopes.conjugate())
 
     def _is_constant(self, constant: Any) -> Any:
-        """Mark where the value is that of a constant and no slope differs from its own, (n,)."""
+        """Mark where the value is that of a constant, (n,).
+
+        No slope differs from that of the constant either.
+        """
         gap = self - constant
         return (gap.values == 0.0) & (gap.slopes == 0.0).all(axis=0)
 

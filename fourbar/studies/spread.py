@@ -1,4 +1,7 @@
-"""Spread of a scene's quantities due to its tolerances: from samples, and to first order from the sensitivities."""
+"""Spread of a scene's quantities due to its tolerances.
+
+It follows from samples, and to first order from the sensitivities.
+"""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
@@ -39,11 +42,14 @@ BAND = (1.0, 99.0)
 AT_ONCE = 200_000
 """Members times positions: about 40 quantities of them are 70 MB."""
 PARTED = 0.1
-"""First order and samples part where their standard deviations differ by more than this share of the larger: the
-quantity is no longer straight over the tolerances, and a share of a variance is that of a straight one.
+"""First order and samples part where their standard deviations differ by more than this
+share of the larger: the quantity is no longer straight over the tolerances, and a share
+of a variance is that of a straight one.
 """
 NEGLIGIBLE = 1e-9
-"""A deviation below this share of the quantity's largest value is rounding and decides nothing."""
+"""Share of the quantity's largest value below which a deviation is rounding. It decides
+nothing then.
+"""
 
 
 class Spread(NamedTuple):
@@ -69,7 +75,10 @@ class Spread(NamedTuple):
 
     @property
     def parted(self) -> NDArray[np.bool_]:
-        """Mark where first order and samples differ by more than `PARTED`, or only samples have a value."""
+        """Mark where first order and samples differ by more than `PARTED`.
+
+        It marks also where only samples have a value.
+        """
         larger = np.fmax(self.deviation, self.first_order)
         size = np.nanmax(np.abs(self.nominal), initial=0.0)
         differ = ~(
@@ -89,16 +98,21 @@ class Tolerances:
     theta_2: Array
     """(n,), rad."""
     spreads: dict[str, Spread]
-    """Spreads by quantity; vectors as components F12_x, F12_y, pin forces also as magnitude |F12|."""
+    """Spreads by quantity. Vectors are components F12_x, F12_y; pin forces are also
+    magnitudes |F12|.
+    """
     without: NDArray[np.intp]
     """Members without a value of everything at each position, (n,)."""
     apart: int
-    """Members that do not assemble at one position or more at which the nominal linkage does."""
+    """Members that fail to assemble at a position. The nominal linkage assembles there.
+    """
     invalid: int
     """Members with a number that no scene takes (a length below zero)."""
 
     def to_pandas(self) -> "DataFrame":
-        """Make a table, a row for each quantity and position, SI and rad; shares of the variance as "share of KEY".
+        """Make a table, a row for each quantity and position, in SI units and rad.
+
+        Shares of the variance are named "share of KEY".
 
         Raises DependencyError where pandas is not installed.
         """
@@ -125,7 +139,10 @@ class Tolerances:
         )
 
     def _list_rows(self) -> list[tuple[str, str, str, str]]:
-        """List for each quantity its nominal values, and the largest standard deviation and worst case."""
+        """List each quantity's nominal values, largest deviation and worst case.
+
+        The deviation is the standard one.
+        """
         shown = [name for name in ("torque", "theta_3", "theta_4", *(f"|{name}|" for name in PIN_FORCES))
                  if name in self.spreads]  # fmt: skip
         rows = []
@@ -163,10 +180,12 @@ def tolerances(
     *,
     progress: Callable[[float], None] | None = None,
 ) -> Tolerances:
-    """Compute the spread of every quantity at each position, from quasi-random samples of the toleranced numbers.
+    """Compute the spread of every quantity at each position.
 
-    With the samples come first-order figures, from s_i = d(quantity)/d(number i): the worst case sum |s_i| t_i and
-    the shares (s_i sigma_i)^2 of the variance.
+    It is from quasi-random samples of the toleranced numbers.
+
+    With the samples come first-order figures, from s_i = d(quantity)/d(number i): the
+    worst case sum |s_i| t_i and the shares (s_i sigma_i)^2 of the variance.
 
     Parameters
     ----------
@@ -176,10 +195,12 @@ def tolerances(
 
     Raises
     ------
-    InputError : no tolerances, a key that the scene does not have, a number that it leaves out, a free motion.
+    InputError : no tolerances, a key that the scene does not have, a number that it
+        leaves out, a free motion.
     DependencyError : SciPy is not installed.
 
-    Source: I. M. Sobol', USSR Comput. Math. Math. Phys. 7 (1967) 86; error propagation: JCGM 100:2008, 5.1.2.
+    Source: I. M. Sobol', USSR Comput. Math. Math. Phys. 7 (1967) 86; error propagation:
+    JCGM 100:2008, 5.1.2.
     """
     expect("scene", scene, Scene)
     if (
@@ -282,7 +303,10 @@ def _make_members(scene: Scene, samples: int, seed: int | np.random.Generator) -
 def _list_blocks(
     study: Study, scene: Scene, samples: int, closes: NDArray[np.bool_]
 ) -> Iterator[tuple[slice, NDArray[np.intp]]]:
-    """List blocks of positions with their indices; the start of the motion comes first if an effect counts from it."""
+    """List blocks of positions with their indices.
+
+    The start of the motion comes first if an effect counts from it.
+    """
     n, first = study.at.angle.shape[1], int(np.argmax(closes))
     begins = [first] if scene.counts_turns else []
     size = max(1, AT_ONCE // samples)
@@ -292,7 +316,10 @@ def _list_blocks(
 
 
 def _compute_first_order(slopes_of: Sensitivity, part: str) -> Spread:
-    """Compute the nominal and the first-order figures of a part of a quantity; the samples' are still to come."""
+    """Compute the nominal and the first-order figures of a part of a quantity.
+
+    Those of the samples are still to come.
+    """
     scene, nominal = slopes_of.scene, slopes_of.value(part)
     slopes = np.array(
         [slopes_of.of(part, tolerance.key) for tolerance in scene.tolerances]
@@ -318,7 +345,10 @@ def _compute_first_order(slopes_of: Sensitivity, part: str) -> Spread:
 
 
 def _fill(spread: Spread, columns: slice, sampled: Array) -> None:
-    """Fill in the samples' figures at some positions; where not all members have a value, those of the others."""
+    """Fill in the samples' figures at some positions.
+
+    If not all members have a value, they are those of the others.
+    """
     if np.isfinite(sampled).all():
         # standard deviation of differences: a mean of equal numbers is rounded
         spread.deviation[columns] = (

@@ -1,4 +1,4 @@
-"""A scene with arrays in the place of some of its numbers: one linkage for each entry."""
+"""A scene with arrays in place of some numbers: one linkage for each entry."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -34,7 +34,9 @@ LENGTHS = tuple(
     for name in ("ground", "input", "coupler", "output", "ground_angle")
 )
 NEAR_A_CHANGE_POINT = 1e-12
-"""Relative to the sum of the lengths, squared: who is not so near has no change point, whatever rounding does."""
+"""Least miss of a change point that rounding cannot remove. It is relative to the sum
+of the lengths, squared.
+"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,11 +46,15 @@ class Study:
     scene: Scene
     """Scene with the numbers that do not vary."""
     values: dict[str, Array]
-    """Varied numbers by key, lengths first, (m,); NaN in a member that a scene would refuse."""
+    """Varied numbers by key, lengths first, (m,). They are NaN in a member that a scene
+    would refuse.
+    """
     invalid: NDArray[np.bool_]
     """The members that a scene would refuse, (m,)."""
     at: Command
-    """Commanded angle and branch (m, n), its speed and acceleration those of the scene, or (m, 1)."""
+    """Commanded angle and branch (m, n), with speed and acceleration. The latter are
+    those of the scene, or (m, 1).
+    """
 
     def __len__(self) -> int:
         return len(self.invalid)
@@ -67,7 +73,10 @@ class Study:
         out: Mapping[str, Array] | None = None,
         side: int = 0,
     ) -> Solution:
-        """Evaluate every member; parameters and errors as of `fourbar.solve`, shapes (m, n) and (m, n, 2)."""
+        """Evaluate every member, in shapes (m, n) and (m, n, 2).
+
+        Parameters and errors are those of `fourbar.solve`.
+        """
         commanded = self.at
         request = find_requested(self.scene, commanded, stage, out)
         results, evaluated = Results(request), None
@@ -96,7 +105,9 @@ class Study:
         return replace_numbers(self.scene, columns)
 
     def members(self, rows: slice, count: int, begins: Scene) -> Scene:
-        """Make the scene of some members whose numbers are arrays, each repeated for `count` positions.
+        """Make the scene of some members, whose numbers are arrays.
+
+        `count`: positions for which each is repeated.
 
         `begins`: the scene with effects that know where the motion begins.
         """
@@ -113,7 +124,10 @@ class Study:
         return scene
 
     def begin(self, rows: slice) -> Scene:
-        """Make the scene with effects that begin where each member's motion does: where it first assembles."""
+        """Make the scene with effects that begin where each member's motion does.
+
+        A motion begins where the member first assembles.
+        """
         scene, commanded = self.scene, self.at
         if not scene.counts_turns:
             return scene
@@ -138,7 +152,10 @@ class Study:
         return scene
 
     def refuse(self, results: Results) -> None:
-        """Mark the members that a scene would refuse, and the strokes that a cylinder cannot have."""
+        """Mark the members that a scene would refuse.
+
+        Strokes that a cylinder cannot have are marked too.
+        """
         results.codes[np.isnan(self.at.angle)] = NOT_ASSEMBLED
         results.codes[self.invalid] = INVALID
         for array in results.arrays.values():
@@ -160,7 +177,10 @@ def take_members(commanded: Command, rows: slice, columns: slice) -> Command:
 
 
 def _find_turns(effects: Iterable[Effect]) -> dict[int, Any]:
-    """Find the whole turns of each pin for the effects that depend on where the motion begins, by their index."""
+    """Find the whole turns of each pin by the index of the effect.
+
+    They are for effects that depend on where the motion begins.
+    """
     turns_of = {
         index: getattr(effect, "turns", None) for index, effect in enumerate(effects)
     }
@@ -172,21 +192,25 @@ def _repeat(values: Array, count: int) -> Array:
 
 
 def vary(scene: Scene, values: Mapping[str, Any]) -> Study:
-    """Make m linkages from one scene, for `solve`: some of its numbers as arrays, one entry for each member.
+    """Make m linkages from one scene, for `solve`.
+
+    Some of its numbers are arrays, one entry for each member.
 
     Parameters
     ----------
-    values : arrays of one length m, or single numbers, SI and rad or texts like "48 cm", by keys as in the
-        scene file: lists by index ("loads.0.moment"), pairs likewise ("bars.coupler.centre.0"). "motion.theta_2" (or
-        theta_3, theta_4, stroke, where that is commanded) is (n,), for all members, or (m, n); a scene that states none
-        needs it. What the scene leaves out (the inertia of a uniform bar, its centre at mid-bar) follows the length of
-        each member.
+    values : arrays of one length m, or single numbers, SI and rad or texts like
+        "48 cm", by keys as in the scene file: lists by index ("loads.0.moment"), pairs
+        likewise ("bars.coupler.centre.0"). "motion.theta_2" (or theta_3, theta_4,
+        stroke, where that is commanded) is (n,), for all members, or (m, n); a scene
+        that states none needs it. What the scene leaves out (the inertia of a uniform
+        bar, its centre at mid-bar) follows the length of each member.
 
     Raises
     ------
-    InputError : a key that the scene does not have or that is no number, a value that is no array of numbers, shapes
-        that do not fit, a free motion. A member with numbers that a scene refuses has the status "invalid", one that
-        never closes "not_assembled".
+    InputError : a key that the scene does not have or that is no number, a value that
+        is no array of numbers, shapes that do not fit, a free motion. A member with
+        numbers that a scene refuses has the status "invalid", one that never closes
+        "not_assembled".
 
     >>> from fourbar import Motion, Scene, solve, uniform
     >>> scene = Scene(uniform(0.3, 0.1, 0.25, 0.22), Motion(1.0, 10.0))
@@ -243,7 +267,10 @@ def vary(scene: Scene, values: Mapping[str, Any]) -> Study:
 def _list_commands(
     scene: Scene, numbers: Mapping[str, Array], angles: Array, m: int
 ) -> Command:
-    """Return the command of each member, (m, n), from the angles or strokes and the numbers that vary."""
+    """Return the command of each member, (m, n).
+
+    It is from the angles or strokes and the numbers that vary.
+    """
     motion: Any = scene.motion if scene.motion.law is None else command(scene)
     angle = np.broadcast_to(angles, (m, angles.shape[1]))
     speed, acceleration = (

@@ -1,6 +1,7 @@
-"""Drawings of a scene in publication quality: linkage, curves over theta_2, forces, free bodies.
+"""Drawings of a scene in publication quality.
 
-Needs matplotlib (the extra ``plot``), which is loaded when something is drawn.
+These are linkage, curves over theta_2, forces and free bodies. Needs matplotlib (the
+extra ``plot``), which is loaded when something is drawn.
 """
 
 from fourbar.show.plot.figures import BRANCHES as BRANCHES

@@ -1,4 +1,7 @@
-"""Curves over what is commanded or time: angles and rates, points, torque, energy, transmission angle; hodographs."""
+"""Curves over what is commanded or over time, and hodographs.
+
+They show angles and rates, points, torque, energy and transmission angle.
+"""
 
 import math
 import re
@@ -56,7 +59,9 @@ POLE_REASON = {2: "bars 3 and 4 collinear", 3: "ω₃ = 0", 4: "ω₄ = 0"}
 
 
 def draw_axes(axes: "Axes", view: View) -> Array:
-    """Draw the axis of the command or of time, positions that do not assemble shaded, the position drawn marked.
+    """Draw the axis of the command or of time.
+
+    Positions that do not assemble are shaded; the drawn position is marked.
 
     Returns what the curves are drawn over.
     """
@@ -93,7 +98,10 @@ def note(view: View, text: str) -> None:
 
 
 def find_poles(view: View) -> Indices:
-    """Find indices i such that the determinant of the drive changes sign between positions i and i + 1."""
+    """Find where the determinant of the drive changes sign.
+
+    Each index i stands for positions i and i + 1.
+    """
     s = view.sweep
     if view.scene.motion.free is not None:  # no drive, no pole
         return np.array([], dtype=np.intp)
@@ -113,14 +121,20 @@ def find_poles(view: View) -> Indices:
 
 
 def break_at_poles(values: Array, poles: Indices) -> Array:
-    """Copy a curve's values with NaN at the positions next to a pole, so that no line crosses it."""
+    """Copy a curve's values with NaN at the positions next to a pole.
+
+    No line then crosses the pole.
+    """
     out = np.array(values, dtype=float)
     out[~np.isfinite(out)] = np.nan
     return np.insert(out, poles + 1, np.nan)
 
 
 def choose_limit(values: list[Array]) -> float | None:
-    """Choose the end of a clipped axis, or None where no value stands far outside the rest."""
+    """Choose the end of a clipped axis.
+
+    It is None if no value stands far outside the rest.
+    """
     size = np.concatenate([np.abs(value[np.isfinite(value)]) for value in values])
     if size.size == 0:
         return None
@@ -207,7 +221,10 @@ def draw_angles(axes: "Axes", view: View) -> None:
 def _draw_rates(
     axes: "Axes", view: View, letter: str, unit: str, title: str, what: str
 ) -> None:
-    """Draw the rates of the commanded bar (where they are not zero) and of the other two bars."""
+    """Draw the rates of the commanded bar and of the other two bars.
+
+    Those of the commanded bar are left out if they are zero.
+    """
     over, driven = draw_axes(axes, view), view.sweep.at.bar
     name = {"omega": "ω", "alpha": "α"}[letter]
     digits, others = (
@@ -440,13 +457,18 @@ def draw_energy(axes: "Axes", view: View) -> None:
 
 
 RECOMMENDED = 40.0
-"""Smallest transmission angle that is usually recommended, deg (R. L. Norton, Design of Machinery)."""
+"""Smallest transmission angle that is usually recommended, deg. R. L. Norton, Design of
+Machinery.
+"""
 REMARK = 0.34
 """Part that a remark takes along an axis, as a part of its length."""
 
 
 def draw_transmission(axes: "Axes", view: View) -> None:
-    """Draw the acute angle between coupler and output, with limit and dead-centre positions."""
+    """Draw the acute angle between coupler and output.
+
+    Limit and dead-centre positions are marked.
+    """
     over = draw_axes(axes, view)
     sweep = view.sweep
     mu = np.degrees(
@@ -483,7 +505,10 @@ def draw_transmission(axes: "Axes", view: View) -> None:
 
 
 def find_free_place(mu: Array) -> float:
-    """Find the place along the axis, as a part of its length, where the curve is furthest from a remark at 40 deg."""
+    """Find the place along the axis where the curve is furthest from a remark.
+
+    It is a part of the axis's length; the remark stands at 40 deg.
+    """
     half = REMARK / 2.0
     best, clearance = 1.0 - half, -1.0
     for place in np.linspace(1.0 - half, half, 25):
@@ -499,7 +524,10 @@ def find_free_place(mu: Array) -> float:
 
 
 def _list_marked(view: View) -> list[tuple[list[float], list[float], str, str]]:
-    """List limits of the commanded bar and dead centres, on the axis: places, mu (degrees), mark, name."""
+    """List limits of the commanded bar and dead centres, on the axis.
+
+    Each is place, mu (degrees), mark and name.
+    """
     if view.time is not None:
         return []
     positions, marked = view.sweep.at, list[tuple[list[float], list[float], str, str]]()
@@ -560,7 +588,10 @@ LONG_NUMBERS = 2000.0
 
 
 def draw_hodograph(axes: "PolarAxes", view: View, name: str) -> None:
-    """Draw the tips of a force's vectors from one origin; open dot: start of the sweep, dots every 60 deg."""
+    """Draw the tips of a force's vectors from one origin.
+
+    An open dot is the start of the sweep; dots stand every 60 deg.
+    """
     from matplotlib.ticker import MaxNLocator
 
     force, look = getattr(view.sweep, name), choose_force_line(name)
@@ -624,7 +655,10 @@ def draw_hodograph(axes: "PolarAxes", view: View, name: str) -> None:
 
 
 def _choose_spacing(view: View) -> tuple[float, str]:
-    """Choose the distance of the dots along the axis, in its unit, and say it in words."""
+    """Choose the distance of the dots along the axis, and say it in words.
+
+    It is in the axis's unit.
+    """
     axis = view.axis
     if axis.unit == "°":
         return EVERY, f"{EVERY:g}° of {axis.symbol}"

@@ -1,4 +1,7 @@
-"""Curves of what follows from a solution: shaking force and moment, ratios, paths of instant centres."""
+"""Curves of what follows from a solution.
+
+These are shaking force and moment, ratios, and paths of instant centres.
+"""
 
 from typing import TYPE_CHECKING
 
@@ -101,7 +104,10 @@ def draw_advantage(axes: "Axes", view: View) -> None:
 
 
 def _draw_ratios(axes: "Axes", view: View, names: dict[int, str]) -> None:
-    """Draw ratios by the bars whose colours they have; beyond a pole no line goes on."""
+    """Draw ratios by the bars whose colours they have.
+
+    No line goes on beyond a pole.
+    """
     over = draw_axes(axes, view)
     everywhere = [
         values for name in names.values() for values in _list_values(view, name)

@@ -154,7 +154,7 @@ FIGURES: dict[str, tuple[Painter, tuple[float, float], bool]] = {
     "bars": (freebody.draw_internal_forces, (9.6, 6.2), True),
     "sensitivity": (studies.draw_influences, (9.6, 3.6), True),
 }
-"""Each figure: its painter, the size of one branch in inches, and whether it needs omega_2."""
+"""Painter of each figure, size of one branch in inches, and need of omega_2."""
 TAKERS = {
     "position": tuple(
         name for name in FIGURES if name not in ("hodograph", "bars", "sensitivity")
@@ -167,7 +167,7 @@ TAKERS = {
 def _choose_painter(
     scene: Scene, figure: str, branches: str
 ) -> tuple[Painter, tuple[float, float]]:
-    """Choose the painter and the size of a figure, where the scene has what it shows."""
+    """Choose the painter and the size of a figure that the scene can show."""
     for key, value, allowed in (
         ("figure", figure, tuple(FIGURES)),
         ("branches", branches, BRANCHES),
@@ -208,7 +208,10 @@ def draw_figure(
     units: Conversion = SI,
     dimensions: bool = False,
 ) -> Drawing:
-    """Draw a figure of a scene for a notebook: `Scene.plot`, which says the parameters."""
+    """Draw a figure of a scene for a notebook.
+
+    `Scene.plot` describes the parameters.
+    """
     painter, size = _choose_painter(scene, figure, branches)
     require_units(units)
     for key, value in (("position", position), ("dimensions", dimensions or None)):
@@ -236,7 +239,10 @@ def draw_figure(
 
 
 def _look_between(shown: View) -> None:
-    """Add what stands between the positions of the sweep: jumps are drawn where they are, peaks to their height."""
+    """Add what lies between the positions of the sweep.
+
+    Jumps are drawn where they are, peaks to their height.
+    """
     between = locate_between(shown.scene, shown.sweep)
     shown.sweep = between.solution
     if between.reversals:
@@ -254,7 +260,10 @@ def _look_between(shown: View) -> None:
 def draw(
     scene: Scene, path: str | Path, figure: str = "overview", **options: Any
 ) -> None:
-    """Draw a figure of a scene, as `draw_figure` does, into a file; the same scene gives the same bytes."""
+    """Draw a figure of a scene, as `draw_figure` does, into a file.
+
+    The same scene gives the same bytes.
+    """
     format_of(path)
     draw_figure(scene, figure, **options).save(path)
 
@@ -285,7 +294,10 @@ def _compose(
 
 
 def _share_limits(columns: "list[list[Axes]]") -> None:
-    """Give the same panel of every branch the same limits; polar panels and free bodies share theirs already."""
+    """Give the same panel of every branch the same limits.
+
+    Polar panels and free bodies share theirs already.
+    """
     for panels in zip(*columns, strict=True):
         if len(panels) == 1 or panels[0].name == "polar" or not panels[0].axison:
             continue

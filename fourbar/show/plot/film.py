@@ -64,7 +64,9 @@ def write_film(
     *,
     moving: bool = False,
 ) -> None:
-    """Film one sweep; where the input does not turn fully, there and back. A motion through time is shown as it is.
+    """Film one sweep, there and back if the input does not turn fully.
+
+    A motion through time is shown as it is.
 
     Raises DependencyError where matplotlib or, for MP4, ffmpeg with its H.264 encoder
     is missing.
@@ -122,7 +124,10 @@ def write_film(
 
 
 def choose_frames(shown: View, count: int) -> list[int]:
-    """Choose the positions shown one after the other, by index: the segment that assembles around the one drawn."""
+    """Choose the positions shown one after the other, by index.
+
+    They are the segment that assembles around the drawn position.
+    """
     closes, positions = shown.sweep.assembled, shown.sweep.at
     here = int(np.argmin(np.abs(positions.places - shown.here.at.places[0])))
     gaps = np.flatnonzero(~closes)

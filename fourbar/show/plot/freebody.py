@@ -48,12 +48,17 @@ FINE = 401
 """Stations along a bar."""
 NOWHERE = "they have a value at none of the positions"
 SHOWN = 0.02
-"""Forces below this share of the largest would be shorter than their head: named in the caption only."""
+"""Share of the largest force below which a force is named in the caption only. Its
+arrow would be shorter than its head.
+"""
 
 
 @dataclass(slots=True)
 class Arrow:
-    """A force on a bar: where it acts (from the bar's first pin, world axes, m) and its vector, N."""
+    """A force on a bar: its point and its vector, N.
+
+    The point is from the bar's first pin in world axes, m.
+    """
 
     text: str
     at: complex
@@ -71,7 +76,10 @@ class Couple:
 
 
 def list_actions(view: View, bar: int) -> tuple[list[Arrow], list[Couple]]:
-    """List every force and couple on a bar at the position drawn, d'Alembert's included: together they vanish."""
+    """List every force and couple on a bar at the drawn position.
+
+    With d'Alembert's they add up to zero.
+    """
     pins, turned = (
         place_of(view.scene.linkage, view.here, 0, 1.0).pins,
         view.state().direction(bar),
@@ -117,7 +125,7 @@ def list_actions(view: View, bar: int) -> tuple[list[Arrow], list[Couple]]:
 
 
 class Recorder(Actions):
-    """Forces and couples that are kept one by one, under the name of what exerts them."""
+    """Forces and couples, kept one by one under the name of their source."""
 
     name = ""
 
@@ -129,14 +137,20 @@ class Recorder(Actions):
     def force(
         self, bar: int, force: Number, point: Number = 0.0j, beyond: Number = None
     ) -> None:
-        """Add a force on a bar, applied at a point of its frame, or `beyond` it in world axes."""
+        """Add a force on a bar, at a point of its frame.
+
+        `beyond`: arm from there in world axes.
+        """
         arm = point * self.state.direction(bar) + (0.0j if beyond is None else beyond)
         self.arrows[bar].append(
             Arrow(self.name.replace("#", str(bar)), take_one(arm), take_one(force), INK)
         )
 
     def pull(self, start: Any, end: Any, force: Number) -> None:
-        """Add both forces, between neighbours too: a freed bar shows each where it acts."""
+        """Add both forces, between neighbours too.
+
+        A freed bar shows each where it acts.
+        """
         self.pull_ends(start, end, force)
 
     def couple(self, bar: int, moment: Number) -> None:
@@ -146,7 +160,10 @@ class Recorder(Actions):
         )
 
     def pin_couple(self, pin: str, couple: Number) -> None:
-        """Add a couple on the second of the two bars that meet at a pin, and its opposite on the first."""
+        """Add a couple on the second of the two bars at a pin.
+
+        Its opposite acts on the first bar.
+        """
         first, second = PINS[pin]
         self.couple(second, couple)
         self.couple(first, -couple)
@@ -179,7 +196,10 @@ def _record_actions(view: View) -> Recorder:
 
 
 def draw_free_bodies(figure: "SubFigure", view: View, labels: Labels) -> None:
-    """Draw the three bars, each freed from its pins, with arrows to one scale, over the couples."""
+    """Draw the three bars, each freed from its pins, over the couples.
+
+    All arrows have one scale.
+    """
     if not np.isfinite(view.here.F12).all():  # type: ignore[arg-type]
         reason = (
             f"needs forces, which have no value at {where_in_words(view.here)}:"
@@ -218,7 +238,10 @@ def draw_free_bodies(figure: "SubFigure", view: View, labels: Labels) -> None:
 
 
 def draw_internal_forces(figure: "SubFigure", view: View, labels: Labels) -> None:
-    """Draw N, V and M along each bar at the position where its bending moment is largest."""
+    """Draw N, V and M along each bar.
+
+    The position is that of the bar's largest bending moment.
+    """
     panels = figure.subplots(3, 3, sharex="col")
     bending = locate_bending(view.scene, locate_between(view.scene, view.sweep))
     if not bending:

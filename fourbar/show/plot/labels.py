@@ -1,4 +1,4 @@
-"""Labels next to points, where they cover neither each other nor a line of the drawing."""
+"""Labels next to points, where they cover neither each other nor a line."""
 
 import math
 from dataclasses import dataclass, field
@@ -20,7 +20,9 @@ REACH = (7.0, 11.0, 16.0, 23.0, 32.0, 44.0)
 """Distances from the point to the label's edge that are tried, typographic points."""
 DIRECTIONS = 16
 LED = 15.0
-"""A label further away than this is led to its point by a thin line, typographic points."""
+"""Distance from which a label is led to its point by a thin line, points. The points
+are typographic.
+"""
 
 
 @dataclass(slots=True)
@@ -39,7 +41,10 @@ class Label:
 
 @dataclass(slots=True)
 class Labels:
-    """The labels of one figure and the lines and marks (data coordinates) they must keep off."""
+    """The labels of one figure, and the lines and marks that they must keep off.
+
+    The marks are in data coordinates.
+    """
 
     wanted: list[Label] = field(default_factory=list)
     lines: list[tuple["Axes", list[Point], float]] = field(default_factory=list)
@@ -57,7 +62,10 @@ class Labels:
         self.lines.append((axes, list(points), width))
 
     def beside(self) -> "list[Annotation]":
-        """Write every label at once, each outwards from its point: what moves is not searched a free spot for."""
+        """Write every label at once, each outwards from its point.
+
+        No free spot is searched for a film.
+        """
         written = []
         for label in self.wanted:
             dx, dy = (p - q for p, q in zip(label.at, label.shun, strict=True))
@@ -71,7 +79,10 @@ class Labels:
         return written
 
     def settle(self, figure: "Figure") -> None:
-        """Place every label once the layout is final: the first free spot, nearest first."""
+        """Place every label once the layout is final.
+
+        Each takes its nearest free spot.
+        """
         from matplotlib.axes import Axes
         from matplotlib.backends.backend_agg import FigureCanvasAgg
 
@@ -159,7 +170,10 @@ RING = np.array(
 
 
 def _sample_line(points: np.ndarray, per_point: float) -> np.ndarray:
-    """Sample points along a polyline, or around a mark: a line that ends where it begins."""
+    """Sample points along a polyline, or around a mark.
+
+    A mark is a line that ends where it begins.
+    """
     pieces, step = [], STEP * per_point
     for p, q in pairwise(points):
         if not (np.all(np.isfinite(p)) and np.all(np.isfinite(q))):
@@ -181,7 +195,10 @@ def _choose_spot(
     mark: float,
     inside: Box,
 ) -> Point:
-    """Choose the centre of the label: the candidate that covers least, the nearest and most outward first."""
+    """Choose the centre of the label: the candidate that covers least.
+
+    Among equal ones the nearest and most outward is taken.
+    """
     best, best_cost, edge = point, math.inf, 0.5 * per_point * dots[:, 2]
     for reach in REACH:
         for k in range(DIRECTIONS):

@@ -1,4 +1,7 @@
-"""The linkage drawn to scale, alike for a plot and for a film, over the paths of its points; coupler curves."""
+"""The linkage drawn to scale over the paths of its points; coupler curves.
+
+Plots and films draw it alike.
+"""
 
 import math
 from collections.abc import Iterator
@@ -38,7 +41,7 @@ if TYPE_CHECKING:
 
 Point = tuple[float, float]
 ON_BAR = 1e-3
-"""Fraction of a bar's length: a point nearer than this to the bar's line looks as if it were on it."""
+"""Part of a bar's length below which a point seems to lie on the bar's line."""
 
 
 def _show_drawing_coordinates(axes: "Axes", view: View, factor: float) -> None:
@@ -68,7 +71,10 @@ def _show_drawing_coordinates(axes: "Axes", view: View, factor: float) -> None:
 
 
 def locate_pins(view: View, factor: float = 1.0) -> dict[str, Point]:
-    """Locate the pins at the position drawn, in the order O2, A, B, O4, m or what the factor makes of it."""
+    """Locate the pins at the drawn position, in the order O2, A, B, O4, m.
+
+    Or in the unit that the factor makes of it.
+    """
     place = place_of(view.scene.linkage, view.here, 0, factor)
     return {name: split_components(pin) for name, pin in place.pins.items()}
 
@@ -76,9 +82,10 @@ def locate_pins(view: View, factor: float = 1.0) -> dict[str, Point]:
 def draw_mechanism(
     axes: "Axes", view: View, solution: Solution, index: int, labels: Labels
 ) -> list[Any]:
-    """Draw bars, pins, mass centres, own points and what acts at a position of a solution; return what was drawn.
+    """Draw bars, pins, mass centres, points and what acts at a position.
 
-    Labels are asked for, each away from what it names; whoever calls places them.
+    Return what was drawn. Labels are asked for, each away from what it names; whoever
+    calls places them.
     """
     factor, _, size = scale_of(view)
     place = place_of(view.scene.linkage, solution, index, factor)
@@ -159,7 +166,10 @@ def draw_mechanism(
 
 
 def _list_carried(view: View, place: Pose) -> Iterator[tuple[int, complex]]:
-    """List what may lie off its bar: own points, mass centres, and where forces, moments and springs act."""
+    """List what may lie off its bar.
+
+    These are points, mass centres, and where forces, moments and springs act.
+    """
     for point in view.scene.settled().points:
         yield point.bar, place.point(point.bar, point.place.vector())
     for number in MOVING_BARS:
@@ -175,7 +185,10 @@ def _list_carried(view: View, place: Pose) -> Iterator[tuple[int, complex]]:
 def draw_plate(
     axes: "Axes", bar: int, corners: tuple[complex, complex, complex], labels: Labels
 ) -> list[Any]:
-    """Join a point to its bar, from pin to point to pin, as a plate; nothing where it lies on the bar."""
+    """Join a point to its bar, from pin to point to pin, as a plate.
+
+    A point on the bar has none.
+    """
     from matplotlib.colors import to_rgba
     from matplotlib.patches import Polygon
 
@@ -246,7 +259,10 @@ def write_bar_name(view: View, number: int) -> str:
 
 
 def scale_of(view: View) -> tuple[float, str, float]:
-    """Choose the factor to the unit of length, the same for both branches; that unit; the size of a support."""
+    """Choose the factor to the unit of length, that unit, and a support's size.
+
+    Both branches have the same.
+    """
     most = max(
         find_greatest(
             v.sweep.A, v.sweep.B, v.sweep.G3, *np.array(list(locate_pins(v).values()))
@@ -291,7 +307,10 @@ COUPLER_CURVES: tuple[tuple[str, Any], ...] = (
 def draw_linkage(
     axes: "Axes", view: View, labels: Labels, *, moving: bool = False
 ) -> None:
-    """Draw the linkage at the position drawn, over the paths of its points; with velocities where it is `moving`."""
+    """Draw the linkage at the drawn position, over the paths of its points.
+
+    `moving`: with velocities.
+    """
     factor, unit, size = scale_of(view)
     pins = locate_pins(view, factor)
     draw_paths(axes, view, labels)
@@ -322,7 +341,7 @@ def draw_linkage(
 
 
 def draw_paths(axes: "Axes", view: View, labels: Labels) -> None:
-    """Draw what does not move: the paths of points, the ground line and its supports."""
+    """Draw what does not move: paths of points, ground line and supports."""
     factor, _, size = scale_of(view)
     for path, colour, dashes, name in list_paths(view):
         scaled = factor * path
@@ -342,7 +361,10 @@ def draw_paths(axes: "Axes", view: View, labels: Labels) -> None:
 
 
 def write_path_legend(axes: "Axes") -> float:
-    """Write the legend of the paths above the drawing; return the distance of the title over it, typographic points."""
+    """Write the legend of the paths above the drawing.
+
+    Return the distance of the title over it, typographic points.
+    """
     legend = axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.005), ncols=3)
     pad = 6.0 + 12.0 * math.ceil(len(legend.get_texts()) / 3)
     axes.set_title(axes.get_title(loc="left"), pad=pad)
@@ -350,7 +372,11 @@ def write_path_legend(axes: "Axes") -> float:
 
 
 def list_paths(view: View) -> list[tuple[Array, str, Any, str]]:
-    """List paths of A, B, mass centres (or the coupler's mid-point) and own points: (n, 2) in m, colour, dash, name."""
+    """List paths of A, B, mass centres and the scene's points.
+
+    Each is (n, 2) in m, colour, dash, name; the coupler's mid-point stands for a mass
+    centre.
+    """
     traced = trace(view)
     sweep = traced.solution
     massive = view.scene.linkage.coupler.mass > 0.0
@@ -381,7 +407,10 @@ def list_paths(view: View) -> list[tuple[Array, str, Any, str]]:
 
 
 def draw_coupler_curves(axes: "Axes", view: View, labels: Labels) -> None:
-    """Draw the paths of the scene's points of the coupler; where it has none, of points along its line and off it."""
+    """Draw the paths of the scene's points of the coupler.
+
+    If it has none, they are of points along its line and off it.
+    """
     factor, unit, _ = scale_of(view)
     pins, names = (
         locate_pins(view, factor),

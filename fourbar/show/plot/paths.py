@@ -1,4 +1,7 @@
-"""Paths of points, traced by steps along the curve: near a small transmission angle a degree may be a long chord."""
+"""Paths of points, traced by steps along the curve.
+
+Near a small transmission angle a degree may be a long chord.
+"""
 
 from typing import NamedTuple
 
@@ -15,7 +18,9 @@ from fourbar.solving import solve
 STEPS = (1440, 7200, 36_000, 180_000)
 """Steps that are tried until no chord is long, each a multiple of 4."""
 CHORD = 1.0 / 150.0
-"""Longest chord of a path, as a part of its extent: no corner is seen in a printed figure."""
+"""Longest chord of a path, as a part of its extent. No corner is seen in a printed
+figure.
+"""
 
 
 class Trace(NamedTuple):
@@ -26,7 +31,10 @@ class Trace(NamedTuple):
     """True for the whole circuit, through both branches where the input has limits."""
 
     def path(self, points: Array) -> Array:
-        """Return the path of a point, (k, 2), m; its positions that stand closer than need be are left out."""
+        """Return the path of a point, (k, 2), m.
+
+        Positions that stand closer than needed are left out.
+        """
         shown = np.where(self.solution.assembled[:, None], points, np.nan)
         if self.circuit:
             shown = np.concatenate([shown, shown[:1]])
@@ -70,14 +78,20 @@ def _list_range(view: View, steps: int) -> Command:
 
 
 def _longest_chord(points: Array) -> float:
-    """Return the longest chord between positions that assemble, as a part of the path's extent."""
+    """Return the longest chord between positions that assemble.
+
+    It is a part of the path's extent.
+    """
     chords = np.hypot(*np.diff(points, axis=0).T)
     extent = float(np.nanmax(np.nanmax(points, axis=0) - np.nanmin(points, axis=0)))
     return float(np.nanmax(chords, initial=0.0)) / extent if extent else 0.0
 
 
 def _thin(path: Array) -> Array:
-    """Leave out positions that lie within half a chord of the one before; gaps and ends stay."""
+    """Leave out positions that lie within half a chord of the one before.
+
+    Gaps and ends stay.
+    """
     extent = float(np.nanmax(np.nanmax(path, axis=0) - np.nanmin(path, axis=0)))
     step = 0.5 * CHORD * extent
     gap = np.isnan(path).any(axis=1)

@@ -1,4 +1,7 @@
-"""Plots of studies: bands of tolerances for torque, pin forces and points, shares of the variance, sensitivities."""
+"""Plots of studies: tolerance bands, shares of the variance, sensitivities.
+
+Bands are drawn for torque, pin forces and points.
+"""
 
 import textwrap
 from pathlib import Path
@@ -35,12 +38,15 @@ if TYPE_CHECKING:
     from matplotlib.figure import SubFigure
 
 MOST_BANDS = 7
-"""Torque, four pin forces, and the two components of one point; the eighth is for the shares."""
+"""Torque, four pin forces, and the components of one point; the eighth is for shares.
+"""
 MOST_SHARES = 5
 """Tolerances that have a colour of their own; the others are drawn together."""
 SHADES = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", FAINT)
 OFF_SCALE = 98.0
-"""Percentile of the half widths beyond which an axis is not stretched: towards a limit they grow without end."""
+"""Percentile of the half widths beyond which an axis is not stretched. Towards a limit
+they grow without end.
+"""
 MOST_NUMBERS = 12
 """Number of the most influential parameters shown; a chart of more is unreadable."""
 BELOW = 30.0
@@ -52,7 +58,9 @@ MOST_PANELS = 6
 def draw_tolerances(
     spreads: Tolerances, path: str | Path, units: Conversion = SI
 ) -> None:
-    """Draw the deviations from the nominal with their bands into a file, whole or not at all.
+    """Draw the deviations from the nominal with their bands into a file.
+
+    The file is written atomically.
 
     Raises InputError for another ending than of svg, png, pdf, or a single position;
     DependencyError without matplotlib.

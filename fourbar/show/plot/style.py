@@ -1,4 +1,7 @@
-"""The look of the drawings, and how they reach a file: object interface of matplotlib, no global state left behind."""
+"""The look of the drawings, and how they reach a file.
+
+They use matplotlib's object interface and leave no global state behind.
+"""
 
 import io
 import math
@@ -86,7 +89,7 @@ FORMATS = ("svg", "png", "pdf")
 
 
 _ONE_AT_A_TIME = RLock()
-"""Lock of the threads that draw, because matplotlib's settings apply to the whole program."""
+"""Lock of the threads that draw. matplotlib's settings apply to the whole program."""
 
 
 @contextmanager
@@ -108,7 +111,10 @@ def apply_style() -> Iterator[None]:
 
 
 def format_of(path: str | Path, formats: tuple[str, ...] = FORMATS) -> str:
-    """Return the format that a file's ending names, the first for `-`; InputError where it is none of `formats`."""
+    """Return the format that a file's ending names, the first for `-`.
+
+    Raises InputError for one that is not among `formats`.
+    """
     expect("path", path, str, Path)
     if Path(path) == STANDARD_STREAM:
         return formats[0]
@@ -140,7 +146,10 @@ class Drawing:
         return self._render("svg").decode("utf-8")
 
     def save(self, path: str | Path) -> None:
-        """Write it as SVG, PNG or PDF, by the ending of the path, whole or not at all."""
+        """Save it as SVG, PNG or PDF, by the ending of the path.
+
+        The file is written atomically.
+        """
         file_format = format_of(path)
         write_bytes(Path(path), self._render(file_format))
 
@@ -182,7 +191,7 @@ def write_number(value: float) -> str:
 
 
 def write_quantity(value: float, unit: str, units: Conversion = SI) -> str:
-    """Write a quantity of an SI unit in the unit given, or with the prefix that suits it."""
+    """Write a quantity of an SI unit in a unit, or with the prefix that suits it."""
     factor, name = choose_unit(abs(value), unit, units)
     return f"{write_number(factor * value)} {name}"
 
@@ -198,7 +207,10 @@ def set_degree_ticks(axis: Any, span: float) -> None:
 
 
 def place_legend(axes: "Axes", columns: int = 4) -> None:
-    """Place the legend between title and panel, where it covers no curve; none where no curve has a value."""
+    """Place the legend between title and panel, where it covers no curve.
+
+    There is none if no curve has a value.
+    """
     if not axes.get_legend_handles_labels()[1]:
         return
     legend = axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.02), ncols=columns)

@@ -1,8 +1,9 @@
-"""Symbols of everything that acts in a scene: springs, loads, gravity, drive, flywheel, and effects in the pins.
+"""Symbols of everything that acts in a scene.
 
-Each symbol knows its bar and its points in that bar's frame: plot, film and page place
-it at any position. Here they are drawn with matplotlib, and so are arrows of velocity
-and acceleration at points.
+These are springs, loads, gravity, drive, flywheel, and effects in the pins. Each symbol
+knows its bar and its points in that bar's frame: plot, film and page place it at any
+position. Here they are drawn with matplotlib, and so are arrows of velocity and
+acceleration at points.
 """
 
 import cmath
@@ -51,7 +52,9 @@ COLOURS = {
     },
 }
 LENGTHS = {"force": 7.0, "moment": 2.6, "drive": 3.2, "flywheel": 4.0, "torsion": 2.2}
-"""Length of an arrow and radii, in sizes of a support; other rings around pins have RING."""
+"""Length of an arrow and radii, in sizes of a support. Other rings around pins have
+RING.
+"""
 RING = {"viscous": 1.5, "friction": 1.8, "pin_friction": 1.8}
 NAMED_AT = {
     "viscous": -0.4,
@@ -60,16 +63,24 @@ NAMED_AT = {
     "flywheel": -1.0,
     "torsion": 0.0,
 }
-"""Angle around its ring at which a name stands, rad, so that several at one pin do not meet."""
+"""Angle at which a name stands around its ring, rad. Several names at one pin do not
+meet.
+"""
 RING_OF_OTHERS, NAME_OF_OTHERS = 2.1, 1.4
 """Ring and name of what acts at pins and is not listed."""
 SMALLEST, SHARE = 0.5, 0.12
-"""A symbol at a pin is as large as this share of the shortest bar there lets it be, and no smaller than half."""
+"""Share of the shortest bar at a pin that a symbol there may take. It is no smaller
+than half its size.
+"""
 ARROWS = {"v": ("#0B6E99", "velocity"), "a": ("#B3261E", "acceleration")}
 LONGEST = 7.0
-"""Length of an arrow, in sizes of a support: the largest of the sweep, or if values diverge all that are as large."""
+"""Length of an arrow, in sizes of a support. The largest of the sweep has it; if values
+diverge, all that are as large.
+"""
 BARREL = 0.85
-"""Length of a cylinder's barrel as a fraction of the shortest stroke of the sweep; the rod is what comes out of it."""
+"""Length of a cylinder's barrel over the shortest stroke of the sweep. The rod is what
+comes out of it.
+"""
 COILS = 7
 OPENING = math.radians(250.0)
 """Extent of an arc with an arrow head."""
@@ -79,7 +90,9 @@ class Symbol(NamedTuple):
     """One thing that acts."""
 
     kind: str
-    """spring, force, moment, drive, cylinder, flywheel, gravity, or an effect in a pin: torsion, viscous, ..."""
+    """spring, force, moment, drive, cylinder, flywheel, gravity, or an effect in a pin.
+    These are torsion, viscous, ...
+    """
     name: str
     """Label of the symbol."""
     bar: int = 1
@@ -87,9 +100,12 @@ class Symbol(NamedTuple):
     at: complex = 0.0j
     """Point of action, from the bar's first pin in the bar's frame, m."""
     beyond: complex = 0.0j
-    """Vector from there to the point itself, m, in world axes: an arm that keeps its direction."""
+    """Vector from there to the point itself, m, in world axes. It is an arm that keeps
+    its direction.
+    """
     vector: complex = 0.0j
-    """Force (N) or field (m/s^2); in world axes, or in the bar's frame where `turns`."""
+    """Force (N) or field (m/s^2) in world axes. It is in the bar's frame where `turns`.
+    """
     turns: bool = False
     moment: float = 0.0
     """N m; of a drive and of what acts in a pin 0."""
@@ -202,7 +218,10 @@ class Pose(NamedTuple):
     """Length of what of a cylinder keeps its length."""
 
     def small(self, pin: str, size: float) -> float:
-        """Shrink the size of what stands around a pin where a bar there is short: it would hide the bar."""
+        """Shrink the size of what stands around a pin of a short bar.
+
+        It would hide the bar.
+        """
         ring = list(self.pins)  # in the order of the loop
         place = ring.index(pin)
         beside = [self.pins[ring[(place + step) % len(ring)]] for step in (-1, 1)]
@@ -362,7 +381,10 @@ def _turn(
     colour: str,
     drawn: DrawnSymbol,
 ) -> None:
-    """Draw an arc with a head, counter-clockwise where turn > 0; none where nothing turns."""
+    """Draw an arc with a head, counter-clockwise where turn > 0.
+
+    Nothing is drawn where nothing turns.
+    """
     if turn == 0.0:
         return
     angles = math.radians(-35.0) * turn + turn * np.linspace(0.0, OPENING, 40)
@@ -422,7 +444,9 @@ def _draw_gravity(axes: "Axes", symbol: Symbol, drawn: DrawnSymbol) -> None:
 def draw_vectors(
     axes: "Axes", view: View, solution: Solution, factor: float, size: float
 ) -> Callable[[int], None]:
-    """Draw the arrows of a solution's first position, each kind to one scale of the sweep.
+    """Draw the arrows of a solution's first position.
+
+    Each kind has one scale for the sweep.
 
     Returns the function that moves them to another position.
     """

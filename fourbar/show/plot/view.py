@@ -1,4 +1,7 @@
-"""Content of a drawing: the sweep of a scene on one branch, and one position of it in detail."""
+"""Content of a drawing: the sweep of a scene on one branch.
+
+One position of it is shown in detail.
+"""
 
 import math
 from dataclasses import dataclass, field, replace
@@ -17,9 +20,13 @@ from fourbar.solution import Array, Conversion, Solution
 from fourbar.solving import solve
 
 CLEAR = 0.3
-"""Motion and drive condition of the position drawn, where any has them: next to a pole forces dwarf all others."""
+"""Motion and drive condition that the drawn position should have. Next to a pole forces
+dwarf all others.
+"""
 LEAD = math.radians(60.0)
-"""The position drawn where none is named: so far into the longest stretch that assembles, or half of a shorter one."""
+"""Place of the drawn position in the longest stretch that assembles. In a shorter one
+it is the half.
+"""
 
 
 @dataclass(slots=True)
@@ -130,7 +137,10 @@ def where_in_words(solution: Solution) -> str:
 def collect_point_vectors(
     scene: Scene, solution: Solution, letter: str
 ) -> dict[str, Array]:
-    """Collect velocities ("v") or accelerations ("a") of A, B, mass centres of bars that have mass, and own points."""
+    """Collect velocities ("v") or accelerations ("a") of points.
+
+    They are A, B, mass centres of bars that have mass, and the scene's points.
+    """
     drawn = (
         "A",
         "B",
@@ -147,7 +157,10 @@ def is_over_time(scene: Scene) -> bool:
 
 
 def list_sweep(scene: Scene) -> Command:
-    """List the positions as what is commanded rises; a single one is put among those of the default range."""
+    """List the positions in ascending order of what is commanded.
+
+    A single one is put among those of the default range.
+    """
     stated = command(scene)
     if len(stated.angle) > 1:
         places = np.sort(stated.places, kind="stable")
@@ -167,7 +180,10 @@ def list_sweep(scene: Scene) -> Command:
 
 
 def find_drawn_place(scene: Scene) -> float | None:
-    """Return the commanded angle that is drawn, within the default range; None where another range is stated."""
+    """Return the commanded angle that is drawn, within the default range.
+
+    It is None if another range is stated.
+    """
     if scene.drawing is None or scene.motion.angle is not None:
         return None
     places = command(scene).places
@@ -177,7 +193,10 @@ def find_drawn_place(scene: Scene) -> float | None:
 
 
 def choose_common_position(scenes: "list[Scene]") -> float | None:
-    """Choose a position that shows each of several scenes over the same range; None where each has its own."""
+    """Choose a position that shows each of several scenes over the same range.
+
+    It is None if each has its own range.
+    """
     if (
         any(is_over_time(scene) for scene in scenes)
         or len(command(scenes[0]).angle) == 1
@@ -189,7 +208,10 @@ def choose_common_position(scenes: "list[Scene]") -> float | None:
 
 
 def describe_change_points(motion: Solution) -> str:
-    """Say when a free motion passed change points, at which it could have gone on otherwise."""
+    """Say when a free motion passed change points.
+
+    It could have gone on otherwise there.
+    """
     times = " and ".join(f"{time:.4g} s" for time in motion.change_points or ())
     return (
         f"At t = {times} all bars are in line, a change point: "
@@ -203,13 +225,13 @@ def set_branch(scene: Scene, branch: int) -> Scene:
 
 
 def make_view(scene: Scene, position: float | None = None) -> View:
-    """Evaluate the sweep of a scene, or its motion through time, and one position of it.
+    """Evaluate the sweep of a scene, or its motion, and one position of it.
 
     Parameters
     ----------
-    position : what is commanded where the linkage is drawn to scale, rad or m; left out: the scene's own where it
-        names one (the start of a motion through time), else 60 deg into the longest stretch that assembles, clear of
-        poles.
+    position : what is commanded where the linkage is drawn to scale, rad or m; left
+        out: the scene's own where it names one (the start of a motion through time),
+        else 60 deg into the longest stretch that assembles, clear of poles.
 
     Raises
     ------
@@ -244,7 +266,11 @@ def _require_assembled(sweep: Solution) -> None:
 
 
 def _view_motion(scene: Scene, position: float | None) -> View:
-    """Evaluate a motion; drawn is the instant that assembles first, or whose theta_2 comes nearest to the position."""
+    """Evaluate a motion.
+
+    The drawn instant is the first that assembles, or that whose theta_2 comes nearest
+    to the position.
+    """
     sweep = solve(scene)
     _require_assembled(sweep)
     angle, name = sweep.at.angle, sweep.commanded
@@ -265,7 +291,10 @@ def _view_motion(scene: Scene, position: float | None) -> View:
 
 
 def choose_position(sweeps: "list[Solution]") -> float:
-    """Choose a position, the same for all sweeps, that shows the bars apart; well conditioned where one is."""
+    """Choose a position that shows the bars apart, the same for all sweeps.
+
+    It is a well-conditioned one if there is any.
+    """
     ends = np.flatnonzero(
         np.diff(np.concatenate([[False], sweeps[0].assembled, [False]]).astype(int))
     ).reshape(-1, 2)
