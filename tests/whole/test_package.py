@@ -36,6 +36,7 @@ MODULE_OF = {
     "python-flint": "flint",
     "pin": "pinocchio",
     "imageio-ffmpeg": "imageio_ffmpeg",
+    "lazy-loader": "lazy_loader",
 }
 """Libraries that are imported under another name than they are installed by."""
 
