@@ -15,6 +15,7 @@ points, where a torque cancels, and for forces near a toggle, which a law in s^2
 excuse too much.
 """
 
+import cmath
 import math
 from collections.abc import Callable
 from functools import lru_cache
@@ -22,12 +23,14 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from fourbar.linkage import MOVING_BARS
-from fourbar.quantities import PIN_FORCES, VECTORS
+from fourbar.linkage import MOVING_BARS, FourBar
+from fourbar.quantities import PIN_FORCES, STAGE_OF, VECTORS
 from fourbar.scene import Command, Scene, with_signs
 from fourbar_validation.compare.tolerance import (
     EPS,
+    OF_THE_INPUT,
     ROUNDINGS,
+    TOUCHING_MARGIN,
     Array,
     Mask,
     mark_touching,
@@ -105,7 +108,8 @@ def predict_error(
     With `carried` the accelerations of the bars are differences of others as large as
     the fastest bar's at `reach`. NaN where the loop does not close. Infinite at a
     singular position, where the equations have no answer, and where rounding decides
-    whether the loop closes.
+    whether the loop closes; but there angles and places are bounded by how far the loop
+    opens, and what the input alone decides loses nothing.
     """
     n, (omega, alpha) = len(command.theta_2), list_speeds(command)
     command = with_signs(scene.linkage, command)
@@ -116,17 +120,25 @@ def predict_error(
         moved = _compute_sensitivity(
             scene, theta_2, branch, float(omega[i]), float(alpha[i])
         )
+        if quantity in OF_THE_INPUT:
+            if moved is not None and moved.states(quantity):
+                errors[i] = moved.first_order(quantity, reach, carried=carried)
+            continue
+        bound = math.inf
+        if touching[i]:
+            bound = _bound_touching(scene.linkage, theta_2, quantity)
         if moved is None:
             if touching[i]:
-                errors[i] = math.inf
+                errors[i] = bound
             continue
         lost = ROUNDINGS * EPS * moved.data["theta_4"] >= FIRST_ORDER * float(
             moved.data["condition"]
         )
-        if lost and not quantity.startswith("theta"):
+        if lost and STAGE_OF.get(quantity) != "position":
             errors[i] = math.inf
             continue
-        errors[i] = moved.first_order(quantity, reach, carried=carried)
+        first = moved.first_order(quantity, reach, carried=carried)
+        errors[i] = min(first, bound)
         if quantity == "torque":
             turned = max(moved.first_order(f"theta_{bar}", reach) for bar in (3, 4))
             pulled = max(
@@ -134,6 +146,35 @@ def predict_error(
             )
             errors[i] += pulled * turned * sum_lengths(scene.linkage)
     return errors
+
+
+def _bound_touching(linkage: FourBar, theta_2: float, quantity: str) -> float:
+    """Bound an error where rounding decides whether the loop closes; infinite without one.
+
+    The diagonal e from A to O4 and bars 3 and 4 are a triangle that misses a line by h:
+    e = b + c - h, or |b - c| + h. Bar 3 is off the diagonal by phi_3,
+
+        sin^2(phi_3/2) = (c^2 - (e - b)^2)/(4 b e) = h (2 c - h)/(4 b e)
+
+    (the cosine in its place where bar 3 points away from O4), so that phi_3 = sqrt(2 c
+    h/(b e)) at the most, and bar 4 by the same with b and c exchanged. The diagonal
+    itself turns by h/e. Places, the sine and the condition follow from both angles;
+    their rates and the forces grow without bound.
+    """
+    _, a, b, c = linkage.lengths
+    ground = cmath.rect(linkage.ground, linkage.ground_angle)
+    e = abs(ground - cmath.rect(a, theta_2))
+    if e == 0.0:
+        return math.inf
+    missed = TOUCHING_MARGIN * sum_lengths(linkage)
+    of_3 = math.sqrt(2.0 * c * missed / (b * e)) + missed / e
+    of_4 = math.sqrt(2.0 * b * missed / (c * e)) + missed / e
+    bounds = {"theta_3": of_3, "theta_4": of_4, "B": c * of_4}
+    bounds |= dict.fromkeys(("sin_mu", "condition"), of_3 + of_4)
+    for bar, turned in ((3, of_3), (4, of_4)):
+        distance, _ = find_centre(linkage.bar(bar))
+        bounds[f"G{bar}"] = abs(distance) * turned
+    return bounds.get(quantity, math.inf)
 
 
 class Sensitivities(NamedTuple):
@@ -147,6 +188,10 @@ class Sensitivities(NamedTuple):
     """
     carried: dict[str, float]
     """Change by couples on the bars of the heaviest bar's inertial force at 1 m of the fastest bar, times 1 m."""
+
+    def states(self, name: str) -> bool:
+        """Return whether the output has a value; only angles have where it is singular."""
+        return (f"{name}_x" if name in VECTORS else name) in self.data
 
     def first_order(self, name: str, reach: float, *, carried: bool = False) -> float:
         """Predict the error of an output, vectors by their norm; infinite where it has none."""
