@@ -1,5 +1,6 @@
 """Scenes stated otherwise have the same numbers, and one that has not fails its row."""
 
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from fourbar.linkage import FourBar
 from fourbar_validation.run import transformed
 from fourbar_validation.run.judge import ask
 from fourbar_validation.run.transformed import (
-    MEASURES,
+    TRANSFORMATIONS,
     SCALE,
     _Conversion,
     check_transformed,
@@ -72,7 +73,7 @@ def test_a_scene_has_the_same_numbers_however_it_is_stated(name: str) -> None:
         "friction": {"superposed", "split masses"},
         "arm": {"split masses"},
     }
-    assert rows.keys() == MEASURES.keys() - left_out.get(name, set())
+    assert rows.keys() == TRANSFORMATIONS.keys() - left_out.get(name, set())
     assert rows["scaled"].error == rows["scaled"].allowed == 0.0
 
 
@@ -119,13 +120,57 @@ def test_an_assembly_through_change_points_is_the_same_however_it_is_stated(
     assert judged >= 4
 
 
+IN_LINE = (
+    *((b + c - a, a, b, c) for a, b, c in ((0.1, 0.25, 0.15), (0.17, 0.3, 0.22))),
+    *((a + c - b, a, b, c) for a, b, c in ((0.2, 0.25, 0.15), (0.17, 0.3, 0.22))),
+    *((a + b - c, a, b, c) for a, b, c in ((0.1, 0.25, 0.22), (0.17, 0.3, 0.22))),
+)
+"""Lengths of ground, input, coupler and output that come in line but for rounding."""
+
+
+@pytest.mark.parametrize("gap", (0, 1, 2, 3, 5, 8, 13, 21, 31, 33, 64, 1000))
+@pytest.mark.parametrize("command", (2, 3, 4))
+def test_lengths_that_miss_a_change_point_by_roundings_are_the_same(
+    command: int, gap: int
+) -> None:
+    """Rounding decides in each statement anew whether there is a change point at all."""
+    judged = 0
+    for lengths, sense, branch in product(IN_LINE, (-1, 1), (-1, 1)):
+        ground, *others = lengths
+        bars = [fourbar.Bar(length, 0.8) for length in others]
+        missed = sense * gap * np.spacing(max(lengths))
+        linkage = FourBar(ground + missed, *bars, ground_angle=0.4)
+        angles = fourbar.Sweep(0.9, 5.9, 7)
+        stated: Any = {f"theta_{command}": angles, f"omega_{command}": 1.3}
+        motion = fourbar.Motion(**stated, branch=branch)
+        rows = list_rows(fourbar.Scene(linkage, motion))
+        assert not [row for row in rows.values() if row.failed], lengths
+        judged += len(rows)
+    assert judged >= 20
+
+
+def test_springs_that_are_wound_through_a_change_point_by_rounding_are_not_judged() -> (
+    None
+):
+    bars = [fourbar.Bar(length, 0.8) for length in (0.1, 0.25, 0.15)]
+    springs = fourbar.Torsion.at(A=(0.4, 0.3, 0.2))
+    motion = fourbar.Motion(fourbar.Sweep(0.9, 5.9, 7), 1.3)
+    left_out = {}
+    for d in (0.3 + 4 * np.spacing(0.3), 0.31):
+        scene = fourbar.Scene(FourBar(d, *bars), motion, effects=(springs,))
+        question = ask("scene", scene, ())
+        assert bool(list(check_transformed(question))) == (d == 0.31)
+        left_out[d] = [line for line in question.left_out if "wound" in line]
+    assert [len(lines) for lines in left_out.values()] == [1, 0]
+
+
 @pytest.mark.parametrize("index", range(6))
 def test_random_scenes_have_the_same_numbers(index: int) -> None:
     rows = list_rows(draw_random_scene(3, index, tuple(DrawnType)))
     assert rows and not [row for row in rows.values() if row.failed]
 
 
-@pytest.mark.parametrize("name", MEASURES)
+@pytest.mark.parametrize("name", TRANSFORMATIONS)
 def test_one_number_that_differs_fails_its_row(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -143,7 +188,7 @@ def test_one_number_that_differs_fails_its_row(
     scene = crank_rocker(loads=LOADS, effects=EVERYTHING)
     few = transformed._take_few(ask("scene", scene, ()))
     assert few is not None
-    monkeypatch.setattr(transformed, "MEASURES", {name: MEASURES[name]})
+    monkeypatch.setattr(transformed, "TRANSFORMATIONS", {name: TRANSFORMATIONS[name]})
     monkeypatch.setattr(transformed, "solve", differ)
     (row,) = check_transformed(ask("scene", scene, ()))
     assert row.failed and row.reason.endswith("worst in torque")

@@ -96,6 +96,10 @@ class Question:
         except ArithmeticError:
             return None
 
+    def leave_out(self, what: str, reason: object) -> None:
+        """Note that something was left out, and why."""
+        self.left_out.append(f"{what}: {reason}")
+
     def adapter(self, engine: Engine) -> Adapter:
         """Start an engine, once."""
         if engine.name not in self.started:
@@ -182,7 +186,7 @@ class Question:
         try:
             yield from check()
         except NotAskedError as reason:
-            self.left_out.append(f"{engine}: {reason}")
+            self.leave_out(engine, reason)
         except Exception as error:
             yield make_breakdown(self.name, engine, error, part)
 

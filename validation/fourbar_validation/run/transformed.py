@@ -5,13 +5,15 @@ which other branches of the code compute; it needs no reference. Scaling by powe
 two changes no digit at all.
 """
 
+import cmath
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fourbar.effects import (
     Effect,
@@ -29,7 +31,7 @@ from fourbar.effects import (
 )
 from fourbar.linkage import MOVING_BARS, Bar, FourBar
 from fourbar.quantities import OK, PIN_FORCES, UNITS
-from fourbar.scene import Command, Scene
+from fourbar.scene import Command, Scene, with_signs
 from fourbar.scene.motion import Motion
 from fourbar.solution import Solution
 from fourbar.solving import solve
@@ -40,13 +42,20 @@ from fourbar_validation.compare.tolerance import (
     WELL_CONDITIONED,
     Array,
     Mask,
+    compute_differences,
     count_half_turns,
+    divide,
     find_condition,
-    find_error,
     magnitude,
     mark_touching,
 )
-from fourbar_validation.run.question import Question
+from fourbar_validation.engines.description import (
+    find_centre,
+    find_inertia,
+    find_mass,
+    state_from_pins,
+)
+from fourbar_validation.run.question import NotAskedError, Question
 
 SAMPLE = 5
 """Positions of a scene that are stated otherwise."""
@@ -68,8 +77,6 @@ TRANSFORMED_QUANTITIES = (
 OTHER_BAR = {1: 1, 2: 4, 3: 3, 4: 2}
 OTHER_PIN = {"O2": "O4", "A": "B", "B": "A", "O4": "O2"}
 """Bars and pins by their numbers and names where the linkage is read from its other end."""
-ADDED = {2: 2.0 * math.pi, 3: math.pi, 4: 0.0}
-"""Added to the commanded angle of a bar there, rad: its half angle stays."""
 OTHER_FORCE = {
     "F12": ("F14", 1.0),
     "F14": ("F12", 1.0),
@@ -77,21 +84,18 @@ OTHER_FORCE = {
     "F43": ("F32", -1.0),
 }
 """Pin forces there: F34 = -F43, F23 = -F32."""
-REASONS = {
-    "mirrored": "y, angles and couples change their signs",
-    "turned": "everything turns with the ground; nothing else changes",
-    "scaled": (
-        "lengths and accelerations times 2^7, forces times 2^7, couples times 4^7, to"
-        " the last digit"
-    ),
-    "exchanged": "bars 2 and 4 change places, the coupler is read from B",
-    "superposed": "the forces of all loads and effects are the sum of what each adds",
-    "split masses": "a bar of two bodies has the forces of both",
-}
 
 
-class _NoCounterpartError(Exception):
-    """The scene holds what a transformation has no counterpart of."""
+class _Sizes(NamedTuple):
+    """Scale, condition and sum of the terms of several quantities, (q, n) each."""
+
+    scale: Array
+    condition: Array
+    terms: Array
+
+    def select(self, rows: slice) -> "_Sizes":
+        """Select the sizes of some of the quantities."""
+        return _Sizes(*(sizes[rows] for sizes in self))
 
 
 @dataclass(frozen=True)
@@ -104,57 +108,82 @@ class _Few:
     question: Question
     fit: Mask
     """Positions that are compared; the first, from which springs count their turns, need not be."""
-    sizes: dict[str, tuple[Array, Array, Array]] = field(default_factory=dict)
-    """Scale, condition and sum of the terms of each quantity that was compared."""
 
     @cached_property
-    def _terms(self) -> Sizes:
-        return Sizes(self.scene, self.solution)
+    def quantities(self) -> list[str]:
+        """List the quantities that the scene has, those of forces in one piece."""
+        return [
+            name
+            for name in TRANSFORMED_QUANTITIES
+            if getattr(self.solution, name, None) is not None
+        ]
+
+    @cached_property
+    def forces(self) -> slice:
+        """Return which of the quantities are forces and torques."""
+        of_forces = [
+            self.quantities.index(name) for name in FORCES if name in self.quantities
+        ]
+        return slice(of_forces[0], of_forces[-1] + 1)
+
+    @cached_property
+    def numbers(self) -> list[Array]:
+        """Return the numbers of each quantity."""
+        return [getattr(self.solution, name) for name in self.quantities]
+
+    @cached_property
+    def sizes(self) -> _Sizes:
+        """Return the sizes of all quantities."""
+        sizes, linkage = Sizes(self.scene, self.solution), self.scene.linkage
+        scales, conditions, terms = [], [], []
+        for name, numbers in zip(self.quantities, self.numbers, strict=True):
+            scales.append(sizes.scale(name, numbers))
+            conditions.append(find_condition(name, linkage, self.solution))
+            terms.append(sizes.sum_terms(name))
+        condition = np.minimum(np.stack(conditions), 1.0)
+        return _Sizes(np.stack(scales), condition, np.stack(terms))
+
+    @cached_property
+    def _signs(self) -> NDArray[np.int8]:
+        """Return the signs of the commanded bar's own sine, (n,)."""
+        return with_signs(self.scene.linkage, self.command).branch
 
     def solve(self, scene: Scene, **changed: Any) -> Solution:
         """Solve another scene at the same positions, some entries of the command changed."""
         return _solve(scene, self.command._replace(**changed))
 
-    def size(self, name: str) -> tuple[Array, Array, Array]:
-        """Return scale, condition and sum of the terms of a quantity, (n,) each."""
-        if name not in self.sizes:
-            condition = find_condition(name, self.scene.linkage, self.solution)
-            self.sizes[name] = (
-                self._terms.scale(name, getattr(self.solution, name)),
-                np.minimum(condition, 1.0),
-                self._terms.sum_terms(name),
-            )
-        return self.sizes[name]
+    def solve_alike(self, scene: Scene, sense: int, **changed: Any) -> Solution:
+        """Solve another scene whose loop lies on the same side at each position, or on the other.
 
-    def measure(self, name: str, theirs: Array, summed: Array | float = 0.0) -> Array:
-        """Return an error times its condition, (n,). `summed`: magnitudes that were summed."""
-        scale, condition, _ = self.size(name)
-        ours = getattr(self.solution, name)
-        return find_error(name, ours, theirs, np.maximum(scale, summed)) * condition
+        An assembly of a linkage with change points has another sign beyond each of
+        them, and the rounding of the lengths decides whether there are any: the sign is
+        the same in both scenes, the name of the assembly need not be.
+        """
+        signed = self.command._replace(branch=sense * self._signs, **changed)
+        return _solve(scene, with_signs(scene.linkage, signed))
 
-    def compare(self, convert: Callable[[str], Array]) -> dict[str, Array]:
-        """Compare the quantities that the scene has with those of another one, converted."""
-        return {
-            name: self.measure(name, convert(name))
-            for name in TRANSFORMED_QUANTITIES
-            if getattr(self.solution, name, None) is not None
-        }
+    def compare(self, convert: Callable[[str], Array]) -> Array:
+        """Compare all quantities with those of another scene, converted; (q, n)."""
+        theirs = [convert(name) for name in self.quantities]
+        apart = compute_differences(self.quantities, self.numbers, theirs)
+        return divide(apart, self.sizes.scale) * self.sizes.condition
 
-    def row(self, name: str, errors: dict[str, Array]) -> Row:
+    def row(self, name: str, transformation: "_Transformation") -> Row:
         """Make the row of a transformation, of the quantity that is worst."""
+        errors, first = transformation.measure(self), 0
+        if transformation.of_forces:
+            first = self.forces.start
         theta_1 = self.scene.linkage.ground_angle
         condition = 1.0 / count_half_turns(theta_1, self.command.angle)
-        allowed = 0.0 if name == "scaled" else EQUIVALENCE.factor / condition
-
-        def find_largest(name: str) -> float:
-            return float(np.nan_to_num(errors[name], nan=np.inf)[self.fit].max())
-
-        worst = max(errors, key=find_largest)
+        allowed = 0.0 if transformation.exact else EQUIVALENCE.factor / condition
+        largest = np.where(np.isnan(errors), np.inf, errors)[:, self.fit].max(axis=1)
+        worst = int(largest.argmax())
         return self.question.row(
             name,
             errors[worst],
             allowed,
-            f"identity: {REASONS[name]}; times the condition; worst in {worst}",
+            f"identity: {transformation.reason}; times the condition; worst in"
+            f" {self.quantities[first + worst]}",
             self.fit,
             condition,
             self.solution.theta_2,
@@ -163,25 +192,36 @@ class _Few:
 
 def check_transformed(question: Question) -> Iterator[Row]:
     """Hold a scene to what it is when it is stated otherwise."""
-    few = _take_few(question)
-    if few is None:
+    try:
+        few = _take_few(question)
+    except NotAskedError as reason:
+        question.leave_out("scenes stated otherwise", reason)
         return
-    for name, measure in MEASURES.items():
+    for name, transformation in TRANSFORMATIONS.items():
         try:
-            errors = measure(few)
-        except _NoCounterpartError:
-            continue
-        yield few.row(name, errors)
+            yield few.row(name, transformation)
+        except NotAskedError as reason:
+            question.leave_out(name, reason)
 
 
-def _take_few(question: Question) -> _Few | None:
-    """Take a scene at a few positions, with plain numbers of its bars and places; None where none fits."""
+def _take_few(question: Question) -> _Few:
+    """Take a scene at a few positions, with plain numbers of its bars and places.
+
+    Raises NotAskedError where it cannot be stated otherwise.
+    """
     solution, at, scene = question.solution, question.at, question.scene
-    if at.speed is None or at.stroke is not None or at.time is not None:
-        return None
-    known = all(type(term) in CONVERTED for term in (*scene.loads, *scene.effects))
-    if not known or any(load.table is not None for load in scene.loads):
-        return None
+    if at.speed is None:
+        raise NotAskedError("the scene states positions only")
+    if at.stroke is not None or at.time is not None:
+        raise NotAskedError("a stroke or a motion law is commanded")
+    for term in (*scene.loads, *scene.effects):
+        if type(term) not in CONVERTED:
+            raise NotAskedError(f"the effect {term.key!r} has no counterpart")
+    if any(load.table is not None for load in scene.loads):
+        raise NotAskedError("a load over a table has no counterpart")
+    in_line = scene.linkage.ground_angle + np.array([0.0, math.pi])
+    if scene.counts_turns and mark_touching(scene.linkage, in_line).any():
+        raise NotAskedError("rounding decides how far its torsion springs are wound")
     assert solution.drive_condition is not None
     fit = (
         (solution.status_code == OK)
@@ -191,12 +231,12 @@ def _take_few(question: Question) -> _Few | None:
     )
     indices = np.flatnonzero(fit)
     if not len(indices):
-        return None
+        raise NotAskedError("no position is well-conditioned")
     begin = int(np.argmax(solution.assembled))
     chosen = indices[np.unique(np.linspace(0, len(indices) - 1, SAMPLE).astype(int))]
     positions = np.concatenate([[begin], chosen[chosen != begin]])
     command = at.part(positions)._replace(remainder=None)
-    placed, link = scene.in_pairs_from_pins(), scene.linkage
+    placed, link = state_from_pins(scene), scene.linkage
     two, three, four = (_make_plain(link.bar(bar)) for bar in MOVING_BARS)
     few = Scene(
         FourBar(link.ground, two, three, four, link.ground_angle),
@@ -218,7 +258,7 @@ def _solve(scene: Scene, command: Command) -> Solution:
 
 def _make_plain(bar: Bar) -> Bar:
     """Return a bar whose mass, inertia and centre are numbers."""
-    return Bar(bar.length, bar.mass, bar.moment_of_inertia, bar.mass_centre)
+    return Bar(bar.length, find_mass(bar), find_inertia(bar), find_centre(bar))
 
 
 @dataclass(frozen=True)
@@ -265,8 +305,7 @@ class _Conversion:
 
 def _from_other_end(length: float, pair: tuple[float, float]) -> tuple[float, float]:
     """Return a place of a bar as it is read from its second pin."""
-    place = length - pair[0] * complex(math.cos(pair[1]), math.sin(pair[1]))
-    return abs(place), math.atan2(place.imag, place.real)
+    return cmath.polar(length - cmath.rect(*pair))
 
 
 def _convert_load(load: Load, to: _Conversion, linkage: FourBar) -> Load:
@@ -409,19 +448,13 @@ def _convert(scene: Scene, to: _Conversion) -> Scene:
     )
 
 
-def _measure_mirrored(few: _Few) -> dict[str, Array]:
-    """Mirror at the x-axis.
-
-    The names of the assemblies are exchanged, unless all bars come to lie in line where
-    the commanded one lies along the ground: an assembly is its own mirror image there.
-    """
-    command, linkage = few.command, few.scene.linkage
-    along_the_ground = np.array([linkage.ground_angle])
-    keeps_name = mark_touching(linkage, along_the_ground, command.bar)[0]
-    other = few.solve(
+def _measure_mirrored(few: _Few) -> Array:
+    """Mirror at the x-axis: the sine changes its sign."""
+    command = few.command
+    other = few.solve_alike(
         _convert(few.scene, _Conversion(sense=-1.0)),
+        -1,
         angle=-command.angle,
-        branch=command.branch if keeps_name else -command.branch,
         speed=-np.asarray(command.speed),
         acceleration=-np.asarray(command.acceleration),
     )
@@ -435,7 +468,7 @@ def _measure_mirrored(few: _Few) -> dict[str, Array]:
     return few.compare(convert)
 
 
-def _measure_turned(few: _Few) -> dict[str, Array]:
+def _measure_turned(few: _Few) -> Array:
     """Turn about O2."""
     other = few.solve(
         _convert(few.scene, _Conversion(turn=TURNED)),
@@ -452,33 +485,30 @@ def _measure_turned(few: _Few) -> dict[str, Array]:
     return few.compare(convert)
 
 
-def _measure_scaled(few: _Few) -> dict[str, Array]:
+def _measure_scaled(few: _Few) -> Array:
     """Multiply lengths, and what grows with them, by a power of two; return what differs at all."""
     other = few.solve(_convert(few.scene, _Conversion(length=SCALE)))
     power = {"N": SCALE, "N m": SCALE**2, "W": SCALE**2}
-    return {
-        name: magnitude(
-            np.array(getattr(other, name)) / power.get(UNITS[name], 1.0) - ours
-        )
-        for name in TRANSFORMED_QUANTITIES
-        if (ours := getattr(few.solution, name, None)) is not None
-    }
+    errors = []
+    for name, ours in zip(few.quantities, few.numbers, strict=True):
+        theirs = np.array(getattr(other, name)) / power.get(UNITS[name], 1.0)
+        errors.append(magnitude(theirs - ours))
+    return np.stack(errors)
 
 
-def _measure_exchanged(few: _Few) -> dict[str, Array]:
+def _measure_exchanged(few: _Few) -> Array:
     """Read the linkage from O4.
 
-    At its other end the ground points the other way, theta_1 + pi. Whole turns are
-    added to the commanded angle such that the half angle of its assembly stays what it
-    was, since the assembly of a linkage with change points depends on it.
+    At its other end the ground points the other way, theta_1 + pi, and so does bar 3,
+    with which sin(theta_4 - theta_2), the sine of a command of bar 3, changes its sign.
     """
     command = few.command
     bar = OTHER_BAR[command.bar]
-    branch = -command.branch if bar == 3 else command.branch
-    other = few.solve(
+    reversed_ = bar == 3
+    other = few.solve_alike(
         _convert(few.scene, _Conversion(exchanged=True)),
-        angle=command.angle + ADDED[command.bar],
-        branch=branch,
+        -1 if reversed_ else 1,
+        angle=command.angle + math.pi if reversed_ else command.angle,
         bar=bar,
     )
 
@@ -494,44 +524,39 @@ def _measure_exchanged(few: _Few) -> dict[str, Array]:
     return few.compare(convert)
 
 
-def _measure_superposed(few: _Few) -> dict[str, Array]:
+def _measure_superposed(few: _Few) -> Array:
     """Sum what each load and effect adds to the forces of inertia alone."""
     scene = few.scene
-    terms = [*scene.loads, *scene.effects]
     _require_linear(scene)
-    if len(terms) < 2:
-        raise _NoCounterpartError
+    if len(scene.loads) + len(scene.effects) < 2:
+        raise NotAskedError("the scene has fewer than two loads and effects")
     bare = replace(scene, loads=(), effects=())
     alone = [
-        (
-            replace(bare, loads=(term,))
-            if isinstance(term, Load)
-            else replace(bare, effects=(term,))
-        )
-        for term in terms
+        *(replace(bare, loads=(load,)) for load in scene.loads),
+        *(replace(bare, effects=(effect,)) for effect in scene.effects),
     ]
-    return _measure_sum(few, bare, alone)
+    return _measure_sum(few, alone, bare)
 
 
-def _measure_split_masses(few: _Few) -> dict[str, Array]:
-    """Sum the forces of two bodies that make up each bar."""
+def _measure_split_masses(few: _Few) -> Array:
+    """Sum the forces of two bodies that make up each bar; all but gravity acts with one of them."""
     scene = few.scene
     _require_linear(scene)
     if any(load.arm is not None for load in scene.loads):
-        raise _NoCounterpartError  # its place follows the mass centre
+        raise NotAskedError("a load at an arm from the mass centre moves with it")
     if not any(bar.mass for bar in scene.linkage.moving):
-        raise _NoCounterpartError
+        raise NotAskedError("no bar has a mass")
+    weight = tuple(effect for effect in scene.effects if isinstance(effect, Gravity))
+    loaded, bare = scene, replace(scene, loads=(), effects=weight)
     parts = [
-        replace(scene, linkage=_take_part(scene.linkage, part))
-        for part in (PART, 1.0 - PART)
+        replace(part, linkage=_take_part(scene.linkage, share))
+        for part, share in ((loaded, PART), (bare, 1.0 - PART))
     ]
-    return _measure_sum(
-        few, replace(scene, linkage=_take_part(scene.linkage, 0.0)), parts
-    )
+    return _measure_sum(few, parts)
 
 
 def _take_part(linkage: FourBar, part: float) -> FourBar:
-    """Take a part of each bar's mass: 0.3 on one side of the centre, 0.7 on the other, or nothing."""
+    """Take a part of each bar's mass: 0.3 on one side of the centre, 0.7 on the other."""
     bars = []
     for bar in linkage.moving:
         assert bar.inertia is not None and bar.centre is not None
@@ -541,44 +566,79 @@ def _take_part(linkage: FourBar, part: float) -> FourBar:
         # makes
         rest = bar.inertia - PART * (1.0 - PART) * bar.mass * apart * apart
         away = apart * ((1.0 - PART) if part == PART else -PART)
-        r, phi = bar.centre
-        centre = r * complex(math.cos(phi), math.sin(phi)) + away
-        pair = (abs(centre), math.atan2(centre.imag, centre.real))
-        bars.append(Bar(bar.length, mass, part * rest, pair))
+        centre = cmath.polar(cmath.rect(*bar.centre) + away)
+        bars.append(Bar(bar.length, mass, part * rest, centre))
     two, three, four = bars
     return FourBar(linkage.ground, two, three, four, linkage.ground_angle)
 
 
 def _require_linear(scene: Scene) -> None:
-    """Raise where forces are not the sum of what each load and effect adds."""
+    """Raise NotAskedError where forces are not the sum of what each load and effect adds."""
     if any(isinstance(effect, NOT_IN_PARTS) for effect in scene.effects):
-        raise _NoCounterpartError
+        raise NotAskedError("forces with dry friction are no sum of what each adds")
 
 
-def _measure_sum(few: _Few, bare: Scene, parts: Sequence[Scene]) -> dict[str, Array]:
-    """Compare with the sum of what scenes have beyond a bare one."""
-    none = few.solve(bare)
+def _measure_sum(few: _Few, parts: Sequence[Scene], bare: Scene | None = None) -> Array:
+    """Compare the forces with the sum of what scenes have, beyond a bare one if any, (q, n)."""
+    names = few.quantities[few.forces]
     solved = [few.solve(part) for part in parts]
-    errors = {}
-    for name in FORCES:
-        if getattr(few.solution, name, None) is None:
-            continue
-        values = [np.array(getattr(each, name)) for each in (none, *solved)]
-        total = values[0] + sum(value - values[0] for value in values[1:])
-        summed = len(parts) * magnitude(values[0])
-        summed = summed + sum(magnitude(value) for value in values[1:])
-        # what cancels within a part is among the terms of the whole
-        summed = np.maximum(summed, few.size(name)[2])
-        errors[name] = few.measure(name, total, summed)
-    return errors
+    none = None if bare is None else few.solve(bare)
+    totals, summed = [], []
+    for name in names:
+        of_parts = [np.array(getattr(part, name)) for part in solved]
+        total = np.sum(of_parts, axis=0)
+        size = np.sum([magnitude(of_part) for of_part in of_parts], axis=0)
+        if none is not None:
+            nothing = np.array(getattr(none, name))
+            total = total - (len(parts) - 1) * nothing
+            size = size + len(parts) * magnitude(nothing)
+        totals.append(total)
+        summed.append(size)
+    scale, condition, terms = few.sizes.select(few.forces)
+    # what cancels within a part is among the terms of the whole
+    sizes = np.maximum(scale, np.maximum(summed, terms))
+    apart = compute_differences(names, few.numbers[few.forces], totals)
+    return divide(apart, sizes) * condition
 
 
-MEASURES: dict[str, Callable[[_Few], dict[str, Array]]] = {
-    "mirrored": _measure_mirrored,
-    "turned": _measure_turned,
-    "scaled": _measure_scaled,
-    "exchanged": _measure_exchanged,
-    "superposed": _measure_superposed,
-    "split masses": _measure_split_masses,
+class _Transformation(NamedTuple):
+    """A way of stating a scene otherwise."""
+
+    measure: Callable[[_Few], Array]
+    """Errors of all quantities, or of forces alone, times their conditions, (q, n)."""
+    reason: str
+    """Why nothing may change, as the report prints it."""
+    of_forces: bool = False
+    """True if it compares forces alone."""
+    exact: bool = False
+    """True if no digit may change."""
+
+
+TRANSFORMATIONS = {
+    "mirrored": _Transformation(
+        _measure_mirrored, "y, angles and couples change their signs"
+    ),
+    "turned": _Transformation(
+        _measure_turned, "everything turns with the ground; nothing else changes"
+    ),
+    "scaled": _Transformation(
+        _measure_scaled,
+        "lengths and accelerations times 2^7, forces times 2^7, couples times 4^7, to"
+        " the last digit",
+        exact=True,
+    ),
+    "exchanged": _Transformation(
+        _measure_exchanged, "bars 2 and 4 change places, the coupler is read from B"
+    ),
+    "superposed": _Transformation(
+        _measure_superposed,
+        "the forces of all loads and effects are the sum of what each adds",
+        of_forces=True,
+    ),
+    "split masses": _Transformation(
+        _measure_split_masses,
+        "a bar of two bodies has the forces of both",
+        of_forces=True,
+    ),
 }
-"""Errors of each way of stating a scene otherwise, by the name of its row."""
+"""Ways of stating a scene otherwise, by the names of their rows."""
