@@ -172,7 +172,7 @@ def moved(*motion: Any) -> Record:
     [
         (
             (fourbar.Sweep(0.0, 6.0, 20), 0.0),
-            "omega_2 is 0: nothing moves through time",
+            "the commanded speed is 0: nothing moves through time",
         ),
         ((1.0, 2.0), "a simulation needs more than one position"),
     ],
@@ -181,7 +181,7 @@ def test_what_does_not_move_through_time_is_not_simulated(
     motion: tuple[Any, float], reason: str
 ) -> None:
     record = moved(*motion)
-    assert record.left_out == [f"mujoco-simulated: {reason}"]
+    assert f"mujoco-simulated: {reason}" in record.left_out
     assert {row.engine for row in record.rows} == {
         "formulas",
         "free-body",

@@ -12,8 +12,8 @@ from fourbar.linkage import FourBar
 from fourbar_validation.run import transformed
 from fourbar_validation.run.judge import ask
 from fourbar_validation.run.transformed import (
-    TRANSFORMATIONS,
     SCALE,
+    TRANSFORMATIONS,
     _Conversion,
     check_transformed,
 )
@@ -75,6 +75,35 @@ def test_a_scene_has_the_same_numbers_however_it_is_stated(name: str) -> None:
     }
     assert rows.keys() == TRANSFORMATIONS.keys() - left_out.get(name, set())
     assert rows["scaled"].error == rows["scaled"].allowed == 0.0
+
+
+@pytest.mark.parametrize(
+    ("scene", "lines"),
+    [
+        (
+            SCENES["arm"],
+            ["split masses: a load at an arm from the mass centre moves with it"],
+        ),
+        (
+            SCENES["friction"],
+            [
+                f"{name}: forces with dry friction are no sum of what each adds"
+                for name in ("superposed", "split masses")
+            ],
+        ),
+        (
+            crank_rocker(motion=fourbar.Motion(np.array([0.1, 0.2]))),
+            ["scenes stated otherwise: the scene states positions only"],
+        ),
+    ],
+    ids=("arm", "friction", "positions"),
+)
+def test_what_cannot_be_stated_otherwise_is_said_with_its_reason(
+    scene: fourbar.Scene, lines: list[str]
+) -> None:
+    question = ask("scene", scene, ())
+    list(check_transformed(question))
+    assert question.left_out == lines
 
 
 CHANGE_POINTS = {

@@ -31,7 +31,7 @@ def compare_answers(question: Question) -> Iterator[Row]:
 def _answer(question: Question, engine: Engine) -> Iterator[Row]:
     answer = question.answer(engine)
     if answer.refusal is not None:
-        question.left_out.append(f"{answer.engine}: {answer.refusal}")
+        question.leave_out(answer.engine, answer.refusal)
     rows = compare_answer(question, engine, answer)
     if any(row.failed for row in rows):
         question.causes[engine.name] = find_causes(question, answer, engine.tolerance)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fourbar.scene import Command, Scene
+from fourbar.scene import Scene
 from fourbar.scene import command as command_of
 from fourbar_validation.compare.rows import FORMULAS, Row
 from fourbar_validation.engines.guests import list_numbers
@@ -48,8 +48,10 @@ class Check(NamedTuple):
     """True if it checks a function of fourbar other than `solve`, whose name is then the engine of its rows."""
     free: bool = False
     """True if it checks a free motion, False for a prescribed one."""
+    what: str = ""
+    """Words for what is checked, where it may be left out."""
     needs_theta_2: str = ""
-    """Message that is printed where theta_2 is not commanded and the check is left out; empty for any command."""
+    """Reason to leave it out where theta_2 is not commanded; empty for any command."""
 
 
 CHECKS = (
@@ -60,30 +62,31 @@ CHECKS = (
     Check(check_blocks),
     Check(
         check_error_bars,
+        what="error bars",
         needs_theta_2=(
-            "error bars: balls are asked at theta_2, and `stability --bar` at the other"
-            " bars"
+            "balls are asked at theta_2, and `stability --bar` at the other bars"
         ),
     ),
     Check(check_residual),
     Check(check_transformed),
     Check(
         Question.find_reversals,
-        needs_theta_2="reversals of dry friction: they are drawn over theta_2",
+        what="reversals of dry friction",
+        needs_theta_2="they are drawn over theta_2",
     ),
     Check(compare_answers),
     Check(
         compare_statements,
-        needs_theta_2=(
-            "statements of the linkage: engines are led to its limits by theta_2"
-        ),
+        what="statements of the linkage",
+        needs_theta_2="engines are led to its limits by theta_2",
     ),
-    Check(check_mjcf, needs_theta_2="MJCF as shipped: it drives bar 2"),
+    Check(check_mjcf, what="MJCF as shipped", needs_theta_2="it drives bar 2"),
     Check(compare_inertia),
     Check(
         check_released,
         free=True,
-        needs_theta_2="released motions: engines begin at theta_2",
+        what="released motions",
+        needs_theta_2="engines begin at theta_2",
     ),
     *(
         Check(rows, derived=True)
@@ -100,7 +103,8 @@ CHECKS = (
         Check(
             rows,
             derived=True,
-            needs_theta_2=f"{rows.__name__}: the file opens at theta_2",
+            what=rows.__name__,
+            needs_theta_2="the file opens at theta_2",
         )
         for rows in (sdf, usd)
     ),
@@ -173,15 +177,14 @@ def judge(
             "they are checked against the free bodies, which have no forces for this"
             " scene"
         )
-        question.left_out.append(f"functions other than solve: {reason}")
+        question.leave_out("functions other than solve", reason)
         derived = False
     rows: list[Row] = []
     for check in CHECKS:
         if check.free == free and (derived or not check.derived):
             if check.needs_theta_2 and question.at.commanded != "theta_2":
-                question.left_out.append(
-                    f"{check.needs_theta_2}; {question.at.commanded} is commanded"
-                )
+                reason = f"{check.needs_theta_2}; {question.at.commanded} is commanded"
+                question.leave_out(check.what, reason)
                 continue
             called = check.make_rows.__name__
             engine, part = (called, "") if check.derived else (FORMULAS, called)
@@ -204,17 +207,16 @@ def ask(name: str, scene: Scene, engines: Sequence[Engine]) -> Question:
     if len(command.angle) > 1 and all(
         np.ptp(values) == 0 for values in numbers
     ):  # a sweep of equal positions
-        question.left_out.append("positions: all are the same, one is evaluated")
+        question.leave_out("positions", "all are the same, one is evaluated")
         question.at = select_positions(command, np.array([0]))._replace(time=None)
-    question.engines = list(_select_needed(engines, question.at, question.left_out))
+    question.engines = list(_select_needed(engines, question))
     question.solve()  # not timed: the first call in a process also pays for imports
     return question
 
 
-def _select_needed(
-    engines: Iterable[Engine], command: Command, left_out: list[str]
-) -> Iterator[Engine]:
+def _select_needed(engines: Iterable[Engine], question: Question) -> Iterator[Engine]:
     """Select the engines that the question needs; the others are left out before they are imported."""
+    command = question.at
     for engine in engines:
         reason = None
         if command.speed is None:
@@ -227,7 +229,7 @@ def _select_needed(
                 )
             )
         elif engine.through_time and not np.any(command.speed):
-            reason = "omega_2 is 0: nothing moves through time"
+            reason = "the commanded speed is 0: nothing moves through time"
         elif engine.through_time and len(command.angle) == 1:
             reason = "a simulation needs more than one position"
         if reason is None:
@@ -237,4 +239,4 @@ def _select_needed(
                 else replace(engine, answers=engine.positions)
             )
         else:
-            left_out.append(f"{engine.name}: {reason}")
+            question.leave_out(engine.name, reason)

@@ -175,7 +175,7 @@ def check_released(question: Question) -> Iterator[Row]:
             Timing(name, fine.engine, fine.setting, len(times), seconds)
         )
         if fine.refusal is not None:
-            question.left_out.append(f"{fine.engine}: {fine.refusal}")
+            question.leave_out(fine.engine, fine.refusal)
         return _make_rows(question, fine, coarse, truth)
 
     for engine in question.engines:
@@ -185,7 +185,7 @@ def check_released(question: Question) -> Iterator[Row]:
             )
     for adapter, (start, longest, library) in FORWARD.items():
         if reason := find_missing(library):
-            question.left_out.append(f"{adapter}: {reason}")
+            question.leave_out(adapter, reason)
         else:
             yield from question.attempt(partial(rows, start, longest), adapter)
 
