@@ -18,6 +18,7 @@ from fourbar.errors import LimitError
 from fourbar.linkage import MOVING_BARS
 from fourbar.scene import Scene
 from fourbar_validation.compare.answer import Array
+from fourbar_validation.compare.pins import resolve
 from fourbar_validation.engines.description import (
     ON_BARS,
     POINTS,
@@ -25,7 +26,6 @@ from fourbar_validation.engines.description import (
     find_unknown,
     list_parts,
     reduce_angle,
-    resolve,
 )
 from fourbar_validation.engines.effects import has_term, list_acting
 from fourbar_validation.engines.loaded import Loaded, Values

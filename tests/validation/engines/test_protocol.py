@@ -13,8 +13,8 @@ from fourbar.errors import FourBarError, InputError
 from fourbar.files import dump
 from fourbar.scene import command as list_positions
 from fourbar_validation.compare.answer import Answer, EngineError
+from fourbar_validation.compare.pins import state_from_pins
 from fourbar_validation.engines import protocol
-from fourbar_validation.engines.description import state_from_pins
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.places import MODELS
 from fourbar_validation.run.question import ask_at

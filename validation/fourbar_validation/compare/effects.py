@@ -13,6 +13,7 @@ import numpy as np
 from fourbar.errors import FourBarError
 from fourbar.linkage import MOVING_BARS, PIN_FORCE, FourBar
 from fourbar.solution import Solution
+from fourbar_validation.compare.pins import find_centre
 from fourbar_validation.compare.reversals import compute_slip
 from fourbar_validation.compare.tolerance import Array, magnitude, sum_lengths
 
@@ -50,7 +51,7 @@ def _find_gravity(gravity: "Gravity", linkage: FourBar, _: Solution) -> float:
     return sum(
         bar.mass
         * abs(gravity.magnitude)
-        * _multiply_levers(linkage, [(number, bar.mass_centre[0])])
+        * _multiply_levers(linkage, [(number, find_centre(bar)[0])])
         for number, bar in bars
     )
 
@@ -108,7 +109,7 @@ def _find_load(load: "Load", linkage: FourBar, _: Solution) -> float:
             reach = _find_reach(load.place)
         else:
             assert load.arm is not None
-            reach = abs(bar.mass_centre[0]) + abs(load.arm[0])
+            reach = abs(find_centre(bar)[0]) + abs(load.arm[0])
         size += abs(load.force[0]) * (1.0 + reach / bar.length)
     if load.table is not None:
         size *= max(abs(factor) for factor in load.table.factor)

@@ -24,6 +24,7 @@ from fourbar.solution import Solution
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.effects import find_size as size_of
 from fourbar_validation.compare.line import place_line
+from fourbar_validation.compare.pins import find_centre, state_from_pins
 from fourbar_validation.compare.tolerance import (
     WELL_CONDITIONED,
     Array,
@@ -41,7 +42,7 @@ class Sizes:
     """Sizes of the quantities of one solution of a scene; each sum of terms is computed once."""
 
     def __init__(self, scene: Scene, formulas: Solution) -> None:
-        self.scene, self.formulas = scene.in_pairs_from_pins(), formulas
+        self.scene, self.formulas = state_from_pins(scene), formulas
         self._sums: dict[str, Array] = {}
 
     def scale(self, quantity: str, values: Array) -> Array:
@@ -208,7 +209,7 @@ def _compute_drive_arms(scene: Scene) -> dict[int, float]:
 
 def _compute_arm(scene: Scene, number: int) -> float:
     """Compute the distance of a bar's mass centre from its first pin, m."""
-    return abs(scene.linkage.bar(number).mass_centre[0])
+    return abs(find_centre(scene.linkage.bar(number))[0])
 
 
 def _sum_force_terms(scene: Scene, formulas: Solution) -> Array:
@@ -220,7 +221,7 @@ def _sum_force_terms(scene: Scene, formulas: Solution) -> Array:
             getattr(formulas, f"a_G{number}"),
             getattr(formulas, f"alpha_{number}"),
         )
-        lever = 1.0 + abs(bar.mass_centre[0]) / bar.length
+        lever = 1.0 + abs(find_centre(bar)[0]) / bar.length
         total += (
             lever * bar.mass * magnitude(acceleration)
             + bar.moment_of_inertia * np.abs(alpha) / bar.length
@@ -247,7 +248,7 @@ def has_angles(answer: Answer) -> bool:
 
 def make_reference(scene: Scene, answer: Answer) -> Solution | None:
     """Make a solution of an answer, its conditions by the sines between its own angles; None without angles."""
-    scene = scene.in_pairs_from_pins()
+    scene = state_from_pins(scene)
     if answer.at is None or not has_angles(answer):
         return None
     answered = answer.quantities
@@ -328,7 +329,7 @@ def _find_velocities(
         "v_B": swung(4, linkage.output.length, 0.0),
     }
     for bar in MOVING_BARS:
-        centre = swung(bar, *linkage.bar(bar).mass_centre)
+        centre = swung(bar, *find_centre(linkage.bar(bar)))
         moved = centre + velocities["v_A"] if bar == 3 else centre
         velocities[f"v_G{bar}"] = moved
     return velocities

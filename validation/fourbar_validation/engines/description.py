@@ -11,11 +11,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fourbar.effects import Effect, ForceDrive, Gravity, Place
+from fourbar.effects import Effect, ForceDrive, Gravity
 from fourbar.linkage import MOVING_BARS, Bar, FourBar
 from fourbar.quantities import COUPLE, LINE, UNKNOWNS
 from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Array
+from fourbar_validation.compare.pins import find_centre, resolve
 
 PINS = {"O2": (1, 2), "A": (2, 3), "B": (3, 4), "O4": (1, 4)}
 FIRST_PIN = {2: "O2", 3: "A", 4: "O4"}
@@ -68,19 +69,9 @@ def find_inertia(bar: Bar) -> float:
     return find_mass(bar) * bar.length**2 / 12.0
 
 
-def find_centre(bar: Bar) -> tuple[float, float]:
-    """Return distance (m) and angle (rad) of the mass centre from pin and bar's line: as specified, or mid-bar."""
-    return bar.centre if bar.centre is not None else (bar.length / 2.0, 0.0)
-
-
 def about_first_pin(bar: Bar) -> float:
     """Compute the moment of inertia about the first pin, kg m^2."""
     return find_inertia(bar) + find_mass(bar) * find_centre(bar)[0] ** 2
-
-
-def resolve(size: float, angle: float) -> tuple[float, float]:
-    """Resolve a vector along and across the line from which its angle (rad) counts."""
-    return size * math.cos(angle), size * math.sin(angle)
 
 
 def reduce_angle(angle: float) -> float:
@@ -167,23 +158,6 @@ def place(point: Any, ground_angle: float) -> tuple[float, float]:
     """Locate an end of a spring along and across its bar's line from the first pin, on the ground in world axes, m."""
     offset = resolve(point.distance, point.angle)
     return rotate(ground_angle, *offset) if point.bar == 1 else offset
-
-
-def state_from_pins(scene: Scene) -> Scene:
-    """State every place of a scene by a pair from its bar's first pin, by arithmetic apart from the formulas'."""
-    stated = {point.name: point.place for point in scene.points}
-
-    def convert(place: Place) -> Place:
-        if place.point is not None:
-            place = stated[place.point]
-        if place.from_centre is None:
-            return place
-        x, y = resolve(*find_centre(scene.linkage.bar(place.bar)))
-        along, across = resolve(*place.from_centre)
-        x, y = x + along, y + across
-        return Place(place.bar, (math.hypot(x, y), math.atan2(y, x)))
-
-    return scene.with_places(convert)
 
 
 def list_speeds(command: Command) -> tuple[Array, Array]:

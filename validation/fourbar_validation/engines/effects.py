@@ -13,12 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fourbar.scene import Scene
-from fourbar_validation.engines.description import (
-    PINS,
-    declares,
-    find_field,
-    resolve,
-)
+from fourbar_validation.compare.pins import resolve
+from fourbar_validation.engines.description import PINS, declares, find_field
 from fourbar_validation.engines.loaded import Act, Loaded
 
 if TYPE_CHECKING:

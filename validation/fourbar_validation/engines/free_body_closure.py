@@ -14,7 +14,8 @@ from fourbar.linkage import FourBar
 from fourbar.scene import Command, Scene
 from fourbar.scene.motion import Motion
 from fourbar_validation.compare.answer import Array
-from fourbar_validation.engines.description import place, resolve
+from fourbar_validation.compare.pins import resolve
+from fourbar_validation.engines.description import place
 
 Complex = NDArray[np.complex128]
 

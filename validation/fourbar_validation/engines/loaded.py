@@ -10,10 +10,10 @@ from fourbar.effects import PointDrive
 from fourbar.linkage import MOVING_BARS
 from fourbar.scene import Scene
 from fourbar_validation.compare.answer import Array
+from fourbar_validation.compare.pins import resolve
 from fourbar_validation.engines.description import (
     FORCE_AT,
     name_driving,
-    resolve,
     rotate,
     rotate_by,
 )

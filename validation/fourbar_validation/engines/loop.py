@@ -21,13 +21,13 @@ from fourbar.quantities import (
 )
 from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Answer, Array
+from fourbar_validation.compare.pins import state_from_pins
 from fourbar_validation.engines.description import (
     SHARED,
     list_speeds,
     list_unknowns,
     name_driving,
     reduce_angle,
-    state_from_pins,
 )
 from fourbar_validation.engines.free_body_closure import (
     LONGEST_STEP,

@@ -20,7 +20,8 @@ from fourbar.errors import LimitError
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Array
-from fourbar_validation.engines.description import list_speeds, state_from_pins
+from fourbar_validation.compare.pins import state_from_pins
+from fourbar_validation.engines.description import list_speeds
 from fourbar_validation.engines.loop import Assembler
 from fourbar_validation.engines.tree import put_back, solve_closed, solve_multipliers
 

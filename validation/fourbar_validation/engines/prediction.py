@@ -26,6 +26,7 @@ import numpy as np
 from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.quantities import PIN_FORCES, STAGE_OF, VECTORS
 from fourbar.scene import Command, Scene, with_signs
+from fourbar_validation.compare.pins import find_centre
 from fourbar_validation.compare.tolerance import (
     EPS,
     OF_THE_INPUT,
@@ -36,7 +37,7 @@ from fourbar_validation.compare.tolerance import (
     mark_touching,
     sum_lengths,
 )
-from fourbar_validation.engines.description import find_centre, list_speeds
+from fourbar_validation.engines.description import list_speeds
 
 if TYPE_CHECKING:
     from fourbar_validation.engines.balls import Ball, Values

@@ -8,8 +8,8 @@ from fourbar_validation.check.judge import Judge
 from fourbar_validation.check.mistakes import explain
 from fourbar_validation.check.theirs import NOT_JUDGED, Array, TheirTable, Unit
 from fourbar_validation.compare.answer import Answer
+from fourbar_validation.compare.pins import state_from_pins
 from fourbar_validation.compare.tolerance import ErrorBound, magnitude
-from fourbar_validation.engines.description import state_from_pins
 from fourbar_validation.run.question import Question
 
 MOST_POSITIONS = 400

@@ -14,6 +14,7 @@ from fourbar.scene import Command, Scene
 from fourbar.scene.motion import Rise
 from fourbar.solution import Solution
 from fourbar.solving import solve
+from fourbar_validation.compare.pins import state_from_pins
 from fourbar_validation.compare.rows import FAILS, FORMULAS, UNDECIDED, Row
 from fourbar_validation.compare.scales import (
     Sizes,
@@ -36,7 +37,7 @@ from fourbar_validation.compare.tolerance import (
     magnitude,
     sum_lengths,
 )
-from fourbar_validation.engines.description import list_speeds, state_from_pins
+from fourbar_validation.engines.description import list_speeds
 from fourbar_validation.engines.exact import BallArithmetic, find_refusal
 from fourbar_validation.engines.free_body import move
 from fourbar_validation.engines.free_body_effects import sum_acting

@@ -35,6 +35,7 @@ from fourbar.scene import Command, Scene, with_signs
 from fourbar.scene.motion import Motion
 from fourbar.solution import Solution
 from fourbar.solving import solve
+from fourbar_validation.compare.pins import find_centre, state_from_pins
 from fourbar_validation.compare.rows import Row
 from fourbar_validation.compare.scales import Sizes
 from fourbar_validation.compare.tolerance import (
@@ -49,12 +50,7 @@ from fourbar_validation.compare.tolerance import (
     magnitude,
     mark_touching,
 )
-from fourbar_validation.engines.description import (
-    find_centre,
-    find_inertia,
-    find_mass,
-    state_from_pins,
-)
+from fourbar_validation.engines.description import find_inertia, find_mass
 from fourbar_validation.run.question import NotAskedError, Question
 
 SAMPLE = 5
@@ -86,16 +82,16 @@ OTHER_FORCE = {
 """Pin forces there: F34 = -F43, F23 = -F32."""
 
 
-class _Sizes(NamedTuple):
+class _QuantitySizes(NamedTuple):
     """Scale, condition and sum of the terms of several quantities, (q, n) each."""
 
     scale: Array
     condition: Array
     terms: Array
 
-    def select(self, rows: slice) -> "_Sizes":
+    def select(self, rows: slice) -> "_QuantitySizes":
         """Select the sizes of some of the quantities."""
-        return _Sizes(*(sizes[rows] for sizes in self))
+        return _QuantitySizes(*(sizes[rows] for sizes in self))
 
 
 @dataclass(frozen=True)
@@ -132,7 +128,7 @@ class _Few:
         return [getattr(self.solution, name) for name in self.quantities]
 
     @cached_property
-    def sizes(self) -> _Sizes:
+    def sizes(self) -> _QuantitySizes:
         """Return the sizes of all quantities."""
         sizes, linkage = Sizes(self.scene, self.solution), self.scene.linkage
         scales, conditions, terms = [], [], []
@@ -141,7 +137,7 @@ class _Few:
             conditions.append(find_condition(name, linkage, self.solution))
             terms.append(sizes.sum_terms(name))
         condition = np.minimum(np.stack(conditions), 1.0)
-        return _Sizes(np.stack(scales), condition, np.stack(terms))
+        return _QuantitySizes(np.stack(scales), condition, np.stack(terms))
 
     @cached_property
     def _signs(self) -> NDArray[np.int8]:

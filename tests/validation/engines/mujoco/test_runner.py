@@ -56,7 +56,7 @@ WHOLE_TURN = Load(
 
 def simulated(posed: Scene) -> list[Row]:
     record = judge("scene", posed, SIMULATED)
-    assert record.left_out == []
+    assert not [line for line in record.left_out if line.startswith("mujoco")]
     return [row for row in record.rows if row.engine == "mujoco-simulated"]
 
 

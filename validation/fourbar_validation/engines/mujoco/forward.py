@@ -22,7 +22,8 @@ from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Command, Scene, with_signs
 from fourbar.scene import command as command_of
 from fourbar_validation.compare.answer import Answer, Array, ReleasedAnswer
-from fourbar_validation.engines.description import name_driving, state_from_pins
+from fourbar_validation.compare.pins import state_from_pins
+from fourbar_validation.engines.description import name_driving
 from fourbar_validation.engines.limits import NO_PUSH
 from fourbar_validation.engines.loaded import Values
 from fourbar_validation.engines.loop import Angles, Assembler, read_each

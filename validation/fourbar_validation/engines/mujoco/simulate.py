@@ -16,11 +16,11 @@ from fourbar.mjcf.model import CYLINDER, unwind
 from fourbar.scene import Command, Scene
 from fourbar.scene.motion import COMMANDS, Motion
 from fourbar_validation.compare.answer import Answer
+from fourbar_validation.compare.pins import state_from_pins
 from fourbar_validation.engines.description import (
     list_speeds,
     list_unknowns,
     name_driving,
-    state_from_pins,
 )
 from fourbar_validation.engines.limits import (
     NEAREST_TOGGLE,

@@ -27,8 +27,9 @@ from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Answer, Array
 from fourbar_validation.compare.compare import COMPARED_QUANTITIES, mark_turning
+from fourbar_validation.compare.pins import state_from_pins
 from fourbar_validation.compare.tolerance import divide, magnitude
-from fourbar_validation.engines.description import name_driving, state_from_pins
+from fourbar_validation.engines.description import name_driving
 from fourbar_validation.engines.loop import (
     MADE,
     Assembler,

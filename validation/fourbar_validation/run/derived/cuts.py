@@ -16,9 +16,9 @@ from fourbar.scene import Command, Scene
 from fourbar.scene import command as command_of
 from fourbar_validation.compare.answer import Answer, Array
 from fourbar_validation.compare.line import place_line
+from fourbar_validation.compare.pins import find_centre, state_from_pins
 from fourbar_validation.compare.rows import Row
 from fourbar_validation.compare.tolerance import ErrorBound, divide
-from fourbar_validation.engines.description import find_centre, state_from_pins
 from fourbar_validation.engines.free_body import move
 from fourbar_validation.engines.free_body_effects import (
     BodyMotion,

@@ -22,6 +22,7 @@ from fourbar.scene import Command, Scene, with_signs
 from fourbar.scene.motion import Motion, Sweep
 from fourbar.studies.equilibrium import Equilibrium
 from fourbar_validation.compare.answer import Array
+from fourbar_validation.compare.pins import find_centre, state_from_pins
 from fourbar_validation.compare.rows import Row
 from fourbar_validation.compare.tolerance import (
     EPS,
@@ -30,7 +31,7 @@ from fourbar_validation.compare.tolerance import (
     ErrorBound,
     K,
 )
-from fourbar_validation.engines.description import find_centre, find_inertia
+from fourbar_validation.engines.description import find_inertia
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.prediction import FIRST_ORDER
 from fourbar_validation.engines.registry import find_missing
@@ -116,7 +117,7 @@ def _at_rest(scene: Scene) -> Scene:
             "how far its torsion springs are wound depends on the motion"
         )
     # what acts at a named point keeps its place without the points
-    scene = scene.in_pairs_from_pins()
+    scene = state_from_pins(scene)
     effects = tuple(effect for effect in scene.effects if not effect.dry_pins)
     if not scene.loads and not effects:
         raise NotAskedError("nothing acts")

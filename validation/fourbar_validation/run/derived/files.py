@@ -17,6 +17,7 @@ from fourbar.mjcf.assembly import write_sdf as sdf_text
 from fourbar.mjcf.assembly import write_usd as usd_text
 from fourbar.scene import Scene
 from fourbar.solving import solve
+from fourbar_validation.compare.pins import state_from_pins
 from fourbar_validation.compare.rows import REFUSES, Row
 from fourbar_validation.compare.tolerance import EPS, K
 from fourbar_validation.run.derived.variants import (
@@ -70,7 +71,7 @@ def _judge_file(
 ) -> list[Row]:
     """Compare a file at its own position and at some more; loads are what a simulator adds."""
     # a drive at a named point keeps its place without the point
-    few = take_few(question).in_pairs_from_pins()
+    few = state_from_pins(take_few(question))
     scene = replace(few, loads=(), points=())
     theta_2 = np.asarray(scene.motion.theta_2)
     opened = replace(scene, motion=scene.motion.replace(angle=theta_2[:1]))

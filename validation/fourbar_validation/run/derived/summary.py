@@ -23,6 +23,7 @@ from fourbar.show.duty import is_once_round, read_drive, shaking_force
 from fourbar.show.summary import Facts, Peak, summarize
 from fourbar.solution import Solution
 from fourbar_validation.compare.answer import Answer
+from fourbar_validation.compare.pins import state_from_pins
 from fourbar_validation.compare.rows import Row
 from fourbar_validation.compare.scales import make_reference
 from fourbar_validation.compare.tolerance import (
@@ -32,7 +33,6 @@ from fourbar_validation.compare.tolerance import (
     magnitude,
     wrap_angle,
 )
-from fourbar_validation.engines.description import state_from_pins
 from fourbar_validation.run.derived.cuts import CUT, WHERE, Piece, free_piece, move_bars
 from fourbar_validation.run.derived.variants import ask_free_bodies, make_row
 from fourbar_validation.run.question import NotAskedError, Question

@@ -1,0 +1,69 @@
+"""Places from the first pins of their bars, and what is judged without the formulas' conversion of them."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fourbar
+from fourbar.effects import Place
+from fourbar_validation.compare.pins import find_centre, state_from_pins
+from fourbar_validation.compare.scales import Sizes
+from fourbar_validation.run.judge import ask
+from fourbar_validation.run.transformed import _take_few
+from tests.support.scenes import crank_rocker
+
+LOADED = crank_rocker(
+    loads=(
+        fourbar.Load(4, (3.0, 0.7), from_centre=(0.05, 1.0)),
+        fourbar.Load(3, (2.0, -1.4), point="P"),
+    ),
+    points=(fourbar.Point("P", 3, from_centre=(0.04, -2.0)),),
+)
+
+
+def test_places_are_sums_of_vectors_along_and_across_the_bar() -> None:
+    stated = state_from_pins(LOADED)
+    for load, from_centre in zip(
+        stated.loads, ((0.05, 1.0), (0.04, -2.0)), strict=True
+    ):
+        r, phi = find_centre(LOADED.linkage.bar(load.bar))
+        x = r * math.cos(phi) + from_centre[0] * math.cos(from_centre[1])
+        y = r * math.sin(phi) + from_centre[0] * math.sin(from_centre[1])
+        assert load.place is not None
+        assert load.place.from_pin == pytest.approx(
+            (math.hypot(x, y), math.atan2(y, x))
+        )
+
+
+def test_a_place_that_the_formulas_misread_widens_nothing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """With places from G far away, a torque would be allowed to be as far off."""
+    solution = fourbar.solve(LOADED)
+    sizes = {
+        name: Sizes(LOADED, solution).sum_terms(name) for name in ("F12", "torque")
+    }
+    polar = Place.polar_from_pin
+
+    def misread(place: Place) -> tuple[Any, Any]:
+        distance, angle = polar(place)
+        return (distance if place.from_centre is None else 1e8 * distance), angle
+
+    monkeypatch.setattr(Place, "polar_from_pin", misread)
+    for name, terms in sizes.items():
+        np.testing.assert_array_equal(Sizes(LOADED, solution).sum_terms(name), terms)
+
+
+def test_a_scene_that_is_stated_otherwise_has_its_places_where_they_are(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    question = ask("scene", LOADED, ())
+    wanted = question.solution.torque
+    monkeypatch.setattr(
+        Place, "in_one_pair", lambda place: Place(place.bar, (1.0, 0.0))
+    )
+    few = _take_few(question)
+    at = [int(np.argmin(abs(question.at.angle - x))) for x in few.command.angle]
+    np.testing.assert_allclose(few.solution.torque, wanted[at], rtol=1e-12)
