@@ -283,10 +283,14 @@ def make_demands(
     answer: Answer,
     formulas: Solution | None = None,
 ) -> Demands:
-    """Hold an answer to the engine's tolerance and quantities, with the errors predicted for it at a command.
+    """Return what an answer is held to: the engine's tolerance and quantities, and the errors predicted for it.
 
-    `formulas`: their solution at the command, with which an engine that can answers
-    again within theta_2's rounding.
+    Parameters
+    ----------
+    command : what was commanded; errors are predicted at its positions.
+    formulas : the formulas' solution at the command. If it is given, an engine with
+        `nearby` may answer again within the rounding of theta_2 where an error is
+        beyond the tolerance.
     """
     nearby = None if formulas is None else make_nearby(engine, scene, command, formulas)
     method = ""
