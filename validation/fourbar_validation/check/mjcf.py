@@ -412,7 +412,8 @@ def command(
     if len(files) > 2:
         raise click.UsageError("give one FILE.xml, and SCENE before it or not")
     theirs = files[-1]
-    scene = read_scene_files(files[:1]).scene(0) if len(files) == 2 else None
+    suite = read_scene_files(files[:-1])
+    scene = suite.scene(0) if len(suite) else None
     if mimic is not None:
         if scene is None:
             raise click.UsageError("--mimic needs the SCENE of the loop")
@@ -427,9 +428,8 @@ def command(
         report(measurement, theirs, out)
         worst = max(map(find_worst, measurement.loops))
         return int(wanted is not None and not worst <= wanted)
-    suite = read_scene_files(files[:1])
     examined = examine_model(
-        suite.name(0), suite.scene(0), theirs, read_names(names), wanted, assets
+        suite.name(0), scene, theirs, read_names(names), wanted, assets
     )
     show(examined, theirs, out)
     return examined.counts.status
