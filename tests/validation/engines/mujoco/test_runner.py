@@ -152,7 +152,9 @@ def test_a_drive_that_does_not_follow_the_law_fails_the_run(
     factor: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The engine is judged at the motion it made; that it is not the law's, its own speed says."""
-    monkeypatch.setattr(runner.Lawful, "alpha", changed(runner.Lawful.alpha, factor))
+    monkeypatch.setattr(
+        runner.LawSegment, "alpha", changed(runner.LawSegment.alpha, factor)
+    )
     posed = crank_rocker(
         motion=fourbar.Motion(law=LAWS["periodic"]), loads=(), effects=()
     )

@@ -47,11 +47,11 @@ LOOKED_AT = 2000
 """Instants at which a law is searched for its greatest speed and acceleration; between them it hardly differs."""
 
 
-class Steady:
+class SteadySegment:
     """A segment of positions in the order of their angles, at constant alpha_2.
 
-    As of `Lawful`, `omega` is the speed at the start, `fastest` the greatest |omega_2|,
-    and `turning` that of the input, rad/s.
+    As in `LawSegment`, `omega` is the speed at the start, `fastest` the greatest
+    |omega_2|, and `turning` that of the input, rad/s.
     """
 
     bar: int | None = 2
@@ -80,7 +80,7 @@ class Steady:
         return math.sqrt(max(self.run.omega**2 + 2.0 * self.run.alpha * turned, 0.0))
 
 
-class Lawful:
+class LawSegment:
     """A segment of positions in the order of their times, by a motion law."""
 
     bar = 2
@@ -131,7 +131,7 @@ class Lawful:
         return float(f[k - 1] + part * (f[k] - f[k - 1]))
 
 
-MotionSegment = Steady | Lawful
+MotionSegment = SteadySegment | LawSegment
 
 
 def find_extremes(law: Law | Rise) -> tuple[float, float]:
@@ -353,7 +353,7 @@ class Lead:
         )
 
 
-class Led(Steady):
+class LedSegment(SteadySegment):
     """A segment of positions in the order of what is commanded."""
 
     def __init__(self, lead: Lead, segment: Sequence[int]) -> None:

@@ -35,12 +35,12 @@ from fourbar_validation.engines.mujoco.monitor import ResidualMonitor, list_alar
 from fourbar_validation.engines.mujoco.runner import (
     LIGHT_FLYWHEEL,
     ActuatorForce,
-    Lawful,
+    LawSegment,
     Lead,
-    Led,
+    LedSegment,
     MotionSegment,
     SimulatedRun,
-    Steady,
+    SteadySegment,
     clip_angles,
     evaluate_loads,
     find_assembled,
@@ -271,11 +271,11 @@ class _Simulation:
     def _choose_motion(self, segment: list[int]) -> MotionSegment:
         """Choose how the input moves through a segment."""
         if self.law is not None:
-            return Lawful(self.law, self.command, segment)
+            return LawSegment(self.law, self.command, segment)
         if self.lead is not None:
-            return Led(self.lead, segment)
+            return LedSegment(self.lead, segment)
         motion = self.scene.motion
-        return Steady(
+        return SteadySegment(
             self.command.theta_2, segment, motion.omega_2 or 0.0, motion.alpha_2
         )
 
@@ -316,7 +316,7 @@ class _Simulation:
             turn = 2.0 * np.pi / motion_segment.turning
             self.steps_per_revolution = max(self.steps_per_revolution, turn / timestep)
         supplied = self.supplied
-        if isinstance(motion_segment, Lawful):
+        if isinstance(motion_segment, LawSegment):
             supplied = {
                 **supplied,
                 "drive": lambda m, d: m.dof_armature[O2] * motion_segment.alpha(d.time),

@@ -27,7 +27,6 @@ from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Answer, Array
 from fourbar_validation.compare.compare import COMPARED_QUANTITIES, mark_turning
-from fourbar_validation.compare.pins import state_from_pins
 from fourbar_validation.compare.tolerance import divide, magnitude
 from fourbar_validation.engines.description import name_driving
 from fourbar_validation.engines.loop import (
@@ -40,7 +39,7 @@ from fourbar_validation.engines.mujoco.closed_loop import O2, ClosedLoop
 from fourbar_validation.engines.mujoco.runner import (
     LIGHT_FLYWHEEL,
     SimulatedRun,
-    Steady,
+    SteadySegment,
     find_assembled,
     order_in_time,
     split_segments,
@@ -218,9 +217,9 @@ class TrialSetup:
         light = self.text(replace(settings, flywheel=flywheel), timestep)
         return loop, (closure or _keep_text)(light, self.omega)
 
-    def motion_segment(self, segment: list[int]) -> Steady:
+    def motion_segment(self, segment: list[int]) -> SteadySegment:
         """Choose how the input moves through a segment."""
-        return Steady(self.command.theta_2, segment, self.omega, self.alpha)
+        return SteadySegment(self.command.theta_2, segment, self.omega, self.alpha)
 
     @property
     def simulated_seconds(self) -> float:
@@ -390,7 +389,6 @@ class SimulatedToError:
 
     def answer(self, scene: Scene, command: Command) -> Answer:
         """Simulate with as many steps as the laws ask for, and more while its own residuals say so."""
-        scene = state_from_pins(scene)
         steps, tc = guess(self.error)
         spent, runs = 0.0, 0
         for _ in range(ROUNDS):
