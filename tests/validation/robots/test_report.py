@@ -18,7 +18,7 @@ from fourbar_validation.robots.report import (
     TextTable,
     Typed,
     describe_measurement,
-    report,
+    report_measurement,
     write_markdown,
     write_states,
 )
@@ -78,7 +78,7 @@ def test_a_page_holds_sentences_tables_and_elements() -> None:
 def test_the_report_is_printed_and_written(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    report(measured(), Path("finger.xml"), tmp_path / "new")
+    report_measurement(measured(), Path("finger.xml"), tmp_path / "new")
     printed = capsys.readouterr().out
     assert "single states" in printed and "written to" in printed
     page = (tmp_path / "new" / "robot.md").read_text()

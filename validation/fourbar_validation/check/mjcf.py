@@ -62,7 +62,7 @@ from fourbar_validation.robots.options import (
     speed_option,
     torque_option,
 )
-from fourbar_validation.robots.report import report
+from fourbar_validation.robots.report import report_measurement
 from fourbar_validation.scenes.suites import read_scene_files
 
 ABOUT_COSTS = (
@@ -85,7 +85,7 @@ EXAMINE = "fourbar_validation.engines.mujoco.theirs:examine"
 CHANGED = "fourbar_validation.engines.mujoco.theirs:examine_changed"
 MENDED = "fourbar_validation.engines.mujoco.theirs:examine_mended"
 SOFTNESS = "fourbar_validation.engines.mujoco.theirs:predict_softness"
-STIFFEST = "as what MuJoCo's stiffest constraint (solimp 0.9999) leaves in this file"
+BY_STIFFEST = "as what MuJoCo's stiffest constraint (solimp 0.9999) leaves in this file"
 """Method by which the error of a file is predicted that nobody holds to another."""
 
 
@@ -279,7 +279,7 @@ def _list_rows(
 
     held = Demands(tolerance, JUDGED)
     if softness:
-        held = held._replace(predicted=predicted, method=f", {STIFFEST}")
+        held = held._replace(predicted=predicted, method=f", {BY_STIFFEST}")
     rows = []
     for answer in answers:
         formulas = solve(scene, "force", at=answer.at)
@@ -425,7 +425,7 @@ def command(
             raise click.UsageError("--name is for the MJCF of a four-bar alone")
         options = read_measure_options(loop, wanted, robot)
         measurement = measure_robot(theirs, options, scene, assets)
-        report(measurement, theirs, out)
+        report_measurement(measurement, theirs, out)
         worst = max(map(find_worst, measurement.loops))
         return int(wanted is not None and not worst <= wanted)
     examined = examine_model(

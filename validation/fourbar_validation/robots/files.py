@@ -24,7 +24,7 @@ DEEPEST = 100
 """Nested elements; the readers of XML recurse."""
 MOST_INCLUDES = 200
 HINGES = 3
-"""Joints of a four-bar."""
+"""Joints of a four-bar whose fourth pin is an equality."""
 REACHING_OUT = (
     "extension",
     "plugin",
@@ -70,7 +70,7 @@ def read_robot(path: Path, assets: Path | None = None) -> RobotFile:
 
 
 def is_four_bar_alone(file: RobotFile) -> bool:
-    """Tell whether a file has no more joints than a four-bar whose fourth pin is an equality."""
+    """Tell whether a file has no more joints than HINGES."""
     joints = [
         element
         for world in ET.fromstring(file.text).iter("worldbody")

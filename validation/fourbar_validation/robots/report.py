@@ -218,7 +218,7 @@ def _list_states(measurement: RobotMeasurement) -> Iterator[tuple[str | float, .
                 yield make_plain(loop.name), method, *map(float, numbers)
 
 
-def report(measurement: RobotMeasurement, robot: Path, out: Path) -> None:
+def report_measurement(measurement: RobotMeasurement, robot: Path, out: Path) -> None:
     """Print a measurement, and write robot.md and robot.csv into a folder."""
     blocks = list(describe_measurement(measurement))
     for block in blocks:
