@@ -25,6 +25,10 @@ SAMPLES = 1001
 FEWEST = 6
 """Positions of the scene from which a polynomial of degree 4 is fitted by least squares with an error to tell."""
 HEADINGS = ("degree", "fit", "angle, deg", "ratio", "polycoef")
+FITS = ("least squares", "smallest largest error")
+"""Names of the fits of `MimicReport.squares` and `MimicReport.fitted`."""
+ROW = "{:6}  {:22}  {:>10}  {:>8}  {}"
+"""Format of a row under HEADINGS."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -188,17 +192,13 @@ def show_mimic(report: MimicReport) -> None:
         f"{_deg(report.centred)} deg with the best one; "
         f"of the ratio omega_4/omega_2: {own.ratio:.4g}"
     )
-    rows = []
-    for fit, errors in (
-        ("least squares", report.squares),
-        ("smallest largest error", report.fitted),
-    ):
-        for degree, best in zip(DEGREES, errors, strict=True):
-            padded = (*best.coefficients, *[0.0] * (5 - len(best.coefficients)))
-            ratio = f"{best.ratio:.4g}"
-            rows.append((str(degree), fit, _deg(best.angle), ratio, _write(padded)))
-    for row in (HEADINGS, *sorted(rows, key=lambda row: row[0])):
-        _say("{:6}  {:22}  {:>10}  {:>8}  {}".format(*row))
+    _say(ROW.format(*HEADINGS))
+    for degree, *errors in zip(DEGREES, report.squares, report.fitted, strict=True):
+        for fit, error in zip(FITS, errors, strict=True):
+            missing = max(DEGREES) - degree
+            polycoef = _write((*error.coefficients, *[0.0] * missing))
+            ratio = f"{error.ratio:.4g}"
+            _say(ROW.format(str(degree), fit, _deg(error.angle), ratio, polycoef))
 
 
 def _deg(angle: float) -> str:
