@@ -251,12 +251,8 @@ class Calculation:
             alpha = gain * getattr(right, f"omega_{bar}")
             more = alpha - getattr(right, f"alpha_{bar}")
             a = more[:, None] * turn_by_quarter(wrenches.arms[bar])
-            body = self.judge.scene.linkage.bar(bar)
-            wrenches = wrenches.changed(
-                bar, body.mass * a, body.moment_of_inertia * more
-            )
-            moved[f"alpha_{bar}"] = alpha
-            moved[f"a_G{bar}"] = getattr(right, f"a_G{bar}") + a
+            wrenches, a_G = self._accelerate(wrenches, bar, a, more)
+            moved |= {f"alpha_{bar}": alpha, **a_G}
         text = "(dJ/dt) v is missing in the accelerations of the loop"
         yield from _state_with_forces(text, moved, wrenches)
 
@@ -281,20 +277,23 @@ class Calculation:
         for text, (part, times) in parts.items():
             wrenches, moved = self.wrenches, Values()
             for bar in MOVING_BARS:
-                a = times * part[bar]
-                wrenches = wrenches.changed(bar, self._mass(bar) * a)
-                moved[f"a_G{bar}"] = getattr(right, f"a_G{bar}") + a
+                wrenches, a_G = self._accelerate(wrenches, bar, times * part[bar])
+                moved |= a_G
             whose = "of every bar, r from its first pin to G"
             yield from _state_with_forces(f"{text} {whose}", moved, wrenches)
         for bar in MOVING_BARS:
             a = -centripetal[bar] - tangential[bar]
-            wrenches = self.wrenches.changed(bar, self._mass(bar) * a)
-            moved = {f"a_G{bar}": getattr(right, f"a_G{bar}") + a}
+            wrenches, moved = self._accelerate(self.wrenches, bar, a)
             text = f"the acceleration of bar {bar}'s first pin is used as its a_G"
             yield from _state_with_forces(text, moved, wrenches)
 
-    def _mass(self, bar: int) -> float:
-        return self.judge.scene.linkage.bar(bar).mass
+    def _accelerate(
+        self, wrenches: BarWrenches, bar: int, a: Array, alpha: Array | float = 0.0
+    ) -> tuple[BarWrenches, Values]:
+        """Return the wrenches and a_G of a bar with a and alpha added to its acceleration."""
+        body = self.judge.scene.linkage.bar(bar)
+        needed = wrenches.changed(bar, body.mass * a, body.moment_of_inertia * alpha)
+        return needed, {f"a_G{bar}": getattr(self.right, f"a_G{bar}") + a}
 
     def _weights(self) -> Iterator[Mistake]:
         """Leave out the weight of one bar."""
@@ -303,7 +302,8 @@ class Calculation:
                 continue
             direction = np.array([np.cos(effect.angle), np.sin(effect.angle)])
             for bar in MOVING_BARS:
-                weight = self._mass(bar) * effect.magnitude * direction
+                mass = self.judge.scene.linkage.bar(bar).mass
+                weight = mass * effect.magnitude * direction
                 without = self.wrenches.changed(bar, weight)
                 yield _state(f"the weight of bar {bar} is missing", without.solve())
 
