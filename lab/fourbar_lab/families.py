@@ -191,16 +191,19 @@ def massless(rng: np.random.Generator) -> Scene:
     )
 
 
+def _draw_place(bar: int, rng: np.random.Generator, nearest: float) -> Place:
+    """Draw a place of a bar, from `nearest` to 1 m away from its first pin."""
+    distance, angle = rng.uniform((nearest, -3.0), (1.0, 3.0)).tolist()
+    return Place(bar, (distance, angle))
+
+
 def springs(rng: np.random.Generator) -> Scene:
     """Draw a spring near the length at which its force is zero, with a preload in every other scene."""
     scene = massless(rng)
     first, second = (
         int(bar) for bar in rng.choice((1, *MOVING_BARS), 2, replace=False)
     )
-    start, end = (
-        Place(bar, tuple(rng.uniform((0.0, -3.0), (1.0, 3.0)).tolist()))
-        for bar in (first, second)
-    )
+    start, end = (_draw_place(bar, rng, 0.0) for bar in (first, second))
     marked = replace(
         scene,
         points=(
@@ -338,18 +341,15 @@ def strokes(rng: np.random.Generator) -> Scene:
 def _put_cylinder(
     scene: Scene, rng: np.random.Generator, one: int, other: int
 ) -> Scene:
-    ends = (
-        Place(bar, tuple(rng.uniform((0.05, -3.0), (1.0, 3.0)).tolist()))
-        for bar in (one, other)
-    )
-    return replace(scene, drive_bar=None, drive=LinearDrive(*ends))  # type: ignore[arg-type]
+    start, end = (_draw_place(bar, rng, 0.05) for bar in (one, other))
+    return replace(scene, drive_bar=None, drive=LinearDrive(start, end))  # type: ignore[arg-type]
 
 
 def pushes(rng: np.random.Generator) -> Scene:
     """Draw a force at a point of a moving bar that drives, along a fixed or turning line."""
     bar, frame = int(rng.choice(MOVING_BARS)), str(rng.choice(FRAMES))
-    distance, angle, direction = rng.uniform((0.05, -3.0, -3.0), (1.0, 3.0, 3.0))
-    drive = PointDrive(Place(bar, (float(distance), float(angle))), direction, frame)
+    place, direction = _draw_place(bar, rng, 0.05), float(rng.uniform(-3.0, 3.0))
+    drive = PointDrive(place, direction, frame)
     return replace(ANYWHERE.draw(rng), drive_bar=None, drive=drive)  # type: ignore[arg-type]
 
 
@@ -370,10 +370,7 @@ def near_pins(rng: np.random.Generator) -> Scene:
         distance, angle = cmath.polar(
             scene.linkage.lengths[near - 1] - cmath.rect(distance, angle)
         )
-    start, end = (
-        Place(near, (distance, angle)),
-        Place(far, tuple(rng.uniform((0.1, -3.0), (1.0, 3.0)).tolist())),
-    )
+    start, end = Place(near, (distance, angle)), _draw_place(far, rng, 0.1)
     if rng.random() < 0.5:
         start, end = end, start
     kind = rng.integers(0, 3)

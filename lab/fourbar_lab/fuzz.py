@@ -116,7 +116,7 @@ def draw_fuzz_scene(seed: int, index: int) -> Scene:
         return replace(scene, motion=scene.motion.replace(acceleration=alpha))
 
 
-def _draw_place(hard: bool, rng: np.random.Generator) -> DrawnLinkage:
+def _draw_linkage(hard: bool, rng: np.random.Generator) -> DrawnLinkage:
     size = SIZES[hard](rng)
     lengths = tuple(float(x * size) for x in _draw_lengths(rng, hard))
     return (
@@ -126,7 +126,7 @@ def _draw_place(hard: bool, rng: np.random.Generator) -> DrawnLinkage:
 
 
 FAMILIES = {
-    hard: RandomFamily(partial(_draw_place, hard), RANGES[hard])
+    hard: RandomFamily(partial(_draw_linkage, hard), RANGES[hard])
     for hard in (False, True)
 }
 """Families of the scenes: ordinary, adversarial."""

@@ -108,12 +108,12 @@ DrawnLinkage = tuple[Sequence[float], Angles]
 class RandomFamily:
     """Random scenes of one kind."""
 
-    draw_place: Callable[[np.random.Generator], DrawnLinkage]
+    draw_linkage: Callable[[np.random.Generator], DrawnLinkage]
     ranges: Ranges
 
     def draw(self, rng: np.random.Generator) -> Scene:
         """Draw a scene."""
-        lengths, draw_angles = self.draw_place(rng)
+        lengths, draw_angles = self.draw_linkage(rng)
         scene = draw_scene(rng, lengths, self.ranges)
         return replace(
             scene, motion=scene.motion.replace(angle=draw_angles(rng, scene.linkage))
