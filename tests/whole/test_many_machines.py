@@ -12,7 +12,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -132,13 +132,18 @@ def started(*line: str, folder: Path) -> Iterator[subprocess.Popen[bytes]]:
         process.wait()
 
 
-def wait_for(path: Path, process: subprocess.Popen[bytes] | None = None) -> None:
-    """Wait until a file is there."""
+def wait_for(ready: Callable[[], bool], process: subprocess.Popen[bytes]) -> None:
+    """Wait for what a process makes while it runs; it must not have ended then."""
     latest = time.monotonic() + TIME
-    while not path.exists():
-        assert time.monotonic() < latest, f"{path} never came"
-        assert process is None or process.poll() is None
+    while process.poll() is None and not ready():
+        assert time.monotonic() < latest, "it takes too long"
         time.sleep(0.02)
+    assert process.poll() is None, "it has ended"
+
+
+def has_address(scheduler: Path) -> bool:
+    """Whether the file of a scheduler is there, whole."""
+    return scheduler.exists() and scheduler.read_text().rstrip().endswith("}")
 
 
 @pytest.mark.skipif(
@@ -157,13 +162,13 @@ def test_a_dask_worker_that_dies_and_one_that_joins_change_no_byte(
         *("scheduler", "--scheduler-file", str(scheduler), "--port", "0"),
         "--no-dashboard",
         folder=tmp_path,
-    ):
-        wait_for(scheduler)
+    ) as serving:
+        wait_for(lambda: has_address(scheduler), serving)
         address = json.loads(scheduler.read_text())["address"]
         with started(*worker, folder=tmp_path) as first:
             line = [str(CI / "dask_run.py"), address, "3", str(out), *OPTIONS]
             program = subprocess.Popen([sys.executable, *line], cwd=tmp_path)
-            wait_for(out, program)
+            wait_for(out.exists, program)
             first.send_signal(signal.SIGKILL)
             with started(*worker, folder=tmp_path):
                 assert program.wait(TIME) == 0
