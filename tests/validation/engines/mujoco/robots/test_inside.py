@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from fourbar.scene import Command
+from fourbar.scene.motion import Sweep
 from fourbar.solving import solve
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.mujoco.robots.answers import QUANTITIES, measure_sizes
@@ -62,6 +63,16 @@ def open_loop(name: str) -> tuple[LoopInside, LoopScene]:
     return LoopInside(posed.model, loop), make_scene(compiled, posed, loop, 2.0)
 
 
+def spread_over_range(inside: LoopInside, made: LoopScene, count: int) -> np.ndarray:
+    """Angles of bar 2 in the loop's plane, within the range that its hinges leave it, rad."""
+    sweep = made.scene.motion.angle
+    assert isinstance(sweep, Sweep)
+    angles = np.linspace(sweep.start, sweep.stop, count + 2)[1:-1]
+    angles = angles + _turn_back(inside, made)
+    away = inside.loop.angles[1] - angles.mean()
+    return np.asarray(angles + math.tau * round(away / math.tau))
+
+
 def ask_again(inside: LoopInside, theta_2: float, alpha_2: float) -> float:
     """Find all joint forces at once by `mj_forward` alone, with the hinges that are not driven left to themselves.
 
@@ -106,8 +117,8 @@ def ask_again(inside: LoopInside, theta_2: float, alpha_2: float) -> float:
 def test_the_torque_is_the_one_that_mujoco_gives_when_asked_by_itself(
     name: str,
 ) -> None:
-    inside, _ = open_loop(name)
-    theta_2 = inside.loop.angles[1] + 0.1
+    inside, made = open_loop(name)
+    theta_2 = float(spread_over_range(inside, made, 3)[-1])
     (row,) = inside.answer_states([theta_2], 2.0, 3.0).rows
     assert row.soft.torque == pytest.approx(
         ask_again(inside, theta_2, 3.0), rel=ASKED_TWICE
@@ -118,7 +129,7 @@ def test_the_torque_is_the_one_that_mujoco_gives_when_asked_by_itself(
 def test_rigid_pins_in_the_robot_are_the_formulas_of_its_scene(name: str) -> None:
     """Multipliers on MuJoCo's mass matrix of the whole robot, against a scene of three bars, and its free bodies."""
     inside, made = open_loop(name)
-    angles = inside.loop.angles[1] + np.linspace(-0.1, 0.1, 5)
+    angles = spread_over_range(inside, made, 5)
     rows = inside.answer_states(angles.tolist(), 2.0, 3.0).rows
     assert len(rows) == len(angles)
     branch = np.full(len(rows), made.scene.motion.branch, dtype=np.int8)
