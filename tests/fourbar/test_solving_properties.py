@@ -15,6 +15,7 @@ from fourbar.linkage import MOVING_BARS, Bar, FourBar
 from fourbar.scene import Scene
 from fourbar.scene.motion import Motion
 from fourbar.solution import Solution
+from tests.support.scenes import change_place, mirrored
 
 WORST_CONDITION = 0.2
 """Sines below this are drawn elsewhere: here every relation must hold to round-off."""
@@ -108,16 +109,6 @@ def draw_load(draw: Any) -> Load:
         frame=frame,
         **at,
     )
-
-
-def change_place(load: Load, change: Any) -> Any:
-    """The place of a load changed, in the form in which it is stated."""
-    forms = ("from_pin", "from_centre", "arm")
-    return {
-        form: change(*getattr(load, form))
-        for form in forms
-        if getattr(load, form) is not None
-    }
 
 
 def arm_from_G(scene: Scene, s: fourbar.Solution, load: Load) -> Any:
@@ -295,36 +286,7 @@ def test_ground_carries_what_acts_and_what_accelerates(scene: Scene) -> None:
 @given(scenes())
 def test_mirror_symmetry(scene: Scene) -> None:
     """Mirrored in the x-axis: angles, couples and speeds change sign, so do y-components and the branch."""
-    link, m = scene.linkage, scene.motion
-
-    def bar(old: Bar) -> Bar:
-        return replace(old, centre=(old.mass_centre[0], -old.mass_centre[1]))
-
-    mirrored = replace(
-        scene,
-        linkage=FourBar(
-            link.ground,
-            bar(link.input),
-            bar(link.coupler),
-            bar(link.output),
-            -link.ground_angle,
-        ),
-        motion=Motion(-float(m.theta_2), -m.omega_2, -m.alpha_2, -m.branch),
-        loads=tuple(
-            replace(
-                load,
-                force=(load.force[0], -load.force[1]),
-                moment=-load.moment,
-                **change_place(load, lambda r, phi: (r, -phi)),
-            )
-            for load in scene.loads
-        ),
-        effects=tuple(
-            replace(e, angle=-e.angle) if isinstance(e, Gravity) else e
-            for e in scene.effects
-        ),
-    )
-    ours, of_mirrored = fourbar.solve(scene), fourbar.solve(mirrored)
+    ours, of_mirrored = fourbar.solve(scene), fourbar.solve(mirrored(scene))
     flipped = {name: value * (1.0, -1.0) for name, value in forces(of_mirrored).items()}
     same_forces(scene, ours, flipped, -float(of_mirrored.torque[0]))
     assert (

@@ -4,9 +4,34 @@ from collections.abc import Iterable
 from itertools import groupby
 from pathlib import Path
 
-from fourbar_validation.compare.rows import Row, sort_rows
+from fourbar_validation.compare.rows import Row, sort_rows, write_results
+from fourbar_validation.compare.tolerance import EQUIVALENCE
+from fourbar_validation.engines.free_body import FreeBody
+from fourbar_validation.engines.registry import Engine
 from fourbar_validation.regression.changes import KEPT, Differences, compare_runs
-from fourbar_validation.regression.record import About, open_run
+from fourbar_validation.regression.record import (
+    About,
+    describe_run,
+    open_run,
+    write_about,
+)
+
+HERE = describe_run([Engine("engine", FreeBody, EQUIVALENCE)], "suite")
+"""What a run of one engine was made with."""
+HEAD = "scene,engine,setting,positions,seconds,times_formulas\n"
+"""First line of a table of times."""
+
+
+def save_run(
+    folder: Path, rows: list[Row], times: str = "", about: About = HERE
+) -> Path:
+    """Write the folder of a run with these rows, and lines of times where there are any."""
+    folder.mkdir()
+    write_results(rows, folder / "results.csv")
+    if times:
+        (folder / "timings.csv").write_text(HEAD + times)
+    write_about(about, folder)
+    return folder
 
 
 def read_run(path: Path) -> tuple[About, list[Row]]:

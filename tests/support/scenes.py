@@ -1,6 +1,8 @@
 """Scenes that several tests share, built in code."""
 
 import math
+from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -60,3 +62,48 @@ def thesis(theta_2: object = None) -> fourbar.Scene:
     return fourbar.Scene(
         linkage, fourbar.Motion(angles, 0.2244), 4, tuple(loads), title="thesis"
     )  # type: ignore[arg-type]
+
+
+def change_place(
+    load: fourbar.Load, change: Callable[[float, float], tuple[float, float]]
+) -> dict[str, tuple[float, float]]:
+    """Return the place of a load changed, in the form in which it is stated."""
+    forms = ("from_pin", "from_centre", "arm")
+    return {
+        form: change(*getattr(load, form))
+        for form in forms
+        if getattr(load, form) is not None
+    }
+
+
+def mirrored(scene: fourbar.Scene) -> fourbar.Scene:
+    """Return the scene with y to -y: angles, couples, speeds and the branch change sign.
+
+    Effects other than gravity stay: they must have no side.
+    """
+    linkage, motion = scene.linkage, scene.motion
+    bars = {}
+    for name, bar in zip(("input", "coupler", "output"), linkage.moving, strict=True):
+        r, phi = bar.mass_centre
+        bars[name] = replace(bar, centre=(r, -phi))
+    loads = []
+    for load in scene.loads:
+        place = change_place(load, lambda r, phi: (r, -phi))
+        force = load.force and (load.force[0], -load.force[1])
+        loads.append(replace(load, force=force, moment=-load.moment, **place))
+    effects = []
+    for effect in scene.effects:
+        turned = isinstance(effect, fourbar.Gravity)
+        effects.append(replace(effect, angle=-effect.angle) if turned else effect)
+    return replace(
+        scene,
+        linkage=replace(linkage, ground_angle=-linkage.ground_angle, **bars),
+        motion=motion.replace(
+            angle=-fourbar.command(scene).theta_2,
+            speed=-motion.omega_2,
+            acceleration=-motion.alpha_2,
+            branch=-motion.branch,
+        ),
+        loads=tuple(loads),
+        effects=tuple(effects),
+    )

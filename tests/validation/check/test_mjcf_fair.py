@@ -31,6 +31,7 @@ from fourbar_validation.engines.mujoco.theirs import (
     predict_softness,
 )
 from tests.support.robots import examine_text as examine
+from tests.support.scenes import mirrored
 
 ARM = FourBar(0.3, Bar(0.1, 0.2), Bar(0.25, 0.3), Bar(0.22, 0.3))
 SWEEP = fourbar.Motion(np.radians(np.linspace(30.0, 90.0, 61)), 1.0)
@@ -286,17 +287,6 @@ def turned(scene: Scene, angle: float) -> Scene:
         motion=scene.motion.replace(angle=np.asarray(scene.motion.angle) + angle),
         effects=tuple(
             replace(effect, angle=effect.angle + angle) for effect in scene.effects
-        ),
-    )
-
-
-def mirrored(scene: Scene) -> Scene:
-    """The scene with y to -y; its mass centres lie on the lines of the bars."""
-    return replace(
-        scene,
-        linkage=replace(scene.linkage, ground_angle=-scene.linkage.ground_angle),
-        motion=scene.motion.replace(
-            angle=-np.asarray(scene.motion.angle), branch=-scene.motion.branch
         ),
     )
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from fourbar_validation.advise.worst_errors import WorstErrors
 from fourbar_validation.cost import conclusion, pictures
-from tests.validation.cost.test_cost import point
+from tests.support.costs import point
 
 
 def test_statement_and_conclusion_have_one_criterion() -> None:

@@ -30,6 +30,7 @@ from fourbar_validation.cost.series import BEST
 from fourbar_validation.engines.mujoco import drives
 from fourbar_validation.engines.mujoco.forward import MujocoOneState
 from fourbar_validation.engines.mujoco.trial import Build, TrialSetup
+from tests.support.costs import point
 from tests.support.scenes import crank_rocker, thesis
 
 
@@ -263,25 +264,6 @@ def test_what_is_no_number_or_not_compared_has_no_small_error() -> None:
             {name: getattr(solution, name) for name in QUANTITIES},
         ).torque
         == math.inf
-    )
-
-
-def point(
-    steps: float, worst: float, curve: str = "c", kind: str = study.STEPPED
-) -> study.CostPoint:
-    errors = WorstErrors(*[worst] * len(QUANTITIES))
-    return study.CostPoint(
-        curve,
-        kind,
-        f"{steps:g} steps a revolution",
-        steps,
-        int(steps),
-        steps,
-        errors,
-        errors,
-        2.0 * steps * 1e-6,
-        steps * 1e-6,
-        0.03,
     )
 
 

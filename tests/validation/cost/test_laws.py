@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import pytest
 
-from fourbar_validation.advise.worst_errors import QUANTITIES, WorstErrors
 from fourbar_validation.cost.conclusion import find_cheapest
 from fourbar_validation.cost.laws import (
     ErrorLaw,
@@ -14,27 +13,9 @@ from fourbar_validation.cost.laws import (
     find_pareto,
     fit_laws,
 )
-from fourbar_validation.cost.study import STEPPED, CostPoint
+from tests.support.costs import point
 
 STEPS = [40.0 * 2**k for k in range(6)]
-
-
-def point(steps: float, error: float, seconds: float | None = None) -> CostPoint:
-    errors = WorstErrors(*[error] * len(QUANTITIES))
-    cost = 1e-6 * steps if seconds is None else seconds
-    return CostPoint(
-        "RK4, tc held",
-        STEPPED,
-        f"{steps:g} steps",
-        steps,
-        int(steps),
-        steps,
-        errors,
-        errors,
-        cost,
-        cost,
-        0.0,
-    )
 
 
 def fit_order(order: float) -> ErrorLaw:

@@ -7,19 +7,14 @@ import pytest
 
 from fourbar.errors import FAILED, HOLDS
 from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES, Row
-from fourbar_validation.compare.tolerance import EQUIVALENCE
-from fourbar_validation.engines.free_body import FreeBody
-from fourbar_validation.engines.registry import Engine
 from fourbar_validation.regression.change import Kind, compare_row
 from fourbar_validation.regression.changes import Differences
-from fourbar_validation.regression.record import describe_run
 from fourbar_validation.regression.rules import list_weakened
-from tests.support.runs import compare_rows
+from tests.support.runs import HERE, compare_rows
 
 EPS = 2.0**-52
 ROW = Row("scene", "engine", "exact", "torque", 1e-15, 1e-9, AGREES, "", 1.0, 1.0)
 KEY = ("scene", "engine", "exact", "torque")
-HERE = describe_run([Engine("engine", FreeBody, EQUIVALENCE)], "suite")
 
 
 def changed(**fields: object) -> Row:

@@ -24,7 +24,7 @@ import fourbar
 from fourbar.errors import InputError
 from fourbar_validation.cli import status
 from fourbar_validation.compare.columns import Columns
-from fourbar_validation.compare.rows import AGREES, FAILS, REFUSES, Row, write_results
+from fourbar_validation.compare.rows import AGREES, FAILS, REFUSES, Row
 from fourbar_validation.compare.tolerance import (
     EPS,
     EQUIVALENCE,
@@ -54,13 +54,12 @@ from fourbar_validation.run.store import Store
 from fourbar_validation.scenes.suites import read_scene_files
 from tests.support.another_machine import CORES, ROOT, environment, why_not
 from tests.support.here import judge_here
-from tests.support.runs import compare_rows, read_run
+from tests.support.runs import HERE, compare_rows, read_run, save_run
 
 WithRows = tuple[About, list[Row]]
 ROW = Row(
     "scene", "engine", "exact", "torque", 1e-15, 1e-14, AGREES, "equivalence", 1.0, 1.0
 )
-HERE = describe_run([Engine("engine", FreeBody, EQUIVALENCE)], "suite")
 
 
 def kinds(old: list[Row], new: list[Row]) -> list[Kind]:
@@ -111,22 +110,12 @@ def test_other_versions_are_reported_first() -> None:
 
 
 MODEL = [str(Path(__file__).parents[3] / "models" / "crank_rocker.toml")]
-HEAD = "scene,engine,setting,positions,seconds,times_formulas\n"
-
-
-def save(folder: Path, rows: list[Row], times: str = "", about: About = HERE) -> Path:
-    folder.mkdir()
-    write_results(rows, folder / "results.csv")
-    if times:
-        (folder / "timings.csv").write_text(HEAD + times)
-    write_about(about, folder)
-    return folder
 
 
 def test_command_writes_every_form_and_leaves_with_the_status(tmp_path: Path) -> None:
     hostile = replace(ROW, scene="<script>alert(1)</script>|`x`")
-    old = save(tmp_path / "old", [ROW, hostile])
-    new = save(
+    old = save_run(tmp_path / "old", [ROW, hostile])
+    new = save_run(
         tmp_path / "new", [replace(ROW, error=1e-9), replace(hostile, error=1e-9)]
     )
     forms = [f"--{form}={tmp_path / form}" for form in ("markdown", "html", "junit")]
@@ -148,7 +137,7 @@ def test_command_writes_every_form_and_leaves_with_the_status(tmp_path: Path) ->
 def test_accept_keeps_the_run_next_to_the_results_or_in_a_stated_folder(
     tmp_path: Path,
 ) -> None:
-    run = save(tmp_path / "run", [ROW], "scene,engine,-,1,1,3.0\n")
+    run = save_run(tmp_path / "run", [ROW], "scene,engine,-,1,1,3.0\n")
     runner = CliRunner()
     for options, kept in (
         ([], tmp_path / "accepted"),
@@ -213,7 +202,7 @@ def test_a_damaged_run_is_named_and_nothing_is_written(
 ) -> None:
     rows = [replace(ROW, engine=f"engine {k}") for k in range(4)]
     good, run = (
-        save(tmp_path / name, rows, "scene,engine,-,1,1,3.0\n")
+        save_run(tmp_path / name, rows, "scene,engine,-,1,1,3.0\n")
         for name in ("good", "run")
     )
     kept = tmp_path / "kept"
@@ -243,11 +232,11 @@ def test_a_damaged_run_is_named_and_nothing_is_written(
 def test_a_damaged_table_is_one_line_and_nothing_is_written(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    run, kept = save(tmp_path / "run", [ROW]), tmp_path / "kept"
+    run, kept = save_run(tmp_path / "run", [ROW]), tmp_path / "kept"
     assert status(["accept", str(run), "--to", str(kept)]) == 0
     file, table = kept / HISTORY, (kept / "results.csv").read_bytes()
     contents = file.read_bytes()
-    run = save(tmp_path / "later", [replace(ROW, error=2e-15)])
+    run = save_run(tmp_path / "later", [replace(ROW, error=2e-15)])
     another = replace(HERE, date="later")
     write_about(another, run)
     with Columns(tmp_path) as columns:
@@ -286,7 +275,7 @@ def test_a_damaged_table_is_one_line_and_nothing_is_written(
 def test_what_has_no_record_of_its_rows_is_compared_with_a_note_and_not_accepted(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    good, bare = (save(tmp_path / name, [ROW]) for name in ("good", "bare"))
+    good, bare = (save_run(tmp_path / name, [ROW]) for name in ("good", "bare"))
     (bare / "record.json").unlink()
     assert status(["compare", str(bare), str(good)]) == 0
     assert f"{bare / 'results.csv'}: not verified" in capsys.readouterr().out
@@ -299,11 +288,11 @@ def test_what_is_empty_unfinished_or_fails_is_not_accepted(tmp_path: Path) -> No
         replace(ROW, verdict=REFUSES),
     )
     folders = {
-        name: save(tmp_path / name, rows)
+        name: save_run(tmp_path / name, rows)
         for name, rows in (("empty", []), ("good", [ROW]), ("bad", [fails]))
     }
     folders |= {
-        name: save(tmp_path / name, [row])
+        name: save_run(tmp_path / name, [row])
         for name, row in (("unfinished", ROW), ("nothing", refuses))
     }
     (folders["unfinished"] / "run.json").write_text("{}")
@@ -469,8 +458,8 @@ def test_a_part_of_a_long_run_compares_with_its_part_and_a_table_out_of_order_wi
 ) -> None:
     rows = [replace(ROW, scene=f"scene {k:03d}") for k in range(80)]
     all_rows, some = (
-        save(tmp_path / "whole", rows),
-        save(tmp_path / "some", [rows[7], rows[70]]),
+        save_run(tmp_path / "whole", rows),
+        save_run(tmp_path / "some", [rows[7], rows[70]]),
     )
     assert status(["compare", str(all_rows), str(some)]) == 2
     printed = capsys.readouterr()
@@ -661,7 +650,7 @@ def test_a_renamed_scene_is_found_by_what_it_states(
         )
         both.append(
             str(
-                save(
+                save_run(
                     tmp_path / folder,
                     rows,
                     "".join(f"{n},engine,-,1,1,3.0\n" for n in scenes),
@@ -782,13 +771,13 @@ def test_a_wider_tolerance_is_a_regression_over_two_nights(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """The first night widens it and is not accepted; the second hides an error in it."""
-    strict = save(tmp_path / "strict", [ROW])
+    strict = save_run(tmp_path / "strict", [ROW])
     accepted = tmp_path / "accepted"
     assert status(["accept", str(strict), "--to", str(accepted)]) == 0
     wider = describe_run([widen(1e-2)], "suite")
     for night, error in (("first", 1e-15), ("second", 5e-3)):
         rows = [replace(LOOSE, error=error)]
-        results = save(tmp_path / night, rows, about=wider)
+        results = save_run(tmp_path / night, rows, about=wider)
         capsys.readouterr()
         assert status(["compare", str(accepted), str(results)]) == 1
         printed = capsys.readouterr().out
@@ -810,7 +799,10 @@ def test_a_run_of_another_suite_is_never_called_no_regression(
     """Two of eight rows stand in both: the verdict says so before anything else."""
     both = [ROW, replace(ROW, quantity="F12")]
     others = [replace(ROW, scene=f"scene {k}") for k in range(6)]
-    old, new = save(tmp_path / "old", both), save(tmp_path / "new", [*both, *others])
+    old, new = (
+        save_run(tmp_path / "old", both),
+        save_run(tmp_path / "new", [*both, *others]),
+    )
     for runs in ([str(old), str(new)], [str(new), str(old)]):
         assert status(["compare", *runs]) == 2
         printed = capsys.readouterr()
@@ -914,8 +906,8 @@ def test_what_is_compared_can_be_chosen(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     bad = replace(ROW, quantity="F12")
-    old = save(tmp_path / "old", [ROW, bad])
-    new = save(tmp_path / "new", [ROW, replace(bad, error=1e-9)])
+    old = save_run(tmp_path / "old", [ROW, bad])
+    new = save_run(tmp_path / "new", [ROW, replace(bad, error=1e-9)])
     arguments = ["compare", str(old), str(new)]
     assert [
         status([*arguments, *more])
@@ -975,7 +967,7 @@ def test_accepted_runs_are_rows_of_one_table_that_pandas_reads(tmp_path: Path) -
             {"newcomer": "1"} if night else {}
         )
         about = replace(record, versions=versions, date=date, commit=f"{night}abcdef")
-        run = save(tmp_path / str(night), rows, "scene,engine,-,1,1,3.0\n", about)
+        run = save_run(tmp_path / str(night), rows, "scene,engine,-,1,1,3.0\n", about)
         assert status(["accept", str(run), "--to", str(kept)]) == 0
     assert (
         status(["accept", str(tmp_path / "1"), "--to", str(kept)]) == 0
@@ -1082,7 +1074,7 @@ def test_a_folder_where_a_file_of_a_run_belongs_is_one_line_before_it(
 def test_accept_onto_a_folder_of_that_name_writes_nothing(
     name: str, tmp_path: Path
 ) -> None:
-    run, kept = save(tmp_path / "run", [ROW]), tmp_path / "kept"
+    run, kept = save_run(tmp_path / "run", [ROW]), tmp_path / "kept"
     (kept / name).mkdir(parents=True)
     assert status(["accept", str(run), "--to", str(kept)]) == 2
     assert [path.name for path in kept.iterdir()] == [name]
@@ -1108,7 +1100,7 @@ def test_folders_among_the_parts_of_a_run_are_swept_away(tmp_path: Path) -> None
 def test_a_full_disk_names_the_file_that_does_not_fit(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    run = save(tmp_path / "run", [ROW])
+    run = save_run(tmp_path / "run", [ROW])
 
     def full(source: Path, target: Path) -> None:
         raise OSError(

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from fourbar_validation.compare.rows import AGREES, FAILS, Row, write_results
+from fourbar_validation.compare.rows import AGREES, FAILS, Row
 from fourbar_validation.compare.tolerance import EQUIVALENCE, ErrorBound
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.guests import STATED
@@ -14,22 +14,20 @@ from fourbar_validation.regression.record import (
     Recorded,
     describe_run,
     open_run,
-    write_about,
 )
 from fourbar_validation.report.record import Record
 from fourbar_validation.run.run import RunOptions, find_since, run
 from tests.support.here import judge_here
+from tests.support.runs import save_run
 from tests.support.unlucky import Few
 
 ROW = Row("a", "mine", "exact", "F32", 1e-15, 1e-14, AGREES, "", 2.0, 1.0)
+MINE = describe_run([Engine("mine", FreeBody, EQUIVALENCE)], "suite")
 FAILED = replace(ROW, error=1e-3, verdict=FAILS)
 
 
 def save(folder: Path, rows: list[Row]) -> Recorded:
-    folder.mkdir()
-    write_results(rows, folder / "results.csv")
-    write_about(describe_run([Engine("mine", FreeBody, EQUIVALENCE)], "suite"), folder)
-    return open_run(folder)
+    return open_run(save_run(folder, rows, about=MINE))
 
 
 @pytest.mark.parametrize(

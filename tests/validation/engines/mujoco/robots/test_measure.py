@@ -9,7 +9,6 @@ import pytest
 import fourbar
 from fourbar.errors import InputError
 from fourbar.mjcf import Plane, write_mjcf
-from fourbar.scene import Scene
 from fourbar_validation.engines.mujoco.robots.answers import MeasureOptions
 from fourbar_validation.engines.mujoco.robots.loop import PoseOptions, RobotFile
 from fourbar_validation.engines.mujoco.robots.measure import measure_loops
@@ -17,6 +16,7 @@ from fourbar_validation.engines.mujoco.robots.scene import read_loop_scene
 from fourbar_validation.robots.files import read_robot
 from fourbar_validation.robots.measure import find_left_out, find_worst
 from tests.support.robots import FINGER
+from tests.support.scenes import mirrored
 
 ROBOTS = Path(__file__).parents[5] / "models" / "robots"
 
@@ -49,30 +49,6 @@ def test_a_scene_with_axes_of_its_own_gives_the_same_errors() -> None:
 
 ROCKER = fourbar.load(ROBOTS.parent / "crank_rocker.toml")
 TILTED = Plane((-2.0, 5.0, 1.0), (1.0, -2.0, 0.5))
-
-
-def mirrored(scene: Scene) -> Scene:
-    """The scene in a mirror, y to -y: the same mechanism seen from behind."""
-    linkage = scene.linkage
-    bars = {
-        name: replace(bar, centre=(bar.centre[0], -bar.centre[1]))
-        for name, bar in zip(
-            ("input", "coupler", "output"), linkage.moving, strict=True
-        )
-        if bar.centre is not None
-    }
-    motion = scene.motion
-    return replace(
-        scene,
-        linkage=replace(linkage, ground_angle=-linkage.ground_angle, **bars),
-        motion=motion.replace(
-            angle=-np.asarray(fourbar.command(scene).theta_2),
-            speed=-motion.speed,
-            branch=-motion.branch,
-        ),
-        loads=(),
-        effects=(),
-    )
 
 
 @pytest.mark.slow
