@@ -8,10 +8,12 @@ import pytest
 import fourbar
 from fourbar.files.scene_file import loads
 from fourbar.show.plot.figures import draw_figure
-from fourbar.show.plot.paths import CHORD, trace
+from fourbar.show.plot.paths import trace
 from fourbar.show.plot.view import make_view
 from tests.support.scenes import crank_rocker
 
+LONGEST = 2.0 / 150.0
+"""Of a chord of a drawn path, as a part of its extent: 2 mm in a figure of 150 mm."""
 NEAR_IN_LINE = """\
 title = "Four-bar from joint coordinates"
 [pins]
@@ -42,11 +44,11 @@ def test_the_whole_circuit_is_traced_without_a_corner() -> None:
     path = traced.path(traced.solution.points["E"])
     assert path[0] == pytest.approx(path[-1])
     longest, sharpest = measure_chords(path)
-    assert longest < 2.0 * CHORD
+    assert longest < LONGEST
     assert sharpest < 30.0
     assert len(path) < 2000
     away = path - view.here.points["E"][0]
-    assert np.hypot(*away.T).min() < CHORD * np.ptp(path, axis=0).max()
+    assert np.hypot(*away.T).min() < 0.5 * LONGEST * np.ptp(path, axis=0).max()
     # the curve of the formulas, by many more positions
     scene = view.scene
     curve = fourbar.coupler_curve(scene, "E", steps=200_000)
@@ -66,7 +68,7 @@ def test_a_stated_sweep_keeps_its_ends() -> None:
     path = traced.path(traced.solution.points["P"])
     assert not traced.circuit
     assert path[[0, -1]] == pytest.approx(view.sweep.points["P"][[0, -1]])
-    assert measure_chords(path)[0] < 2.0 * CHORD
+    assert measure_chords(path)[0] < LONGEST
 
 
 def test_the_coupler_figure_draws_that_path() -> None:
@@ -74,5 +76,5 @@ def test_the_coupler_figure_draws_that_path() -> None:
     figure = draw_figure(scene, "coupler").figure
     (axes,) = (axes for axes in figure.axes if axes.get_title(loc="left"))
     lines = {line.get_label(): line.get_xydata() for line in axes.lines}
-    assert measure_chords(np.asarray(lines["E"]))[0] < 2.0 * CHORD
+    assert measure_chords(np.asarray(lines["E"]))[0] < LONGEST
     assert "circuit" in axes.get_title(loc="left")

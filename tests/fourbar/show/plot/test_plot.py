@@ -54,6 +54,8 @@ BALANCE = 1e-12
 """Force and moment sums of a free body, relative to their largest term: a few tens of roundings."""
 
 
+BESIDE_A_CHORD = 150.0**-2
+"""Of a path's extent: a chord of a 150th leaves a curve whose radius is an eighth by that."""
 TOUCH = 1.0
 """Boxes of texts may share this many pixels: a box is wider than its ink."""
 
@@ -218,11 +220,14 @@ def test_the_coupler_figure_shows_the_points_of_the_scene() -> None:
         if line.get_label()[0] != "_"
     }
     assert list(curves) == ["$A$", "$B$", "P"]  # Q belongs to the output
-    # each solved position lies between two of the finer path
+    # each solved position lies on the finer path: beside one of its chords
     path = np.asarray(curves["P"])
-    near = np.hypot(*np.diff(path, axis=0).T).max()
+    starts, chords = path[:-1], np.diff(path, axis=0)
+    extent = np.ptp(path, axis=0).max()
     for place in solved(scene).points["P"]:
-        assert np.hypot(*(path - place).T).min() < near
+        along = np.sum((place - starts) * chords, axis=1) / np.sum(chords**2, axis=1)
+        nearest = starts + np.clip(along, 0.0, 1.0)[:, None] * chords
+        assert np.hypot(*(nearest - place).T).min() < BESIDE_A_CHORD * extent
 
 
 @pytest.mark.slow
