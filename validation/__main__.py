@@ -5,9 +5,8 @@ import sys
 from pathlib import Path
 
 HERE = str(Path(__file__).parent)
-sys.path.insert(
-    0, HERE
-)  # where the checkout is not installed, and for the processes that are started from here
+# where the checkout is not installed, and for the processes that are started from here
+sys.path.insert(0, HERE)
 os.environ["PYTHONPATH"] = os.pathsep.join(
     filter(None, (HERE, os.environ.get("PYTHONPATH")))
 )

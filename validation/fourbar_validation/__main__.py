@@ -1,4 +1,7 @@
-"""`python -m fourbar_validation`: the command line of the harness, wherever it is installed."""
+"""`python -m fourbar_validation`: the command line of the harness.
+
+It works wherever the package is installed.
+"""
 
 from fourbar_validation.cli import main
 

@@ -1,4 +1,7 @@
-"""Commands of the harness; each lives in its own module and is imported when it is called."""
+"""Commands of the harness.
+
+Each lives in its own module and is imported when it is called.
+"""
 
 import sys
 from collections.abc import Mapping
@@ -31,7 +34,9 @@ class LazyGroup(click.Group):
     def __init__(self, *, modules: Mapping[str, str], **settings: Any) -> None:
         super().__init__(**settings)
         self.modules = modules
-        """Module and function of each subcommand, by name, in the order a newcomer needs them."""
+        """Module and function of each subcommand, by name. They are in the order in
+        which a newcomer needs them.
+        """
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """List the commands in their order."""
@@ -49,7 +54,10 @@ class LazyGroup(click.Group):
 
 
 def _stand_in(name: str, missing: ModuleNotFoundError) -> click.Command:
-    """Stand in for a command whose library is not installed: it is listed, and says so where it is called."""
+    """Stand in for a command whose library is not installed.
+
+    It is listed, and says so when it is called.
+    """
 
     @click.command(name, help=f"Not available: {missing.name} is not installed.")
     @click.argument("arguments", nargs=-1, type=click.UNPROCESSED)
@@ -70,7 +78,7 @@ def _stand_in(name: str, missing: ModuleNotFoundError) -> click.Command:
 @click.version_option(__version__, "-V", "--version", prog_name="fourbar-validation")
 @click.pass_context
 def group(context: click.Context) -> None:
-    """Check the closed formulas of the planar four-bar linkage against independent engines.
+    """Check the closed formulas of the planar four-bar against independent engines.
 
     Exit status: 0 all holds, 1 a comparison fails or nothing was compared, 2 the input
     is bad, 3 the environment or the program failed, 130 interrupted.
@@ -85,5 +93,8 @@ def main(arguments: list[str] | None = None) -> None:
 
 
 def status(arguments: list[str] | None = None) -> int:
-    """Run a command; what goes wrong becomes one line on standard error and an exit status."""
+    """Run a command and return its exit status.
+
+    An error becomes one line on standard error.
+    """
     return run(group, PROGRAM, arguments, "validation")

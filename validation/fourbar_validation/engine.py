@@ -1,6 +1,7 @@
-"""`python -m fourbar_validation.engine NAME | MODULE:CLASS`: serve an engine by the protocol, one line a question.
+"""`python -m fourbar_validation.engine NAME | MODULE:CLASS`: serve an engine.
 
-NAME is one of our adapters. docs/protocol.md states what a class has.
+It is served by the protocol, one line a question. NAME is one of our adapters.
+docs/protocol.md states what a class has.
 """
 
 import json
@@ -32,7 +33,9 @@ ALL_BUT_CYLINDER = (
 OURS = frozenset(sys.modules)
 """Modules that were imported before those of the engine."""
 Factory = Callable[..., Any]
-"""Makes an engine; the keywords are those of a question's setting, or the step of a released motion."""
+"""Function that makes an engine. Its keywords are those of a question's setting, or the
+step of a released motion.
+"""
 
 
 class NotFoundError(Exception):
@@ -70,7 +73,10 @@ def open_engine(entry: str) -> tuple[Factory, dict[str, Any]]:
 
 
 def _apply_setting(engine: Any, setting: dict[str, Any], names: Sequence[str]) -> Any:
-    """Return the engine with a setting; one that knows none has no timestep, and no error but round-off."""
+    """Return the engine with a setting.
+
+    One that takes none has no timestep, and no error but round-off.
+    """
     if "name" in setting and setting["name"] not in names:
         raise LimitError(
             f"it has no setting {setting['name']!r}; it has:"
@@ -118,7 +124,10 @@ def _open_class(entry: str) -> tuple[Factory, dict[str, Any]]:
 
 
 def hash_code(module: str) -> str:
-    """Hash of the modules imported with a class, of the others in its folder, and of what is installed."""
+    """Hash the modules imported with a class, and the others in its folder.
+
+    What is installed is hashed too.
+    """
     files = {
         getattr(loaded, "__file__", None)
         for name, loaded in list(sys.modules.items())

@@ -1,4 +1,7 @@
-"""Locate this package, the models, and the checkout that contains both, if there is one."""
+"""Locate this package, the models, and the checkout that contains both.
+
+There may be none.
+"""
 
 import os
 import sys
@@ -14,12 +17,17 @@ from fourbar.errors import FourBarError
 PACKAGE = Path(__file__).resolve().parent
 FORMULAS = Path(fourbar.__file__).resolve().parent
 CHECKOUT = None if (PACKAGE / "models" / "problems").is_dir() else PACKAGE.parents[1]
-"""The folder of pyproject.toml, models, tests and docs; None where the package is installed, with the models in it."""
+"""The folder of pyproject.toml, models, tests and docs. None if the package is
+installed, with the models in it.
+"""
 MODELS = PACKAGE / "models" if CHECKOUT is None else CHECKOUT / "models"
 
 
 def find_program(started: str) -> str:
-    """Return the command that starts the harness, from the file that was started (`sys.argv[0]`)."""
+    """Return the command that starts the harness.
+
+    It follows from the file that was started (`sys.argv[0]`).
+    """
     if Path(started).parts[-2:] == ("validation", "__main__.py"):
         return "python -m validation"
     return "fourbar-validation"
@@ -30,7 +38,10 @@ PROGRAM = find_program(sys.argv[0] if sys.argv else "")
 
 
 def find_checkout(what: str) -> Path:
-    """Return the checkout; FourBarError, which says what needs one, where there is none."""
+    """Return the checkout.
+
+    Raises a FourBarError that says what needs one, if there is none.
+    """
     if CHECKOUT is None:
         raise FourBarError(
             f"{what} needs a checkout of the repository; this is the installed package"
@@ -40,7 +51,10 @@ def find_checkout(what: str) -> Path:
 
 @contextmanager
 def import_path() -> Iterator[str]:
-    """Return PYTHONPATH for another interpreter: it finds this code there, and no library of this environment."""
+    """Return PYTHONPATH for another interpreter.
+
+    It finds this code there, and no library of this environment.
+    """
     rest = filter(None, [os.environ.get("PYTHONPATH")])
     if CHECKOUT is not None:
         yield os.pathsep.join(

@@ -1,1 +1,1 @@
-"""The cheapest settings of MuJoCo that keep torque and pin forces within a required error."""
+"""The cheapest settings of MuJoCo that keep an answer within a required error."""

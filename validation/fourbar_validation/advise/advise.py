@@ -1,8 +1,8 @@
-"""The cheapest settings of MuJoCo that keep torque and pin forces within a required error on a given scene.
+"""The cheapest settings of MuJoCo within a required error on a given scene.
 
-The laws of the study (`guess`) say where to look, and short runs of the scene itself
-decide. With fitted pads the softness of the closure plays no part above 1e-9 (1e-6 in a
-slow linkage), so that tc may be long.
+The error is that of torque and pin forces. The laws of the study (`guess`) say where to
+look, and short runs of the scene itself decide. With fitted pads the softness of the
+closure plays no part above 1e-9 (1e-6 in a slow linkage), so that tc may be long.
 """
 
 from collections.abc import Callable, Sequence
@@ -52,14 +52,20 @@ from fourbar_validation.robots.options import (
 from fourbar_validation.robots.report import describe_advice, show
 
 MARGIN = 0.7
-"""The run must stay within this part of the required error: elsewhere it may be larger."""
+"""Part of the required error within which the run must stay. Elsewhere the error may be
+larger.
+"""
 CLOSE_ENOUGH = 1.15
-"""The search stops where the least steps that serve and the most that do not are this close."""
+"""Ratio at which the search stops. It is that of the least steps that serve to the most
+that do not.
+"""
 BETWEEN = 180
 """Intervals of the sweep at which a run is read at least."""
 MOST_TRIALS = 24
 MOST_STEPS = 16_000
-"""Most steps of one run, a fifth of a second. An error that needs more steps counts as not reachable."""
+"""Most steps of one run, a fifth of a second. An error that needs more steps counts as
+not reachable.
+"""
 ROBOTS = (".xml", ".mjcf")
 """Suffixes of a robot's file."""
 LEAST_GAIN = 0.8
@@ -67,7 +73,9 @@ LEAST_GAIN = 0.8
 ROUNDS, TIMED_STEPS, TIMED_READINGS = 5, 200, 30
 """Timings of each kind of step, and what is timed at once."""
 CHEAPER = 0.97
-"""A kind of step is taken for cheaper below this part of the work: less is the noise of its timing."""
+"""Part of the work below which a kind of step counts as cheaper. Less is the noise of
+its timing.
+"""
 Kind = Callable[[Settings], Settings]
 """Function that changes what a step costs: solver, flywheel, integrator, pads."""
 
@@ -136,12 +144,17 @@ class Advice:
 
     required: float
     best: Attempt
-    """Cheapest attempt that reaches the required error; the most accurate one if none does."""
+    """Cheapest attempt that reaches the required error. It is the most accurate one if
+    none does.
+    """
     attempts: tuple[Attempt, ...]
     reached: bool
 
     def cells(self) -> tuple[str, str, str]:
-        """Format error, steps per revolution and time constant for a table of several scenes."""
+        """Format error, steps per revolution and time constant for a table.
+
+        The table is of several scenes.
+        """
         error = f"{self.best.errors.worst:.1e}" + (
             "" if self.reached else " (not reached)"
         )
@@ -175,7 +188,9 @@ class Advice:
 
 
 def advise(scene: Scene, error: float, setup: TrialSetup | None = None) -> Advice:
-    """Search the number of steps, and the time constant around what the law says, by runs of the scene.
+    """Search the number of steps, and the time constant, by runs of the scene.
+
+    The time constant is searched around what the law says.
 
     Raises LimitError for a scene that cannot be run through in time.
     """
@@ -189,7 +204,10 @@ def advise(scene: Scene, error: float, setup: TrialSetup | None = None) -> Advic
 
 
 def choose_positions(scene: Scene) -> Command:
-    """Take the scene's positions and others between them: the error peaks there, most near a pole of T3, T4."""
+    """Take the scene's positions and others between them.
+
+    The error has its peaks there, most near a pole of T3, T4.
+    """
     command = command_of(scene)
     if np.ptp(command.branch) != 0:
         return command
@@ -232,7 +250,10 @@ class _CheapestSearch:
         return attempt.steps * attempt.step_cost + attempt.readings * self.reading_cost
 
     def _try_kinds(self) -> None:
-        """Try each kind of step with as many steps as would be cheaper, and with fewer if they serve."""
+        """Try each kind of step with as many steps as would be cheaper.
+
+        If they serve, fewer are tried.
+        """
         start = min(self._list_served(), key=lambda attempt: attempt.steps)
         settings = start.settings
         costs = self._time_kinds(settings)
@@ -255,7 +276,10 @@ class _CheapestSearch:
                 self._bisect(tc, n / CLOSE_ENOUGH, serves=n, kind=kind, cost=cost)
 
     def _time_kinds(self, settings: Settings) -> dict[str, float]:
-        """Time a step of each kind, and a reading, in steps of the settings; the least of interleaved rounds."""
+        """Time a step of each kind, and a reading, in steps of the settings.
+
+        Each time is the least of interleaved rounds.
+        """
         variants = {
             "": settings,
             **{name: kind(settings) for name, kind in KINDS.items()},
@@ -272,7 +296,7 @@ class _CheapestSearch:
         return {name: min(values) / base for name, values in times.items()}
 
     def _polish(self, tc: float) -> None:
-        """Try whether another time constant serves with fewer steps, or serves at all."""
+        """Try whether another time constant serves, or serves with fewer steps."""
         served = self._list_served()
         if not served:
             self._bisect(tc, _find_nearest(self.attempts).settings.steps_per_revolution)
@@ -290,7 +314,7 @@ class _CheapestSearch:
         kind: Kind | None = None,
         cost: float = 1.0,
     ) -> None:
-        """Narrow down the least steps per revolution that serve with one time constant."""
+        """Narrow down the least steps per revolution at one time constant."""
         fails: float | None = None
         last: Attempt | None = None
         for _ in range(MOST_TRIALS):
@@ -421,11 +445,12 @@ def command(
     output: Path | None,
     **robot: Any,
 ) -> int:
-    """Find the cheapest MuJoCo settings that keep SCENES within an error; exit 1 where none is found for one of them.
+    """Find the cheapest MuJoCo settings that keep SCENES within an error.
 
-    Of each scene it says which of the settings matters, and why; of several scenes a
-    table is printed at the end. Of a robot's FILE.xml, and SCENE before it or not, it
-    tries settings in the file itself and prints what to type.
+    Exit with status 1 if none is found for one of them. Of each scene it says which of
+    the settings matters, and why; of several scenes a table is printed at the end. Of a
+    robot's FILE.xml, and SCENE before it or not, it tries settings in the file itself
+    and prints what to type.
     """
     if scenes[-1].suffix.lower() in ROBOTS:
         if output is not None or len(scenes) > 2:

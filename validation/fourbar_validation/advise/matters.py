@@ -1,4 +1,7 @@
-"""Find the MuJoCo settings that matter for a scene, and why, by changing one at a time and measuring the error."""
+"""Find the MuJoCo settings that matter for a scene, and why.
+
+Each is changed by itself, and the error measured.
+"""
 
 import math
 from collections.abc import Callable, Iterator
@@ -25,17 +28,25 @@ from fourbar_validation.engines.mujoco.trial import (
 )
 
 MATTERS = 2.0
-"""A setting that a change of a factor of two, or its loss, makes the error grow by less does not matter."""
+"""Growth of the error below which a setting does not matter. The setting is changed by
+a factor of two, or lost.
+"""
 SPLINE = 7
-"""Degree of the curve through what was read at the steps: its error falls faster with them than that of RK4."""
+"""Degree of the curve through what was read at the steps. Its error falls faster with
+the steps than that of RK4.
+"""
 IN_LINE = 0.3
-"""|sin(theta_4 - theta_3)| below which bars 3 and 4 speed up so much that the timestep feels it."""
+"""Least |sin(theta_4 - theta_3)| at which the timestep does not feel bars 3 and 4.
+Below it they speed up too much.
+"""
 MUJOCO_TOLERANCE = 1e-8
 """MuJoCo's own default."""
 
 
 Reason = Callable[[TrialSetup, float, float], str]
-"""Function from the setup, the growth of the error, and that of the error at the steps alone, to its cause."""
+"""Function from the setup and two growths to the cause. The growths are that of the
+error, and that at the steps alone.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +72,10 @@ class SettingInfluence:
 
 
 def judge_trial(scene: Scene, trial: Trial) -> WorstErrors:
-    """Compute the errors of a trial, at its steps and between them; none where MuJoCo lost the motion."""
+    """Compute the errors of a trial, at its steps and between them.
+
+    There are none if MuJoCo lost the motion.
+    """
     if trial.broken:
         return NO_ANSWER
     errors = [compute_errors(scene, trial.at, trial.quantities)]
@@ -73,11 +87,12 @@ def judge_trial(scene: Scene, trial: Trial) -> WorstErrors:
 def compute_errors_between(
     scene: Scene, trial: Trial, samples: slice, steps: int
 ) -> Iterator[WorstErrors]:
-    """Compute errors amid the steps of a segment, where they are fewer than its positions: by a spline.
+    """Compute errors between the steps of a segment, by a spline.
 
-    A largest force that lies between two steps is not seen at either of them. A drive
-    on bar 3 or 4, and a cylinder, has poles, through which no curve can be drawn: each
-    stretch between them has a spline of its own.
+    It is used where the steps are fewer than the positions. A largest force that lies
+    between two steps is not seen at either of them. A drive on bar 3 or 4, and a
+    cylinder, has poles, through which no curve can be drawn: each stretch between them
+    has a spline of its own.
     """
     theta_2, first = np.unique(trial.at.theta_2[samples], return_index=True)
     n = samples.stop - samples.start
@@ -115,7 +130,10 @@ def compute_errors_between(
 
 
 def split_at_poles(scene: Scene, command: Command) -> list[slice]:
-    """Split positions into stretches of two or more in which the drive is far from a pole."""
+    """Split positions into stretches in which the drive is far from a pole.
+
+    A stretch has two positions or more.
+    """
     far = np.flatnonzero(mark_far_from_poles(scene, command))
     stretches = np.split(far, np.flatnonzero(np.diff(far) > 1) + 1)
     return [slice(rows[0], rows[-1] + 1) for rows in stretches if len(rows) > 1]
@@ -128,7 +146,7 @@ def _compute_stretch(
     read: dict[str, Array],
     places: Array,
 ) -> WorstErrors:
-    """Compute errors at some places of the splines through what was read at the steps."""
+    """Compute errors at some places of the splines through what was read."""
     from scipy.interpolate import make_interp_spline
 
     degree = min(SPLINE, len(theta_2) - 1)
@@ -165,7 +183,7 @@ def measure_influences(
 def _measure(
     scene: Scene, setup: TrialSetup, settings: Settings
 ) -> tuple[float, float]:
-    """Return the worst error at the steps and between them, and that at the steps alone."""
+    """Return the worst error at the steps and between them, and at the steps alone."""
     trial = setup.try_out(settings)
     if trial.broken:
         return math.inf, math.inf
@@ -233,7 +251,10 @@ def _describe_changes(
 
 
 def _explain_timestep(setup: TrialSetup, times: float, growth: float) -> str:
-    """Say what of the growth comes from the steps, and what from the curve drawn between them."""
+    """Say what of the growth comes from the steps, and what from the curve.
+
+    The curve is drawn between the steps.
+    """
     motion = solve(setup.scene, "position", at=setup.command)
     sines = np.abs(motion.sin_mu)
     nearest = int(np.nanargmin(sines))

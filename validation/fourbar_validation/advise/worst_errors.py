@@ -1,4 +1,7 @@
-"""Compute the worst errors of an answer: torque and each pin force against the formulas, each on its scale."""
+"""Compute the worst errors of an answer against the formulas.
+
+They are those of the torque and of each pin force, each on its scale.
+"""
 
 import math
 from collections.abc import Sequence
@@ -73,7 +76,10 @@ def compute_errors(
 
 
 def mark_far_from_poles(scene: Scene, command: Command) -> NDArray[np.bool_]:
-    """Mark where the driven bar, or the stroke, moves fast enough to be far from a pole of the drive, (n,)."""
+    """Mark where the drive is far from a pole, (n,).
+
+    The driven bar, or the stroke, moves fast enough there.
+    """
     return _mark_far(scene, solve(scene, "velocity", at=command))
 
 
@@ -96,6 +102,9 @@ def _take_rows(command: Command, rows: NDArray[np.bool_]) -> Command:
 
 
 def find_greatest(errors: Array | Sequence[float]) -> float:
-    """Return the greatest of some errors; inf if one is NaN or the greatest is not finite, or if there are none."""
+    """Return the greatest of some errors.
+
+    It is inf if one is NaN, if the greatest is not finite, or if there are none.
+    """
     value = float(np.max(errors, initial=-math.inf))
     return value if math.isfinite(value) else math.inf

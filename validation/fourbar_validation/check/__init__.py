@@ -1,3 +1,6 @@
-"""Judge other people's numbers: a table of torques and forces, row by row against the formulas."""
+"""Judge other people's numbers: a table of torques and forces.
+
+Each row is held against the formulas.
+"""
 
 from fourbar_validation.check.check import check as check

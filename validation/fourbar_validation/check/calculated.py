@@ -33,13 +33,15 @@ Values = dict[str, Array]
 PAIRS = {"F12": (1, 2), "F32": (3, 2), "F43": (4, 3), "F14": (1, 4)}
 """Bar that exerts each pin force, and bar on which it acts."""
 CHAINS = {"B": ((2, 3), (4,)), "A": ((2,), (4, 3)), "O4": ((2, 3, 4),)}
-"""Pins at which a loop is cut into a tree, the commonest first: the chains of bars that are
-left, each from the ground on.
+"""Pins at which a loop is cut into a tree, the commonest first: the chains of bars that
+are left, each from the ground on.
 """
 ENOUGH = 3
 """Columns or positions that a hypothesis with a number in it needs."""
 SOFT = 1e-6
-"""Part of the torque that a soft constraint still carries in MuJoCo's inverse dynamics of a loop at rest; 2e-8 seen."""
+"""Part of the torque that a soft constraint still carries at rest. It is that of
+MuJoCo's inverse dynamics of a loop; 2e-8 was seen.
+"""
 
 
 LATE = {
@@ -50,7 +52,7 @@ LATE = {
 
 
 class BarWrenches(NamedTuple):
-    """Bars at n positions, with what their pins and the drive must give each of them."""
+    """Bars at n positions, and what their pins and the drive must give them."""
 
     arms: dict[int, Array]
     """From the bar's first pin (O2, A, O4) to G, (n, 2)."""
@@ -124,7 +126,7 @@ class BarWrenches(NamedTuple):
         }
 
     def _torque_of_tree(self, pin: str) -> Array:
-        """Compute the moment that the driven bar's joint gives in the tree cut at a pin."""
+        """Compute the moment of the driven bar's joint in the tree cut at a pin."""
         A = self.bars[2]
         B = A + self.bars[3]
         first_pins = {2: np.zeros_like(A), 3: A, 4: B - self.bars[4]}
@@ -242,7 +244,10 @@ class Calculation:
                 yield _state(f"{name} = -{other}", {name: -values}, whole=False)
 
     def _velocity_terms(self) -> Iterator[Mistake]:
-        """Leave out (dJ/dt) v, without which alpha_3 and alpha_4 follow alpha_2 alone."""
+        """Leave out (dJ/dt) v.
+
+        alpha_3 and alpha_4 then follow alpha_2 alone.
+        """
         right = self.right
         with np.errstate(divide="ignore", invalid="ignore"):
             gain = np.asarray(right.alpha_2) / np.asarray(right.omega_2)
@@ -308,7 +313,7 @@ class Calculation:
                 yield _state(f"the weight of bar {bar} is missing", without.solve())
 
     def _arms_of_loads(self) -> Iterator[Mistake]:
-        """Measure where a force acts from the wrong point, or let it turn with its bar."""
+        """Measure where a force acts from the wrong point, or turn it with its bar."""
         scene = self.judge.scene
         for number, load in enumerate(scene.loads):
             if not load.force:
@@ -373,7 +378,10 @@ def _state(
 def _state_with_forces(
     text: str, moved: Values, wrenches: BarWrenches
 ) -> Iterator[Mistake]:
-    """State a mistake in accelerations: these and the forces are wrong, or the forces alone."""
+    """State a mistake in accelerations.
+
+    These and the forces are wrong, or the forces alone.
+    """
     forces = wrenches.solve()
     yield _state(text, {**moved, **forces})
     yield _state(f"{text}, from which the forces follow", forces)
@@ -439,7 +447,10 @@ def _find_late(judge: Judge) -> Iterator[Mistake]:
 
 
 def _find_other_branch(judge: Judge) -> Iterator[Mistake]:
-    """Follow the other branch from the position on at which the numbers leave this one."""
+    """Follow the other branch from the position at which the numbers change.
+
+    There they leave the branch of the scene.
+    """
     key = next(
         (
             key

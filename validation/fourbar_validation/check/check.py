@@ -1,4 +1,4 @@
-"""`python -m validation check SCENE THEIRS.csv`: judge a user's own torques and forces."""
+"""`python -m validation check SCENE THEIRS.csv`: judge a user's torques and forces."""
 
 import json
 import math
@@ -30,13 +30,15 @@ class Judgement:
 
     findings: list[Discrepancy]
     not_assembled: list[int]
-    """Lines at which this linkage does not assemble, or is singular: there is no right answer there."""
+    """Lines at which the linkage does not assemble, or is singular. There is no right
+    answer there.
+    """
     explanations: list[Explanation]
     tolerance: Allowance | None = None
 
     @property
     def differing(self) -> list[Discrepancy]:
-        """Return the findings that do not agree, though there are digits to judge by."""
+        """Return the findings that do not agree, though digits are left to judge by."""
         return [
             finding
             for finding in self.findings
@@ -92,7 +94,10 @@ class Judgement:
 
     @property
     def digits(self) -> str:
-        """Write to how many digits each quantity was compared, the fewest of its numbers."""
+        """Write to how many digits each quantity was compared.
+
+        They are the fewest of its numbers.
+        """
         fewest: dict[int, list[str]] = {}
         for quantity in dict.fromkeys(finding.quantity for finding in self.findings):
             allowed = [
@@ -112,7 +117,7 @@ class Judgement:
         )
 
     def together(self) -> bool:
-        """Return whether the explanations together account for every quantity that differs."""
+        """Return whether the explanations account for every quantity that differs."""
         explained = {
             quantity
             for explanation in self.explanations
@@ -150,9 +155,11 @@ def require_information(judge: Judge) -> None:
 def judge_table(
     scene: Scene, table: TheirTable, tolerance: Allowance | None = None
 ) -> Judgement:
-    """Judge every number by K eps/condition plus half a unit of its last printed digit, and of theta_2's.
+    """Judge every number of a table.
 
-    With a tolerance that decides, and what explains the rest is held to it too.
+    The allowed error is K eps/condition, plus half a unit of the last printed digit,
+    and of theta_2's. With a tolerance that decides, and what explains the rest is held
+    to it too.
     """
     judge = Judge(scene, table, tolerance)
     require_information(judge)
@@ -170,7 +177,10 @@ def judge_table(
 
 
 def write_json(judgement: Judgement, table: TheirTable) -> str:
-    """Return one object in SI: the counts, every number that differs with theirs and ours, and what explains it."""
+    """Return one object in SI units: counts, and every number that differs.
+
+    Each has theirs and ours, and what explains it.
+    """
     tolerance = judgement.tolerance
     document = {
         "schema": 1,
@@ -196,7 +206,10 @@ def write_json(judgement: Judgement, table: TheirTable) -> str:
 
 
 def write_junit(judgement: Judgement, name: str) -> str:
-    """Return one case per quantity: a failure if any of its numbers differs, skipped if none could be judged."""
+    """Return one JUnit case per quantity.
+
+    It is a failure if a number differs, and skipped if none could be judged.
+    """
     return write_document(judgement.sentence(), _list_cases(judgement, name))
 
 
@@ -292,7 +305,7 @@ def check(
     json: Path | None,
     junit: Path | None,
 ) -> int:
-    """Judge a table of torques and forces (THEIRS.csv) against the formulas, row by row.
+    """Judge a table of torques and forces (THEIRS.csv) against the formulas.
 
     `check PROBLEM.json RESULT.json` judges the answers to a problem of models/problems,
     by its levels of accuracy.
@@ -408,7 +421,10 @@ def choose_worst(differing: list[Discrepancy]) -> list[Discrepancy]:
 
 
 def write_in_their_unit(finding: Discrepancy, table: TheirTable) -> tuple[str, ...]:
-    """Write the quantity with the unit of their column, and both numbers in it with the digits that set them apart."""
+    """Write the quantity with the unit of their column, and both numbers in it.
+
+    They have the digits that set them apart.
+    """
     unit = table.units[
         next(key for key in table.values if table.label(key) == finding.quantity)
     ]

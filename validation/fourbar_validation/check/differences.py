@@ -1,4 +1,7 @@
-"""List how a described MJCF differs from the one generated for the same scene, and what each difference costs."""
+"""List how a described MJCF differs from the one generated for the scene.
+
+The list says what each difference costs.
+"""
 
 import math
 import tomllib
@@ -15,7 +18,9 @@ from fourbar_validation.engines.description import ModelEntry, Value
 SAME = 1e-12
 """Relative; a number written with its digits in another order of operations."""
 SAME_SOFTNESS = 1e-9
-"""Relative; it follows from the places of both bodies in the world, which cost digits."""
+"""Relative difference that is round-off. It follows from the places of both bodies in
+the world, which cost digits.
+"""
 TENFOLD = 1e-9
 """Relative distance from a power of ten at which a ratio is called one."""
 ONE_SIDED = ("loads.", "tendons.", "actuators.")
@@ -40,8 +45,9 @@ class Difference:
     written: str = ""
     """Element and attribute in their file, where there is one."""
     cost: float | None = None
-    """What this entry alone, as in theirs, adds to the error of the generated file: of torque and pin forces that which
-    grows most. None if it was not measured, or cannot be set alone.
+    """What this entry alone, as in theirs, adds to the error of the generated file: of
+    torque and pin forces that which grows most. None if it was not measured, or cannot
+    be set alone.
     """
     quantity: str = ""
     """Quantity that has this error."""
@@ -85,7 +91,8 @@ def find_differences(
         if (ours is None or yours_entry is None) and not (
             key.startswith(ONE_SIDED) or key.endswith(".motor")
         ):
-            continue  # what one of the files has no use for, such as the solver parameters of no friction
+            # one of the files has no use for it, like solver parameters of no friction
+            continue
         nothing = next(
             (value for end, value in NOTHING.items() if key.endswith(end)), None
         )
@@ -126,7 +133,10 @@ def price(
 
 
 def _collect_errors(rows: Sequence[Row]) -> dict[tuple[str, str], float]:
-    """Collect the error of the torque and of each pin force, by method; infinite where there is no answer."""
+    """Collect the error of the torque and of each pin force, by method.
+
+    An error is infinite if there is no answer.
+    """
     return {
         (row.engine, row.quantity): row.error if math.isfinite(row.error) else math.inf
         for row in rows
@@ -135,12 +145,18 @@ def _collect_errors(rows: Sequence[Row]) -> dict[tuple[str, str], float]:
 
 
 def order(differences: Sequence[Difference]) -> list[Difference]:
-    """Order differences by their cost, the worst first; those without one keep their order."""
+    """Order differences by their cost, the worst first.
+
+    Those without a cost keep their order.
+    """
     return sorted(differences, key=lambda one: (one.cost is None, -(one.cost or 0.0)))
 
 
 def is_setting(key: str) -> bool:
-    """Tell whether an entry is no part of the mechanism: what it costs depends on the other settings of its file."""
+    """Tell whether an entry is a setting, and no part of the mechanism.
+
+    What it costs depends on the other settings of its file.
+    """
     settings = ("option.", "closure.sol", "closure.softness")
     return key.startswith(settings) or key.endswith(
         ("solreffriction", "solimpfriction")

@@ -1,4 +1,7 @@
-"""Mistakes with a number in them, which is fitted to the table: a ratio, a factor, an offset, another order."""
+"""Mistakes with a number in them, which is fitted to the table.
+
+The number is a ratio, a factor, an offset or another order.
+"""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -26,7 +29,9 @@ from fourbar_validation.scenes.hard_families import replace_bars
 ENOUGH = 3
 """Numbers that a fitted one must explain: fewer are explained by chance."""
 CARRIED = 2.0
-"""Times what is allowed: the fitted number carries the rounding of the numbers it was fitted to."""
+"""Factor on what is allowed. A fitted number carries the rounding of the numbers it was
+fitted to.
+"""
 FACTORS = {
     0.5: "halved",
     2.0: "doubled",
@@ -36,7 +41,9 @@ FACTORS = {
 }
 """Factors of a moment of inertia, and the mistake behind each."""
 VANISHING = 1e-9
-"""A factor below it is none: what it stands before was left out, which is a mistake of its own."""
+"""Least factor. What stands behind a smaller one was left out, which is a mistake of
+its own.
+"""
 PLAIN = 1e-2
 """Relative; a fitted number this near a plain one is tried as that."""
 GRID = 72
@@ -48,7 +55,8 @@ NEWTON = 12
 STEP = 1e-6
 """Step of the finite difference from which the fit finds its slope, rad."""
 MOST_ROWS = 1000
-"""Rows among which another order is looked for: every one is held against every other."""
+"""Rows among which another order is looked for. Every one is held against every other.
+"""
 
 
 def find_fitted(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
@@ -62,7 +70,10 @@ def find_fitted(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
 
 
 def _find_ratios(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
-    """Find columns that are one number times ours: a unit, by name where a pair of units has that ratio."""
+    """Find columns that are a number times ours.
+
+    It is a unit by name if a pair of units has that ratio.
+    """
     by_ratio: dict[tuple[str, float], set[str]] = {}
     for key in differing:
         mask = judge.where(key)
@@ -114,7 +125,10 @@ def _name_ratio(
 
 
 def _round_ratio(judge: Judge, key: str, near: float) -> tuple[str, float] | None:
-    """Round to a power of ten, or keep the ratio as fitted; a reversed sign is a mistake of its own."""
+    """Round to a power of ten, or keep the ratio as fitted.
+
+    A reversed sign is a mistake of its own.
+    """
     if judge.explained(key, -judge.ours(key)):
         return None
     power = round(math.log10(abs(near)))
@@ -150,7 +164,10 @@ def _compute_residual(judge: Judge, key: str, one: Array, base: Array) -> Array:
 
 
 def _try_factors(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
-    """Try a moment of inertia, a mass, gravity or a load times a factor: forces and torque are linear in each."""
+    """Try a moment of inertia, a mass, gravity or a load times a factor.
+
+    Forces and torque are linear in each.
+    """
     scene = judge.scene
     keys = [key for key in differing if name_quantity(key) in FORCES]
     keys = [
@@ -255,7 +272,10 @@ def _scale_load(scene: Scene, load: Load, f: float) -> Scene:
 
 
 def _try_offset(judge: Judge) -> Iterator[Mistake]:
-    """Try the crank angle from another zero: the offset at which theirs fit best, refined by Gauss and Newton."""
+    """Try the crank angle from another zero.
+
+    The offset is that at which theirs fit best, refined by Gauss and Newton.
+    """
     keys = [key for key in judge.table.values if judge.size(key).any()]
     rows = np.unique(
         np.linspace(0, len(judge.at.theta_2) - 1, TRIED).round().astype(int)
@@ -320,7 +340,10 @@ def _try_offset(judge: Judge) -> Iterator[Mistake]:
 
 
 def _try_order(judge: Judge) -> Iterator[Mistake]:
-    """Try the right numbers in other rows: each row of theirs goes to the nearest of ours."""
+    """Try the right numbers in other rows.
+
+    Each row of theirs goes to the nearest of ours.
+    """
     table, n = judge.table, len(judge.at.theta_2)
     keys = [
         key for key in table.values if judge.where(key).all() and judge.size(key).all()

@@ -1,4 +1,7 @@
-"""A table judged number by number: how far each is from the formulas, what it is allowed, and what may explain it."""
+"""A table judged number by number.
+
+Each number has its error, what it is allowed, and what may explain it.
+"""
 
 import math
 from collections.abc import Callable
@@ -37,7 +40,10 @@ AS_PRINTED = 4.0 * EPS
 
 @dataclass(frozen=True, slots=True)
 class Allowance:
-    """Tolerance stated by a user, in NumPy's form: atol + rtol |ours|, with atol in the SI unit of each quantity."""
+    """Tolerance stated by a user, in NumPy's form: atol + rtol |ours|.
+
+    atol is in the SI unit of each quantity.
+    """
 
     rtol: float = 0.0
     atol: float = 0.0
@@ -58,7 +64,9 @@ class Discrepancy:
     difference: float
     """Difference in the unit of the quantity, as `permitted`."""
     permitted: float | None
-    """Difference permitted by the stated tolerance and the printed digits; None if no tolerance was stated."""
+    """Difference permitted by the stated tolerance and the printed digits. None if no
+    tolerance was stated.
+    """
     theta_2: float
 
     @property
@@ -73,7 +81,7 @@ class Discrepancy:
 
     @property
     def agrees(self) -> bool:
-        """Return whether it is within the allowed error or the stated tolerance, if there is one."""
+        """Return whether it is within the allowed error, or a stated tolerance."""
         if self.permitted is None:
             return self.exact
         return self.exact or (self.judged and self.difference <= self.permitted)
@@ -144,7 +152,10 @@ class Judge:
 
     @cached_property
     def near(self) -> list[Solution]:
-        """Solve again half a unit of a rounded theta_2 away, to either side; empty if theta_2 is not rounded."""
+        """Solve again half a unit of a rounded theta_2 away, to either side.
+
+        The result is empty if theta_2 is not rounded.
+        """
         rounding = self.table.theta_2_rounding
         if not rounding.any():
             return []
@@ -155,7 +166,10 @@ class Judge:
         ]
 
     def judged(self, key: str, ours: Array) -> tuple[Array, Array, Array]:
-        """Return (error, allowed, apart) of the table if `ours` is taken for the right numbers, each (n,)."""
+        """Return (error, allowed, apart) of the table, each (n,).
+
+        `ours` is taken for the right numbers.
+        """
         quantity, size = name_quantity(key), self.size(key)
         scale = replace_zero_size(size)  # quantities whose terms are all 0
         theirs = self.table.values[key]
@@ -186,7 +200,10 @@ class Judge:
         )
 
     def permitted(self, key: str, ours: Array) -> Array | None:
-        """Compute the difference that the given tolerance allows, (n,), in the quantity's unit."""
+        """Compute the difference that the given tolerance allows, (n,).
+
+        It is in the quantity's unit.
+        """
         if self.tolerance is None:
             return None
         return np.asarray(
@@ -239,7 +256,10 @@ class Judge:
         return findings
 
     def without_answer(self) -> list[int]:
-        """List lines that state a number where this linkage does not assemble or is singular: none is right there."""
+        """List lines with a number where the linkage does not assemble.
+
+        No number is right there, nor at a singular position.
+        """
         missing = [
             self.table.stated(key) & ~self._answer(key) for key in self.table.values
         ]
@@ -251,10 +271,10 @@ class Judge:
 
 
 def make_command(scene: Scene, table: TheirTable) -> Command:
-    """Build the command at each row of the table: the scene's own where it has the same positions.
+    """Build the command at each row of the table.
 
-    Where the scene states no speed it is that of the row, as in the log of a simulator
-    or a test stand.
+    It is the scene's if that has the same positions. Where the scene states no speed it
+    is that of the row, as in the log of a simulator or a test stand.
     """
     require_input(scene, "a table of results")
     base = command(scene)
@@ -285,7 +305,10 @@ def make_command(scene: Scene, table: TheirTable) -> Command:
 
 
 def _moves_itself(scene: Scene, table: TheirTable) -> bool:
-    """Return whether the table, and not the scene, states the motion that its rows are judged at."""
+    """Return whether the table states the motion that its rows are judged at.
+
+    Otherwise the scene states it.
+    """
     return (
         scene.motion.law is None
         and scene.motion.speed is None
@@ -295,20 +318,31 @@ def _moves_itself(scene: Scene, table: TheirTable) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class Mistake:
-    """A mistake as a hypothesis: what was done, and what it turns the right numbers into."""
+    """A mistake as a hypothesis: what was done, and what the numbers become."""
 
     text: str
     predict: Callable[[str, Solution], Array | None]
-    """quantity, right solution -> what would have been printed; None where it changes nothing of it."""
+    """quantity, right solution -> what would have been printed. None where it changes
+    nothing of it.
+    """
     whole: bool = True
-    """True if it was made in the calculation and shows in every quantity; a column's unit shows in that column only."""
+    """True if it was made in the calculation and shows in every quantity. A column's
+    unit shows in that column only.
+    """
     times: float = 1.0
-    """Factor on the allowed error: a number that was fitted to rounded ones carries their rounding once more."""
+    """Factor on the allowed error. A number that was fitted to rounded ones carries
+    their rounding once more.
+    """
     left: float = 0.0
-    """Part of the largest value by which an engine that makes this mistake may miss the prediction."""
+    """Part of the largest value by which an engine may miss the prediction. The engine
+    makes this mistake.
+    """
 
     def prediction(self, key: str, right: Solution) -> Array | None:
-        """Return the numbers that this mistake predicts for a key of the table; None if it predicts none."""
+        """Return the numbers that this mistake predicts for a key of the table.
+
+        None if it predicts none.
+        """
         predicted = self.predict(name_quantity(key), right)
         return (
             magnitude(predicted)

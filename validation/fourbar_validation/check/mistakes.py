@@ -1,4 +1,7 @@
-"""Known mistakes as hypotheses: what the numbers would be if it had been made, held against what they are."""
+"""Known mistakes as hypotheses.
+
+The numbers that each would make are held against the table.
+"""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
@@ -32,7 +35,9 @@ GRAVITY_TURNED = {
 SHOWN = 5
 """Explanations that are printed."""
 NEARER = 10.0
-"""A mistake that brings every row that differs this much nearer is named, though it does not explain it wholly."""
+"""Ratio of improvement above which a mistake is named. It then explains not all, but
+brings every row that differs nearer.
+"""
 
 
 def list_hypotheses(scene: Scene, command: Command) -> Iterator[Mistake]:
@@ -83,7 +88,10 @@ def _take_from(wrong: Solution, quantity: str, right: Solution) -> Array | None:
 
 
 def _scale_inertial(scene: Scene, command: Command) -> Iterator[Mistake]:
-    """Scale the inertial forces against the loads they are added to: forces and torque are linear in each."""
+    """Scale the inertial forces against the loads.
+
+    Forces and torque are linear in each.
+    """
     if command.omega_2 is None:
         return
     bare = replace(scene, loads=(), effects=())
@@ -134,7 +142,10 @@ def _scale_inertial(scene: Scene, command: Command) -> Iterator[Mistake]:
 def _list_other_problems(
     scene: Scene, command: Command
 ) -> Iterator[tuple[str, Scene, Command]]:
-    """List scenes and commands that mistakes amount to: the same formulas answer them."""
+    """List scenes and commands that mistakes amount to.
+
+    The same formulas answer them.
+    """
     for text, other_command in _list_other_commands(command):
         yield text, scene, other_command
     for text, changed in chain(
@@ -322,7 +333,9 @@ COLUMN_MISTAKES: tuple[
         lambda quantity: quantity.startswith("theta"),
     ),
 )
-"""Mistakes in a column: name, change of the values, and the quantities whose columns can have it."""
+"""Mistakes in a column: name, change of the values, and quantities. The quantities are
+those whose columns can have it.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -337,13 +350,16 @@ class Explanation:
     whole: bool = True
     """True if the mistake is one of the calculation, False if it is one of columns."""
     nearer: tuple[str, ...] = ()
-    """Quantities that it explains for the most part: what remains is NEARER times smaller."""
+    """Quantities that it explains for the most part. What remains is NEARER times
+    smaller.
+    """
 
 
 def explain(judge: Judge, differing: list[str]) -> list[Explanation]:
-    """Find the mistakes under which quantities that differ agree, the most complete first; then those that come near.
+    """Find the mistakes under which quantities that differ agree.
 
-    A mistake that breaks a quantity which agreed as it was is none.
+    The most complete come first, then those that come near. A mistake that breaks a
+    quantity which agreed as it was is none.
     """
     explanations: list[Explanation] = []
     table = judge.table

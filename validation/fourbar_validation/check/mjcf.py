@@ -1,7 +1,7 @@
-"""`python -m validation check-mjcf`: what differs from the generated MJCF, and what it costs in accuracy.
+"""`python -m validation check-mjcf`: what differs from the generated MJCF.
 
-The file is somebody's: it is compiled and run in a process of its own, with a limit on
-time and memory.
+It says what each difference costs in accuracy. The file is somebody's: it is compiled
+and run in a process of its own, with a limit on time and memory.
 """
 
 import math
@@ -77,8 +77,8 @@ ADVICE = (
     "fourbar-validation advise SCENE FILE.xml --error E"
 )
 JUDGED = tuple(name for name in UNKNOWNS if name not in ("alpha_3", "alpha_4"))
-"""Quantities that a file is held to. A soft loop lets the bars accelerate by themselves for an instant; what that does
-to the torque and the pin forces is judged there.
+"""Quantities that a file is held to. A soft loop lets the bars accelerate by themselves
+for an instant; what that does to the torque and the pin forces is judged there.
 """
 HEADINGS = ("quantity", "theirs", "generated", "allowed", "verdict")
 EXAMINE = "fourbar_validation.engines.mujoco.theirs:examine"
@@ -130,7 +130,7 @@ class ModelReport:
         return list(dict.fromkeys(cost.method for cost in self.costs))
 
     def sentences(self) -> Iterator[str]:
-        """Yield a sentence for each method: how wrong the torque and the worst pin force are."""
+        """Yield a sentence for each method: the errors of torque and worst force."""
         for method in self.methods():
             errors = {
                 cost.row.quantity: cost.row.error
@@ -195,8 +195,9 @@ def examine_model(
 
     Parameters
     ----------
-    wanted : relative error that theirs is held to; None: that of the generated file, and where its torque or pin forces
-        exceed this, what MuJoCo's stiffest constraint leaves in it.
+    wanted : relative error that theirs is held to; None: that of the generated file,
+        and where its torque or pin forces exceed this, what MuJoCo's stiffest
+        constraint leaves in it.
     """
     tolerance = SIMULATED
     if wanted is not None:
@@ -243,7 +244,11 @@ def _price(
     tolerance: ErrorBound,
     examined: Callable[..., Any],
 ) -> list[Difference]:
-    """Price differences: those of the mechanism in the generated file, settings and what it cannot hold in theirs."""
+    """Price differences.
+
+    Those of the mechanism are put into the generated file; settings and what it cannot
+    hold into theirs.
+    """
     of_mechanism = [one for one in differences if not is_setting(one.key)]
     answered = examined(CHANGED, scene, [(one.key, one.theirs) for one in of_mechanism])
     unchanged, *changed = (
@@ -272,7 +277,10 @@ def _list_rows(
     tolerance: ErrorBound,
     softness: Mapping[str, float] | None = None,
 ) -> list[Row]:
-    """Hold answers to a tolerance and, where the softness of their loop is known, to what it leaves, N m and N."""
+    """Hold answers to a tolerance, N m and N.
+
+    Where the softness of their loop is known, they are held to what it leaves.
+    """
 
     def predicted(quantity: str, mask: Mask) -> Array:
         return np.full(len(mask), (softness or {}).get(quantity, 0.0))
@@ -403,7 +411,7 @@ def command(
     out: Path,
     **robot: Any,
 ) -> int:
-    """Compare your own MJCF with a scene: how wrong its torque and pin forces are, and why.
+    """Compare your own MJCF with a scene: the errors of torque and pin forces, and why.
 
     A four-bar alone is compared with the generated MJCF of SCENE, entry by entry. With
     --loop, without SCENE, or where FILE.xml has more joints, loops are measured inside
@@ -438,7 +446,10 @@ def command(
 def _is_robot(
     mjcf: Path, names: tuple[str, ...], assets: Path | None, robot: Mapping[str, Any]
 ) -> bool:
-    """Tell whether a file is to be measured as a robot: by its options, or because it has more joints."""
+    """Tell whether a file is to be measured as a robot.
+
+    Its options say so, or it has more joints than a four-bar.
+    """
     return any(robot.values()) or (
         not names and not is_four_bar_alone(read_robot(mjcf, assets))
     )

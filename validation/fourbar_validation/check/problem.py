@@ -1,6 +1,7 @@
-"""Problems of models/problems and their results: how far each quantity is off, and which level that reaches.
+"""Problems of models/problems and their results.
 
-A problem is a question of the protocol with its answer, each value with an error bar;
+They say how far each quantity is off, and which level that reaches. A problem is a
+question of the protocol with its answer, each value with an error bar;
 docs/benchmark.md has the format.
 """
 
@@ -23,7 +24,9 @@ from fourbar_validation.engines import protocol
 
 SCHEMA, RESULT = "fourbar-problem/3", "fourbar-result/1"
 LEVELS = {"A": 1e-9, "B": 1e-6, "C": 1e-3}
-"""Largest error of each level, of the largest value; D is worse. Error bars of the problem are allowed."""
+"""Largest error of each level, over the largest value; D is worse. Error bars of the
+problem are allowed.
+"""
 WORSE, MISSING = "D", "-"
 GROUPS = {
     "reactions": (*PIN_FORCES, "guide_force"),
@@ -32,7 +35,9 @@ GROUPS = {
 }
 """Quantities of each group; every quantity that is not listed belongs to the motion."""
 SAFE = 8.0
-"""Times the error bars of the formulas, which are estimates: against many digits an answer is up to 6.6 of them off."""
+"""Factor on the error bars of the formulas, which are estimates. Against many digits an
+answer is up to 6.6 of them off.
+"""
 LARGEST_FILE = 10**7
 """Bytes."""
 
@@ -44,7 +49,9 @@ class Judged(NamedTuple):
     group: str
     level: str
     error: float
-    """Error relative to the largest value, for an angle in rad; NaN if there is no answer."""
+    """Error relative to the largest value, for an angle in rad. NaN if there is no
+    answer.
+    """
     position: int
 
 
@@ -96,7 +103,10 @@ def _read(path: str | Path, schema: str) -> dict[str, Any]:
 
 
 def judge(problem: dict[str, Any], answered: dict[str, Any]) -> list[Judged]:
-    """Judge every quantity that a problem asks for; one that is missing has the level "-"."""
+    """Judge every quantity that a problem asks for.
+
+    One that is missing has the level "-".
+    """
     answers, errors = problem["answers"], problem["errors"]
     if answered.get("at") is not None:
         answers, errors = _answer_at(problem, answered["at"])
@@ -128,7 +138,10 @@ def _answer_at(
 
 
 def collect_answers(solution: Solution) -> tuple[dict[str, Array], dict[str, Array]]:
-    """Return angles, torque (or the drive's force) and pin forces of a solution with their error bars."""
+    """Return angles, torque or force of the drive, and pin forces.
+
+    They have their error bars.
+    """
     drive = "torque" if solution.drive_force is None else "drive_force"
     angle = K * EPS / solution.condition
     assert solution.force_error is not None
@@ -187,7 +200,10 @@ def find_levels(rows: list[Judged]) -> dict[str, str]:
 
 
 def check_problem(problem_file: Path, result_file: Path) -> int:
-    """Print how far each quantity of a result is off, and its level; the exit status."""
+    """Print how far each quantity of a result is off, and its level.
+
+    Return the exit status.
+    """
     from rich.console import Console
     from rich.markup import escape
 

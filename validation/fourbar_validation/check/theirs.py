@@ -1,4 +1,6 @@
-"""Reading a table of somebody's results: columns named as `fourbar analyze --csv` names them, units in brackets.
+"""Reading a table of somebody's results.
+
+Columns are named as `fourbar analyze --csv` names them, with units in brackets.
 
     theta_2 [deg], torque [N cm], F12_x, F12_y, F43 [kN]
 
@@ -30,7 +32,9 @@ from fourbar_validation.compare.tolerance import EPS
 Array = NDArray[np.float64]
 
 DECIMALS = 4
-"""12.5 deg and 0.25 rad are positions that somebody chose, 0.1745 rad is one that was rounded."""
+"""Decimals of a position that somebody chose, like 12.5 deg or 0.25 rad. 0.1745 rad is
+one that was rounded.
+"""
 NOT_JUDGED = {
     "time": "a row is found by its theta_2",
     **dict.fromkeys(
@@ -55,7 +59,9 @@ OTHER_NAMES = {
     "inputangle": "theta_2",
     "zeit": "time",
 }
-"""Names in small letters, without spaces and underscores, of other programs and languages."""
+"""Names that other programs and languages use, in small letters. They have no spaces
+and underscores.
+"""
 MAY_MEAN = (
     ("theta", "theta_2"),
     ("omega", "omega_2"),
@@ -91,7 +97,9 @@ OTHER_UNITS = {
         "kgf mm",
     ),
 }
-"""Units that may be taken for each SI unit; the SI unit itself if the file announced another unit."""
+"""Units that may be taken for each SI unit. The SI unit is one if the file announced
+another unit.
+"""
 THOUSANDS = re.compile(r"[-+]?\d{1,3}(?:[ ,'\u2019\u00a0\u202f]\d{3})+(?:\.\d+)?")
 GERMAN_THOUSANDS = re.compile(r"[-+]?\d{1,3}(?:\.\d{3})+,\d+")
 TWO_TURNS = 4.0 * math.pi
@@ -105,7 +113,9 @@ HEADING = re.compile(
     r"(?:\[(?P<square>[^\]]*)\]|\((?P<round>.*)\))?"
     r"(?P<letter>_[xy])?"
 )
-"""Heading of a column: a name, perhaps between bars, its unit in brackets, and a component."""
+"""Heading of a column: a name, its unit in brackets, and a component. The name may
+stand between bars.
+"""
 PLACES = frozenset(name for name in VECTORS if UNITS[name] == "m")
 """Quantities that are places, in the coordinates of a scene's drawing."""
 
@@ -121,10 +131,10 @@ class Unit:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TheirTable:
-    """Somebody's numbers in SI: theta_2 (n,), and per quantity values (n,) or (n, 2) with their rounding.
+    """Somebody's numbers in SI units: theta_2 (n,) and values by quantity.
 
-    Of a vector (n,) are its magnitudes, under |name|. What the table does not state is
-    NaN.
+    Values are (n,) or (n, 2) and have their rounding. Of a vector (n,) are its
+    magnitudes, under |name|. What the table does not state is NaN.
     """
 
     theta_2: Array
@@ -135,7 +145,9 @@ class TheirTable:
     lines: list[int]
     """The line of the file that each row stands in."""
     theta_2_rounding: Array
-    """Half a unit of the last digit of theta_2 in a column that is printed with DECIMALS, rad, (n,); else 0."""
+    """Half a unit of the last digit of theta_2, rad, (n,). It is stated if the column
+    is printed with DECIMALS, else 0.
+    """
     left_out: dict[str, str]
     """Headings of columns that are not judged, and why."""
     notes: tuple[str, ...] = ()
@@ -157,7 +169,10 @@ class TheirTable:
         return np.asarray(finite.any(axis=1) if finite.ndim == 2 else finite)
 
     def from_pin(self, origin: tuple[float, float]) -> "TheirTable":
-        """Return the table with its places from O2, which stands at `origin` in a drawing's coordinates."""
+        """Return the table with its places from O2.
+
+        O2 stands at `origin` in a drawing's coordinates.
+        """
         if not any(origin):
             return self
         values = {
@@ -262,7 +277,10 @@ def _drop_repeated(
     headings: list[str],
     rows: list[tuple[int, list[str]]],
 ) -> None:
-    """Leave out a column that repeats another one; InputError where it says otherwise."""
+    """Leave out a column that repeats another one.
+
+    Raises InputError if it says otherwise.
+    """
     first: dict[str, int] = {}
     for index, (name, unit) in list(columns.items()):
         earlier = first.setdefault(name, index)
@@ -291,7 +309,7 @@ def _read_degrees(
     headings: list[str],
     columns: dict[int, tuple[str, Unit]],
 ) -> tuple[str, ...]:
-    """Read a theta_2 without a unit as degrees where its numbers can be nothing else."""
+    """Read a theta_2 without a unit as degrees if it can be nothing else."""
     values = numbers["theta_2"]
     heading = next(headings[i] for i, (name, _) in columns.items() if name == "theta_2")
     bare = not re.search(r"[\[(]", heading) and units["theta_2"].text == "rad"
@@ -331,7 +349,10 @@ def _put(
 
 
 def _find_rounding(halves: Array, unit: Unit) -> Array:
-    """Find half a unit of each theta_2's last digit; of a cell whose zeros were left off, that of the column."""
+    """Find half a unit of each theta_2's last digit.
+
+    For a cell whose zeros were left off it is that of the column.
+    """
     least = halves.min()
     if least > 0.5 * unit.factor * 10.0**-DECIMALS * (1.0 + EPS):
         return np.zeros_like(halves)
@@ -370,7 +391,10 @@ def _read_lines(path: Path) -> list[tuple[int, list[str]]]:
 
 
 def _remove_comments(text: str) -> str:
-    """Blank the lines that are comments; the last one before the numbers may be the header."""
+    """Blank the lines that are comments.
+
+    The last one before the numbers may be the header.
+    """
     lines = text.splitlines()
     of_comment = [line.lstrip().startswith(COMMENT) for line in lines]
     first = next(
@@ -395,7 +419,7 @@ def _read_comma(cell: str) -> str:
 
 
 def _find_name(name: str) -> str:
-    """Find the quantity that a column's name means, in whatever letters it is written."""
+    """Find the quantity that a column's name means, in any letters."""
     if name in UNITS or name in NOT_JUDGED:
         return name
     plain = _spell(name)
@@ -422,7 +446,10 @@ def _suggest(name: str) -> str:
 
 
 def _is_unit_line(cells: list[str]) -> bool:
-    """Return whether a line under the header states units: no cell contains a number."""
+    """Return whether a line under the header states units.
+
+    No cell of it contains a number.
+    """
     return not any(
         re.search("[0-9]", re.sub(r"[\^*][0-9]|[²³]", "", cell)) for cell in cells
     )
@@ -431,9 +458,10 @@ def _is_unit_line(cells: list[str]) -> bool:
 def _read_columns(
     path: Path, headings: list[str], unit_line: list[str]
 ) -> tuple[dict[int, tuple[str, Unit]], dict[str, str], dict[str, str]]:
-    """Return each column's name and unit by its place in a row, and the headings left out.
+    """Return each column's name and unit by its place in a row.
 
-    Of these each has a reason, and some that are not known what they may be renamed to.
+    The headings left out are returned too. Of these each has a reason, and some that
+    are not known what they may be renamed to.
     """
     columns: dict[int, tuple[str, Unit]] = {}
     left_out: dict[str, str] = {}
@@ -487,7 +515,10 @@ def _find_known() -> str:
 
 
 def _read_number(path: Path, place: str, cell: str) -> tuple[float, float]:
-    """Read the number in a cell and half a unit of its last printed digit; NaN for a blank."""
+    """Read the number in a cell and half a unit of its last printed digit.
+
+    It is NaN for a blank.
+    """
     text = cell.strip().replace("\N{MINUS SIGN}", "-")
     if THOUSANDS.fullmatch(text):
         text = re.sub(r"[ ,'\u2019\u00a0\u202f]", "", text)

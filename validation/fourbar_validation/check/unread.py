@@ -69,15 +69,19 @@ LOOKED_AT = {
         " cogging"
     ),
 }
-"""Elements and their attributes that the check compares, that enter what it compares, or that move nothing: of those
-that read and draw, of what collides only whether anything does, and of the drive nothing, for it is taken off.
+"""Elements and their attributes that the check compares, that enter what it compares,
+or that move nothing: of those that read and draw, of what collides only whether
+anything does, and of the drive nothing, for it is taken off.
 """
 SKIPPED = ("visual", "asset", "sensor", "keyframe", "custom")
 """Elements whose whole content moves nothing."""
 
 
 def list_unread(text: str) -> list[str]:
-    """List what a screened MJCF states and the check does not look at, as "element attribute"."""
+    """List what a screened MJCF states and the check does not look at.
+
+    Each is "element attribute".
+    """
 
     def walk(element: ET.Element) -> Iterator[str]:
         looked_at = LOOKED_AT.get(element.tag)

@@ -1,4 +1,7 @@
-"""Define an engine's answer: its own numbers at the motion it really made, or the reason why it does not answer."""
+"""Define an engine's answer.
+
+It is the engine's numbers at the motion it really made, or the reason for none.
+"""
 
 from dataclasses import dataclass, field
 from typing import Protocol
@@ -14,26 +17,39 @@ Array = NDArray[np.float64]
 
 @dataclass(slots=True, eq=False)
 class Answer:
-    """Quantities of one engine on one scene, under the names of `fourbar.Solution`, SI and radians."""
+    """Quantities of one engine on one scene, in SI units and radians.
+
+    They have the names of `fourbar.Solution`.
+    """
 
     engine: str
-    """Name of the engine, for example "pinocchio-inverse", "mujoco-inverse", "mujoco-simulated"."""
+    """Name of the engine, such as "pinocchio-inverse" or "mujoco-simulated"."""
     setting: str
     """Setting of the engine: "exact", or for example "RK4 628/rev"."""
     at: Command | None = None
-    """The motion this answer belongs to: the command itself, or what a simulation really did."""
+    """Motion of this answer: the command itself, or that of a simulation."""
     assembled: NDArray[np.bool_] | None = None
     """Positions where the engine found by its own means that the loop closes, (n,)."""
     quantities: dict[str, Array] = field(default_factory=dict)
-    """(n,) or (n, 2) arrays; NaN where not assembled. A name that is missing was not answered."""
+    """(n,) or (n, 2) arrays; NaN where not assembled. A name that is missing was not
+    answered.
+    """
     refusal: str | None = None
-    """A declared limit of the engine that this scene meets, with its reason; then nothing else is set."""
+    """Declared limit of the engine that this scene meets, with its reason. Nothing else
+    is set then.
+    """
     predicted: dict[str, Array] = field(default_factory=dict)
-    """Errors that the engine must expect by its own residuals, (n,), in the unit of the quantity."""
+    """Errors that the engine must expect by its own residuals, (n,). They are in the
+    unit of the quantity.
+    """
     alarms: list[str] = field(default_factory=list)
-    """Faults that the engine's monitoring of itself found, in words; each fails the run."""
+    """Faults that the engine's monitoring of itself found, in words. Each fails the
+    run.
+    """
     evidence: dict[str, float] = field(default_factory=dict)
-    """Figures that the engine reports of itself: closure gap (m), speed error, resets, residuals."""
+    """Figures that the engine reports of itself. These are closure gap (m), speed
+    error, resets and residuals.
+    """
     shared: str = ""
     """Inputs that the engine takes from the formulas' side."""
     own: str = ""
@@ -53,11 +69,17 @@ class Adapter(Protocol):
         """Return the engine's name as it stands in the results."""
 
     def answer(self, scene: Scene, command: Command) -> Answer:
-        """Answer a scene, given the description and the command, never a result of the formulas."""
+        """Answer a scene, given the description and the command.
+
+        It is never given a result of the formulas.
+        """
 
 
 def explain_refusal(engine: Adapter, command: Command) -> str:
-    """Say why an engine cannot be asked: it does not declare that it takes what is commanded; empty where it does."""
+    """Say why an engine cannot be asked.
+
+    It does not declare that it takes what is commanded; empty if it does.
+    """
     takes = getattr(engine, "commands", ("theta_2",))
     if command.commanded in takes:
         return ""

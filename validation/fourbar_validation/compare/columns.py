@@ -24,15 +24,20 @@ from fourbar_validation.compare.rows import (
 )
 
 GROUP_ROWS = 100_000
-"""Rows of a row group of the Parquet file: each costs some kilobytes of footer, whatever it holds."""
+"""Rows of a row group of the Parquet file. Each group costs some kilobytes of footer,
+whatever it holds.
+"""
 BATCH_ROWS = 20_000
 """Rows in memory while the file is read."""
 CSV_ROWS = 1_000_000
-"""Rows beyond this are in results.parquet alone: a text table of that size serves nobody."""
+"""Most rows of the text table. Further ones are in results.parquet alone."""
 
 
 class Columns:
-    """Writer of both files, which are complete at the end of a `with`, and do not exist if it fails."""
+    """Writer of both files, which are complete at the end of a `with`.
+
+    They do not exist if it fails.
+    """
 
     def __init__(self, out: Path) -> None:
         self.out = out
@@ -40,7 +45,9 @@ class Columns:
         """The line of results.csv at which each scene starts."""
         self._line = 2
         self._waiting: list[Any] = []
-        """Arrow tables that wait to be a row group: rows themselves would take five times the memory."""
+        """Arrow tables that wait to be a row group. Rows themselves would take five
+        times the memory.
+        """
         self._rows_waiting = 0
         self._files = ExitStack()
 
@@ -119,12 +126,18 @@ class Columns:
 
 
 def null_nan(value: object) -> object:
-    """Give a missing number as null: no greatest error is NaN by it, and every reader takes it for none."""
+    """Give a missing number as null.
+
+    No greatest error is NaN by it, and every reader takes it for none.
+    """
     return None if isinstance(value, float) and math.isnan(value) else value
 
 
 def read_columns(path: Path) -> Iterator[Row]:
-    """Read the rows of a results.parquet or results.csv, some thousands at a time; words that recur are kept once."""
+    """Read the rows of a results.parquet or results.csv, some thousands at a time.
+
+    Words that recur are kept once.
+    """
     for cells in _read_batches(path, list(MADE_OF)):
         words: dict[str, str] = {}
         columns = [

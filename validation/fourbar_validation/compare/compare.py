@@ -1,4 +1,7 @@
-"""An engine's answer against the formulas: one row per quantity, at the position where it is worst."""
+"""An engine's answer against the formulas.
+
+It has one row per quantity, at the position where it is worst.
+"""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -63,9 +66,13 @@ from fourbar_validation.compare.tolerance import (
 )
 
 Predicted = Callable[[str, Mask], Array]
-"""The error to be expected of a quantity, in its own unit, (n,); it matters at the positions of the mask alone."""
+"""Function that predicts the error of a quantity, in its unit, (n,). It matters at the
+positions of the mask alone.
+"""
 Nearby = Callable[[Mask], dict[str, Array]]
-"""Function that evaluates every quantity again at the positions of a mask, within theta_2's rounding; NaN elsewhere."""
+"""Function that evaluates every quantity again at the positions of a mask. theta_2 is
+varied within its rounding; elsewhere it is NaN.
+"""
 Scales = dict[str, tuple[Array, Array]]
 """Size and condition of each quantity at each position."""
 
@@ -77,26 +84,31 @@ OF_THE_FORMULAS = (
     "force_error",
     "power",
 )
-"""Quantities with checks of their own: the range in which dry friction holds, its residual, error bars, a product."""
+"""Quantities with checks of their own. These are the range in which dry friction holds,
+its residual, error bars, a product.
+"""
 COMPARED_QUANTITIES = tuple(
     name for name in STAGE_OF if name not in (*OF_THE_FORMULAS, *LINE_QUANTITIES)
 )
-"""Quantities that are compared with an exact engine: all that is printed of a position."""
+"""Quantities that are compared with an exact engine. These are all that is printed of a
+position.
+"""
 OF_THE_LINE = {
     "stroke": "sin_mu",
     "drive_line": "sin_mu",
     "stroke_speed": "v_B",
     LINE.value: COUPLE.value,
 }
-"""Quantities of a drive that exerts a force; each is compared if the quantity it maps to is compared or the engine
-answers it.
+"""Quantities of a drive that exerts a force; each is compared if the quantity it maps
+to is compared or the engine answers it.
 """
 OF_FORCES = (*FORCES, *DRY_FRICTION_QUANTITIES)
 MOST_UNDECIDED = 0.5
 """Share of the numbers of a scene that are undecided, beyond which it does not hold."""
 SLOW_DRIVE = 0.1
-"""Part of the drive's greatest speed above which a simulation's forces are judged. The torque on bar 3 or 4, the force
-of a cylinder and the pin forces have poles where the speed of the drive vanishes.
+"""Part of the drive's greatest speed above which a simulation's forces are judged. The
+torque on bar 3 or 4, the force of a cylinder and the pin forces have poles where the
+speed of the drive vanishes.
 """
 CLOSURE = "a e^{i theta_2} + b e^{i theta_3} = d e^{i theta_1} + c e^{i theta_4}"
 NOWHERE = "no position at which it is demanded"
@@ -117,13 +129,15 @@ class Demands(NamedTuple):
     prediction.
     """
     nearby: Nearby | None = None
-    """Evaluation near a position. With it an error beyond the tolerance is taken again within theta_2's rounding."""
+    """Evaluation near a position. With it an error beyond the tolerance is taken again
+    within theta_2's rounding.
+    """
     method: str = ""
     """Method for which the errors are predicted, as the end of a reason."""
 
 
 class _Judged(NamedTuple):
-    """Row of a quantity, with the number of positions that have it, and of those with a verdict."""
+    """Row of a quantity, and the numbers of positions with it and with a verdict."""
 
     row: Row
     numbers: int = 0
@@ -156,18 +170,24 @@ class Comparison:
     """Solution of the formulas at `answer.at`."""
     demands: Demands
     reference: Solution | None = None
-    """Second derivation at the same positions; by default the answer itself. The stricter of its scale and condition
-    and those of the formulas sets the allowed error.
+    """Second derivation at the same positions; by default the answer itself. The
+    stricter of its scale and condition and those of the formulas sets the allowed
+    error.
     """
     scales: Scales = field(default_factory=dict)
-    """Scales of `formulas` and `reference`, if an earlier answer was compared with them."""
+    """Scales of `formulas` and `reference`. They are kept if an earlier answer was
+    compared with them.
+    """
 
     def __post_init__(self) -> None:
         if self.reference is None:
             self.scales = {}
 
     def rows(self) -> list[Row]:
-        """Compare where the loop closes, each quantity, and what the engine says of itself."""
+        """Compare where the loop closes and each quantity.
+
+        What the engine says of itself is a row too.
+        """
         answer = self.answer
         if answer.refusal is not None:
             return [
@@ -259,14 +279,17 @@ class Comparison:
 
     @cached_property
     def _reversing(self) -> Mask:
-        """Positions at which dry friction reverses, so that a force may have either of two values."""
+        """Positions at which dry friction reverses.
+
+        A force may have either of two values there.
+        """
         tolerance = self.demands.tolerance
         return mark_reversing(
             self.scene, self.formulas, tolerance.factor, in_time=tolerance.in_time
         )
 
     def _may_reverse(self, quantity: str) -> bool:
-        """Return whether a quantity may have either of two values where dry friction reverses."""
+        """Return whether a quantity may have two values where friction reverses."""
         return quantity in OF_FORCES or (
             quantity == "drive_condition"
             and any(effect.loaded_pins for effect in self.scene.effects)
@@ -316,7 +339,10 @@ class Comparison:
         )
 
     def _compare(self, quantities: Sequence[str]) -> list[_Judged]:
-        """Compare all quantities of the answer at once, in their order; those that neither side has are left out."""
+        """Compare all quantities of the answer at once, in their order.
+
+        Those that neither side has are left out.
+        """
         prepared = [self._prepare(quantity) for quantity in quantities]
         judged = iter(self._judge([one for one in prepared if isinstance(one, _Due)]))
         return [
@@ -326,7 +352,10 @@ class Comparison:
         ]
 
     def _prepare(self, quantity: str) -> _Judged | _Due | None:
-        """Find where both close the loop and the formulas state a value; None if neither side has the quantity."""
+        """Find where both close the loop and the formulas state a value.
+
+        None if neither side has the quantity.
+        """
         formulas, scene, tolerance = self.formulas, self.scene, self.demands.tolerance
         ours, theirs = (
             getattr(formulas, quantity, None),
@@ -336,7 +365,8 @@ class Comparison:
             if quantity == "drive_condition" and any(
                 effect.loaded_pins for effect in scene.effects
             ):
-                return None  # an engine that passes over loads and friction does not know how near they are to jamming
+                # an engine without loads and friction cannot tell how near a jam is
+                return None
             theirs = getattr(self._solution, quantity)
         if ours is None and theirs is None:  # the scene states positions only
             return None
@@ -421,7 +451,7 @@ class Comparison:
         )
 
     def _take_again(self, quantity: str, ours: Array, errors: "Errors") -> "Errors":
-        """Ask again within the rounding of theta_2 where an error is beyond the allowed one."""
+        """Ask again within the rounding of theta_2 for an error that is too large."""
         beyond = errors.mask & (errors.error > errors.allowed)
         if self.demands.nearby is None or not beyond.any():
             return errors
@@ -434,7 +464,7 @@ class Comparison:
         )
 
     def _predict(self, quantity: str, errors: "Errors") -> Array | None:
-        """Predict the errors that are beyond the allowed ones, in the unit of the errors.
+        """Predict the errors beyond the allowed ones, in the unit of the errors.
 
         None where nothing predicts them. A position that was asked again needs no more
         than what is allowed there: the prediction knows nothing of theta_2's rounding.
@@ -452,7 +482,10 @@ class Comparison:
         return np.nan_to_num(share, nan=0.0, posinf=np.inf)
 
     def _scale(self, quantity: str) -> tuple[Array, Array]:
-        """Return size and condition of a quantity at each position, each the stricter of formulas and reference."""
+        """Return size and condition of a quantity at each position.
+
+        Each is the stricter of formulas and reference.
+        """
         if quantity not in self.scales:
             ours, theirs = self._sizes
             reference = None if theirs is None else theirs.formulas
@@ -478,7 +511,8 @@ class Errors(NamedTuple):
     error: Array
     allowed: Array
     unit: Array
-    """What they are divided by: the scale, or 1 of the quantity's unit where that is 0."""
+    """Divisor of the errors. It is the scale, or 1 of the quantity's unit if that is 0.
+    """
     relative: Mask
     """Positions at which they are parts of the quantity's scale."""
     condition: Array
@@ -520,7 +554,10 @@ class Errors(NamedTuple):
 
     @property
     def notes(self) -> str:
-        """Positions that were not judged, or were asked again, as the end of a reason."""
+        """Positions that were not judged, or were asked again.
+
+        They are the end of a reason.
+        """
         notes = ""
         if undecided := int(np.count_nonzero(self.mask & ~self.decidable)):
             limit = f"eps/condition > {NOTHING_TO_TELL:g}"
@@ -542,7 +579,7 @@ class WorstPosition(NamedTuple):
 
 
 def find_worst_used(errors: Errors) -> NDArray[np.intp]:
-    """Find the position of each quantity where the error uses most of what is allowed."""
+    """Find where the error of each quantity uses most of what is allowed."""
     used = find_used(errors.error, errors.allowed)
     return np.asarray(np.argmax(np.where(errors.decidable, used, -1.0), axis=-1))
 
@@ -550,10 +587,11 @@ def find_worst_used(errors: Errors) -> NDArray[np.intp]:
 def judge_errors(
     errors: Errors, predicted: Array | None, method: str = ""
 ) -> WorstPosition:
-    """Judge errors by the allowed error, and larger ones by TIMES_PREDICTED times the predicted one.
+    """Judge errors by the allowed error.
 
-    An error that is no number fails. `predicted` is None where nothing predicts it;
-    `method` says for which method it is predicted.
+    Larger ones are judged by TIMES_PREDICTED times the predicted one. An error that is
+    no number fails. `predicted` is None where nothing predicts it; `method` says for
+    which method it is predicted.
     """
     beyond = errors.beyond
     if not (errors.decidable | beyond).any():
@@ -589,7 +627,10 @@ def judge_errors(
 
 
 def _mark_stated(quantity: str, formulas: Solution, ours: Array) -> Mask:
-    """Mark where the formulas have a single value. After an overflow these are the quantities computed before it."""
+    """Mark where the formulas have a single value.
+
+    After an overflow these are the quantities computed before it.
+    """
     code = formulas.status_code
     if quantity in OF_FORCES:
         # A jam at rest concerns the motion that would begin, so its forces are stated.
@@ -629,6 +670,9 @@ def _mark_moving_drive(scene: Scene, formulas: Solution) -> Mask:
 
 
 def mark_turning(speed: Array) -> Mask:
-    """Mark where the driven bar is fast enough that its torque and the pin forces are not near a pole, (n,)."""
+    """Mark where the driven bar is fast enough, (n,).
+
+    Its torque and the pin forces are not near a pole there.
+    """
     fast = np.abs(np.nan_to_num(speed))
     return np.asarray(fast > SLOW_DRIVE * fast.max())

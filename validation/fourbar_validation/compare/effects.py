@@ -1,7 +1,8 @@
-"""Compute the size of the forces of each load and effect, couples divided by a bar's length, N: one table row each.
+"""Compute the size of the forces of each load and effect, N.
 
-A sum of forces that (nearly) vanishes is judged by these, so none of them is asked of
-the formulas' side: what an effect said of itself would excuse what it does wrong.
+Couples are divided by a bar's length. Each kind is one row of a table. A sum of forces
+that (nearly) vanishes is judged by these, so none of them is asked of the formulas'
+side: what an effect said of itself would excuse what it does wrong.
 """
 
 import math
@@ -37,7 +38,10 @@ def _find_shortest(linkage: FourBar) -> float:
 
 
 def _multiply_levers(linkage: FourBar, places: Iterable[tuple[int, float]]) -> float:
-    """Return the size of forces at distances along bars with their couples, as a multiple of the force."""
+    """Return the size of forces with their couples, as a multiple of the force.
+
+    The forces act at distances along bars.
+    """
     return sum(
         1.0 + abs(distance) / linkage.bar(bar).length
         for bar, distance in places
@@ -85,7 +89,10 @@ def _find_torsion(torsion: "Torsion", linkage: FourBar, _: Solution) -> float:
 
 
 def _find_springs(springs: "Springs", linkage: FourBar, _: Solution) -> float:
-    """Sum the tensions with their levers; the ends stay within the linkage and their own arms."""
+    """Sum the tensions with their levers.
+
+    The ends stay within the linkage and the arms to them.
+    """
     total = 0.0
     for spring in springs.springs:
         ends = [(end.bar, _find_reach(end)) for end in (spring.start, spring.end)]
@@ -101,7 +108,10 @@ def _find_flywheel(flywheel: "Flywheel", linkage: FourBar, formulas: Solution) -
 
 
 def _find_load(load: "Load", linkage: FourBar, _: Solution) -> float:
-    """Return the force with its lever, and the couple over the bar's length, at the table's greatest factor."""
+    """Return the force with its lever, and the couple over the bar's length.
+
+    The table's factor is its greatest.
+    """
     bar = linkage.bar(load.bar)
     size = abs(load.moment) / bar.length
     if load.force is not None:
@@ -117,7 +127,7 @@ def _find_load(load: "Load", linkage: FourBar, _: Solution) -> float:
 
 
 def _find_reach(place: Any) -> float:
-    """Return the distance of a place from its bar's first pin, from which it is stated, m."""
+    """Return the distance of a place from its bar's first pin, m."""
     assert place.from_pin is not None and place.from_centre is None
     return abs(float(place.from_pin[0]))
 

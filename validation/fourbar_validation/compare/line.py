@@ -1,4 +1,7 @@
-"""The line of a drive that exerts a force, from the angles of the bars alone: stroke, speed and leverage."""
+"""The line of a drive that exerts a force, from the angles of the bars alone.
+
+It has stroke, speed and leverage.
+"""
 
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -25,7 +28,9 @@ class DriveLine(NamedTuple):
     arms: tuple[Complex, ...]
     """Vectors from the first pins of the bars to the points where the drive acts, m."""
     across: Complex
-    """Vector from one end of the drive to the other, m; of a force at a point its unit vector."""
+    """Vector from one end of the drive to the other, m. For a force at a point it is
+    its unit vector.
+    """
 
     @property
     def stroke(self) -> Array:
@@ -39,7 +44,10 @@ class DriveLine(NamedTuple):
             return self.across / self.stroke
 
     def speed(self, omega: dict[int, Array]) -> Array:
-        """Compute the rate of the stroke at angular velocities of bars 1 to 4, m/s: each arm swings across itself."""
+        """Compute the rate of the stroke at angular velocities of bars 1 to 4, m/s.
+
+        Each arm swings across itself.
+        """
         rate: Complex | float = 0.0
         for (sense, point), arm in zip(self.drive.ends, self.arms, strict=True):
             velocity = 1j * omega[point.bar] * arm
@@ -53,7 +61,10 @@ class DriveLine(NamedTuple):
 
     @property
     def lever(self) -> Array:
-        """Distance of a cylinder's line from the ground pin of its bar 2 or 4, over the longer of both arms."""
+        """Distance of a cylinder's line from the ground pin of its bar.
+
+        The bar is 2 or 4; the distance is over the longer of both arms.
+        """
         points = [point for _, point in self.drive.ends]
         on_bar, on_ground = (0, 1) if points[0].bar != 1 else (1, 0)
         point = points[on_bar]
@@ -67,7 +78,10 @@ class DriveLine(NamedTuple):
 
     @property
     def most(self) -> float:
-        """Return the greatest possible movement of its ends, as `condition` counts it, m."""
+        """Return the greatest possible movement of its ends, m.
+
+        It is counted as in `condition`.
+        """
         _, a, b, c = self.linkage.lengths
         reach = {1: (0.0, 0.0), 2: (0.0, 1.0), 3: (a, a / b), 4: (0.0, a / c)}
         return float(
@@ -79,7 +93,10 @@ class DriveLine(NamedTuple):
 
     @property
     def condition(self) -> Array:
-        """Compute the rate of the stroke over the most, at speeds that close the loop and are finite at its limits."""
+        """Compute the rate of the stroke over the most that it could be.
+
+        The speeds close the loop and are finite at its limits.
+        """
         _, a, b, c = self.linkage.lengths
         u2, u3, u4 = (self.directions[bar] for bar in (2, 3, 4))
         zero = np.zeros(len(u2))

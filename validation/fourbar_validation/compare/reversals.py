@@ -1,7 +1,7 @@
-"""Find where dry friction reverses: the sense of rotation at a pin changes, and the pin forces jump.
+"""Find where dry friction reverses.
 
-The driving torque bends there and does not jump: the power f |omega_j - omega_i| is
-continuous.
+The sense of rotation at a pin changes, and the pin forces jump. The driving torque
+bends there and does not jump: the power f |omega_j - omega_i| is continuous.
 """
 
 from collections.abc import Callable
@@ -19,7 +19,7 @@ from fourbar.solving import solve
 from fourbar_validation.compare.tolerance import EPS, Array, K
 
 HALVINGS = 60
-"""Number of times the interval between two positions is halved, down to neighbouring doubles."""
+"""Halvings of the interval between two positions, down to neighbouring doubles."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +28,9 @@ class Reversal:
 
     pin: str
     theta_2: float
-    """rad; `before` and `after` are solved there with friction in the sense of either side."""
+    """rad; `before` and `after` are solved there. Friction has the sense of either
+    side.
+    """
     before: Solution
     after: Solution
     position: int
@@ -91,11 +93,12 @@ def find_reversals(
 def mark_reversing(
     scene: Scene, solution: Solution, slip: float, *, in_time: bool = False
 ) -> NDArray[np.bool_]:
-    """Mark where a dry pin of a moving linkage slips by at most this part of the two speeds over sin^2 mu, (n,).
+    """Mark where a dry pin of a moving linkage slips little, (n,).
 
-    There the sense of friction is undecided, and the forces on both sides of the jump
-    are right. An engine that runs through the motion `in_time` has no convention at
-    rest either: 0 is as good as any couple up to the friction's.
+    The slip is at most this part of the two speeds over sin^2 mu. There the sense of
+    friction is undecided, and the forces on both sides of the jump are right. An engine
+    that runs through the motion `in_time` has no convention at rest either: 0 is as
+    good as any couple up to the friction's.
     """
     mask = np.zeros(len(solution), dtype=bool)
     for pin in {pin for effect in scene.effects for pin in effect.dry_pins}:
@@ -123,10 +126,10 @@ def break_curve(
     jumps: list[Reversal],
     value: Callable[[Solution], Array],
 ) -> tuple[Array, Array]:
-    """Give a curve, (n,), both ends of each jump and NaN between them: no line is drawn across.
+    """Give a curve, (n,), both ends of each jump and NaN between them.
 
-    `theta_2` and `values`: the curve at the positions of the solution, rad.
-    `value`: what the curve shows of a solution.
+    No line is then drawn across. `theta_2` and `values`: the curve at the positions of
+    the solution, rad. `value`: what the curve shows of a solution.
     """
     for jump in sorted(jumps, key=lambda jump: -jump.position):
         after = jump.position + 1
@@ -149,7 +152,10 @@ def _compute_speeds(solution: Solution) -> dict[int, Any]:
 def _bisect(
     scene: Scene, command: Command, pin: str, i: int, j: int, slip: float
 ) -> Reversal:
-    """Locate the reversal between positions i and j by bisection, with friction in the sense of either side."""
+    """Locate the reversal between positions i and j by bisection.
+
+    Friction has the sense of either side.
+    """
 
     def look(theta_2: float, side: int, stage: str) -> Solution:
         moved = command._replace(

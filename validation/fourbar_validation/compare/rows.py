@@ -1,4 +1,7 @@
-"""The flat sorted table that joins run and report: one row per scene, engine, setting and quantity."""
+"""The flat sorted table that joins run and report.
+
+It has one row per scene, engine, setting and quantity.
+"""
 
 import csv
 import io
@@ -23,7 +26,9 @@ VERDICTS = (AGREES, DEGRADED, UNDECIDED, REFUSES, FAILS)
 """Verdicts from the best to the worst."""
 HOLDING_VERDICTS = (AGREES, DEGRADED)
 COMPARED_VERDICTS = (*HOLDING_VERDICTS, FAILS)
-"""Verdicts of comparisons that took place; otherwise no digit is left to decide by, or the engine declared a limit."""
+"""Verdicts of comparisons that took place. In the others no digit is left to decide by,
+or the engine declared a limit.
+"""
 
 FORMULAS = "formulas"
 IDENTITIES = (
@@ -53,7 +58,9 @@ DERIVED = (
     "sdf",
     "usd",
 )
-"""Engines of the rows that check functions other than `solve`: with `formulas` they are fourbar's own."""
+"""Engines of the rows that check functions other than `solve`. With `formulas` they are
+those of fourbar itself.
+"""
 LONGEST = 500
 """Characters of what somebody else's code gives as a reason."""
 
@@ -67,7 +74,9 @@ class Row:
     setting: str
     quantity: str
     error: float
-    """Relative to the scale of the quantity (angles: rad); NaN where there is no answer."""
+    """Error relative to the scale of the quantity (angles: rad). NaN if there is no
+    answer.
+    """
     allowed: float
     passed: bool = field(init=False)
     """True if it was compared and holds; the verdict decides."""
@@ -77,7 +86,10 @@ class Row:
     condition: float
 
     def __post_init__(self) -> None:
-        """Raise ValueError for a verdict that nobody knows, and for one that holds without a number."""
+        """Raise ValueError for a verdict that is not defined.
+
+        Likewise for one that holds without a number.
+        """
         if self.verdict not in VERDICTS or (
             self.verdict in HOLDING_VERDICTS and math.isnan(self.error)
         ):
@@ -96,7 +108,10 @@ class Row:
         verdict: str,
         reason: str,
     ) -> "Row":
-        """Make a verdict without numbers: a refusal, a breakdown, an answer that is missing."""
+        """Make a verdict without numbers.
+
+        It is a refusal, a breakdown, or an answer that is missing.
+        """
         nan = math.nan
         return cls(
             scene,
@@ -123,13 +138,15 @@ class Row:
         condition: Array | float = 1.0,
         where: Mask | None = None,
     ) -> "Row":
-        """Judge errors by the one rule of agreement, at the position where they use most of what is allowed.
+        """Judge errors by the one rule of agreement.
+
+        The position is that where they use most of what is allowed.
 
         Parameters
         ----------
         who : scene, engine and setting.
-        error : each a number, or an array over the positions, (n,), as `allowed`, `theta_2` and `condition`; one that
-            is no finite number fails.
+        error : each a number, or an array over the positions, (n,), as `allowed`,
+            `theta_2` and `condition`; one that is no finite number fails.
         where : positions that are held to it; undecided where there are none.
         """
         errors = np.atleast_1d(np.asarray(error, dtype=float))
@@ -161,14 +178,20 @@ class Row:
 
     @property
     def failed(self) -> bool:
-        """Return whether it was compared and does not hold, or an answer that was due is missing."""
+        """Return whether it was compared and does not hold.
+
+        It fails too if an answer that was due is missing.
+        """
         return self.verdict == FAILS
 
 
 def make_breakdown(
     scene: str, engine: str, error: BaseException, part: str = ""
 ) -> Row:
-    """Make the row of an engine that raised, took its process with it, or never came back; `part`: in what."""
+    """Make the row of an engine that broke down.
+
+    It raised, took its process with it, or never came back. `part`: in what.
+    """
     if isinstance(error, TimeoutError):
         reason = "the engine hung and was stopped"
     elif type(error).__name__ == "ProcessExpired":  # raised by Pebble
@@ -191,7 +214,10 @@ def say_error(error: BaseException) -> str:
 
 
 def write_one_line(text: str) -> str:
-    """Write somebody's text in one line that prints, its middle left out where it is long."""
+    """Write somebody's text in one line that prints.
+
+    The middle of a long text is left out.
+    """
     line = make_plain(" ".join(text.split()))
     return (
         line
@@ -201,9 +227,10 @@ def write_one_line(text: str) -> str:
 
 
 def make_plain(text: str) -> str:
-    """Write every character that does not print, but for the ends of lines, as its escape.
+    """Write every character that does not print as its escape.
 
-    Characters that would steer a terminal or a reader are shown, not sent.
+    Ends of lines are kept. Characters that would steer a terminal or a reader are
+    shown, not sent.
     """
     if text.isprintable():
         return text
@@ -214,11 +241,14 @@ def make_plain(text: str) -> str:
 
 
 FORMULA = ("=", "+", "-", "@")
-"""Characters that a spreadsheet takes for the beginning of a formula, which it calculates."""
+"""Characters that a spreadsheet takes for the beginning of a formula."""
 
 
 def write_cell_text(cell: str) -> str:
-    """Write a cell that stays text in a spreadsheet: with an apostrophe before what begins a formula."""
+    """Write a cell that stays text in a spreadsheet.
+
+    An apostrophe stands before what begins a formula.
+    """
     return f"'{cell}" if cell.startswith(FORMULA) and len(cell) > 1 else cell
 
 
@@ -251,7 +281,11 @@ def write_rows(rows: Iterable[Row]) -> str:
 
 
 def write_csv(columns: Sequence[str], rows: Iterable[Iterable[object]]) -> str:
-    """Write a table as CSV, floats as repr, nothing for None, no text that a spreadsheet would calculate."""
+    """Write a table as CSV.
+
+    Floats are written as repr, None as nothing, and no text that a spreadsheet would
+    calculate.
+    """
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerows([columns] if columns else [])
@@ -288,7 +322,10 @@ WORDING = {
 
 
 class Counts:
-    """Rows by verdict. What no engine answered is not compared, even where the formulas' own identities hold."""
+    """Rows by verdict.
+
+    What no engine answered is not compared, even if the formulas' own identities hold.
+    """
 
     def __init__(self, rows: Iterable[Row] = ()) -> None:
         self._of = Counter(dict.fromkeys(VERDICTS, 0))
@@ -346,7 +383,10 @@ class Counts:
 
     @property
     def headline(self) -> str:
-        """Give the verdict alone, for what does not fail; where nothing was compared, what was done instead."""
+        """Give the verdict alone, for what does not fail.
+
+        If nothing was compared, it says what was done instead.
+        """
         if self.nothing:
             return self.sentence()
         hold = f"All {self.compared} comparisons{self._write_where()} hold"
@@ -355,7 +395,10 @@ class Counts:
         return hold
 
     def sentence(self) -> str:
-        """Give the verdict in one sentence: "all hold" is stated only of what was compared."""
+        """Give the verdict in one sentence.
+
+        "all hold" is stated only of what was compared.
+        """
         total, failed = self.compared, self[FAILS]
         if failed:
             verdict = (

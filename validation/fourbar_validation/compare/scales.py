@@ -1,10 +1,10 @@
-"""Compute the scale of a quantity's error and its condition, by the formulas and by another derivation.
+"""Compute the scale of a quantity's error and its condition.
 
-The scale of a quantity is its largest magnitude over the well-conditioned positions; a
-position below that is judged relative to its own magnitude, or the forces that diverge
-near a limit would excuse every other row. A quantity that (nearly) vanishes is judged
-against the sum of the absolute terms of its equation; if those vanish too, the answer
-must be exactly zero.
+They come from the formulas and from another derivation. The scale of a quantity is its
+largest magnitude over the well-conditioned positions; a position below that is judged
+relative to its own magnitude, or the forces that diverge near a limit would excuse
+every other row. A quantity that (nearly) vanishes is judged against the sum of the
+absolute terms of its equation; if those vanish too, the answer must be exactly zero.
 
 A wrong formula would widen what it is allowed: an angle between bars 3 and 4 that is
 too small, an acceleration that is too large. So another derivation, the reference, is
@@ -35,11 +35,16 @@ from fourbar_validation.compare.tolerance import (
 )
 
 VANISHING = 1.0 / K
-"""A quantity below this part of the sum of its terms has lost more to cancellation than K covers."""
+"""Part of the sum of its terms below which a quantity has lost too many digits.
+Cancellation costs it more than K covers.
+"""
 
 
 class Sizes:
-    """Sizes of the quantities of one solution of a scene; each sum of terms is computed once."""
+    """Sizes of the quantities of one solution of a scene.
+
+    Each sum of terms is computed once.
+    """
 
     def __init__(self, scene: Scene, formulas: Solution) -> None:
         self.scene, self.formulas = state_from_pins(scene), formulas
@@ -66,7 +71,7 @@ class Sizes:
         return np.where(well, most if scale < VANISHING * most else scale, nonzero)
 
     def sum_terms(self, quantity: str) -> Array:
-        """Sum the absolute terms of the equation that a quantity is computed from, (n,), in its unit.
+        """Sum the absolute terms of the equation of a quantity, (n,), in its unit.
 
         Raises KeyError for a quantity of a unit that has no such sum here: nothing is
         judged by another's scale.
@@ -202,7 +207,7 @@ TERMS: dict[str, Callable[[str, Sizes], Array]] = {
 
 
 def _compute_drive_arms(scene: Scene) -> dict[int, float]:
-    """Compute the distances from the first pins of the bars to where a force drives them, m."""
+    """Compute the distances from the bars' first pins to where a force drives, m."""
     ends = () if scene.drive is None else scene.drive.ends
     return {end.bar: abs(end.distance) for _, end in ends}
 
@@ -213,7 +218,10 @@ def _compute_arm(scene: Scene, number: int) -> float:
 
 
 def _sum_force_terms(scene: Scene, formulas: Solution) -> Array:
-    """Sum of the magnitudes of all inertial and external forces, couples divided by their bar's length, N."""
+    """Sum the magnitudes of all inertial and external forces, N.
+
+    Couples are divided by their bar's length.
+    """
     total = np.zeros(len(formulas))
     for number in MOVING_BARS:
         bar = scene.linkage.bar(number)
@@ -232,7 +240,9 @@ def _sum_force_terms(scene: Scene, formulas: Solution) -> Array:
 
 
 SIZED_BY = ("omega_3", "omega_4", "alpha_3", "alpha_4", "a_G2", "a_G3", "a_G4")
-"""Quantities from which the size of a force is computed; a reference without them has none."""
+"""Quantities from which the size of a force is computed. A reference without them has
+none.
+"""
 
 
 def has_angles(answer: Answer) -> bool:
@@ -247,7 +257,10 @@ def has_angles(answer: Answer) -> bool:
 
 
 def make_reference(scene: Scene, answer: Answer) -> Solution | None:
-    """Make a solution of an answer, its conditions by the sines between its own angles; None without angles."""
+    """Make a solution of an answer.
+
+    Its conditions follow from the sines between its own angles; None without angles.
+    """
     scene = state_from_pins(scene)
     if answer.at is None or not has_angles(answer):
         return None
@@ -301,7 +314,10 @@ def _find_line(
     theta: dict[int, Array],
     known: dict[str, Any],
 ) -> dict[str, Array]:
-    """Find stroke, direction, speed and leverage of a force that drives, from the answer's own angles and speeds."""
+    """Find stroke, direction, speed and leverage of a force that drives.
+
+    They follow from the answer's own angles and speeds.
+    """
     line = place_line(linkage, drive, theta)
     quantities = {"drive_line": np.stack((line.unit.real, line.unit.imag), axis=1)}
     if drive.has_stroke:
@@ -318,7 +334,10 @@ def _find_line(
 def _find_velocities(
     linkage: FourBar, theta: dict[int, Array], known: dict[str, Any]
 ) -> dict[str, Array]:
-    """Find the speeds of A, B and the mass centres, from the answer's own angles and speeds, m/s."""
+    """Find the speeds of A, B and the mass centres, m/s.
+
+    They follow from the answer's own angles and speeds.
+    """
 
     def swung(bar: int, distance: float, angle: float) -> Array:
         speed, direction = distance * known[f"omega_{bar}"], theta[bar] + angle

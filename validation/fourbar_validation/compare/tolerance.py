@@ -1,4 +1,6 @@
-"""Compute errors and allowed errors, with the reason for each: four classes of tolerance, each a named object.
+"""Compute errors and allowed errors, with the reason for each.
+
+There are four classes of tolerance, each a named object.
 
 `condition` lies in (0, 1], 1 is best; an exact comparison is allowed K eps / condition.
 The motion condition is s = |sin(theta_4 - theta_3)|, the drive condition the sine
@@ -27,19 +29,24 @@ Angle = TypeVar("Angle", float, Array)
 
 EPS = 2.0**-52
 K = 50.0
-"""One factor for every exact comparison. Two evaluations of about fifty roundings each differ by
-sqrt(2 * 50) = 10 of them as a random walk; 50 covers the tails of some 10^5 comparisons.
+"""One factor for every exact comparison. Two evaluations of about fifty roundings each
+differ by sqrt(2 * 50) = 10 of them as a random walk; 50 covers the tails of some 10^5
+comparisons.
 """
 ROUNDINGS = 8.0
-"""A chain of some fifty roundings moves a result by sqrt(50) = 7 last digits, as a random walk."""
+"""Digits that a chain of some fifty roundings loses, as a random walk. It moves a
+result by sqrt(50) = 7 last digits.
+"""
 NOTHING_TO_TELL = 1e-3
-"""Greatest eps/condition with a verdict; beyond it two correct programs may differ in the third digit."""
+"""Greatest eps/condition with a verdict. Beyond it two correct programs may differ in
+the third digit.
+"""
 WELL_CONDITIONED = 0.1
 """Positions whose condition is at least this set the scale of a quantity."""
 SMALL = 1e-12
 """Allowed errors below this are stated in parts of eps."""
 TIMES_PREDICTED = 10.0
-"""An engine whose error is predicted may exceed the prediction by this factor, not more."""
+"""Factor by which an engine may exceed the error that is predicted."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,12 +60,14 @@ class ErrorBound:
     conditioned: bool
     """True if the allowed error is divided by the condition."""
     in_time: bool = False
-    """True for an engine that runs through the motion in time and has no convention at rest."""
+    """True for an engine that runs through the motion in time. It has no convention at
+    rest.
+    """
     cause: str = ""
     """What makes the error, in a few words."""
 
     def explain(self, condition: float) -> str:
-        """Say in a sentence what is allowed at a condition, and what makes the error."""
+        """Say in a sentence what is allowed at a condition, and the error's cause."""
         if self.conditioned:
             size = f"{self.factor / EPS:.3g} eps over the condition {condition:.2g}"
         elif self.factor < SMALL:
@@ -115,14 +124,16 @@ POWER = {
     **dict.fromkeys(("rad", "m", "1"), 1),
     **dict.fromkeys(("rad/s", "m/s", "rad/s^2", "m/s^2", "N", "N m", "W"), 2),
 }
-"""Power of 1/s by unit: angles and positions lose digits as 1/s, everything that follows from them as 1/s^2."""
+"""Power of 1/s by unit. Angles and positions lose digits as 1/s, everything that
+follows from them as 1/s^2.
+"""
 OF_THE_INPUT = frozenset(
     ("theta_2", "omega_2", "alpha_2", "A", "G2", "v_A", "v_G2", "a_A", "a_G2")
 )
 """Quantities that the input alone decides: they lose none."""
 TOUCHING_MARGIN = 32.0 * EPS
-"""A loop that closes, or misses, by less than this part of the sum of its lengths does so by the
-rounding of the data, and the engines may differ on whether it closes.
+"""A loop that closes, or misses, by less than this part of the sum of its lengths does
+so by the rounding of the data, and the engines may differ on whether it closes.
 """
 
 
@@ -138,14 +149,16 @@ def hold_simulated(error: float, why: str) -> ErrorBound:
 
 
 OF_DIRECTION = frozenset(("drive_line", "stroke_speed", "drive_condition"))
-"""Quantities that, like every force, follow from the direction of the force that drives: the places of its ends are
-rounded as the lengths are, and the direction by that over the stroke.
+"""Quantities that, like every force, follow from the direction of the force that
+drives: the places of its ends are rounded as the lengths are, and the direction by that
+over the stroke.
 """
 
 
 def find_lever(linkage: FourBar, bar: int = 2) -> float:
-    """Compute min(b, c)/longest bar: a loop closes to eps of its longest bar, which turns a shorter bar 3 or 4 by more.
+    """Compute min(b, c)/longest bar.
 
+    A loop closes to eps of its longest bar, which turns a shorter bar 3 or 4 by more.
     Of another commanded bar it is the shorter of the two moving bars besides it.
 
     Without it 28 of 10 008 comparisons on 300 random linkages exceed K = 50 (at most
@@ -157,7 +170,10 @@ def find_lever(linkage: FourBar, bar: int = 2) -> float:
 
 
 def find_condition(quantity: str, linkage: FourBar, formulas: Solution) -> Array:
-    """Compute a quantity's condition at each position: s for positions, s^2 for what follows, times lever and drive."""
+    """Compute a quantity's condition at each position.
+
+    It is s for positions and s^2 for what follows, times lever and drive.
+    """
     s, unit, bar, commanded = (
         formulas.condition,
         UNITS[quantity],
@@ -190,14 +206,20 @@ def wrap_angle(angle: Angle) -> Angle:
 
 
 def count_half_turns(ground_angle: float, theta_2: Array | float = 0.0) -> float:
-    """Give the largest angle in half turns, at least 1: many turns away it has fewer digits of its direction."""
+    """Give the largest angle in half turns, at least 1.
+
+    Many turns away it has fewer digits of its direction.
+    """
     return max(
         1.0, abs(ground_angle) / np.pi, float(np.abs(theta_2).max(initial=0.0)) / np.pi
     )
 
 
 def find_roundoff(linkage: FourBar) -> float:
-    """Compute what two derivations of an angle may differ by, rad: it is one against the ground's."""
+    """Compute by what two derivations of an angle may differ, rad.
+
+    The angle is one against the ground.
+    """
     return EQUIVALENCE.factor * count_half_turns(linkage.ground_angle)
 
 
@@ -207,7 +229,10 @@ def sum_lengths(linkage: FourBar) -> float:
 
 
 def find_margin(linkage: FourBar, theta: Array, bar: int = 2) -> Array:
-    """Compute by what part of the sum of the lengths the loop closes (> 0) or misses (< 0) at a bar's angle."""
+    """Compute by what the loop closes (> 0) or misses (< 0) at a bar's angle.
+
+    It is a part of the sum of the lengths.
+    """
     held = linkage.bar(bar).length * (-1.0 if bar == 4 else 1.0)
     b, c = (linkage.bar(number).length for number in MOVING_BARS if number != bar)
     e = np.abs(
@@ -217,7 +242,10 @@ def find_margin(linkage: FourBar, theta: Array, bar: int = 2) -> Array:
 
 
 def find_gap(linkage: FourBar, theta_2: Array, theta_3: Array, theta_4: Array) -> Array:
-    """Compute by what part of the sum of the lengths three angles miss the closure of the loop, (n,)."""
+    """Compute by what three angles miss the closure of the loop, (n,).
+
+    It is a part of the sum of the lengths.
+    """
     d, a, b, c = linkage.lengths
     ground = d * np.exp(1j * linkage.ground_angle)
     gap = (
@@ -272,7 +300,10 @@ def compute_difference(quantity: str, ours: Array, theirs: Array) -> Array:
 
 
 def divide(apart: Array | float, size: Array | float) -> Array:
-    """Divide a difference by a size; a size of 0 demands exactly 0: over the least double any other is huge."""
+    """Divide a difference by a size.
+
+    A size of 0 demands exactly 0: over the least double any other difference is huge.
+    """
     with np.errstate(over="ignore"):
         return np.asarray(apart / np.where(size == 0.0, np.nextafter(0.0, 1.0), size))
 
@@ -288,7 +319,10 @@ def replace_zero_size(size: Array) -> Array:
 
 
 def find_used(error: Array | float, allowed: Array | float) -> Array:
-    """Return error/allowed, the used part of the allowed error; infinite if the error is not finite, 0 if it is 0."""
+    """Return error/allowed, the used part of the allowed error.
+
+    It is infinite if the error is not finite, and 0 if the error is 0.
+    """
     error, allowed = np.asarray(error, dtype=float), np.asarray(allowed, dtype=float)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         share = np.where(error == 0.0, 0.0, error / allowed)

@@ -1,4 +1,7 @@
-"""Say in a few lines what a study of cost found: what digits cost, what the defaults pay, what matters."""
+"""Say in a few lines what a study of cost found.
+
+It says what digits cost, what the defaults pay, and what matters.
+"""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -17,7 +20,7 @@ Curves = Mapping[str, Sequence[CostPoint]]
 
 
 def list_stepped(curves: Curves) -> list[CostPoint]:
-    """List the points of all settings that were stepped through time at the scene's own speed."""
+    """List the points of all settings that were stepped at the scene's own speed."""
     return [
         point
         for name, row in curves.items()
@@ -28,7 +31,10 @@ def list_stepped(curves: Curves) -> list[CostPoint]:
 
 
 def find_cheapest(curves: Curves, quantity: str, error: float) -> CostPoint | None:
-    """Find the cheapest stepped point within an error, at the steps and between them."""
+    """Find the cheapest stepped point within an error.
+
+    The error is that at the steps and between them.
+    """
     points = [
         point
         for point in list_stepped(curves)

@@ -1,4 +1,4 @@
-"""`python -m validation cost`: the study of scenes, its table, its laws and its pictures."""
+"""`python -m validation cost`: the study of scenes, its table, laws and pictures."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -50,10 +50,10 @@ HEAD = ("setting", "error", "ms per simulated second", "ms a revolution")
     help="Print the cheapest settings of every error, the laws and the warnings too.",
 )
 def cost(scenes: tuple[Path, ...], out: Path, verbose: bool) -> int:
-    """Measure what accuracy costs in time: every method, on SCENES (default: the crank-rocker).
+    """Measure what accuracy costs in time, by every method, on SCENES.
 
-    An interrupted study is resumed where it stopped. Exit status 1 where the law of any
-    quantity does not hold, or none is decided.
+    The default is the crank-rocker. An interrupted study is resumed where it stopped.
+    Exit status 1 where the law of any quantity does not hold, or none is decided.
     """
     from rich.console import Console
     from rich.progress import track
@@ -113,7 +113,10 @@ def print_details(
     curves: Mapping[str, Sequence[CostPoint]],
     laws: Sequence[ErrorLaw],
 ) -> None:
-    """Print the cheapest settings of every error, the laws, the warnings and what was left out."""
+    """Print the cheapest settings of every error, the laws, and warnings.
+
+    It prints too what was left out.
+    """
     from rich.console import Console
 
     Console().print(make_table(HEAD, list_front(curves)))
@@ -166,13 +169,19 @@ def write_subtitle(scene: Scene, title: str) -> str:
 
 
 def write_price(curves: Mapping[str, Sequence[CostPoint]], error: float) -> str:
-    """Write the least ms of a simulated second within an error; a dash where nothing reaches it."""
+    """Write the least ms of a simulated second within an error.
+
+    A dash stands where nothing reaches it.
+    """
     point = find_cheapest(curves, "worst", error)
     return "-" if point is None else f"{1e3 * point.seconds_per_second:.2g}"
 
 
 def list_front(curves: Mapping[str, Sequence[CostPoint]]) -> list[tuple[str, ...]]:
-    """List the Pareto front of everything stepped, by the worse of torque and force, under HEAD."""
+    """List the Pareto front of everything stepped, under HEAD.
+
+    The error is the worse of torque and force.
+    """
     return [
         (
             point.name,

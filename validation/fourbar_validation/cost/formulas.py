@@ -1,4 +1,7 @@
-"""The formulas' side of the study: double and single precision, the thirteen equations, fifty digits."""
+"""The formulas' side of the study.
+
+It has double and single precision, the thirteen equations, and fifty digits.
+"""
 
 import math
 from collections.abc import Callable
@@ -23,9 +26,13 @@ from fourbar_validation.compare.tolerance import divide
 from fourbar_validation.published import thirteen
 
 FIFTY_DIGITS = 167 + 30
-"""Bits: fifty digits, and what some sixty roundings of a well-conditioned position cost."""
+"""Bits of fifty digits. They include what some sixty roundings of a well-conditioned
+position cost.
+"""
 AT_MOST = 25
-"""Positions at which errors against the reference are taken: a few milliseconds each."""
+"""Positions at which errors against the reference are taken. They take a few
+milliseconds each.
+"""
 Quantities = dict[str, Any]
 
 
@@ -97,7 +104,10 @@ def solve_thirteen_equations(scene: Scene, command: Command) -> Quantities:
 
 
 def make_bodies(scene: Scene, command: Command) -> thirteen.FreeBodies:
-    """Set up the free bodies with what acts on them, moments about the mass centres, by our kinematics."""
+    """Set up the free bodies with what acts on them, by our kinematics.
+
+    Moments are about the mass centres.
+    """
     state, parts = (
         compute_state(scene, command),
         list_bodies(scene.linkage, scene.effects),

@@ -1,4 +1,7 @@
-"""Laws behind the points, of each quantity by itself: exponents with their uncertainty, floors, jumps."""
+"""Laws behind the points, of each quantity by itself.
+
+These are exponents with their uncertainty, floors and jumps.
+"""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -12,21 +15,23 @@ from fourbar_validation.cost.study import STEPPED, CostPoint
 TOO_LARGE = 0.1
 """A larger error is not small enough for its law: the motion itself is another."""
 FLOORED = 0.8
-"""An error that twice the steps leave above this part of what it was has met its floor."""
+"""Part of an error above which twice the steps leave a floor."""
 ABOVE_FLOOR = 3.0
 """Points within this factor of the floor carry part of it and are not fitted."""
 WITHIN = 0.35
-"""An exponent may miss the expected one by this much, or by twice its own uncertainty: over two decades of
-a ladder the next order of the error's series moves a fitted slope by about a quarter.
+"""An exponent may miss the expected one by this much, or by twice its own uncertainty:
+over two decades of a ladder the next order of the error's series moves a fitted slope
+by about a quarter.
 """
 FEWEST = 3
 """Points of a fit."""
 JUMP = 10.0
-"""An error so many times larger than at either of the two coarser settings is no part of a law, where it has met no
-floor: between neighbours of a ladder the laws here change it by 10 or less, and downwards.
+"""An error so many times larger than at either of the two coarser settings is no part
+of a law, where it has met no floor: between neighbours of a ladder the laws here change
+it by 10 or less, and downwards.
 """
 MIXES = 1.0 / 30.0
-"""Part of the least error above which what does not depend on the setting flattens a slope."""
+"""Part of the least error that flattens a slope. It does not depend on the setting."""
 FIRST_ORDER, FOURTH_ORDER = 1.0, 4.0
 EXPECTED_ORDER = dict.fromkeys(
     ("Euler", "implicit", "implicitfast", "discrete"), FIRST_ORDER
@@ -45,13 +50,15 @@ class ErrorLaw:
     expected: float
     points: int
     jumps: tuple[str, ...] = ()
-    """Settings where the error jumps up as the steps get finer; no law holds then, whatever the other points fit."""
+    """Settings where the error jumps up as the steps get finer. No law holds then,
+    whatever the other points fit.
+    """
     constant: float = 0.0
     """Part of the least fitted error that does not depend on the setting."""
 
     @property
     def mixed(self) -> bool:
-        """Return whether a part that does not depend on the setting flattens the slope."""
+        """Return whether a part that the setting does not change flattens the slope."""
         return (
             self.constant > MIXES
             and self.points >= FEWEST
@@ -60,12 +67,18 @@ class ErrorLaw:
 
     @property
     def decided(self) -> bool:
-        """Return whether enough points are left for a fit with an uncertainty, or a jump rules the law out."""
+        """Return whether enough points are left for a fit with an uncertainty.
+
+        It is decided too if a jump rules the law out.
+        """
         return (self.points >= FEWEST and not self.mixed) or bool(self.jumps)
 
     @property
     def holds(self) -> bool:
-        """Return whether the exponent is the expected one throughout; False if it is not decided."""
+        """Return whether the exponent is the expected one throughout.
+
+        It is False if that is not decided.
+        """
         return (
             self.decided
             and not self.jumps
@@ -110,7 +123,10 @@ def _group(pairs: Sequence[tuple[str, str]]) -> list[str]:
 
 
 def fit(x: Sequence[float], y: Sequence[float]) -> tuple[float, float]:
-    """Fit the slope of log y over log x by least squares; return it and its standard error."""
+    """Fit the slope of log y over log x by least squares.
+
+    Return it and its standard error.
+    """
     from scipy.stats import linregress
 
     line = linregress(np.log(x), np.log(y))
@@ -118,7 +134,10 @@ def fit(x: Sequence[float], y: Sequence[float]) -> tuple[float, float]:
 
 
 def find_floor(points: Sequence[CostPoint], quantity: str) -> float | None:
-    """Find the error that more steps no longer lessen; None where it still falls at the end of the ladder."""
+    """Find the error that more steps no longer lessen.
+
+    None if it still falls at the end of the ladder.
+    """
     errors = [_read(point, quantity) for point in _list_by_steps(points)]
     if (
         len(errors) < 2
@@ -130,7 +149,7 @@ def find_floor(points: Sequence[CostPoint], quantity: str) -> float | None:
 
 
 def find_steps_at_floor(points: Sequence[CostPoint], quantity: str) -> CostPoint | None:
-    """Find the first point of a ladder from which on its error stays near its last one."""
+    """Find the first point of a ladder from which its error stays near its last."""
     floor = find_floor(points, quantity)
     if floor is None:
         return None
@@ -148,7 +167,10 @@ def _list_by_steps(points: Sequence[CostPoint]) -> list[CostPoint]:
 
 
 def find_jumps(points: Sequence[CostPoint], quantity: str) -> list[CostPoint]:
-    """Return the points where an error jumps up as steps get finer, once the motion is the scene's."""
+    """Return the points where an error jumps up as steps get finer.
+
+    They count once the motion is the scene's.
+    """
     jumps = []
     for i, point in enumerate(points[1:], 1):
         value, before = (
@@ -168,7 +190,10 @@ def find_jumps(points: Sequence[CostPoint], quantity: str) -> list[CostPoint]:
 
 
 def fit_laws(curves: Mapping[str, Sequence[CostPoint]]) -> list[ErrorLaw]:
-    """Fit every law that the study was laid out for, of each quantity, as far as its curves exist."""
+    """Fit every law that the study was laid out for, of each quantity.
+
+    A law is fitted as far as its curves exist.
+    """
     laws = []
     one_state = [
         point for point in curves.get("one state", ()) if point.setting_value > 0.0
@@ -231,7 +256,10 @@ def _fit_law(
 
 
 def _read(point: CostPoint, quantity: str) -> float:
-    """Return the error of a quantity at the steps: between them the laws are those of a spline."""
+    """Return the error of a quantity at the steps.
+
+    Between them the laws are those of a spline.
+    """
     return float(getattr(point.at_steps, quantity))
 
 
@@ -241,7 +269,10 @@ def _measure_leap(point: CostPoint, ladder: Sequence[CostPoint], quantity: str) 
 
 
 def _fit_sag(curves: Mapping[str, Sequence[CostPoint]], quantity: str) -> ErrorLaw:
-    """Fit the sag over the time constant: of second order where softness by itself is small next to it."""
+    """Fit the sag over the time constant.
+
+    It is of second order where softness by itself is small next to it.
+    """
     points = curves["sag tc, slow"]
     law = _fit_law("sag at 0.1 rad/s in tc", quantity, points, 2.0)
     least = min(_read(point, quantity) for point in points)
@@ -252,7 +283,10 @@ def _fit_sag(curves: Mapping[str, Sequence[CostPoint]], quantity: str) -> ErrorL
 
 
 def _fit_stiff(curves: Mapping[str, Sequence[CostPoint]], quantity: str) -> ErrorLaw:
-    """Fit RK4's floor: at a time constant of k steps it goes as k^-4, whatever the timestep."""
+    """Fit RK4's floor.
+
+    At a time constant of k steps it goes as k^-4, whatever the timestep.
+    """
     ladders = (
         (tc, curves.get(f"RK4, pads, tc = {tc:g} steps", ()))
         for tc in (3.0, 10.0, 30.0, 100.0)
@@ -270,7 +304,10 @@ def _fit_stiff(curves: Mapping[str, Sequence[CostPoint]], quantity: str) -> Erro
 
 
 def list_warnings(curves: Mapping[str, Sequence[CostPoint]]) -> list[str]:
-    """List warnings where a quantity jumps towards finer steps, and where it has passed its floor."""
+    """List warnings where a quantity jumps, and where it has passed its floor.
+
+    Jumps are towards finer steps.
+    """
     warnings = []
     for name, points in curves.items():
         ladder = _list_by_steps(
@@ -314,7 +351,10 @@ def list_warnings(curves: Mapping[str, Sequence[CostPoint]]) -> list[str]:
 
 
 def _describe_floor(ladder: Sequence[CostPoint], quantity: str) -> str:
-    """Say where more steps no longer lessen an error, and where it was less on the way."""
+    """Say where more steps no longer lessen an error.
+
+    It says too where the error was less on the way.
+    """
     floor = find_floor(ladder, quantity)
     first = find_steps_at_floor(ladder, quantity)
     assert floor is not None and first is not None
@@ -329,9 +369,10 @@ def _describe_floor(ladder: Sequence[CostPoint], quantity: str) -> str:
 
 
 def find_pareto(points: Sequence[CostPoint], quantity: str) -> list[CostPoint]:
-    """Find the points that no other beats in both error and cost, from cheap to accurate.
+    """Find the points that no other beats in both error and cost.
 
-    The error is that at the steps and between them, as the advice judges it.
+    The order is from cheap to accurate. The error is that at the steps and between
+    them, as the advice judges it.
     """
     front: list[CostPoint] = []
     for point in sorted(

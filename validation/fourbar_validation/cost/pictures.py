@@ -1,4 +1,7 @@
-"""Pictures of the study: work and precision, and each setting that decides by itself."""
+"""Pictures of the study: work and precision, and each setting by itself.
+
+The settings are those that decide.
+"""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -35,7 +38,10 @@ BLUE, GREEN, ORANGE, PINK, VIOLET = (LIGHT[f"--e{n}"] for n in range(1, 6))
 
 
 class Look(NamedTuple):
-    """Curve of the study, and how it is drawn: colour, and marker and dashes that tell it apart in grey."""
+    """Curve of the study, and how it is drawn.
+
+    Colour, marker and dashes tell it apart in grey too.
+    """
 
     curve: str
     colour: str
@@ -75,7 +81,9 @@ SOLVERS = {
     "CG": Look("tolerance, CG", GREEN, "^", DOTTED),
 }
 LARGEST = 10.0
-"""A larger error over the timestep, and one without end, is drawn here: at the upper edge."""
+"""Largest error over the timestep that is drawn in its place. A larger one, and one
+without end, is drawn at the upper edge.
+"""
 LOWEST = 1e-17
 """Bottom of the picture; fifty digits lie far below and are not drawn."""
 NONE = 1e-18
@@ -84,7 +92,7 @@ WIDTH = 5.0
 """Width of a picture, in: on a screen of 360 px its texts are still 9 px high."""
 TEXT = 9.5
 NEAR_FRONT = 1.1
-"""Time over that of the cheapest within which an advised setting counts as one of them."""
+"""Time over that of the cheapest within which an advised setting is one of them."""
 
 
 def draw(curves: Curves, title: str, folder: Path) -> list[Path]:
@@ -183,7 +191,10 @@ def set_axes(axes: Any, legend_columns: int = 2) -> None:
 
 
 def draw_work_precision(curves: Curves, quantity: str, title: str) -> Any:
-    """Draw the error of the torque, or of the worst pin force, over the time of a simulated second."""
+    """Draw the error over the time of a simulated second.
+
+    It is that of the torque, or of the worst pin force.
+    """
     height = 6.0
     figure = make_figure(height, write_statement(curves, quantity), title)
     axes = figure.add_axes((0.135, 0.085, 0.84, 0.675))
@@ -232,7 +243,10 @@ def draw_work_precision(curves: Curves, quantity: str, title: str) -> Any:
 def _locate(
     points: Sequence[CostPoint], quantity: str
 ) -> tuple[list[float], list[float]]:
-    """Return ms of a simulated second, and errors; what lies below the picture at its edge."""
+    """Return ms of a simulated second, and errors.
+
+    What lies below the picture is put at its edge.
+    """
     errors = [max(getattr(point.errors, quantity), LOWEST) for point in points]
     return [1e3 * point.seconds_per_second for point in points], errors
 
@@ -287,7 +301,10 @@ SHORT = {
 
 
 def write_statement(curves: Curves, quantity: str) -> str:
-    """Say what the picture means, by the criterion of its front: the error at the steps and between them."""
+    """Say what the picture means, by the criterion of its front.
+
+    It is the error at the steps and between them.
+    """
     four, default = find_cheapest(curves, quantity, 1e-4), find_default(curves)
     name = NAMES[quantity].split()[-1] if quantity == "torque" else "pin force"
     parts = []
@@ -307,7 +324,10 @@ def write_statement(curves: Curves, quantity: str) -> str:
 
 
 def measure_distance(curves: Curves, quantity: str) -> float:
-    """Return the greatest time of an advised setting over that of the front at its error."""
+    """Return the greatest time of an advised setting over that of the front.
+
+    The error is the same.
+    """
     front = find_pareto(list_stepped(curves), quantity)
     most = 1.0
     for point in curves.get("recommended", ()):
@@ -374,7 +394,10 @@ def draw_timestep(curves: Curves, title: str) -> Any:
 
 
 def draw_integrator(curves: Curves, title: str) -> Any:
-    """Draw each integrator over the timestep, with the slopes of first and fourth order."""
+    """Draw each integrator over the timestep.
+
+    Slopes of first and fourth order are drawn too.
+    """
     figure, axes = _draw_single(
         curves,
         title,
@@ -433,7 +456,10 @@ def _draw_slope(axes: Any, exponent: float, x: float, y: float, name: str) -> No
 
 
 def draw_over_timestep(axes: Any, curves: Curves, quantity: str) -> None:
-    """Draw one quantity's error over the timestep, by integrator, with its jumps ringed."""
+    """Draw one quantity's error over the timestep, by integrator.
+
+    Its jumps are ringed.
+    """
     for label, look in INTEGRATORS.items():
         row = sorted(curves.get(look.curve, ()), key=lambda point: point.setting_value)
         errors = {

@@ -1,4 +1,7 @@
-"""List what the study tries: one setting at a time around the recommended settings and MuJoCo's defaults."""
+"""List what the study tries: one setting at a time.
+
+It is changed around the recommended settings and MuJoCo's defaults.
+"""
 
 import math
 from collections.abc import Callable, Iterable
@@ -32,7 +35,7 @@ SLOW = 0.1
 DEFAULT_TIMESTEP = 0.002
 """s, of MuJoCo."""
 PART_OF_TURN = 0.25
-"""Time constant, as a part of a revolution, that stays what it is while the timestep changes."""
+"""Time constant, as a part of a revolution, while the timestep changes."""
 INTEGRATORS = ("Euler", "implicit", "implicitfast", "discrete", "RK4")
 """Integrators, all that MuJoCo 4.0 has."""
 
@@ -62,8 +65,9 @@ class Curve:
     bare: bool = False
     """Run without gravity and loads."""
     settled: bool = False
-    """Judged after a first turn, where the input turns fully: from an exact start a soft closure first sags, and its
-    worst error would be that of the start (three to four times as large) at every setting.
+    """Judged after a first turn, where the input turns fully: from an exact start a
+    soft closure first sags, and its worst error would be that of the start (three to
+    four times as large) at every setting.
     """
 
 
@@ -149,7 +153,10 @@ def _choose_ladder(integrator: str) -> tuple[int, ...]:
 
 
 def _vary_default_closure(integrator: str, speed: float) -> Curve:
-    """Vary MuJoCo's solref, solimp and solver around Euler at 2 ms, which a new user gets."""
+    """Vary MuJoCo's solref, solimp and solver around Euler at 2 ms.
+
+    A new user gets these.
+    """
     settings = replace(BEST, integrator=integrator, pad=None)
     curve = trace_steps(
         f"{integrator}, MuJoCo's defaults",
@@ -216,7 +223,10 @@ def _list_impedances() -> tuple[Spot, ...]:
 
 
 def _vary_sag() -> list[Curve]:
-    """Vary what a loop at rest would sag by, and what is left of the error where the time constant is short."""
+    """Vary what a loop at rest would sag by.
+
+    The rest of the error at a short time constant is varied too.
+    """
     by_tc = trace(
         "sag tc, slow",
         "tc = {:g} steps",

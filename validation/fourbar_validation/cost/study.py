@@ -1,4 +1,7 @@
-"""The work-precision study of one scene: curve after curve, each kept once it is done."""
+"""The work-precision study of one scene.
+
+It goes curve after curve, each kept once it is done.
+"""
 
 import math
 import time
@@ -34,7 +37,9 @@ from fourbar_validation.run.store import Store
 ROUNDS = 7
 """Timings of each setting."""
 TIMED_STEPS = 200
-"""Steps per timing: some 3 ms of RK4, so that a round of a curve passes within one spell of the machine."""
+"""Steps per timing: some 3 ms of RK4. A round of a curve then passes within one spell
+of the machine.
+"""
 TIMED_READINGS = 50
 """Readings per timing."""
 REQUIRED = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 2e-9)
@@ -57,20 +62,26 @@ class CostPoint:
     """ "stepped" through time, "exact" at each position, or "formulas"."""
     setting: str
     setting_value: float
-    """The value of the curve's setting: steps per revolution, 1-d, tc in steps, tolerance, ..."""
+    """Value of the curve's setting. It is steps per revolution, 1-d, tc in steps,
+    tolerance, ...
+    """
     steps: int
-    """Number of steps of one run through the scene; of positions if nothing is stepped."""
+    """Steps of one run through the scene; positions if nothing is stepped."""
     steps_per_revolution: float
     errors: WorstErrors
     """At the steps and between them."""
     at_steps: WorstErrors
     """At the steps alone, where the laws of the steps are those of the engine."""
     seconds_per_second: float
-    """CPU seconds of torque and pin forces at the scene's positions, in a simulated second."""
+    """CPU seconds of torque and pin forces in a simulated second. They are read at the
+    scene's positions.
+    """
     seconds_per_revolution: float
     """The same in a revolution of the input."""
     scatter: float
-    """The middle one of the timings less the least, over the least, which is the one that counts."""
+    """Middle timing less the least one, over the least one. The least one is the one
+    that counts.
+    """
     broken: str = ""
 
     @property
@@ -151,7 +162,10 @@ class CostStudy:
     def setup(
         self, slow: bool = False, bare: bool = False, settled: bool = False
     ) -> TrialSetup:
-        """Assemble the scene for trials: at its own speed or slow, as it is or bare, after a turn or not."""
+        """Assemble the scene for trials.
+
+        It runs at its own speed or slow, as it is or bare, after a turn or not.
+        """
         if (slow, bare, settled) not in self._rigs:
             scene = self.scene
             if slow:
@@ -194,7 +208,10 @@ class CostStudy:
         setup: TrialSetup,
         settled: bool = False,
     ) -> list[CostPoint]:
-        """Try each spot: its errors, and CPU time of steps and readings, interleaved with those of the others."""
+        """Try each spot: its errors, and CPU time of steps and readings.
+
+        The timings are interleaved with those of the others.
+        """
         trials = [
             setup.try_out(spot.settings, spot.closure, spot.drive) for spot in spots
         ]
@@ -260,7 +277,10 @@ class CostStudy:
         n: int,
         setting_value: float = math.nan,
     ) -> CostPoint:
-        """Make a point of a method that answers each position by itself, from timings of n positions."""
+        """Make a point of a method that answers each position by itself.
+
+        The timings are those of n positions.
+        """
         setup = self.setup()
         positions = sum(map(len, setup.segments))
         seconds, scatter = summarise_timings(times) if times else (math.nan, math.nan)
@@ -303,7 +323,10 @@ class CostStudy:
         return points
 
     def _time_inverse(self) -> list[CostPoint]:
-        """Time the exact engines in a plain loop over their own calls, from position to position."""
+        """Time the exact engines in a plain loop over their own calls.
+
+        The loop goes from position to position.
+        """
         from fourbar_validation.engines.mujoco.plain_loop import MujocoInverseLoop
         from fourbar_validation.engines.pinocchio_plain_loop import PinocchioLoop
 
@@ -330,7 +353,10 @@ class CostStudy:
         return points
 
     def _try_one_state(self) -> list[CostPoint]:
-        """Try MuJoCo at single states by several impedances; their order counts, no time is measured."""
+        """Try MuJoCo at single states by several impedances.
+
+        Their order counts; no time is measured.
+        """
         from fourbar_validation.engines.mujoco.forward import MujocoOneState
 
         tried = [
@@ -371,7 +397,10 @@ def _leave_out_first(trial: Trial) -> None:
 
 
 def summarise_timings(times: Sequence[float]) -> tuple[float, float]:
-    """Return the least of timings, and how far the middle one lies above it, as a part of it."""
+    """Return the least of timings, and the middle one above it.
+
+    The latter is a part of the least.
+    """
     least = min(times)
     return least, median(times) / least - 1.0
 
@@ -391,7 +420,10 @@ def time_call(action: Callable[[], object], calls: int = 1) -> float:
 def time_in_turns(
     clocks: Mapping[Any, Callable[[], T]], rounds: int
 ) -> dict[Any, list[T]]:
-    """Read the clocks in turns, there and back: a slow spell hits all, and none always finds a warmer machine."""
+    """Read the clocks in turns, there and back.
+
+    A slow spell hits all, and none always finds a warmer machine.
+    """
     times: dict[Any, list[T]] = {name: [] for name in clocks}
     for number in range(rounds):
         for name in list(clocks)[:: -1 if number % 2 else 1]:

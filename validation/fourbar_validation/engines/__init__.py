@@ -1,1 +1,4 @@
-"""Adapt each engine in a module of its own; an engine is imported here and nowhere else."""
+"""Adapt each engine in a module of its own.
+
+An engine is imported here and nowhere else.
+"""

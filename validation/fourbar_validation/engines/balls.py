@@ -1,9 +1,10 @@
-"""The linkage in ball arithmetic: every output of `solve` to 50 digits with a rigorous radius.
+"""The linkage in ball arithmetic.
 
-Shares nothing with the formulas: the loop is closed by the complex quadratic in e^{i
-theta_3}, the velocities and accelerations come from the linear systems of the
-differentiated loop, the pin forces and the torque from the full thirteen Newton-Euler
-equations about the mass centres.
+Every output of `solve` has 50 digits and a rigorous radius. Shares nothing with the
+formulas: the loop is closed by the complex quadratic in e^{i theta_3}, the velocities
+and accelerations come from the linear systems of the differentiated loop, the pin
+forces and the torque from the full thirteen Newton-Euler equations about the mass
+centres.
 """
 
 import math
@@ -51,19 +52,25 @@ def dot(u: Complex, v: Complex) -> Ball:
 
 
 BITS = 320
-"""Working precision; 50 digits are 167 bits, the rest is what the worst sample (a limit position at 1e-20) cancels."""
+"""Working precision. 50 digits are 167 bits; the rest is what the worst sample (a limit
+position at 1e-20) cancels.
+"""
 OF_PIECE = ("table_start", "table_stop", "table_first", "table_last")
 """Angles and factors of the piece of a load's table that a position is in."""
 ENDS = ("from", "to")
 """Names of the points between which a linear drive acts."""
 STEP_BITS = 90
-"""Sensitivities are difference quotients with a relative step of 2^-90: wrong by about 2^-90 / (distance to the
-nearest singular position), and the cancelled 90 bits are there to lose.
+"""Sensitivities are difference quotients with a relative step of 2^-90: wrong by about
+2^-90 / (distance to the nearest singular position), and the cancelled 90 bits are there
+to lose.
 """
 
 
 def collect_inputs(scene: Scene, angle: float) -> dict[str, float]:
-    """Collect the stored doubles that the outputs at one position, of the commanded angle, depend on."""
+    """Collect the stored doubles that the outputs at one position depend on.
+
+    The position is of the commanded angle.
+    """
     link, motion = scene.linkage, scene.motion
     d, a, b, c = link.lengths
     values = {"d": d, "a": a, "b": b, "c": c, "theta_1": link.ground_angle}
@@ -145,7 +152,9 @@ def place_from_pin(
     w: dict[int, Complex],
     centre: dict[int, Complex],
 ) -> Complex:
-    """Return the vector from a bar's first pin to a place on it, by the two numbers that state it.
+    """Return the vector from a bar's first pin to a place on it.
+
+    Two numbers state the place.
 
     `w`: directions of the bars; `centre`: vectors from their first pins to G.
     """
@@ -154,7 +163,10 @@ def place_from_pin(
 
 
 def make_balls(scene: Scene, angle: float, **motion: float) -> Values:
-    """Give the inputs as balls of no radius, with another omega_2 or alpha_2 where given; set the working precision."""
+    """Give the inputs as balls of no radius, and set the working precision.
+
+    omega_2 or alpha_2 are replaced where they are given.
+    """
     ctx.prec = BITS
     return {
         name: arb(value)
@@ -163,7 +175,9 @@ def make_balls(scene: Scene, angle: float, **motion: float) -> Values:
 
 
 def closure(x: Values, branch: int) -> tuple[Complex, Complex, Complex] | None:
-    """Return e^{i theta_2}, e^{i theta_3}, e^{i theta_4}; None if the loop does not close.
+    """Return e^{i theta_2}, e^{i theta_3}, e^{i theta_4}.
+
+    None if the loop does not close.
 
     The two bars that are not commanded, of lengths b and c, span a vector D. With w the
     direction of the first of them, |D - b w| = c is
@@ -204,13 +218,19 @@ def find_commanded(x: Values) -> int:
 
 
 def solve_linear(rows: list[list[Ball]], right: list[Ball]) -> list[Ball]:
-    """Solve a linear system rigorously; ZeroDivisionError where it is singular to working precision."""
+    """Solve a linear system rigorously.
+
+    Raises ZeroDivisionError where it is singular to working precision.
+    """
     solution = arb_mat(rows).solve(arb_mat([[value] for value in right]))
     return [solution[k, 0] for k in range(len(right))]
 
 
 def compute_outputs(scene: Scene, branch: int, inputs: Values) -> Values | None:
-    """Compute every output at one position as balls; vectors as name_x, name_y; None where the loop does not close."""
+    """Compute every output at one position as balls.
+
+    Vectors are name_x, name_y; None if the loop does not close.
+    """
     x = turn_by_stroke(scene, inputs) if "stroke" in inputs else inputs
     directions = None if x is None else closure(x, branch)
     if x is None or directions is None:
@@ -262,7 +282,10 @@ def compute_outputs(scene: Scene, branch: int, inputs: Values) -> Values | None:
 
 
 class BallBars(NamedTuple):
-    """Bars 2, 3 and 4 in motion at one position: directions, rates, and vectors of the plane."""
+    """Bars 2, 3 and 4 in motion at one position.
+
+    They have directions, rates, and vectors of the plane.
+    """
 
     w: dict[int, Complex]
     """Unit vectors along the bars."""
@@ -295,7 +318,10 @@ class BallBars(NamedTuple):
         return {1: polar(arb(1), x["theta_1"]), **self.w}
 
     def points(self) -> dict[str, Complex]:
-        """Return places, velocities and accelerations of the points that are answered, by name."""
+        """Return places, velocities and accelerations of the points, by name.
+
+        The points are those that are answered.
+        """
         points = {"A": self.tip[2], "B": self.first_pin[4] + self.tip[4]}
         points |= {"v_A": self.v_pin[3], "v_B": self.turn(4, self.tip[4])}
         points |= {"a_A": self.a_pin[3], "a_B": self.swing(4, self.tip[4])}
@@ -313,7 +339,10 @@ def _move(x: Values, w: dict[int, Complex], commanded: int) -> BallBars:
     first, second = (bar for bar in MOVING_BARS if bar != commanded)
 
     def rates(stated: Ball, total: Complex) -> dict[int, Ball]:
-        """Solve for the rates of the other bars, where the sum of i side rate is `total`."""
+        """Solve for the rates of the other bars.
+
+        The sum of i side rate is `total`.
+        """
         u, v, rest = (
             acb(0, 1) * side[first],
             acb(0, 1) * side[second],
@@ -436,11 +465,12 @@ def _solve_thirteen(
     moment: dict[int, Ball],
     drives: dict[int, tuple[Ball, Ball, Ball]],
 ) -> tuple[dict[str, Complex], Ball]:
-    """Solve for the pin forces and the driving torque or force; ZeroDivisionError where they are singular.
+    """Solve for the pin forces and the driving torque or force.
 
-    Unknowns F12 F32 F23 F43 F34 F14 (x, y each) and the drive, whose force and moment
-    on each bar, for one of it, are `drives`. Equations: Newton and Euler about each
-    mass centre, then action and reaction at A and B.
+    Raises ZeroDivisionError where they are singular. Unknowns F12 F32 F23 F43 F34 F14
+    (x, y each) and the drive, whose force and moment on each bar, for one of it, are
+    `drives`. Equations: Newton and Euler about each mass centre, then action and
+    reaction at A and B.
     """
     at_pin = {bar: -bars.centre[bar] for bar in MOVING_BARS}
     at_tip = {bar: bars.tip[bar] - bars.centre[bar] for bar in MOVING_BARS}
@@ -484,7 +514,10 @@ def _put(y: Values, vectors: dict[str, Complex]) -> None:
 
 
 def _add_twist(moment: dict[int, Ball], pin: str, couple: Ball) -> None:
-    """Add a couple to bar j of a pin (i, j), its opposite to bar i; on the ground it does nothing."""
+    """Add a couple to bar j of a pin (i, j), its opposite to bar i.
+
+    On the ground it does nothing.
+    """
     i, j = PINS[pin]
     for bar, value in ((j, couple), (i, -couple)):
         if bar in moment:
@@ -492,9 +525,10 @@ def _add_twist(moment: dict[int, Ball], pin: str, couple: Ball) -> None:
 
 
 def _interpolate_factor(table: Table, theta_2: Ball, x: Values, k: int) -> Ball:
-    """Interpolate between the two points of a table that enclose an angle, taken modulo a turn.
+    """Interpolate between the two points of a table that enclose an angle.
 
-    Where the inputs have them, the four numbers are multiplied by those of `OF_PIECE`.
+    The angle is taken modulo a turn. Where the inputs have them, the four numbers are
+    multiplied by those of `OF_PIECE`.
     """
     turns = math.floor((float(theta_2.mid()) - table.theta_2[0]) / math.tau + 1e-12)
     angle = theta_2 - 2 * turns * arb.pi()
@@ -513,7 +547,9 @@ def _interpolate_factor(table: Table, theta_2: Ball, x: Values, k: int) -> Ball:
 
 
 def turn_by_stroke(scene: Scene, x: Values) -> Values | None:
-    """Add angle, speed and acceleration of the bar that a commanded stroke turns; None where the triangle stays open.
+    """Add angle, speed and acceleration of the bar that a stroke turns.
+
+    None if the triangle stays open.
 
     With l and r from the pin to the ends: s^2 = l^2 + r^2 - 2 l r cos beta, twice
     differentiated.
@@ -563,7 +599,7 @@ class BallLine(NamedTuple):
     """Sign of the drive's push along the line on each of these bars."""
 
     def speed(self, foot: dict[int, Complex], omega: dict[int, Ball]) -> Ball:
-        """Return ds/dt from the speeds of the bars' first pins and the bars' angular speeds."""
+        """Return ds/dt from the bars' angular speeds and their pins' speeds."""
         ends = (
             sense * (foot[k] + acb(0, omega[k]) * self.arms[k])
             for k, sense in self.sense.items()
@@ -579,7 +615,10 @@ class BallLine(NamedTuple):
 
 
 def find_line(scene: Scene, x: Values, bars_in_motion: BallBars) -> BallLine:
-    """Find the line of a drive from the directions and first pins of all bars, the ground's too."""
+    """Find the line of a drive from the directions and first pins of all bars.
+
+    The ground's are among them.
+    """
     drive, first_pin = scene.drive, bars_in_motion.first_pin
     assert drive is not None
     w, centre = bars_in_motion.directions(x), bars_in_motion.centre
@@ -605,10 +644,11 @@ def find_line(scene: Scene, x: Values, bars_in_motion: BallBars) -> BallLine:
 def compute_condition(
     line: BallLine, x: Values, tip: Complex, sines: dict[int, Ball]
 ) -> Ball:
-    """Compute |P|/L, P the stroke's speed with (sin mu, (a/b) sin(theta_2 - theta_4), (a/c) sin(theta_2 - theta_3)).
+    """Compute |P|/L.
 
-    L is the sum of what each end could move: r on bar 2, a + r a/b on bar 3, r a/c on
-    bar 4, `tip` is A.
+    P is the stroke's speed with (sin mu, (a/b) sin(theta_2 - theta_4), (a/c)
+    sin(theta_2 - theta_3)). L is the sum of what each end could move: r on bar 2, a + r
+    a/b on bar 3, r a/c on bar 4, `tip` is A.
     """
     a, b, c = x["a"], x["b"], x["c"]
     turning = {1: arb(0), 2: sines[2], 3: -a / b * sines[3], 4: -a / c * sines[4]}

@@ -1,8 +1,8 @@
-"""State a second time what a scene's numbers mean, so that no engine takes it from the formulas' side.
+"""State a second time what a scene's numbers mean.
 
-Pins and the bars i, j that meet there; a bar's inertia and mass centre where they are
-left out; a field of gravity; a point of a bar; the bars as a tree that is open at pin
-B.
+No engine takes it from the formulas' side. Pins and the bars i, j that meet there; a
+bar's inertia and mass centre where they are left out; a field of gravity; a point of a
+bar; the bars as a tree that is open at pin B.
 """
 
 import math
@@ -29,11 +29,13 @@ POINTS = {
     "B4": "end4",
     **{g: g for g in ("G2", "G3", "G4")},
 }
-"""Names of points in `Part`, by the name under which a point is answered; A2 and B4 are the ends of bars 2 and 4."""
+"""Names of points in `Part`, by the name under which a point is answered. A2 and B4 are
+the ends of bars 2 and 4.
+"""
 ON_BARS = {"A": "end2", "B": "end4", "G2": "G2", "G3": "G3", "G4": "G4"}
 """Points whose accelerations are answered, each as a point of a bar."""
 TELLS = 2.0**-53
-"""A component of a direction below this is what the angle's own rounding leaves of zero."""
+"""Component of a direction that the angle's rounding leaves of zero."""
 SHARED = "the description, what is commanded and the branch"
 """Words of a report for what an exact engine takes from the formulas' side."""
 
@@ -42,11 +44,14 @@ Value = float | str | tuple[float, ...]
 
 
 class ModelEntry(NamedTuple):
-    """One entry of a model file: its value as compiled, and the element and attribute that state it."""
+    """One entry of a model file.
+
+    It has its value as compiled, and the element and attribute that state it.
+    """
 
     value: Value
     element: str = ""
-    """Tag and name, for example `joint "A"`; empty where no single element states it."""
+    """Tag and name, for example `joint "A"`. Empty if no single element states it."""
     attribute: str = ""
 
 
@@ -63,7 +68,10 @@ def find_mass(bar: Bar) -> float:
 
 
 def find_inertia(bar: Bar) -> float:
-    """Return the moment of inertia about G, kg m^2: as stated, or that of a uniform slender bar, m L^2/12."""
+    """Return the moment of inertia about G, kg m^2.
+
+    It is as stated, or that of a uniform slender bar, m L^2/12.
+    """
     if bar.inertia is not None:
         return bar.inertia
     return find_mass(bar) * bar.length**2 / 12.0
@@ -75,7 +83,10 @@ def about_first_pin(bar: Bar) -> float:
 
 
 def reduce_angle(angle: float) -> float:
-    """Reduce an angle to its direction, rad: sums with others then lose none of its digits."""
+    """Reduce an angle to its direction, rad.
+
+    Sums with others then lose none of its digits.
+    """
     return (
         angle if abs(angle) <= math.pi else math.atan2(math.sin(angle), math.cos(angle))
     )
@@ -104,7 +115,7 @@ def find_field(gravity: Gravity) -> tuple[float, float]:
 
 
 class Part(NamedTuple):
-    """A moving bar in axes of its own: from its first pin along its line, and across."""
+    """A moving bar in its own axes: from its first pin along its line, and across."""
 
     bar: int
     bearer: int
@@ -116,7 +127,9 @@ class Part(NamedTuple):
     """About the mass centre, kg m^2."""
     length: float
     points: dict[str, tuple[float, float]]
-    """first_pin, G and end, each with the bar's number: its first pin, mass centre and second pin, m."""
+    """first_pin, G and end, each with the bar's number, m. They are its first pin, mass
+    centre and second pin.
+    """
 
     @property
     def centre(self) -> tuple[float, float]:
@@ -155,13 +168,19 @@ def list_parts(linkage: FourBar) -> list[Part]:
 
 
 def place(point: Any, ground_angle: float) -> tuple[float, float]:
-    """Locate an end of a spring along and across its bar's line from the first pin, on the ground in world axes, m."""
+    """Locate an end of a spring from the first pin of its bar, m.
+
+    It is along and across the bar's line; on the ground it is in world axes.
+    """
     offset = resolve(point.distance, point.angle)
     return rotate(ground_angle, *offset) if point.bar == 1 else offset
 
 
 def list_speeds(command: Command) -> tuple[Array, Array]:
-    """Return speed and acceleration of the commanded bar at each position, (n,); a speed that is not stated is 0."""
+    """List speed and acceleration of the commanded bar at each position, (n,).
+
+    A speed that is not stated is 0.
+    """
     rates = (
         0.0 if rate is None else rate for rate in (command.speed, command.acceleration)
     )
@@ -182,7 +201,7 @@ def name_drive(drive: ForceDrive) -> str:
 
 
 def list_unknowns(scene: Scene, names: Iterable[str] = UNKNOWNS) -> list[str]:
-    """List quantities with what is solved for of the scene's drive in the place of a torque."""
+    """List quantities with the scene's own drive in place of a torque."""
     return [name_driving(scene) if name == COUPLE.value else name for name in names]
 
 
@@ -194,7 +213,9 @@ def declares(effect: Effect, method: str) -> bool:
 def find_unknown(
     scene: Scene, knows: Callable[[Any], bool], *, forces: bool = False
 ) -> str:
-    """Give the reason to refuse a scene with an effect that an engine does not know; empty where there is none.
+    """Give the reason to refuse a scene with an unknown effect.
+
+    Empty if the engine knows them all.
 
     `forces`: True if the engine knows drives that exert a force.
     """

@@ -1,7 +1,7 @@
-"""Apply each load and effect to an engine's bars, from the engine's own numbers: one row of a table each.
+"""Apply each load and effect to an engine's bars, from the engine's numbers.
 
-No engine is named here, and nothing of the formulas' `act` is used: this is the second
-derivation.
+Each kind is one row of a table. No engine is named here, and nothing of the formulas'
+`act` is used: this is the second derivation.
 """
 
 import bisect
@@ -57,13 +57,19 @@ def _apply_viscous(effect: "Viscous", bars: Loaded) -> None:
 
 
 def _apply_friction(effect: "Friction", bars: Loaded) -> None:
-    """Apply couples of constant size; MuJoCo's own frictionloss is a soft constraint."""
+    """Apply couples of constant size.
+
+    MuJoCo's own frictionloss is a soft constraint.
+    """
     for pin, f in effect.torques:
         _apply_twist(bars, pin, f * float(np.sign(_compute_slip(bars, pin))))
 
 
 def _pin_friction(effect: "PinFriction", bars: Loaded) -> None:
-    """Apply couples of mu r times the load that the engine computed at the pin in its last pass."""
+    """Apply couples of mu r times the load at the pin.
+
+    The engine computed the load in its last pass.
+    """
     for pin, mu, r in effect.pins:
         _apply_twist(
             bars,
@@ -100,12 +106,18 @@ def _apply_springs(effect: "Springs", bars: Loaded) -> None:
 
 
 def _apply_flywheel(effect: "Flywheel", bars: Loaded) -> None:
-    """Apply the couple that accelerating the wheel takes, from the engine's own angular acceleration."""
+    """Apply the couple that accelerating the wheel takes.
+
+    The angular acceleration is the engine's own.
+    """
     bars.couple(effect.bar, -effect.inertia * bars.alpha(effect.bar))
 
 
 def _load(load: "Load", bars: Loaded) -> None:
-    """Apply a force at its place, which the engine's bar carries along, and a couple."""
+    """Apply a force at its place, which the engine's bar carries along.
+
+    A couple is applied too.
+    """
     factor = 1.0 if load.table is None else look_up(load.table, bars.angle(2))
     if load.force is not None:
         force = resolve(*load.force)
@@ -123,7 +135,10 @@ def _load(load: "Load", bars: Loaded) -> None:
 
 
 def look_up(table: "Table", theta_2: float) -> float:
-    """Interpolate a table at one angle, by the two neighbours' chord, apart from the formulas' `at`."""
+    """Interpolate a table at one angle, by the chord of its two neighbours.
+
+    It is apart from the formulas' `at`.
+    """
     angle = table.theta_2[0] + math.fmod(
         math.fmod(theta_2 - table.theta_2[0], math.tau) + math.tau, math.tau
     )
@@ -142,7 +157,9 @@ TERM_OF: dict[str, Callable[[Any, Loaded], None]] = {
     "flywheel": _apply_flywheel,
     "load": _load,
 }
-"""Function that applies an effect at a state of the bars, by the effect's key; others bring their own."""
+"""Function that applies an effect at a state of the bars, by the effect's key. Others
+bring their own.
+"""
 
 
 def has_term(effect: "Effect") -> bool:
@@ -151,7 +168,9 @@ def has_term(effect: "Effect") -> bool:
 
 
 def list_acting(scene: Scene, bars: Loaded, own: Container[str] = ()) -> list[Act]:
-    """List what loads and effects do at each state of the bars; gravity, the engine's own, is set once and for all.
+    """List what loads and effects do at each state of the bars.
+
+    Gravity is the engine's own, and is set once.
 
     `own`: the keys of effects for which the engine has elements of its own.
     """

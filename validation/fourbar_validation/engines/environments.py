@@ -1,4 +1,7 @@
-"""Engines in environments of their own: engines.toml says what pip installs, and which adapter or command answers."""
+"""Engines in environments of their own.
+
+engines.toml says what pip installs, and which adapter or command answers.
+"""
 
 import hashlib
 import os
@@ -58,11 +61,16 @@ class Entry:
     setting: str = ""
     """Name of its setting, one of those that its hello lists."""
     steps: tuple[int, ...] = ()
-    """Steps in a turn of an engine that runs through time: a run asks for the most, a benchmark for each."""
+    """Steps in a turn of an engine that runs through time. A run asks for the most, a
+    benchmark for each.
+    """
 
 
 def read_engines(folders: Iterable[Path]) -> dict[str, Entry]:
-    """Read engines.toml of these folders, of the package and of the lab, by name; InputError for what is no entry."""
+    """Read engines.toml of these folders, of the package and of the lab, by name.
+
+    Raises InputError for what is no entry.
+    """
     entries: dict[str, Entry] = {}
     for file in dict.fromkeys(
         folder / FILE for folder in (*folders, Path(__file__).parent, *FOLDERS)
@@ -120,10 +128,11 @@ def _read_entry(file: Path, table: object) -> Entry:
 
 
 def make_environment(entry: Entry, cache: Path = CACHE) -> str:
-    """Return the interpreter of an engine's environment, which is made once; DependencyError where pip fails.
+    """Return the interpreter of an engine's environment, which is made once.
 
-    Engines with the same requirements share it. With this Python all else comes from
-    the environment that runs here; another gets what the harness needs as well.
+    Raises DependencyError if pip fails. Engines with the same requirements share it.
+    With this Python all else comes from the environment that runs here; another gets
+    what the harness needs as well.
     """
     if not entry.requires and not entry.python:
         return sys.executable

@@ -1,4 +1,7 @@
-"""Solve the scene in 320-bit ball arithmetic as an engine: the loop as a quadratic, all thirteen equations."""
+"""Solve the scene in 320-bit ball arithmetic as an engine.
+
+The loop is a quadratic, and all thirteen equations are solved.
+"""
 
 import math
 from typing import Any
@@ -77,7 +80,10 @@ class BallArithmetic:
 
 
 def compute_sines(linkage: FourBar, command: Command) -> Array:
-    """Compute sin(theta_4 - theta_3) of each position in many digits, (n,); NaN where the loop does not close."""
+    """Compute sin(theta_4 - theta_3) of each position in many digits, (n,).
+
+    NaN where the loop does not close.
+    """
     from flint import arb, ctx
 
     from fourbar_validation.engines.balls import BITS, closure, wedge
@@ -102,7 +108,9 @@ def compute_sines(linkage: FourBar, command: Command) -> Array:
 
 
 def shift_to(linkage: FourBar, theta_2: float, sin_mu: float) -> Any:
-    """Compute what to add to theta_2 (mpmath, rad) for sin(theta_4 - theta_3) to be +-sin_mu; None if beyond rounding.
+    """Compute what to add to theta_2 for sin(theta_4 - theta_3) to be +-sin_mu.
+
+    It is in rad (mpmath); None if beyond rounding.
 
     The diagonal e from A to O4 has
         e^2 = d^2 + a^2 - 2 a d cos(theta_2 - theta_1) = b^2 + c^2 -+ 2 b c cos(mu).

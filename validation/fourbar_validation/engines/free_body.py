@@ -51,15 +51,21 @@ DRIVE = 12
 ROWS = {2: (0, "F12", "F32"), 3: (3, "F23", "F43"), 4: (6, "F14", "F34")}
 """First row of a bar, the force at its first pin and that at its second."""
 BLOCK = 4096
-"""Positions solved at once: 1.4 kB a matrix, and some four of them at a time, are 22 MB."""
+"""Positions solved at once. At 1.4 kB a matrix, and some four of them at a time, they
+are 22 MB.
+"""
 FRICTION_STAGES = 16
-"""Friction grows from none to its full coefficient in so many stages, each the start of the next."""
+"""Stages in which friction grows to its full coefficient. Each is the start of the
+next.
+"""
 FRICTION_STEPS = 60
 """Newton's steps in a stage; where it converges it needs a tenth of them."""
 FRICTION_SETTLED = 8.0 * 2.0**-52
-"""Residual of a friction couple's equation that counts as rounding, in parts of the sum of its terms."""
+"""Residual of a friction couple's equation that counts as rounding. It is over the sum
+of its terms.
+"""
 FRICTION_STARTS = 100
-"""Number of starts from which other solutions are sought, over six decades of couples."""
+"""Starts from which other solutions are sought, over six decades of couples."""
 APART = 1e-6
 """Relative; two solutions that differ by less are one."""
 
@@ -133,7 +139,10 @@ class FreeBody:
 def _compute_places(
     linkage: FourBar, theta_2: Array, theta_3: Array, theta_4: Array
 ) -> dict[str, Array]:
-    """Compute the angles of bars 3 and 4, their sine, pins A, B and the mass centres."""
+    """Compute the angles of bars 3 and 4, their sine, and the points.
+
+    The points are pins A, B and the mass centres.
+    """
     unit = {2: np.exp(1j * theta_2), 3: np.exp(1j * theta_3), 4: np.exp(1j * theta_4)}
     O4 = linkage.ground * np.exp(1j * linkage.ground_angle)
     first_pin = {2: 0.0, 3: linkage.input.length * unit[2], 4: O4}
@@ -163,7 +172,10 @@ def _answer_positions(
     theta_3: Array,
     theta_4: Array,
 ) -> tuple[dict[str, Array], float]:
-    """Compute motion, pin forces and torque at some positions, and the residual of their thirteen equations."""
+    """Answer motion, pin forces and torque at some positions.
+
+    The residual of their thirteen equations is returned too.
+    """
     motion = move(
         scene.linkage, theta_2, speed, acceleration, theta_3, theta_4, commanded
     )
@@ -241,7 +253,10 @@ def move(
     theta_4: Array,
     bar: int = 2,
 ) -> BodyMotion:
-    """Compute speeds and accelerations where those of a bar are stated; NaN where the Jacobian is singular."""
+    """Compute speeds and accelerations where those of a bar are stated.
+
+    NaN where the Jacobian is singular.
+    """
     d, a, b, c = linkage.lengths
     n = len(theta_2)
     u_1, u_2 = np.exp(1j * linkage.ground_angle), np.exp(1j * theta_2)
@@ -286,7 +301,10 @@ def move(
 
 
 def balance(scene: Scene, motion: BodyMotion) -> tuple[Array, float, Array | float]:
-    """Solve for the thirteen unknowns (n, 13), N and N m, their residual, and how far friction is from jamming."""
+    """Solve for the thirteen unknowns (n, 13), N and N m.
+
+    Their residual, and the distance of friction from jamming, are returned too.
+    """
     unknowns, loads, arms, residual = _solve_unit_couples(scene, motion)
     total: Array = unknowns[..., 0]
     from_jamming: Array | float = 1.0
@@ -325,7 +343,10 @@ def _solve_unit_couples(
 
 
 def count_solutions(scene: Scene, command: Command) -> Array:
-    """Count the pin forces and friction couples that balance the linkage at each position, where it moves, (n,)."""
+    """Count the solutions that balance the linkage at each position, (n,).
+
+    A solution is pin forces and friction couples; the linkage moves there.
+    """
     scene = state_from_pins(scene)
     signs = with_signs(scene.linkage, command).branch
     closed = close(scene.linkage, command.angle, signs, command.bar)
@@ -344,7 +365,10 @@ def count_solutions(scene: Scene, command: Command) -> Array:
 
 
 def _count_at_position(F: Complex, C: Complex, k: Array) -> int:
-    """Count at one position: one where the couples are a contraction, else those reached from many starts."""
+    """Count at one position.
+
+    One where the couples are a contraction, else those reached from many starts.
+    """
     if not (np.isfinite(F).all() and np.isfinite(C).all()):
         return 0
     if np.abs(np.linalg.eigvals(k[:, None] * np.abs(C))).max() < 1.0:
@@ -369,7 +393,10 @@ def _count_at_position(F: Complex, C: Complex, k: Array) -> int:
 
 
 def _add_inertia(motion: BodyMotion, wrenches: BodyWrenches) -> None:
-    """Add -m a_G and -I alpha (d'Alembert), with moments about each bar's first pin; that of bar 3 accelerates."""
+    """Add -m a_G and -I alpha (d'Alembert), with moments about the first pins.
+
+    The first pin of bar 3 accelerates.
+    """
     for number in MOVING_BARS:
         bar = motion.linkage.bar(number)
         arm, alpha = motion.to_centre(number), motion.alpha[number]
@@ -383,10 +410,11 @@ def _add_inertia(motion: BodyMotion, wrenches: BodyWrenches) -> None:
 
 
 def _make_matrix(scene: Scene, motion: BodyMotion) -> Array:
-    """Make the matrix of the equations, (n, 13, 13): forces and moments of bars 2, 3, 4, reactions at A and B.
+    """Make the matrix of the equations, (n, 13, 13).
 
-    Moments are divided by the bar's length, so that every entry is 0, 1 or a component
-    of a unit vector. The last column is that of the torque, or the effect of 1 N of the
+    They are forces and moments of bars 2, 3, 4, and the reactions at A and B. Moments
+    are divided by the bar's length, so that every entry is 0, 1 or a component of a
+    unit vector. The last column is that of the torque, or the effect of 1 N of the
     drive on the bars that it pushes.
     """
     matrix = np.zeros((len(motion.theta_2), 13, 13))
@@ -422,9 +450,10 @@ def _make_right_sides(linkage: FourBar, wrenches: BodyWrenches) -> Array:
 
 
 def solve_system(matrix: Array, right: Array) -> tuple[Array, float]:
-    """Solve linear systems, NaN where singular; return also the largest residual over |matrix| |x| + |right|.
+    """Solve linear systems, NaN where singular.
 
-    One step of refinement makes each equation hold to the rounding of its own terms.
+    The largest residual over |matrix| |x| + |right| is returned too. One step of
+    refinement makes each equation hold to the rounding of its own terms.
     """
     x = np.full(right.shape, np.nan)
     finite = np.asarray(np.isfinite(matrix).all(axis=(1, 2)))
@@ -438,12 +467,15 @@ def solve_system(matrix: Array, right: Array) -> tuple[Array, float]:
 
 
 def continue_couples(F: Complex, C: Complex, k: Array) -> Array:
-    """Solve x_p = k_p |F_p + sum over q of C_pq x_q|, (n, p), by continuation from no friction; NaN where it jams.
+    """Solve x_p = k_p |F_p + sum over q of C_pq x_q|, (n, p).
+
+    The continuation starts from no friction; NaN where it jams.
 
     Parameters
     ----------
     F : pin forces without this friction, (n, p), N.
-    C : force that a couple of 1 N m against the rotation at pin q adds at pin p, (n, p, p), 1/m.
+    C : force that a couple of 1 N m against the rotation at pin q adds at pin p, (n, p,
+        p), 1/m.
     k : mu r of each pin, m.
     """
     x = np.full(F.shape, np.nan)
@@ -464,7 +496,10 @@ def continue_couples(F: Complex, C: Complex, k: Array) -> Array:
 
 
 def compute_distance_from_jamming(F: Complex, C: Complex, k: Array, x: Array) -> Array:
-    """Compute the least singular value of the Jacobian of the equations of `continue_couples`, at most 1, (n,)."""
+    """Compute the least singular value of the Jacobian, at most 1, (n,).
+
+    The equations are those of `continue_couples`.
+    """
     with np.errstate(invalid="ignore"):
         _, matrix = _compute_friction_jacobian(F, C, k, x)
     far = np.full(len(x), np.nan)
@@ -478,7 +513,10 @@ def compute_distance_from_jamming(F: Complex, C: Complex, k: Array, x: Array) ->
 def _compute_friction_jacobian(
     F: Complex, C: Complex, k: Array, x: Array
 ) -> tuple[Array, Array]:
-    """Compute the pin forces under couples, (n, p), N, and the Jacobian of `continue_couples`, (n, p, p)."""
+    """Compute the pin forces under couples, (n, p), N, and the Jacobian.
+
+    The Jacobian is that of `continue_couples`, (n, p, p).
+    """
     force = F + (C * x[:, None, :]).sum(axis=-1)
     size = np.abs(force)
     direction = force / np.where(size == 0.0, 1.0, size)
@@ -488,7 +526,10 @@ def _compute_friction_jacobian(
 def _solve_couples(
     F: Complex, C: Complex, k: Array, x: Array
 ) -> tuple[Array, NDArray[np.bool_], Array]:
-    """Solve by Newton's method from couples `x`; return also where it converged, and the Jacobian's determinant."""
+    """Solve by Newton's method from couples `x`.
+
+    Return also where it converged, and the Jacobian's determinant.
+    """
     for _ in range(FRICTION_STEPS):
         size, matrix = _compute_friction_jacobian(F, C, k, x)
         gap, terms = (

@@ -1,4 +1,6 @@
-"""Assembly of a four-bar by Newton's method on its two closure equations, all positions at once.
+"""Assembly of a four-bar by Newton's method on its two closure equations.
+
+All positions are solved at once.
 
     a e^{i theta_2} + b e^{i theta_3} = d e^{i theta_1} + c e^{i theta_4}
 
@@ -23,23 +25,31 @@ STARTS = (
     *((30, 30), (15, 15), (45, 45), (5, 5), (5, 120)),
     *((120, 5), (60, 60), (2, 150), (150, 2), (1, 1)),
 )
-"""Degrees that bars 3 and 4 first make with the diagonal from A to O4, tried in turn where the triangle of the lengths
-is none to start from; they alone served 8000 of 8000 linkages, in four times as many steps.
+"""Degrees that bars 3 and 4 first make with the diagonal from A to O4, tried in turn
+where the triangle of the lengths is none to start from; they alone served 8000 of 8000
+linkages, in four times as many steps.
 """
 LONGEST_STEP = 0.5
 """rad; a longer Newton step leaves the region in which the gap is nearly linear."""
 HALVINGS = 40
 """A step halved this often moves nothing that a gap above the rounding could tell."""
 NEWTON_STEPS = 100
-"""Near a toggle Newton halves its distance: fifty steps reach the last digit from any start."""
+"""Newton steps. Near a toggle Newton halves its distance: fifty steps reach the last
+digit from any start.
+"""
 IN_LINE = 2.0**-26
 """rad; so far from a line the gap is as small as rounding."""
 ROUNDING = 16.0 * 2.0**-52
-"""Gap, relative to the sum of the lengths, that the roundings of a sum of four bars can leave."""
+"""Gap that the roundings of a sum of four bars can leave. It is relative to the sum of
+the lengths.
+"""
 
 
 class Closed(NamedTuple):
-    """Positions where the loop closes, the two angles sought there (NaN elsewhere), and the remaining gap, m."""
+    """Positions where the loop closes, the two angles, and the remaining gap, m.
+
+    The angles are NaN elsewhere.
+    """
 
     assembled: NDArray[np.bool_]
     theta: Array
@@ -50,10 +60,11 @@ class Closed(NamedTuple):
 def close(
     linkage: FourBar, theta: Array, branch: NDArray[np.int8], bar: int = 2
 ) -> Closed:
-    """Close the loop by Newton's method, from the next start where no earlier one converged.
+    """Close the loop by Newton's method.
 
-    Bar 2 commanded, bars 3 and 4 span the diagonal from A to O4; of bar 3 they are bars
-    2 and 4, of bar 4 bars 3 and 2, bar 2 from A to O2.
+    Where a start does not converge, the next one is tried. Bar 2 commanded, bars 3 and
+    4 span the diagonal from A to O4; of bar 3 they are bars 2 and 4, of bar 4 bars 3
+    and 2, bar 2 from A to O2.
     """
     d, a, b, c = linkage.lengths
     ground = d * np.exp(1j * linkage.ground_angle)
@@ -91,7 +102,10 @@ def close(
 
 
 def _compute_angle_between(e: Array, near: float, far: float) -> Array:
-    """Compute the angle between the sides e and near, by half-angle tangents; bars 3 and 4 are never in line."""
+    """Compute the angle between the sides e and near, by half-angle tangents.
+
+    Bars 3 and 4 are never collinear.
+    """
     above, below = (
         (e - near + far) * (far + near - e),
         (e + near - far) * (e + near + far),
@@ -110,11 +124,11 @@ def _solve_newton(
     theta: Array,
     closed: float,
 ) -> tuple[Array, Array]:
-    """Return theta_3, theta_4 (2, n) and the gap left (n,), NaN where it does not come down to `closed`.
+    """Return theta_3, theta_4 (2, n) and the gap left (n,).
 
-    The Jacobian's determinant is b c sin(theta_4 - theta_3), whose sign is the
-    branch's. A step is halved until the gap falls and that sign is kept; so it ends
-    where no smaller gap is to be had.
+    NaN where it does not come down to `closed`. The Jacobian's determinant is b
+    c sin(theta_4 - theta_3), whose sign is the branch's. A step is halved until the gap
+    falls and that sign is kept; so it ends where no smaller gap is to be had.
     """
 
     def look(
@@ -171,7 +185,10 @@ STROKE_HALVINGS = 80
 
 
 def measure_cylinder(scene: Scene) -> tuple[complex, complex]:
-    """Measure from the ground pin of its bar, at angle 0, to a cylinder's end on it, and to that on the ground, m."""
+    """Measure from the ground pin of its bar to a cylinder's ends, m.
+
+    The end on the bar is at angle 0 of the bar; the other is on the ground.
+    """
     drive = scene.drive
     assert drive is not None and drive.has_stroke
     on_ground, on_bar = sorted(
@@ -188,9 +205,10 @@ def measure_cylinder(scene: Scene) -> tuple[complex, complex]:
 def find_angle(
     command: Command, motion: Motion, arm: complex, ground: complex
 ) -> Command:
-    """Find the bar's angle where its cylinder has the stroke, on the side that is stated, and its rates.
+    """Find the bar's angle where its cylinder has the stroke, and its rates.
 
-    `arm` and `ground`: as `measure_cylinder` has them, or as an engine measures them.
+    The side is the one that is stated. `arm` and `ground`: as `measure_cylinder` has
+    them, or as an engine measures them.
     """
     assert command.stroke is not None
     sense = 1.0 if motion.side == "left" else -1.0

@@ -1,7 +1,7 @@
-"""Compute the wrench of each load and effect on the free bodies of a four-bar: a table from its kind to its wrench.
+"""Compute the wrench of each load and effect on the free bodies of a four-bar.
 
-Definitions as in docs/scene-file.md, from the numbers of the description alone. Vectors
-of the plane are complex numbers, x + i y.
+A table leads from its kind to its wrench. Definitions as in docs/scene-file.md, from
+the numbers of the description alone. Vectors of the plane are complex numbers, x + i y.
 """
 
 import math
@@ -19,7 +19,9 @@ from fourbar_validation.engines.description import PINS, declares, find_mass
 from fourbar_validation.engines.free_body_closure import Complex, close, cross
 
 HALF_TURN = math.pi * (1.0 - 1e-12)
-"""Half a turn less the rounding of an angle of several turns, rad: greatest winding of a spring from rest."""
+"""Greatest winding of a spring from rest, rad. It is half a turn less the rounding of
+an angle of several turns.
+"""
 
 
 class BodyMotion(NamedTuple):
@@ -34,14 +36,19 @@ class BodyMotion(NamedTuple):
     omega: dict[int, Array]
     alpha: dict[int, Array]
     beginning: dict[int, Array] | None = None
-    """Speeds of the motion that is about to begin where the linkage rests, rad/s; None: it stays at rest."""
+    """Speeds of the motion that is about to begin where the linkage rests, rad/s. None:
+    it stays at rest.
+    """
 
     def to_centre(self, bar: int) -> Complex:
-        """Return the vector from the first pin of a moving bar to its mass centre, m."""
+        """Return the vector from a moving bar's first pin to its mass centre, m."""
         return self.unit[bar] * make_vector(find_centre(self.linkage.bar(bar)))
 
     def swing(self, bar: int, arm: Complex) -> Complex:
-        """Return the acceleration of the end of an arm of a bar about its first pin, m/s^2."""
+        """Return the acceleration of the end of an arm about its bar's first pin.
+
+        The unit is m/s^2.
+        """
         return (1j * self.alpha[bar] - self.omega[bar] ** 2) * arm
 
     def slip(self, pin: str) -> Array:
@@ -69,7 +76,10 @@ TURNS_AS_ONE = 64.0 * 2.0**-52
 
 
 class BodyWrenches:
-    """Sums of the forces (N) on the moving bars and of their moments (N m) about the first pins, (n,) each."""
+    """Sums of the forces (N) and moments (N m) on the moving bars, (n,) each.
+
+    The moments are about the first pins.
+    """
 
     def __init__(self, n: int) -> None:
         self.force: dict[int, Complex] = {
@@ -78,7 +88,10 @@ class BodyWrenches:
         self.moment: dict[int, Array] = {bar: np.zeros(n) for bar in MOVING_BARS}
 
     def push(self, bar: int, force: Any, arm: Any) -> None:
-        """Add a force, at `arm` from the bar's first pin; on the ground it does nothing."""
+        """Add a force, at `arm` from the bar's first pin.
+
+        On the ground it does nothing.
+        """
         if bar in self.force:
             self.force[bar] = self.force[bar] + force
             self.moment[bar] = self.moment[bar] + cross(arm, force)
@@ -96,7 +109,9 @@ class BodyWrenches:
 
 
 MEET = 16.0 * 2.0**-52
-"""Two points nearer than this part of the lengths by which they are reached lie in one."""
+"""Part of the lengths below which two points lie in one. The lengths are those by which
+they are reached.
+"""
 FOLLOWED = np.radians(2.0)
 """Step in which angles are followed from where a motion begins, rad."""
 
@@ -131,7 +146,10 @@ def _apply_friction(effect: Any, motion: BodyMotion, wrenches: BodyWrenches) -> 
 
 
 def _apply_torsion(effect: Any, motion: BodyMotion, wrenches: BodyWrenches) -> None:
-    """Couple -(preload + k (theta_j - theta_i - rest)), the angle within half a turn."""
+    """Apply the couple -(preload + k (theta_j - theta_i - rest)).
+
+    The angle is within half a turn.
+    """
     for pin, k, rest, preload in effect.springs:
         i, j = PINS[pin]
         angle = np.angle(
@@ -141,7 +159,10 @@ def _apply_torsion(effect: Any, motion: BodyMotion, wrenches: BodyWrenches) -> N
 
 
 def _apply_springs(effect: Any, motion: BodyMotion, wrenches: BodyWrenches) -> None:
-    """Pull preload + k (distance - length) along the line of the two points; none is known where they coincide."""
+    """Apply the pull preload + k (distance - length) along the points' line.
+
+    The line has no direction where they coincide.
+    """
     for spring in effect.springs:
         arms = [
             motion.unit[point.bar] * make_vector((point.distance, point.angle))
@@ -187,7 +208,9 @@ WRENCH_OF: dict[str, Callable[[Any, BodyMotion, BodyWrenches], None]] = {
     "springs": _apply_springs,
     "flywheel": _apply_flywheel,
 }
-"""Function that applies an effect, by the effect's name in a scene file; others bring their own."""
+"""Function that applies an effect, by the effect's name in a scene file. Others bring
+their own.
+"""
 
 
 def has_wrench(effect: Any) -> bool:
@@ -204,7 +227,10 @@ def apply_effect(effect: Any, motion: BodyMotion, wrenches: BodyWrenches) -> Non
 
 
 def sum_acting(scene: Scene, motion: BodyMotion) -> BodyWrenches:
-    """Sum all that acts on the bars but pins, inertia, drive and what depends on the pin forces."""
+    """Sum all that acts on the bars but pins, inertia and drive.
+
+    What depends on the pin forces is left out too.
+    """
     wrenches = BodyWrenches(len(motion.theta_2))
     for load in scene.loads:
         apply_load(load, motion, wrenches)
@@ -227,7 +253,10 @@ def apply_load(load: Any, motion: BodyMotion, wrenches: BodyWrenches) -> None:
 
 
 def find_arm(load: Any, motion: BodyMotion) -> Any:
-    """Return the vector from the bar's first pin to where a load acts; to G where it is a couple alone."""
+    """Return the vector from the bar's first pin to where a load acts.
+
+    It is G for a couple alone.
+    """
     if load.arm is not None:
         return motion.to_centre(load.bar) + make_vector(load.arm)
     if load.place is None:
@@ -236,16 +265,20 @@ def find_arm(load: Any, motion: BodyMotion) -> Any:
 
 
 def _interpolate_factor(table: Any, theta_2: Array) -> Array:
-    """Interpolate between the points; the angle is taken within half a turn of the middle of the table."""
+    """Interpolate between the points.
+
+    The angle is taken within half a turn of the middle of the table.
+    """
     middle = 0.5 * (table.theta_2[0] + table.theta_2[-1])
     around = np.remainder(theta_2 - middle + np.pi, 2.0 * np.pi) - np.pi
     return np.asarray(np.interp(middle + around, table.theta_2, table.factor))
 
 
 def find_wound(scene: Scene, motion: BodyMotion) -> NDArray[np.bool_] | None:
-    """Find where a torsion spring is wound by more than half a turn from its rest, followed from the motion's start.
+    """Find where a torsion spring is wound by more than half a turn from its rest.
 
-    None where no spring counts turns, or the motion changes its branch.
+    It is followed from the motion's start. None where no spring counts turns, or the
+    motion changes its branch.
     """
     springs = [
         spring

@@ -1,6 +1,7 @@
-"""Engines outside the judge's process: programs that read lines of JSON and answer with lines of JSON.
+"""Engines outside the judge's process.
 
-The judge imports nothing of a guest. docs/protocol.md is the contract.
+They are programs that read lines of JSON and answer with lines of JSON. The judge
+imports nothing of a guest. docs/protocol.md is the contract.
 """
 
 import hashlib
@@ -29,11 +30,15 @@ from fourbar_validation.engines.registry import SIMULATED_TO_ERROR, Engine
 from fourbar_validation.places import CHECKOUT, PACKAGE
 
 CLASS = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*", re.ASCII)
-"""A class of the user's, which our host serves: "module:Class"; anything else is a command line."""
+"""A class of the user's, which our host serves: "module:Class". Anything else is a
+command line.
+"""
 NOT_FOUND = 2
 """Exit status of our host where there is no such class or engine."""
 QUESTIONS = 4
-"""Most questions to a guest about one scene, hello included; each may take as long as the guest's time limit."""
+"""Most questions to a guest about one scene, hello included. Each may take as long as
+the guest's time limit.
+"""
 QUANTITIES = (*COMPARED_QUANTITIES, *DRY_FRICTION_QUANTITIES)
 """Names of what an engine can answer."""
 STATED = "as the engine states"
@@ -80,7 +85,10 @@ class Guest(Engine):
         return engine
 
     def at_setting(self, **setting: Any) -> "Guest":
-        """Return the guest that is asked with this setting; without `name` it keeps its named setting."""
+        """Return the guest that is asked with this setting.
+
+        Without `name` it keeps its named setting.
+        """
         name = setting.pop("name", self.setting)
         asked = {"name": name, **setting} if name else setting
         return replace(self, setting=name, start=partial(self.start, setting=asked))  # type: ignore[call-arg]
@@ -89,7 +97,10 @@ class Guest(Engine):
 def read_guests(
     entries: Sequence[str], known: Iterable[str], seconds: float | None = None
 ) -> tuple[Guest, ...]:
-    """Start each guest of the command line and read its hello; InputError where there is no such program or class."""
+    """Start each guest of the command line and read its hello.
+
+    Raises InputError if there is no such program or class.
+    """
     return name_guests(
         [(entry, "", make_program(entry, seconds)) for entry in entries], known
     )
@@ -98,7 +109,10 @@ def read_guests(
 def name_guests(
     entries: Sequence[tuple[str, str, Program]], known: Iterable[str]
 ) -> tuple[Guest, ...]:
-    """Read the hello of programs, each with its entry and the name that it is given, and name them apart."""
+    """Read the hello of programs, and name them apart.
+
+    Each has its entry and the name that it is given.
+    """
     names, guests = {FORMULAS, *known}, list[Guest]()
     for entry, chosen, program in entries:
         hello, trouble = Hello(_name_program(entry, program)), ""
@@ -137,7 +151,10 @@ def name_guests(
 
 
 def adjust_engines(engines: Sequence[Engine], error: float) -> tuple[Engine, ...]:
-    """Lay out simulations for an error and hold them to it; guests are asked for it, and exact engines stay exact."""
+    """Lay out simulations for an error and hold them to it.
+
+    Guests are asked for it, and exact engines stay exact.
+    """
     tolerance = hold_simulated(error, "steps and softness are laid out for it")
     adjusted = []
     for stated in engines:
@@ -160,7 +177,10 @@ def list_numbers(engines: Iterable[Engine]) -> dict[str, int]:
 
 
 def make_program(entry: str, seconds: float | None = None) -> Program:
-    """Make the program of "module:Class" or a command line; InputError where there is none."""
+    """Make the program of "module:Class" or a command line.
+
+    Raises InputError if there is none.
+    """
     if CLASS.fullmatch(entry):
         return serve(entry, seconds)
     try:
@@ -194,7 +214,10 @@ def serve(
 
 
 def _name_program(entry: str, program: Program) -> str:
-    """Name a guest whose hello is not read: its class, or the first argument that is a file, else the program."""
+    """Name a guest whose hello is not read.
+
+    It is its class, or the first argument that is a file, else the program.
+    """
     if CLASS.fullmatch(entry):
         return entry.partition(":")[2]
     first, *arguments = program.command
@@ -313,7 +336,10 @@ def find_needs(scene: Scene) -> list[str]:
 
 
 class GuestClient:
-    """Client of a guest's program, which runs on from scene to scene and is started again after a failure."""
+    """Client of a guest's program, which runs on from scene to scene.
+
+    It is started again after a failure.
+    """
 
     def __init__(
         self,

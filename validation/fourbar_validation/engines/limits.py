@@ -92,7 +92,10 @@ LIMITS = (
 
 
 def find_exceeded(scene: Scene, speed: float) -> str | None:
-    """Name the limit of speed, load or place of a centre that a scene passes, if any; speed in rad/s."""
+    """Name the limit that a scene passes, if any; speed in rad/s.
+
+    It is one of speed, load or place of a centre.
+    """
     if speed > FASTEST.boundary:
         return FASTEST.reason
     if scene.linkage.input.length * speed**2 < SLOWEST.boundary:
@@ -108,7 +111,10 @@ def find_exceeded(scene: Scene, speed: float) -> str | None:
 def compute_least_sine(
     linkage: FourBar, theta_2: NDArray[np.float64], assembled: NDArray[np.bool_]
 ) -> float:
-    """Compute the least |sin(theta_4 - theta_3)| between assembled neighbours, by the cosine rule."""
+    """Compute the least |sin(theta_4 - theta_3)| between assembled neighbours.
+
+    The cosine rule gives it.
+    """
     d, a, b, c = linkage.lengths
     psi = np.sort(theta_2[assembled] - linkage.ground_angle)
     if not len(psi):

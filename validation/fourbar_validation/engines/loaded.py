@@ -1,4 +1,7 @@
-"""The bars of a four-bar as an engine holds them; loads and effects act on them as wrenches, from its own numbers."""
+"""The bars of a four-bar as an engine holds them.
+
+Loads and effects act on them as wrenches, from its own numbers.
+"""
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -23,26 +26,34 @@ if TYPE_CHECKING:
     from fourbar.effects.place import Place
 
 PASSES = 1000
-"""Passes over pin loads and the friction they make; each lessens the error where the friction is far from a jam."""
+"""Passes over pin loads and the friction they make. Each lessens the error where the
+friction is far from a jam.
+"""
 STAGES, STEPS = 16, 30
-"""Near a jam friction grows from none in so many stages, each by at most so many of Newton's steps."""
+"""Stages and Newton's steps of each in which friction grows near a jam."""
 NUDGE = 1e-6
 """Change of each load for the slopes of a pass, in parts of the greatest load."""
 REPEATED = 2.0 * 2.0**-52
 """Change of a pin load, relative, that is rounding."""
 ROUNDED = 1e-11
-"""Change, relative, at or below which one that no longer falls is rounding, near a pole of the torque too."""
+"""Relative change that is rounding once it no longer falls. It holds near a pole of the
+torque too.
+"""
 DIVERGED = 1e100
 """Load, N, that only passes running away from each other reach."""
 Pair = tuple[float, float]
-"""A vector of the plane: plain numbers, since an array of two costs more than its arithmetic."""
+"""A vector of the plane: plain numbers. An array of two costs more than its arithmetic.
+"""
 Act = Callable[[], None]
 """Function that applies what acts on the bars at their present motion."""
 Values = dict[str, Array | Sequence[float] | float]
 
 
 class Assembled(Protocol):
-    """Bars opened at pin A or B, as an engine places them; every number is the engine's own."""
+    """Bars opened at pin A or B, as an engine places them.
+
+    Every number is the engine's own.
+    """
 
     def place(self, q: Sequence[float]) -> None:
         """Move to a configuration."""
@@ -54,26 +65,40 @@ class Assembled(Protocol):
         """Return the derivative of the gap, (2, 3), m."""
 
     def positions(self) -> Mapping[str, Array | Pair]:
-        """Locate O4, A, B, "B4", the end of bar 4, and where pin A is open "A2", that of bar 2; (2,), m."""
+        """Locate O4, A, B and "B4", the end of bar 4; (2,), m.
+
+        If pin A is open, "A2" is that of bar 2.
+        """
 
 
 class EngineBars(Assembled, Protocol):
-    """An engine holding the bars of a scene, which knows their mass centres (G2, G3, G4 among the points) and moves."""
+    """An engine that holds the bars of a scene and moves.
+
+    It has their mass centres, G2, G3, G4, among the points.
+    """
 
     own: str
     """Results that the engine finds alone, in words for the report."""
     alone: bool = False
-    """True if it also answers the torque that the bars take without loads and effects: `torque_inertia`."""
+    """True if it also answers `torque_inertia`. It is the torque that the bars take
+    without loads and effects.
+    """
     ground_angle: float
 
     def angle(self, bar: int) -> float:
         """Compute the direction of a bar's line, in (-pi, pi], rad."""
 
     def cylinder(self, bar: int) -> tuple[complex, complex]:
-        """Measure from the ground pin of a bar, at angle 0, to a cylinder's end on it, and to that on the ground, m."""
+        """Measure from the ground pin of a bar to a cylinder's ends, m.
+
+        The end on the bar is at angle 0 of the bar; the other is on the ground.
+        """
 
     def move(self, bar: int, speed: float, acceleration: float) -> Values:
-        """Return motion and forces where the bars are placed, by name; empty where a toggle leaves them 0/0."""
+        """Return motion and forces where the bars are placed, by name.
+
+        Empty where a toggle leaves them 0/0.
+        """
 
     def refusal(self) -> str:
         """Return why what was answered does not count, or nothing."""
@@ -81,9 +106,10 @@ class EngineBars(Assembled, Protocol):
 
 
 class Loaded(EngineBars, Protocol):
-    """Bars on which loads and effects act, each by its row of the table `effects.TERM_OF`.
+    """Bars on which loads and effects act.
 
-    The ground (bar 1) does not move; its line points from O2 to O4.
+    Each acts by its row of the table `effects.TERM_OF`. The ground (bar 1) does not
+    move; its line points from O2 to O4.
     """
 
     drive_bar: int
@@ -96,13 +122,20 @@ class Loaded(EngineBars, Protocol):
     loaded: list[str]
     """Pins whose friction depends on their load."""
     pin_loads: dict[str, float]
-    """Magnitudes of its own pin forces in the last pass, by pin, N; empty before the first."""
+    """Magnitudes of its own pin forces in the last pass, by pin, N. Empty before the
+    first.
+    """
     wrenches: dict[int, list[float]]
-    """Sum of what acts on each moving bar: a force at its first pin and a couple, (x, y, moment), N and N m."""
+    """Sum of what acts on each moving bar, (x, y, moment), N and N m. It is a force at
+    its first pin and a couple.
+    """
     terms: list[Act]
 
     def ready(self, scene: Scene, terms: list[Act]) -> None:
-        """Prepare the evaluation; an engine calls this once it has its bars and what acts on them."""
+        """Prepare the evaluation.
+
+        An engine calls this once it has its bars and what acts on them.
+        """
         self.ground_angle, self.drive_bar, self.terms = (
             scene.linkage.ground_angle,
             scene.drive_bar,
@@ -113,7 +146,10 @@ class Loaded(EngineBars, Protocol):
 
     # methods that the engine defines
     def point(self, name: str) -> Array:
-        """Locate a point that `description.parts` names, world axes, (2,), m; perhaps the engine's own memory."""
+        """Locate a point that `description.parts` names, world axes, (2,), m.
+
+        The array may be the engine's own memory.
+        """
 
     def rotation(self, bar: int) -> Array:
         """Return the axes along and across a moving bar's line, (2, 2)."""
@@ -195,7 +231,10 @@ class Loaded(EngineBars, Protocol):
         self.field = field
 
     def push(self, bar: int, force: Iterable[float], point: Iterable[float]) -> None:
-        """Add a force (N, world axes) at a point (m, world axes); on the ground it does nothing."""
+        """Add a force (N, world axes) at a point (m, world axes).
+
+        On the ground it does nothing.
+        """
         if bar != 1:
             (x, y), (x_0, y_0), (f_x, f_y) = point, self.first_pin(bar), force
             wrench = self.wrenches[bar]
@@ -215,10 +254,10 @@ class Loaded(EngineBars, Protocol):
             act()
 
     def settled(self, balanced: Callable[[], dict[str, Any]]) -> dict[str, Any]:
-        """Solve for pin forces and torque that balance what acts, by name; nothing where friction jams.
+        """Solve for pin forces and torque that balance what acts, by name.
 
-        Effects that depend on the load of a pin are given the loads of the pass before,
-        until they repeat.
+        The result is empty where friction jams. Effects that depend on the load of a
+        pin are given the loads of the pass before, until they repeat.
         """
         self.pin_loads, before = {}, math.inf
         forces = balanced()
@@ -238,9 +277,10 @@ class Loaded(EngineBars, Protocol):
         return self._grow(balanced) if self.loaded else forces
 
     def _grow(self, balanced: Callable[[], dict[str, Any]]) -> dict[str, Any]:
-        """Grow friction from none, where passes run away; nothing where the growth ends in a jam.
+        """Grow friction from none, where passes run away.
 
-        By Newton's steps, the slopes from passes with each load changed a little.
+        The result is empty where the growth ends in a jam. By Newton's steps, the
+        slopes from passes with each load changed a little.
         """
 
         def passed(loads: Array) -> tuple[dict[str, Any], Array]:

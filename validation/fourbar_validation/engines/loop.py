@@ -1,4 +1,7 @@
-"""A four-bar assembled position by position, by whatever engine moves its bars: what an exact engine answers."""
+"""A four-bar assembled position by position, by the engine that moves its bars.
+
+It is what an exact engine answers.
+"""
 
 import cmath
 import math
@@ -55,14 +58,19 @@ NOT_ANSWERED = frozenset(
         *("v_A", "v_B", "v_G2", "v_G3", "v_G4"),
     )
 )
-"""Quantities that are commanded, follow from others that are answered, or exist in the formulas alone."""
+"""Quantities that no exact engine answers. They are commanded, follow from others that
+are answered, or exist in the formulas alone.
+"""
 ROUNDING = 16.0 * 2.0**-52
-"""Gap, relative to the sum of the lengths, that the roundings of a chain of three bars alone can leave."""
+"""Gap that the roundings of a chain of three bars can leave. It is relative to the sum
+of the lengths.
+"""
 Angles = tuple[float, float, float]
 """Turns of bar 2 at O2, of bar 3 against bar 2 at A, of bar 4 at O4, rad."""
 CLOSING = {2: (3, 4), 3: (2, 4), 4: (3, 2)}
-"""The two bars that close the loop, by the commanded bar. In this order the sine between them is the branch's, and
-they stand on the diagonal between their free ends as bars 3 and 4 do from A to O4; bar 2 from A back to O2.
+"""The two bars that close the loop, by the commanded bar. In this order the sine
+between them is the branch's, and they stand on the diagonal between their free ends as
+bars 3 and 4 do from A to O4; bar 2 from A back to O2.
 """
 
 
@@ -85,7 +93,10 @@ class Assembler:
         self.closed = ROUNDING * sum(lengths)
 
     def find(self, theta: float, branch: int) -> Angles | None:
-        """Assemble on the branch and place the tree there; None where the loop does not close."""
+        """Assemble on the branch and place the tree there.
+
+        None if the loop does not close.
+        """
         bar, near, far, closed = self.bar, self.near, self.far, self.closed
         theta = theta if bar == 2 else reduce_angle(theta)
         held = self.along * complex(math.cos(theta), math.sin(theta))
@@ -195,7 +206,9 @@ class Exact:
 
     name: str
     build: Callable[[Scene], EngineBars]
-    """Function that builds the engine's bars from the description; LimitError says why the engine cannot hold them."""
+    """Function that builds the engine's bars from the description. LimitError says why
+    the engine cannot hold them.
+    """
     commands: tuple[str, ...] = ("theta_2", "theta_3", "theta_4", "stroke")
 
     def answer(self, scene: Scene, command: Command) -> Answer:
@@ -255,13 +268,18 @@ class Exact:
 
 
 Read = Callable[[Angles, float, float], Mapping[str, Any]]
-"""Function from the bars' angles, and speed and acceleration of the commanded bar, to values by name."""
+"""Function from the bars' angles to values by name. It has speed and acceleration of
+the commanded bar.
+"""
 
 
 def read_each(
     bars: Assembled, command: Command, names: Iterable[str], read: Read
 ) -> tuple[dict[str, Array], NDArray[np.bool_], float]:
-    """Read each position that assembles, NaN elsewhere; return that, where it assembles, and the greatest gap, m."""
+    """Read each position that assembles, NaN elsewhere.
+
+    Return that, where it assembles, and the greatest gap, m.
+    """
     n, (omega, alpha) = len(command.angle), list_speeds(command)
     missing: dict[str, Any] = {
         name: (math.nan, math.nan) if name in VECTORS else math.nan for name in names
@@ -299,7 +317,10 @@ def make_blank(
 def split_answer(
     out: dict[str, Array], branch: NDArray[np.int8]
 ) -> tuple[Command, dict[str, Array]]:
-    """Split what was read into the motion that was made, as a command, and the other quantities."""
+    """Split what was read into a command and the other quantities.
+
+    The command is the motion that was made.
+    """
     theta_2, omega_2, alpha_2 = (out[name] for name in MADE)
     rest = {name: values for name, values in out.items() if name not in MADE}
     return Command(theta_2, branch, omega_2, alpha_2), rest

@@ -1,4 +1,7 @@
-"""Pinocchio: recursive Newton-Euler on the open tree, the loop closed by multipliers; and a released motion."""
+"""Pinocchio: recursive Newton-Euler on the open tree, and a released motion.
+
+Multipliers close the loop.
+"""
 
 import math
 from collections.abc import Callable, Iterable, Sequence
@@ -127,7 +130,10 @@ class PinocchioTree(Tree):
     def needed(
         self, field: tuple[float, float], wrenches: dict[int, list[float]]
     ) -> Array:
-        """Compute recursive Newton-Euler with what acts on the bars as external forces."""
+        """Compute recursive Newton-Euler.
+
+        What acts on the bars are external forces.
+        """
         self._weigh(field)
         if not any(map(any, wrenches.values())):
             return np.array(pin.rnea(self.model, self.data, self.q, self.v, self.a))
@@ -156,18 +162,21 @@ def _place_at(x: float, y: float) -> Any:
 
 NAME = "pinocchio-forward"
 TIME_CONSTANT_STEPS = 10.0
-"""Time constant of Baumgarte's stabilisation of a free motion, in timesteps: with 30 the loop is lost at a change point
-from h = 5 ms on.
+"""Time constant of Baumgarte's stabilisation of a free motion, in timesteps: with 30
+the loop is lost at a change point from h = 5 ms on.
 """
 PROXIMAL = (1e-14, 1e-8, 10)
-"""Accuracy, mu, iterations. With the default mu = 0 every acceleration is NaN: of the three rows of the closure only
-two are independent in the plane.
+"""Accuracy, mu, iterations. With the default mu = 0 every acceleration is NaN: of the
+three rows of the closure only two are independent in the plane.
 """
 Acceleration = Callable[[Array, Array], Array]
 
 
 class ClosedTree:
-    """A tree with its loop closed at B; `time_constant`: of the stabilisation, s: Kp = 1/tc^2 and Kd = 2/tc."""
+    """A tree with its loop closed at B.
+
+    `time_constant`: of the stabilisation, s: Kp = 1/tc^2 and Kd = 2/tc.
+    """
 
     def __init__(self, tree: PinocchioTree, time_constant: float) -> None:
         self.tree = tree
@@ -201,7 +210,10 @@ class ClosedTree:
     def start(
         self, theta_2: float, branch: int, omega_2: float
     ) -> tuple[Array, Array] | None:
-        """Assemble at the speeds that keep the loop closed; None if it does not close."""
+        """Assemble at the speeds that keep the loop closed.
+
+        None if it does not close.
+        """
         q = Assembler(self.tree).find(theta_2, branch)
         return (
             None

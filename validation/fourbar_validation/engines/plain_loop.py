@@ -1,4 +1,6 @@
-"""Ask an engine as a user would: a plain loop over its own calls, for torque and pin forces alone.
+"""Ask an engine as a user would, in a plain loop over its own calls.
+
+It is asked for torque and pin forces alone.
 
 Each position is assembled from the one before. With the gap g(q) at pin B and its
 derivative J = dg/dq, one position takes Newton's steps on g, the speeds and
@@ -78,7 +80,10 @@ class PlainLoop:
         return {"torque": torque, **forces}
 
     def close(self, q: Array) -> Array:
-        """Close the gap by bars 3 and 4, in place; return the derivative of the gap there."""
+        """Close the gap by bars 3 and 4, in place.
+
+        Return the derivative of the gap there.
+        """
         converged = False
         for _ in range(MOST_STEPS):
             x, y, jacobian = self.look(q)
@@ -102,5 +107,5 @@ class PlainLoop:
         raise NotImplementedError
 
     def inverse(self, q: Array, v: Array, a: Array) -> Array:
-        """Return the generalized forces that the motion needs beside loads and weights."""
+        """Return the generalized forces of the motion beside loads and weights."""
         raise NotImplementedError

@@ -1,4 +1,6 @@
-"""Sensitivities in 320-bit arithmetic, and the error that rounding must be expected to make by them.
+"""Sensitivities in 320-bit arithmetic, and the error that rounding makes.
+
+The error is expected by these sensitivities.
 
     predicted = eps (R sum_i w_i |dy/dx_i| + reach sum_j |dy/dz_j|),
 
@@ -43,8 +45,9 @@ if TYPE_CHECKING:
     from fourbar_validation.engines.balls import Ball, Values
 
 FIRST_ORDER = 0.1
-"""Limit of first-order prediction. Angles uncertain by this part of the sine that everything divides by leave speeds,
-forces and the torque undetermined; the torque's own first order can cancel.
+"""Limit of first-order prediction. Angles uncertain by this part of the sine that
+everything divides by leave speeds, forces and the torque undetermined; the torque's own
+first order can cancel.
 """
 
 
@@ -58,16 +61,20 @@ def predict_from_data(
 def predict_in_world_axes(
     scene: Scene, command: Command, quantity: str, mask: Mask | None = None
 ) -> Array:
-    """Predict for an engine that differences points of the linkage in world axes, as Pinocchio's frame Jacobians do."""
+    """Predict for an engine that differences points in world axes.
+
+    Pinocchio's frame Jacobians do so.
+    """
     return predict_error(scene, command, quantity, sum_lengths(scene.linkage), mask)
 
 
 def predict_about_mass_centre(
     scene: Scene, command: Command, quantity: str, mask: Mask | None = None
 ) -> Array:
-    """Predict for an engine that moves a tree of bodies about the mass centre of all of them, as MuJoCo does.
+    """Predict for an engine that moves a tree about the common mass centre.
 
-    Every bar is accelerated with the first of its tree and back again by its own joint.
+    MuJoCo moves it so; the mass centre is that of all bodies. Every bar is accelerated
+    with the first of its tree and back again by its own joint.
     """
     furthest = max(
         abs(find_centre(scene.linkage.bar(number))[0]) for number in MOVING_BARS
@@ -104,13 +111,13 @@ def predict_error(
     *,
     carried: bool = False,
 ) -> Array:
-    """Predict the absolute error of a quantity at each position, or at those of a mask, (n,).
+    """Predict the absolute error of a quantity at each position, (n,).
 
-    With `carried` the accelerations of the bars are differences of others as large as
-    the fastest bar's at `reach`. NaN where the loop does not close. Infinite at a
-    singular position, where the equations have no answer, and where rounding decides
-    whether the loop closes; but there angles and places are bounded by how far the loop
-    opens, and what the input alone decides loses nothing.
+    A mask chooses positions. With `carried` the accelerations of the bars are
+    differences of others as large as the fastest bar's at `reach`. NaN where the loop
+    does not close. Infinite at a singular position, where the equations have no answer,
+    and where rounding decides whether the loop closes; but there angles and places are
+    bounded by how far the loop opens, and what the input alone decides loses nothing.
     """
     n, (omega, alpha) = len(command.theta_2), list_speeds(command)
     command = with_signs(scene.linkage, command)
@@ -150,7 +157,9 @@ def predict_error(
 
 
 def _bound_touching(linkage: FourBar, theta_2: float, quantity: str) -> float:
-    """Bound an error where rounding decides whether the loop closes; infinite without one.
+    """Bound an error where rounding decides whether the loop closes.
+
+    It is infinite without a bound.
 
     The diagonal e from A to O4 and bars 3 and 4 are a triangle that misses a line by h:
     e = b + c - h, or |b - c| + h. Bar 3 is off the diagonal by phi_3,
@@ -182,20 +191,30 @@ class Sensitivities(NamedTuple):
     """Change of each output at one position, by cause."""
 
     data: dict[str, float]
-    """Sensitivity to the data, |y| + sum w_i |dy/dx_i|; for the condition, its value."""
+    """Sensitivity to the data, |y| + sum w_i |dy/dx_i|. For the condition it is its
+    value.
+    """
     loop: dict[str, float]
-    """Change by a loop that opens at its fastest bar's speed and acceleration times 1 m, and by couples on the bars of
-    the strongest pin force times 1 m.
+    """Change by a loop that opens at its fastest bar's speed and acceleration times
+    1 m, and by couples on the bars of the strongest pin force times 1 m.
     """
     carried: dict[str, float]
-    """Change by couples on the bars of the heaviest bar's inertial force at 1 m of the fastest bar, times 1 m."""
+    """Change by couples on the bars. They are the heaviest bar's inertial force at 1 m
+    of the fastest bar, times 1 m.
+    """
 
     def states(self, name: str) -> bool:
-        """Return whether the output has a value; only angles have where it is singular."""
+        """Return whether the output has a value.
+
+        Where the linkage is singular only angles have one.
+        """
         return (f"{name}_x" if name in VECTORS else name) in self.data
 
     def first_order(self, name: str, reach: float, *, carried: bool = False) -> float:
-        """Predict the error of an output, vectors by their norm; infinite where it has none."""
+        """Predict the error of an output, vectors by their norm.
+
+        It is infinite if it has none.
+        """
         parts = []
         name = "sin_mu" if name == "condition" else name
         for axis in ("_x", "_y") if name in VECTORS else ("",):
@@ -265,7 +284,10 @@ def _compute_sensitivity(
 
 
 def _weigh_inputs(stored: dict[str, float]) -> dict[str, float]:
-    """Weigh each input by one rounding: relative, but a chain of bars meets O4 as its longest bar is rounded."""
+    """Weigh each input by one rounding.
+
+    It is relative, but a chain of bars meets O4 as its longest bar is rounded.
+    """
     longest = max(stored[name] for name in ("d", "a", "b", "c"))
     weights = {name: abs(value) for name, value in stored.items() if value != 0.0}
     weights["d"] = longest
@@ -280,7 +302,10 @@ def _weigh_inputs(stored: dict[str, float]) -> dict[str, float]:
 def compute_reference(
     scene: Scene, branch: int, angle: float
 ) -> "tuple[Values, dict[str, float]] | None":
-    """Compute values at one position as balls, and sum |x_i dy/dx_i| of each; None where the loop does not close."""
+    """Compute values at one position as balls, and sum |x_i dy/dx_i| of each.
+
+    None if the loop does not close.
+    """
     from flint import arb
 
     from fourbar_validation.engines.balls import OF_PIECE, compute_outputs, make_balls
@@ -312,7 +337,10 @@ def _add_responses(
     inputs: "Values",
     weights: dict[str, float],
 ) -> None:
-    """Add how far each output moves as each input moves by its weight, to a side on which the loop closes."""
+    """Add how far each output moves as each input moves by its weight.
+
+    The side is one on which the loop closes.
+    """
     from flint import arb
 
     from fourbar_validation.engines.balls import STEP_BITS
@@ -328,7 +356,10 @@ def _add_responses(
 def _add_response(
     total: dict[str, float], base: "Values", moved: "Values | None"
 ) -> None:
-    """Add how far each output moves, in parts of 2^-STEP_BITS; infinitely far where it has become singular."""
+    """Add how far each output moves, in parts of 2^-STEP_BITS.
+
+    It is infinitely far if the output has become singular.
+    """
     from flint import arb
 
     from fourbar_validation.engines.balls import STEP_BITS

@@ -1,4 +1,7 @@
-"""Run other programs, to their end or question by question; bound the memory of this process, and keep its output."""
+"""Run other programs, to their end or question by question.
+
+The memory of this process is bounded, and its output kept.
+"""
 
 import ctypes
 import json
@@ -115,7 +118,9 @@ def find_reason(errors: str) -> str:
 
 
 KEPT = 20_000
-"""Bytes that are kept of one answer's output: half from its beginning, half from its end."""
+"""Bytes that are kept of one answer's output. Half are from its beginning, half from
+its end.
+"""
 _file: list[IO[bytes]] = []
 """The one file of this process, once it keeps what is printed."""
 
@@ -140,13 +145,19 @@ def keep_printed(outputs: dict[str, str], engine: str) -> Iterator[None]:
 
 
 def print_kept(data: bytes) -> None:
-    """Add what a program outside printed to what this process keeps; nothing where it keeps none."""
+    """Add what a program outside printed to what this process keeps.
+
+    Nothing is added if it keeps none.
+    """
     if _file and data:
         _file[0].write(data)
 
 
 def take_printed() -> str:
-    """Take what was printed since the last call, as plain text; nothing where this process does not keep it."""
+    """Take what was printed since the last call, as plain text.
+
+    It is empty if this process does not keep it.
+    """
     if not _file:
         return ""
     file = _file[0]
@@ -173,7 +184,10 @@ def take_printed() -> str:
 
 
 def _take_written(file: IO[bytes]) -> bytes:
-    """Empty a file; return its beginning and its end where it holds more than is kept."""
+    """Empty a file, and return what it held.
+
+    Of more than is kept it is its beginning and its end.
+    """
     size = file.seek(0, os.SEEK_END)
     file.seek(0)
     text = file.read(min(size, KEPT // 2))
@@ -188,7 +202,9 @@ def _take_written(file: IO[bytes]) -> bytes:
 
 
 SECONDS, SECONDS_PER_POSITION = 60.0, 0.03
-"""Time for a question where no limit is stated: ten times what a position takes with all engines."""
+"""Time for a question if no limit is stated. It is ten times what a position takes with
+all engines.
+"""
 LONGEST_LINE, BYTES_PER_POSITION = 10**6, 10**4
 """Bytes of an answer: ten times as many as all quantities take."""
 MOST_ERRORS = 10**8
@@ -272,7 +288,10 @@ class Running:
             raise
 
     def _ask(self, question: Message, positions: int) -> Message:
-        """Send a question and return the object that answers it, also one that says why it has no answer."""
+        """Send a question and return the object that answers it.
+
+        The object may say why it has no answer.
+        """
         process = self._process or self._start()
         assert process.stdin is not None and process.stdout is not None
         self._number += 1
@@ -362,7 +381,10 @@ class Running:
                 return
 
     def _take_errors(self) -> bytes:
-        """Take what it wrote to its standard error, which is kept as what this process prints."""
+        """Take what it wrote to its standard error.
+
+        It is kept as what this process prints.
+        """
         text = b"" if self._errors is None else _take_written(self._errors)
         print_kept(text)
         return text

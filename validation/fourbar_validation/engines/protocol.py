@@ -1,8 +1,9 @@
-"""Scenes, commands and answers as JSON: what a judge sends to an engine outside, and what comes back.
+"""Scenes, commands and answers as JSON.
 
-SI units and radians. A scene travels as it is stated, a command holds what is commanded
-and nothing that the formulas computed; null stands where there is no value.
-docs/protocol.md is the contract.
+A judge sends them to an engine outside, and gets them back. SI units and radians. A
+scene travels as it is stated, a command holds what is commanded and nothing that the
+formulas computed; null stands where there is no value. docs/protocol.md is the
+contract.
 """
 
 import math
@@ -31,8 +32,8 @@ from fourbar_validation.engines.description import find_mass
 PROTOCOL = 3
 """Number of the contract; a change that an engine must know of raises it."""
 FURTHEST = 0.1
-"""rad, and part of the greatest speed and acceleration: a motion that ends further from the command than this answers
-another question.
+"""rad, and part of the greatest speed and acceleration: a motion that ends further from
+the command than this answers another question.
 """
 TABLES = ("lengths", "bars", "drive", "loads", "effects")
 KINDS_OF_COMMAND = (*COMMANDS.values(), STROKE_COMMAND)
@@ -56,10 +57,11 @@ class _Numbers(Reader):
 
 
 def scene_to_json(scene: Scene) -> dict[str, Any]:
-    """Write lengths, bars, drive, loads and effects of a scene; InputError for an effect that no scene file holds.
+    """Write lengths, bars, drive, loads and effects of a scene.
 
-    Every place is a pair from its bar's first pin, but for the arm of a load. A bar has
-    its mass, whatever states it.
+    Raises InputError for an effect that no scene file holds. Every place is a pair from
+    its bar's first pin, but for the arm of a load. A bar has its mass, whatever states
+    it.
     """
     bars: dict[str, Any] = {
         BAR_NAMES[number]: Bar(bar.length, find_mass(bar), bar.inertia, bar.centre)
@@ -79,7 +81,10 @@ def _take_numbers(value: Any) -> Any:
 
 
 def scene_from_json(data: Any) -> Scene:
-    """Read a scene, whose motion is stated elsewhere; InputError names what is wrong."""
+    """Read a scene, whose motion is stated elsewhere.
+
+    Raises an InputError that names what is wrong.
+    """
     read = _Numbers("scene")
     try:
         return read_scene(read, read.table("", data, TABLES), ".")
@@ -88,7 +93,10 @@ def scene_from_json(data: Any) -> Scene:
 
 
 def command_to_json(scene: Scene, command: Command) -> dict[str, Any]:
-    """Write what is commanded: an angle or a stroke, its speed and acceleration, the branch."""
+    """Write what is commanded: place, speed, acceleration and branch.
+
+    The place is an angle or a stroke.
+    """
     if command.stroke is None:
         names, values = (
             COMMANDS[command.bar],
@@ -130,7 +138,10 @@ def _write_numbers(value: Any) -> Any:
 
 
 def command_from_json(scene: Scene, data: Any) -> tuple[Scene, Command]:
-    """Read a command; the scene gets the motion that it states. InputError names what is wrong."""
+    """Read a command; the scene gets the motion that it states.
+
+    Raises an InputError that names what is wrong.
+    """
     names = _find_names(data)
     place, speed, acceleration = names
     _refuse_unknown(
@@ -243,7 +254,10 @@ def _read_branch(value: Any, n: int) -> Any:
 
 
 def _read_digits(value: Any, n: int) -> Any:
-    """Read what the angle as a double leaves out; one number, as `Command.remainder` is."""
+    """Read what the angle as a double leaves out.
+
+    It is one number, as `Command.remainder` is.
+    """
     if value is None:
         return None
     from mpmath import mp, mpf
@@ -267,7 +281,10 @@ def _read_digits(value: Any, n: int) -> Any:
 
 
 def _make_array(values: Iterable[Any]) -> Array | None:
-    """Make an array of numbers and None, which becomes NaN; None where there is anything else."""
+    """Make an array of numbers and None, which becomes NaN.
+
+    None if there is anything else.
+    """
     values = list(values)
     if not set(map(type, values)) <= {int, float, type(None)}:
         return None
@@ -365,7 +382,10 @@ def answer_from_json(engine: str, command: Command, data: Any) -> Answer:
 
 
 def _read_reply(data: Any) -> dict[str, Any]:
-    """Return the object that an engine replied with; EngineError with its own words where it broke down."""
+    """Return the object that an engine replied with.
+
+    Raises EngineError with its own words if it broke down.
+    """
     if not isinstance(data, dict):
         raise InputError("answer", data, "must be an object")
     if "error" in data:
@@ -488,7 +508,10 @@ def read_motion(data: Any, command: Command) -> Command:
 
 
 def require_near(made: Command, command: Command) -> None:
-    """Raise InputError where the motion that an engine made is no answer to the command."""
+    """Raise InputError if the motion that an engine made is no answer.
+
+    The motion is held against the command.
+    """
     same = made.bar == command.bar and np.array_equal(made.branch, command.branch)
     if not same or (made.speed is None) != (command.speed is None):
         raise InputError(
@@ -520,7 +543,10 @@ def require_near(made: Command, command: Command) -> None:
 
 
 def read_setting(data: Any) -> dict[str, Any]:
-    """Read the setting of a question, none where it is left out; InputError names what is wrong."""
+    """Read the setting of a question, none if it is left out.
+
+    Raises an InputError that names what is wrong.
+    """
     if data is None:
         return {}
     allowed = (
@@ -554,7 +580,10 @@ def release_to_json(scene: Scene) -> dict[str, Any]:
 
 
 def release_from_json(scene: Scene, command: Any, times: Any) -> Scene:
-    """Read the start of a released motion into a scene; InputError names what is wrong."""
+    """Read the start of a released motion into a scene.
+
+    Raises an InputError that names what is wrong.
+    """
     if not isinstance(command, dict) or "theta_2" not in command:
         raise InputError(
             "command",

@@ -1,4 +1,7 @@
-"""Register the engines (independent solvers): what starts each, what it needs, and how it is judged."""
+"""Register the engines (independent solvers).
+
+The entry says what starts each, what it needs, and how it is judged.
+"""
 
 import tomllib
 from collections.abc import Callable, Iterable
@@ -65,28 +68,39 @@ class Engine:
     order: Order | None = None
     """Function that measures its observed order, which is shown."""
     positions: tuple[str, ...] = ()
-    """Quantities it must answer if the scene states positions only; if empty, it is not started for such a scene."""
+    """Quantities it must answer if the scene states positions only. If empty, it is not
+    started for such a scene.
+    """
     through_time: bool = False
     """True if it runs through the motion in time."""
     generated: bool = False
     """True if it runs the generated MJCF, which is then also compared as shipped."""
     predictor: Predictor | None = None
-    """Function that predicts, from the description, the errors to be expected beyond the tolerance."""
+    """Function that predicts the errors to be expected beyond the tolerance. It works
+    from the description.
+    """
     residuals: bool = False
     """True if the engine's own residuals predict the errors to be expected."""
     nearby: bool = False
-    """True if it answers at the angle that `Command.remainder` completes, so that where an error is beyond the
-    tolerance it can answer again within the rounding of theta_2.
+    """True if it answers at the angle that `Command.remainder` completes, so that where
+    an error is beyond the tolerance it can answer again within the rounding of theta_2.
     """
     stated: bool = True
-    """True if an exact engine also checks what the formulas state of the linkage, independently of its motion."""
+    """True if an exact engine also checks what the formulas state of the linkage. These
+    statements do not depend on its motion.
+    """
     code: str = ""
-    """Hash of an adapter that the harness does not ship, so that no answer of another one is resumed."""
+    """Hash of an adapter that the harness does not ship. No answer of another one is
+    resumed.
+    """
     library: str = ""
-    """The module that its adapter imports, nothing: it needs no more than the formulas."""
+    """Module that its adapter imports. Empty: it needs no more than the formulas."""
 
     def fingerprint(self) -> str:
-        """Name everything that its answers and verdicts depend on, alike in every process."""
+        """Name everything that its answers and verdicts depend on.
+
+        It is alike in every process.
+        """
         values = (getattr(self, part.name) for part in fields(self))
         return ", ".join(
             (
@@ -103,13 +117,18 @@ class Engine:
 
 
 EXTRA = {"mujoco": "validation", "pinocchio": "validation", "flint": "validation"}
-"""Module of an engine: the extra that brings it; others are installed by the name of their package."""
+"""Extra that brings the module of an engine. Others are installed by the name of their
+package.
+"""
 PACKAGE_OF = {"pydrake": "drake"}
 """Module of an engine: its package, where that has another name."""
 
 
 def find_missing(library: str) -> str | None:
-    """Give the reason where a module cannot be found, or does not load; None where it does."""
+    """Give the reason why a module cannot be found, or does not load.
+
+    None if it does.
+    """
     try:
         import_module(library)
     except ModuleNotFoundError as error:
@@ -166,7 +185,9 @@ WORK = {
         " forces and torque"
     ),
 }
-"""Work of each engine, by its name: the times that are compared are not for the same work."""
+"""Work of each engine, by its name. The times that are compared are not for the same
+work.
+"""
 OF_A_POSITION = tuple(
     name for name in COMPARED_QUANTITIES if STAGE_OF[name] == "position"
 )
@@ -174,7 +195,10 @@ OF_A_POSITION = tuple(
 
 @dataclass(frozen=True, slots=True)
 class Later:
-    """Class or function that is imported when it is called: a library that is missing costs its own rows only."""
+    """Class or function that is imported when it is called.
+
+    A library that is missing costs its own rows only.
+    """
 
     name: str
     """The module and the name in it, as `module:name`."""
@@ -231,11 +255,14 @@ BALLS = Engine(
 
 
 ANY_METHOD = ", by a method in world axes or about the mass centres"
-"""What a reason says of an error that is predicted for an engine of an unknown method."""
+"""Words of a reason on an error predicted for an engine of an unknown method."""
 
 
 def hold_fully(engine: Engine) -> Engine:
-    """Hold the engine to full accuracy, or else to the error predicted for each position."""
+    """Hold the engine to full accuracy, or else to the error predicted.
+
+    The prediction is for each position.
+    """
     if engine.tolerance not in (EQUIVALENCE, FULL_ACCURACY):
         return engine
     unstated = predict_from_data if engine.nearby else predict_for_any_method
@@ -246,7 +273,9 @@ def hold_fully(engine: Engine) -> Engine:
 
 HARD_ENGINES = tuple(hold_fully(engine) for engine in (BALLS, *ENGINES))
 LAB, GROUP = "fourbar-lab", "fourbar.engines"
-"""Distribution and group of its entry points; no other distribution adds an engine to the judge's process."""
+"""Distribution and group of its entry points. No other distribution adds an engine to
+the judge's process.
+"""
 
 
 @cache
@@ -273,7 +302,9 @@ def load_further() -> tuple[Engine, ...]:
 
 FOLDERS = tuple(Path(folder) for spec in [find_spec(LAB.replace("-", "_"))] if spec is not None
                 for folder in spec.submodule_search_locations or ())  # fmt: skip
-"""Folder of the lab, whose engines.toml a run reads too; none if the lab is not installed."""
+"""Folder of the lab, whose engines.toml a run reads too. None if the lab is not
+installed.
+"""
 
 
 def make_demands(
@@ -283,7 +314,9 @@ def make_demands(
     answer: Answer,
     formulas: Solution | None = None,
 ) -> Demands:
-    """Return what an answer is held to: the engine's tolerance and quantities, and the errors predicted for it.
+    """Return what an answer is held to: the engine's tolerance and quantities.
+
+    The errors predicted for it are allowed.
 
     Parameters
     ----------
@@ -308,7 +341,10 @@ def make_demands(
 def make_prediction(
     engine: Engine, scene: Scene, command: Command, answer: Answer
 ) -> Predicted | None:
-    """Give what computes the errors to be expected, should any be called for; an alarm leaves no own excuse."""
+    """Give what computes the errors to be expected, should any be asked for.
+
+    An alarm leaves no own excuse.
+    """
     if answer.refusal is not None:
         return None
     if engine.residuals:
@@ -330,11 +366,11 @@ def make_prediction(
 def make_nearby(
     engine: Engine, scene: Scene, command: Command, formulas: Solution
 ) -> Nearby | None:
-    """Give what answers within the rounding of the theta_2 that are stated, if the engine does.
+    """Give what answers within the rounding of the stated theta_2.
 
-    Near a limit position the last digits of theta_2 decide sin(theta_4 - theta_3), and
-    with it every other number: once they are chosen such that this sine is that of the
-    formulas, all the others have their digits.
+    None if the engine does not. Near a limit position the last digits of theta_2 decide
+    sin(theta_4 - theta_3), and with it every other number: once they are chosen such
+    that this sine is that of the formulas, all the others have their digits.
 
     A drive on bar 3 or 4 has poles of its own, which another theta_2 for the same sine
     does not correct.

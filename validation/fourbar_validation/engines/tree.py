@@ -1,7 +1,9 @@
-"""The bars of a four-bar opened at pin B, as a tree of an engine, and what follows from the few numbers that it gives.
+"""The bars of a four-bar opened at pin B, as a tree of an engine.
 
-The coordinates q are the turns of bar 2 at O2, of bar 3 against bar 2 at A, and of bar 4
-at O4. With g(q) the place of B on bar 3 minus that on bar 4, and J = dg/dq, the loop
+A few numbers of the engine give everything.
+
+The coordinates q are the turns of bar 2 at O2, of bar 3 against bar 2 at A, and of bar
+4 at O4. With g(q) the place of B on bar 3 minus that on bar 4, and J = dg/dq, the loop
 holds where
 
     g = 0,   J v = 0,   J a + (dJ/dt) v = 0,
@@ -44,7 +46,11 @@ OMEGAS, ALPHAS = (
 
 
 class Tree(Loaded, Protocol):
-    """Bars opened at pin B; the engine gives points, Jacobians, accelerations, inverse dynamics and joint forces."""
+    """Bars opened at pin B.
+
+    The engine gives points, Jacobians, accelerations, inverse dynamics and joint
+    forces.
+    """
 
     own: str = (
         "assembly (Newton on its own gap), velocities (own Jacobian), accelerations"
@@ -59,7 +65,10 @@ class Tree(Loaded, Protocol):
     a: Array
 
     def ready(self, scene: Scene, terms: list[Act]) -> None:
-        """Prepare the evaluation; an engine calls this once it has built its bars and what acts on them."""
+        """Prepare the evaluation.
+
+        An engine calls this once it has built its bars and what acts on them.
+        """
         super().ready(scene, terms)
         self.alone = bool(scene.loads or scene.effects)
         self.place((0.0, 0.0, 0.0))
@@ -82,10 +91,16 @@ class Tree(Loaded, Protocol):
     def needed(
         self, field: tuple[float, float], wrenches: dict[int, list[float]]
     ) -> Array:
-        """Return the generalized forces that the motion last set needs beyond gravity and what acts, (3,), N m."""
+        """Return the generalized forces of the motion last set, (3,), N m.
+
+        Gravity and what acts are taken off.
+        """
 
     def carried(self) -> dict[int, Pair]:
-        """Return the force on each moving bar at its first pin, at the motion and wrenches last asked for, N."""
+        """Return the force on each moving bar at its first pin, N.
+
+        It is at the motion and wrenches last asked for.
+        """
 
     # methods that follow from these
     def gap(self) -> tuple[float, float]:
@@ -136,7 +151,10 @@ class Tree(Loaded, Protocol):
         return np.asarray(along @ rate)
 
     def end_jacobian(self, point: "Place") -> Array:
-        """Return the derivative of an end of the drive, (2, 3), m: its bar's first pin, and the arm turned across."""
+        """Return the derivative of an end of the drive, (2, 3), m.
+
+        It is that of its bar's first pin, and the arm turned across.
+        """
         if point.bar == 1:
             return np.zeros((2, 3))
         x, y = np.subtract(self.end(point), self.first_pin(point.bar)).tolist()
@@ -160,7 +178,10 @@ class Tree(Loaded, Protocol):
         return put_back(on, x, y)
 
     def move(self, bar: int, speed: float, acceleration: float) -> Values:
-        """Return velocities, accelerations and forces where the tree is placed; nothing where they are 0/0."""
+        """Return velocities, accelerations and forces where the tree is placed.
+
+        Empty where they are 0/0.
+        """
         jacobian, commanded = self.jacobian(), self.turns[bar]
         try:
             v = solve_closed(jacobian, speed, commanded)
@@ -198,14 +219,21 @@ class Tree(Loaded, Protocol):
 
 
 def carry(on: dict[int, Pair], bar: int, x: float, y: float) -> None:
-    """Let the pins of an open tree carry one more force on a bar, N; the ground takes none."""
+    """Let the pins of an open tree carry one more force on a bar, N.
+
+    The ground takes none.
+    """
     for bearer in BORNE.get(bar, ()):
         f_x, f_y = on[bearer]
         on[bearer] = f_x - x, f_y - y
 
 
 def put_back(on: dict[int, Pair], x: float, y: float) -> dict[str, Pair]:
-    """Return F12, F32, F14, N: what the pins of an open tree carry, with the force (x, y) of bar 4 on bar 3."""
+    """Return F12, F32, F14, N.
+
+    They are what the pins of an open tree carry, with the force (x, y) of bar 4 on bar
+    3.
+    """
     carry(on, 3, x, y)
     carry(on, 4, -x, -y)
     x, y = on[3]
@@ -219,9 +247,10 @@ BAR_2 = np.array([1.0, 0.0, 0.0])
 def solve_closed(
     jacobian: Array, rate: float, turn: Array = BAR_2, x: float = 0.0, y: float = 0.0
 ) -> Array:
-    """Solve J rates + (x, y) = 0, turn . rates = rate for the rates of the coordinates; LinAlgError at a toggle.
+    """Solve J rates + (x, y) = 0, turn . rates = rate.
 
-    By Cramer's rule: for bar 2 the determinant is that of `newton` to the last digit.
+    The rates are those of the coordinates; LinAlgError at a toggle. By Cramer's rule:
+    for bar 2 the determinant is that of `newton` to the last digit.
     """
     (e, a, b), (f, c, d) = jacobian.tolist()
     p, q, r = turn.tolist()
@@ -239,11 +268,12 @@ def solve_closed(
 
 
 def solve_multipliers(jacobian: Array, turn: Array, needed: Array) -> Array:
-    """Solve [J^T turn] [lambda; T] = tau, (3,); LinAlgError where no torque on that bar balances tau.
+    """Solve [J^T turn] [lambda; T] = tau, (3,).
 
-    By Cramer's rule: of bar 2 the determinant is that of `solve_closed` to the last
-    digit: there are forces wherever there are speeds, as far as rounding leaves them
-    digits; elimination may find the matrix singular there.
+    Raises LinAlgError if no torque on that bar balances tau. By Cramer's rule: of bar 2
+    the determinant is that of `solve_closed` to the last digit: there are forces
+    wherever there are speeds, as far as rounding leaves them digits; elimination may
+    find the matrix singular there.
     """
     (a, b, c), (d, e, f) = jacobian.tolist()
     (p, q, r), (x, y, z) = turn.tolist(), needed.tolist()

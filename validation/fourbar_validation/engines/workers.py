@@ -1,7 +1,7 @@
-"""A function over many items by Pebble's processes: the same results whatever their number.
+"""A function over many items by Pebble's processes.
 
-Each item is a task with a limit of time. A worker that dies or hangs costs the item
-that it was at.
+The results are the same whatever the number of processes. Each item is a task with a
+limit of time. A worker that dies or hangs costs the item that it was at.
 """
 
 from collections import deque
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 SECONDS = 60.0
 """A scene takes 0.05 to 3 s; what takes longer than this hangs."""
 IN_FLIGHT = 4
-"""Chunks submitted per worker, so that it is always busy and the memory stays bounded."""
+"""Chunks submitted per worker. It is always busy then, and the memory stays bounded."""
 LOCKED = 10.0
 """Seconds for which a worker waits for the pipe that all workers share.
 
@@ -97,7 +97,10 @@ class Tasks:
     def outcomes(
         self, items: Sequence[Any], tasks: "Sequence[Future[Any]]", instead: Instead
     ) -> list[Any]:
-        """Return the results of items in order, of those that failed what stands instead."""
+        """Return the results of items in order.
+
+        Of those that failed it is what stands instead.
+        """
         results = []
         for item, task in zip(items, tasks, strict=True):
             outcome = self.outcome(item, task)

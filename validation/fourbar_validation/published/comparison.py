@@ -1,4 +1,7 @@
-"""`published`: the thesis's torque error by error, then every printed figure against ours, differences explained."""
+"""`published`: the thesis's torque error by error, then every printed figure.
+
+Ours stand beside them, and differences are explained.
+"""
 
 from collections import Counter
 from collections.abc import Iterator, Mapping
@@ -21,14 +24,20 @@ WIDTH = 78
 
 
 def list_figures() -> Iterator[PublishedFigure]:
-    """List every published figure: the thesis, the Maple worksheet, public test cases."""
+    """List every published figure.
+
+    The sources are the thesis, the Maple worksheet, and public test cases.
+    """
     yield from list_thesis_figures()
     yield from compare_maple()
     yield from compare_textbooks()
 
 
 def is_explained(figure: PublishedFigure) -> bool:
-    """Tell whether a difference has errata that give the published digits, or is a misprint that none can give."""
+    """Tell whether a difference has errata that give the published digits.
+
+    A misprint that none can give is explained too.
+    """
     if not figure.errata or not set(figure.errata) <= set(ERRATA):
         return False
     return figure.reproduced() or not all(
@@ -56,7 +65,10 @@ def explain_difference(figure: PublishedFigure) -> str:
 
 
 def check(show_all: bool) -> int:
-    """Compare the figures of the sources with ours; 1 on a difference that no erratum explains."""
+    """Compare the figures of the sources with ours.
+
+    Return 1 on a difference that no erratum explains.
+    """
     from rich.console import Console
     from rich.table import Table
 
@@ -130,10 +142,11 @@ HEAD = (
 
 
 def list_ladder_rows() -> list[tuple[str, ...]]:
-    """List the rows from our answer to the two published ones, error by error, each of these with its printed figures.
+    """List the rows from our answer to the two published ones, error by error.
 
-    The first row is right: 309.309 N cm and (7.033, -2.121) N. The last two are what
-    the manual and section 5.7 print: 308.804 N cm and (161.418, -156.506) N.
+    Each of the published ones has its printed figures. The first row is right:
+    309.309 N cm and (7.033, -2.121) N. The last two are what the manual and section 5.7
+    print: 308.804 N cm and (161.418, -156.506) N.
     """
     source = read_printed()["published"]
     tables = {
@@ -173,10 +186,14 @@ def list_ladder_rows() -> list[tuple[str, ...]]:
     help="Write the steps as Markdown.",
 )
 def published(show_all: bool, out: Path | None) -> int:
-    """Compare the figures of the sources with ours; exit 1 on a difference that no erratum explains."""
+    """Compare the figures of the sources with ours.
+
+    Exit with status 1 on a difference that no erratum explains.
+    """
     from rich.console import Console
 
-    try:  # a missing requirement of the last source is noticed before the first is printed
+    try:
+        # a missing library of the last source is noticed before the first is printed
         import_module("scipy.integrate")
     except ModuleNotFoundError:
         raise DependencyError(

@@ -39,14 +39,19 @@ class PublishedFigure(NamedTuple):
     printed: str
     ours: float
     errata: tuple[str, ...] = ()
-    """Ids of the errata that lead from ours to what is printed, in the order in which they are made."""
+    """Ids of the errata that lead from ours to what is printed. They are in the order
+    in which they are made.
+    """
     made: float | None = None
     """Ours after these errata; None where they cannot be computed."""
     noise: float = 0.0
     """Round-off of whoever printed 15 digits or more, in the unit printed."""
 
     def verdict(self) -> str:
-        """Say how ours compares with the published digits: rounded, truncated or differs."""
+        """Say how ours compares with the published digits.
+
+        It is rounded, truncated or differs.
+        """
         return compare(self.printed, self.ours, self.noise)
 
     def reproduced(self) -> bool:
@@ -58,7 +63,10 @@ class PublishedFigure(NamedTuple):
 
 
 def compare(printed: str, value: float, noise: float = 0.0) -> str:
-    """Compare `value` to the published number of decimals: rounded, truncated, or it differs."""
+    """Compare `value` to the published number of decimals.
+
+    It is rounded, truncated, or it differs.
+    """
     theirs, ours = Decimal(printed), Decimal(value)
     unit = Decimal(1).scaleb(int(theirs.as_tuple().exponent))
     if ours.quantize(unit, ROUND_HALF_EVEN) == theirs or abs(ours - theirs) <= Decimal(

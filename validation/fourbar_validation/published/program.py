@@ -1,4 +1,6 @@
-"""The thesis's own program: its 13 unknowns, its units, and its errors, each behind a switch.
+"""The thesis's own program: its 13 unknowns and its units.
+
+Each of its errors is behind a switch.
 
 Source: I. Linares Mendoza, "Analisis cinematico y dinamico asistido por computadora de
 mecanismos de cuatro barras", UNAM FES Cuautitlan, sections 4.12 and 5.7 and the
@@ -84,7 +86,10 @@ def split_components(r: float, angle: float) -> tuple[float, float]:
 
 
 def to_ours(theta: float) -> float:
-    """Convert theta_1 or theta_4 of the thesis (its polygon sums to zero) to our convention, or back, rad."""
+    """Convert theta_1 or theta_4 of the thesis to our convention, or back, rad.
+
+    The thesis's polygon sums to zero.
+    """
     return math.remainder(theta + math.pi, 2.0 * math.pi)
 
 
@@ -132,13 +137,19 @@ def compute_right_unknowns() -> dict[str, float]:
 
 
 def compute_inertia(bar: int, about_long_axis: bool = False) -> float:
-    """Compute I_G of bar 3 or 4, kg cm^2: m (L^2 + w^2)/12, or m w^2/12 as the thesis has it."""
+    """Compute I_G of bar 3 or 4, kg cm^2.
+
+    It is m (L^2 + w^2)/12, or m w^2/12 as the thesis has it.
+    """
     across = 0.0 if about_long_axis else LENGTHS[bar - 1] ** 2
     return MASSES[bar] * (across + WIDTH**2) / 12.0
 
 
 class Kinematics:
-    """Motion at theta_2 = 135 deg by our formulas, in cm and the thesis's angles, and the arms of the pin forces."""
+    """Motion at theta_2 = 135 deg by our formulas, and the arms of the pin forces.
+
+    It is in cm and the thesis's angles.
+    """
 
     def __init__(self) -> None:
         s = compute_motion(np.array([THETA_2]))
@@ -151,7 +162,9 @@ class Kinematics:
         self.a_A = 100.0 * s.a_A[0]
         self.a_G = {bar: 100.0 * getattr(s, f"a_G{bar}")[0] for bar in MOVING_BARS}
         self.slip = 2.0 * CENTRE[3] * self.alpha[3] * math.sin(self.theta_3)
-        """Amount erratum 4 adds to the x component of A_G3/A: -(L w^2 cos - L alpha sin) for -(... + ...), eq 4.20."""
+        """Amount that erratum 4 adds to the x component of A_G3/A. It is -(L w^2
+        cos - L alpha sin) for -(... + ...), eq 4.20.
+        """
         self.arms = {  # from G; R14 points along B to O4, the thesis's theta_4
             "R12": split_components(-CENTRE[2], THETA_2),
             "R32": split_components(LENGTHS[1] - CENTRE[2], THETA_2),
@@ -216,11 +229,12 @@ def compute_thesis_program(
 def round_off(
     errors: ProgramErrors, inertias: tuple[float, float] | None = None
 ) -> dict[str, float]:
-    """Bound how far an elimination of these equations may be off in each unknown, whoever makes it: N and N cm.
+    """Bound how far an elimination of these equations may be off, N and N cm.
 
-    13 eps |A^-1| (|A| |x| + |b|): each number of the system carries up to as many
-    roundings as there are unknowns, from its own making and from the elimination
-    (Higham, Accuracy and Stability, 7.2 and 9.3).
+    The bound is for each unknown, whoever eliminates. 13 eps |A^-1| (|A| |x| + |b|):
+    each number of the system carries up to as many roundings as there are unknowns,
+    from its own making and from the elimination (Higham, Accuracy and Stability, 7.2
+    and 9.3).
     """
     matrix, right = make_equations(errors, inertias)
     unknowns = np.linalg.solve(matrix, right)
@@ -232,7 +246,9 @@ def round_off(
 
 PRINTED_INERTIAS = (0.2924725333, 0.1075266667)
 TYPED_INERTIAS = (0.292472, 0.107526)
-"""I_G3, I_G4 of the manual's table and of section 5.7, kg cm^2: solved back from the printed unknowns."""
+"""I_G3, I_G4 of the manual's table and of section 5.7, kg cm^2. They are solved back
+from the printed unknowns.
+"""
 STEPS: tuple[tuple[str, ProgramErrors, tuple[float, float] | None], ...] = (
     ("", ProgramErrors(), None),
     ("3", ProgramErrors(True), None),

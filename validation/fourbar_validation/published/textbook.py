@@ -1,4 +1,7 @@
-"""Printed answers of public test cases, listed in `textbook.toml`, and of a Maple worksheet, against ours."""
+"""Printed answers of public test cases, and of a Maple worksheet, against ours.
+
+The test cases are listed in `textbook.toml`.
+"""
 
 import json
 import math
@@ -82,7 +85,10 @@ def _solve(scene: str) -> fourbar.Solution:
 
 
 def compare_maple() -> Iterator[PublishedFigure]:
-    """Compute the worksheet's two solutions of positions, theta_1 = 0, rad; and the constant of its real equation."""
+    """Compute the worksheet's two solutions of positions, theta_1 = 0, rad.
+
+    The constant of its real equation is computed too.
+    """
     sheet = json.loads(SHEET.read_text(encoding="utf-8"))
     a, b, c, d = (float(sheet["inputs"][name]) for name in "abcd")
     theta_2 = math.pi / 3.0

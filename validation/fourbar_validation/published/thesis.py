@@ -1,8 +1,9 @@
-"""The thesis's printed figures against ours: angles and limit positions, then motion, constants and unknowns.
+"""The thesis's printed figures against ours.
 
-Sections 2.4, 4.12 and 5.7, table 3.2 and the tables of the manual. Ours come from
-`fourbar.solve` and `fourbar.formulas.mobility`, or from the thesis's formula for a
-constant that nobody else defines. Units as printed: cm, deg, rad/s, cm/s^2, N, N cm.
+They are angles and limit positions, then motion, constants and unknowns. Sections 2.4,
+4.12 and 5.7, table 3.2 and the tables of the manual. Ours come from `fourbar.solve` and
+`fourbar.formulas.mobility`, or from the thesis's formula for a constant that nobody
+else defines. Units as printed: cm, deg, rad/s, cm/s^2, N, N cm.
 """
 
 import csv
@@ -43,7 +44,9 @@ from fourbar_validation.published.program import (
 )
 
 ANGLE_NOISE = 4e-15
-"""The program carries angles near 360 deg, where a double steps by 5.7e-14 deg = 1e-15 rad: four such steps, rad."""
+"""Four steps of a double near 360 deg, rad. The program carries such angles, where a
+step is 5.7e-14 deg = 1e-15 rad.
+"""
 d, a, b, c = LENGTHS
 
 
@@ -93,7 +96,10 @@ def list_positions() -> Iterator[PublishedFigure]:
 
 
 def list_half_angle_constants() -> Iterator[PublishedFigure]:
-    """List section 2.4 at theta_2 = 90 deg: k1 cos + k2 sin + k3 + e^2 = 0, A t^2 + B t + C = 0, t = tan(theta/2)."""
+    """List section 2.4 at theta_2 = 90 deg.
+
+    k1 cos + k2 sin + k3 + e^2 = 0, A t^2 + B t + C = 0, t = tan(theta/2).
+    """
     theta_2 = math.radians(90.0)
     x, y = (
         a * math.cos(theta_2) + d * math.cos(THETA_1),
@@ -156,7 +162,10 @@ def list_simulation_window() -> Iterator[PublishedFigure]:
 
 
 def list_limits() -> Iterator[PublishedFigure]:
-    """List table 3.2: cosines whose existence decides, and the limit positions that do exist."""
+    """List table 3.2: cosines whose existence decides, and limit positions.
+
+    The limit positions are those that do exist.
+    """
     linkage = make_scene(THETA_2).linkage
     output, dead_centre = (limit_positions(linkage, bar) for bar in (4, 2))
     cosines = {
@@ -202,7 +211,10 @@ def cut(value: float, decimals: int) -> float:
 
 
 def compute_cut_arm(k: Kinematics, decimals: int) -> float:
-    """Compute y of R23 with theta_3 cut to some decimals of a degree first, erratum 12."""
+    """Compute y of R23 with theta_3 cut to some decimals of a degree.
+
+    It is erratum 12.
+    """
     return -CENTRE[3] * math.sin(math.radians(cut(to_degrees(k.theta_3), decimals)))
 
 
@@ -287,7 +299,10 @@ def list_kinematics(k: Kinematics) -> Iterator[PublishedFigure]:
 
 
 def list_constants(k: Kinematics) -> Iterator[PublishedFigure]:
-    """List section 5.7: inertias, right sides and moment arms of the 13 equations, and the matrix as printed."""
+    """List section 5.7: inertias, right sides and moment arms.
+
+    They belong to the 13 equations; the matrix is as printed.
+    """
     source = read_printed()
     inertias = source["inputs"]["inertia_kg_cm2_printed"]
     yield PublishedFigure("5.7 inertias", "I_G2", inertias["I_G2"], INERTIA_2)

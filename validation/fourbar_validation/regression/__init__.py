@@ -1,1 +1,4 @@
-"""Find what changed since the accepted state: new, gone, better, worse, changed verdict, and mere round-off."""
+"""Find what changed since the accepted state.
+
+A row is new, gone, better, worse, of another verdict, or mere round-off.
+"""

@@ -1,9 +1,10 @@
-"""`python -m validation compare` and `accept`, which keeps the rows of every accepted run in one table.
+"""`python -m validation compare` and `accept`.
 
-The table is history.parquet, which pandas and DuckDB read: one line per row, and one
-per time (quantity "time": `times_formulas` is the engine's time over that of the
-formulas on the scene), with the run's date, commit, machine and versions in columns of
-their own (`version_mujoco`).
+The latter keeps the rows of every accepted run in one table. The table is
+history.parquet, which pandas and DuckDB read: one line per row, and one per time
+(quantity "time": `times_formulas` is the engine's time over that of the formulas on the
+scene), with the run's date, commit, machine and versions in columns of their own
+(`version_mujoco`).
 """
 
 import hashlib
@@ -165,7 +166,10 @@ def report_differences(
     forms: dict[str, Path | None],
     chosen: dict[str, str | None] | None = None,
 ) -> int:
-    """Print the differences, write the forms wanted; 1 on a regression, or where nothing was compared."""
+    """Print the differences, and write the forms wanted.
+
+    Return 1 on a regression, or if nothing was compared.
+    """
     from rich.console import Console
     from rich.progress import track
 
@@ -209,7 +213,9 @@ def _is_chosen(
     words: Callable[[str], Iterable[str]],
     renamed: Mapping[str, str] = MappingProxyType({}),
 ) -> Callable[[Row], bool]:
-    """Return a test for rows that the options name; InputError for a name that does not stand in its column.
+    """Return a test for rows that the options name.
+
+    Raises InputError for a name that does not stand in its column.
 
     `find_renamed`: of a scene with an old and a new name either means both.
     """
@@ -251,16 +257,16 @@ def compare(
     quantity: str | None,
     **forms: Path | None,
 ) -> int:
-    """Say what changed from OLD (a run's folder, its results.csv, or an accepted name) to NEW.
+    """Say what changed from OLD to NEW.
 
-    Scenes that changed come first, entry by entry; their rows, and those with other
-    settings or at other positions, are named and not compared. What the new run was not
-    asked for is "not run", and no regression. Exit status 1 on a regression: a rule
-    that is weaker than it was (a wider tolerance, another class or reason, a limit that
-    is met earlier), a verdict that got worse, an error that grew beyond round-off and
-    its allowance, a row that was run for and is gone, a new row that fails; and where
-    nothing was compared. Exit status 2 where the runs share fewer than half of their
-    rows.
+    OLD is a run's folder, its results.csv, or an accepted name. Scenes that changed
+    come first, entry by entry; their rows, and those with other settings or at other
+    positions, are named and not compared. What the new run was not asked for is "not
+    run", and no regression. Exit status 1 on a regression: a rule that is weaker than
+    it was (a wider tolerance, another class or reason, a limit that is met earlier), a
+    verdict that got worse, an error that grew beyond round-off and its allowance, a row
+    that was run for and is gone, a new row that fails; and where nothing was compared.
+    Exit status 2 where the runs share fewer than half of their rows.
     """
     return report_differences(
         find_baseline(old),
@@ -271,7 +277,7 @@ def compare(
 
 
 def _require_as_strict(run: Recorded, target: Path) -> None:
-    """Refuse a run whose rules are weaker than those of the run that is accepted now."""
+    """Refuse a run whose rules are weaker than those of the accepted one."""
     if not (target / ABOUT).is_file():
         return
     accepted = open_run(target, "--to")
@@ -288,8 +294,12 @@ def _require_as_strict(run: Recorded, target: Path) -> None:
 
 @click.command(name="accept")
 @click.argument("results", type=click.Path(path_type=Path))
-@click.option("--to", type=click.Path(path_type=Path, file_okay=False), metavar="DIR",
-              help=f"Keep it there; left out: {ACCEPTED}/ next to RESULTS.")  # fmt: skip
+@click.option(
+    "--to",
+    type=click.Path(path_type=Path, file_okay=False),
+    metavar="DIR",
+    help=f"Folder that keeps it (default: {ACCEPTED}/ next to RESULTS).",
+)
 @click.option(
     "--even-failing",
     is_flag=True,
@@ -303,10 +313,10 @@ def _require_as_strict(run: Recorded, target: Path) -> None:
 def accept_command(
     results: Path, to: Path | None, even_failing: bool, allow_weaker: bool
 ) -> None:
-    """Record RESULTS (a run's folder) as the accepted state that later runs are compared with.
+    """Record RESULTS (a run's folder) as the accepted state.
 
-    It is kept in DIR, and its rows are appended to DIR/history.parquet, a table for
-    pandas or DuckDB.
+    Later runs are compared with it. It is kept in DIR, and its rows are appended to
+    DIR/history.parquet, a table for pandas or DuckDB.
     """
     folder = results if results.is_dir() else results.parent
     target = folder.absolute().parent / ACCEPTED if to is None else to

@@ -8,8 +8,9 @@ from fourbar_validation.compare.rows import FAILS, VERDICTS, Row
 from fourbar_validation.compare.tolerance import EPS, K
 
 ROUND_OFF = K
-"""Errors of an exact comparison move freely by this many eps/condition: another compiler, another
-order of summation. A move beyond it is a change of the numbers themselves.
+"""Errors of an exact comparison move freely by this many eps/condition: another
+compiler, another order of summation. A move beyond it is a change of the numbers
+themselves.
 """
 NOTICEABLE = 1.25
 """An error that is not round-off has changed where it grew or shrank by this factor."""
@@ -36,7 +37,8 @@ class Kind(Enum):
 
 
 WHOLE = ("all", "watch")
-"""Rows that stand for what went wrong with an engine as a whole: once it is mended they are gone."""
+"""Rows of what went wrong with an engine as a whole. Once it is mended they are gone.
+"""
 REGRESSIONS = frozenset((Kind.VERDICT_WORSE, Kind.WORSE, Kind.GONE, Kind.NEW_FAILURE))
 OTHER_QUESTION = (Kind.OTHER_SCENE, Kind.OTHER_POSITIONS, Kind.OTHER_SETTING)
 """Rows that are not compared: each run answers a question of its own."""
@@ -61,7 +63,10 @@ class Change:
 
     @property
     def severity(self) -> tuple[bool, float]:
-        """Return whether it fails now, and by what factor its error, or round-off, has grown."""
+        """Return whether it fails now, and by what factor its error has grown.
+
+        The error is at least round-off.
+        """
         new = self.new
         if new is None or self.old is None:
             return new is not None and new.failed, 1.0

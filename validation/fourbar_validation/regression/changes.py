@@ -1,4 +1,7 @@
-"""Two runs held against each other, scene by scene: both tables are sorted, and neither is ever whole in memory."""
+"""Two runs held against each other, scene by scene.
+
+Both tables are sorted, and neither is ever whole in memory.
+"""
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -34,7 +37,9 @@ from fourbar_validation.regression.scenes import (
 KEPT = 10_000
 """Rows of one kind that are listed, the worst of them; all are counted."""
 NAMED = 50
-"""Scenes and engines listed by name that were not run or not compared; the others are counted."""
+"""Scenes and engines listed by name that were not run or not compared. The others are
+counted.
+"""
 ONE_SIDED = (
     *(Kind.NOT_RUN, Kind.GONE, Kind.GONE_FAILURE),
     *(Kind.NEW, Kind.NEW_FAILURE),
@@ -173,17 +178,26 @@ class Differences:
 
     @property
     def grown(self) -> list[str]:
-        """Rows that are allowed more than NOTABLE times what they were; no regression."""
+        """Rows that are allowed more than NOTABLE times what they were.
+
+        They are no regression.
+        """
         return [*self._grown]
 
     @property
     def not_run(self) -> list[str]:
-        """Scenes and engines of the old run that the new one was not run for, each with its number of rows."""
+        """Scenes and engines of the old run that the new one was not run for.
+
+        Each has its number of rows.
+        """
         return [*self._scenes_not_run, *self._engines_not_run]
 
     @property
     def not_compared(self) -> list[str]:
-        """Rows that both runs have, each as the answer to another question: by scene, engine and setting."""
+        """Rows that both runs have as answers to different questions.
+
+        They are listed by scene, engine and setting.
+        """
         return [*self._not_compared]
 
     @property
@@ -193,7 +207,10 @@ class Differences:
 
     @property
     def nothing(self) -> bool:
-        """Return whether no comparison of the new run has a counterpart in the old one."""
+        """Return whether no comparison of the new run has a counterpart.
+
+        The counterpart would be in the old run.
+        """
         return self._compared.nothing
 
     @property
@@ -230,7 +247,9 @@ def compare_runs(
     engines: set[str],
     kept: int = KEPT,
 ) -> Differences:
-    """Compare two runs by their scenes, in ascending order: only where both answer the same question.
+    """Compare two runs by their scenes, in ascending order.
+
+    Rows are compared only if both answer the same question.
 
     `engines`: those that have rows in the new run.
     """
@@ -268,7 +287,10 @@ def compare_runs(
 
 
 def _rename_scenes(scenes: ByScene[T], names: Mapping[str, str]) -> ByScene[T]:
-    """Return the old run's scenes under the new run's names; nothing is held in memory if none differs."""
+    """Return the old run's scenes under the new run's names.
+
+    Nothing is held in memory if none differs.
+    """
     if not names:
         return scenes
     return sorted(
@@ -280,7 +302,10 @@ def _rename_scenes(scenes: ByScene[T], names: Mapping[str, str]) -> ByScene[T]:
 def _merge_scenes(
     old: ByScene[T], new: ByScene[T]
 ) -> Iterator[tuple[str, Sequence[T], Sequence[T]]]:
-    """Yield each scene that either run has, with what both have of it; InputError where the scenes are not in order."""
+    """Yield each scene that either run has, with what both have of it.
+
+    Raises InputError if the scenes are not in order.
+    """
     both = merge(
         _require_order("OLD", old),
         _require_order("NEW", new),
@@ -319,7 +344,10 @@ def _compare_scene(
     engines: set[str],
     change: SceneChange | None,
 ) -> list[Change]:
-    """Tell what happened to each row of a scene, for which `engines` were to answer, and what changed in it."""
+    """Tell what happened to each row of a scene, and what changed in it.
+
+    `engines`: those that were to answer.
+    """
     renamed = _pair_settings(before, after)
     changes = []
     for key in sorted((before.keys() | after.keys()) - set(renamed.values())):
@@ -340,7 +368,10 @@ def _compare_scene(
 def _pair_settings(
     before: Mapping[Key, Row], after: Mapping[Key, Row]
 ) -> dict[Key, Key]:
-    """Pair the rows that each run has with a single setting of its own: old key to new key."""
+    """Pair the rows that each run has with a single setting of its own.
+
+    The pairs lead from old key to new key.
+    """
 
     def index_single(keys: Iterable[Key]) -> dict[tuple[str, str, str], Key]:
         groups: dict[tuple[str, str, str], list[Key]] = {}
@@ -362,7 +393,10 @@ def _pair_settings(
 def _list_surroundings(
     old: About, new: About
 ) -> tuple[list[tuple[str, str, str]], list[str]]:
-    """List what the runs were made with where it differs, and what a record cannot say."""
+    """List what the runs were made with if it differs.
+
+    What a record cannot say is listed too.
+    """
     pairs = [("commit", old.commit, new.commit)] if old.commit and new.commit else []
     pairs += _take_both(old.versions, new.versions)
     pairs.append(("machine", old.machine, new.machine))
@@ -377,8 +411,11 @@ def _list_surroundings(
             if not (old.scenes or new.scenes)
             else "the older record does not say"
         )
-        notes.append(f"the scenes' hash is another ({suites[0]} -> {suites[1]}), and {silent} what they ask: "
-                     "a scene that changed cannot be named, rows are compared by name alone")  # fmt: skip
+        notes.append(
+            f"the scenes' hash is another ({suites[0]} -> {suites[1]}), and {silent}"
+            " what they ask: a scene that changed cannot be named, rows are compared by"
+            " name alone"
+        )
     return [
         (what, before, after) for what, before, after in pairs if before != after
     ], notes

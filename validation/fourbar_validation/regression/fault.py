@@ -1,4 +1,7 @@
-"""Locate a regression: rows by engine and cause, scenes by the engines that disagree."""
+"""Locate a regression: rows by engine and cause, scenes by engines.
+
+The engines are those that disagree.
+"""
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
@@ -84,7 +87,10 @@ class Fault:
             self._who[write_sentence(worse, exact), frozenset(worse)] += 1
 
     def groups(self, kinds: Iterable[Kind]) -> list[Group]:
-        """Return the groups of some kinds, the worst first, each with the number of its engine's scenes."""
+        """Return the groups of some kinds, the worst first.
+
+        Each has the number of its engine's scenes.
+        """
         wanted = set(kinds)
         groups = [group for group in self._groups.values() if group.kind in wanted]
         for group in groups:
@@ -102,7 +108,10 @@ class Fault:
 
     @property
     def sentences(self) -> list[str]:
-        """List who disagrees, and in how many of their scenes; the most frequent first."""
+        """List who disagrees, and in how many of their scenes.
+
+        The most frequent come first.
+        """
         counts: Counter[str] = Counter()
         of_scenes: Counter[str] = Counter()
         for (text, engines), n in self._who.items():
@@ -145,7 +154,10 @@ def find_cause(change: Change) -> str:
 
 
 def write_sentence(worse: set[str], exact: set[str]) -> str:
-    """Say who is at fault in a scene where the rows of `worse` regressed; `exact` are the engines held to round-off."""
+    """Say which engine is at fault in a scene.
+
+    The rows of `worse` regressed; `exact`: engines held to round-off.
+    """
     engines = worse - {FORMULAS}
     if len(exact) > 1 and engines >= exact:
         if FORMULAS in worse:

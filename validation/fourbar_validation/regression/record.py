@@ -1,4 +1,7 @@
-"""A recorded run: its table and the versions, machine, settings and scenes it was made with."""
+"""A recorded run: its table, and what it was made with.
+
+That is versions, machine, settings and scenes.
+"""
 
 import csv
 import hashlib
@@ -49,7 +52,9 @@ class About:
     settings: dict[str, str]
     """Engines, suite, and the factors of the tolerances."""
     scenes: dict[str, dict[str, str]] = field(default_factory=dict)
-    """Entries of each scene, by its name; empty in older records and in suites too long for it."""
+    """Entries of each scene, by its name. Empty in older records and in suites too long
+    for it.
+    """
     date: str = ""
     """UTC, ISO 8601; empty in older records."""
     commit: str = ""
@@ -99,7 +104,11 @@ def describe_run(
 
 
 def _find_commit() -> str:
-    """Return the commit of the harness's folder, marked if it has uncommitted changes; CI's statement goes first."""
+    """Return the commit of the harness's folder.
+
+    It is marked if it has uncommitted changes; the statement of a CI service goes
+    first.
+    """
     if stated := os.environ.get("GITHUB_SHA") or os.environ.get("CI_COMMIT_SHA"):
         return stated[:12]
     command = ["git", "describe", "--always", "--dirty", "--abbrev=12", "--exclude=*"]
@@ -120,7 +129,10 @@ def _find_commit() -> str:
 
 
 def write_about(record: About, folder: Path) -> None:
-    """Write record.json next to the results, with rows and SHA-256 of each table, and of itself."""
+    """Write record.json next to the results.
+
+    It has rows and SHA-256 of each table, and of itself.
+    """
     present = [path for name in TABLES if (path := folder / name).is_file()]
     tables = {
         path.name: {"rows": count_rows(path), "sha256": _hash_file(path)}
@@ -145,7 +157,10 @@ def _hash_own(kept: Mapping[str, Any]) -> str:
 def _require_whole(
     tables: Mapping[str, Mapping[str, Any]], folder: Path, read: str, key: str
 ) -> None:
-    """Raise an InputError that names the first table of a folder that is not what its record says."""
+    """Raise an InputError that names the first damaged table of a folder.
+
+    Such a table is not what its record says.
+    """
     present = {name for name in TABLES if (folder / name).is_file()}
     for name in sorted({*tables, *present, read}):
         path = folder / name
@@ -172,12 +187,17 @@ NOTHING_KNOWN = About({}, "unknown machine", {})
 
 @dataclass(frozen=True, slots=True)
 class Recorded:
-    """A run as it is kept in a folder: its table is read as it is needed, and never whole."""
+    """A run as it is kept in a folder.
+
+    Its table is read as it is needed, and never whole.
+    """
 
     about: About
     table: Path
     verified: bool = False
-    """True if the tables are those that the record was written with; older records do not say."""
+    """True if the tables are those that the record was written with. Older records do
+    not say.
+    """
     key: str = "RESULTS"
     """Name in an error message: the argument or option that named the record."""
 
@@ -210,7 +230,10 @@ class Recorded:
         yield from self._read(read_column(self.table, column))
 
     def times(self) -> Iterator[tuple[str, list[tuple[str, float]]]]:
-        """Return each engine's time over that of the formulas, scene by scene; none where they were not kept."""
+        """Return each engine's time over that of the formulas, scene by scene.
+
+        It is empty if they were not kept.
+        """
         table = self.table.parent / TIMINGS
         if not table.is_file():
             return
@@ -249,7 +272,9 @@ class Recorded:
 
 
 def open_run(path: Path, key: str = "RESULTS") -> Recorded:
-    """Open a run by its folder, or by a results.csv only (then how it was made is unknown).
+    """Open a run by its folder, or by a results.csv only.
+
+    Of the latter it is not known how it was made.
 
     Raises InputError where there is no readable table, an empty or a damaged one, or
     that of an unfinished run.
@@ -284,7 +309,10 @@ def open_run(path: Path, key: str = "RESULTS") -> Recorded:
 
 
 def _open_described(record: Path, table: Path, key: str) -> Recorded:
-    """Open a table with what its record says of it; InputError where either is damaged."""
+    """Open a table with what its record says of it.
+
+    Raises InputError if either is damaged.
+    """
     try:
         kept = json.loads(record.read_text(encoding="utf-8"))
         stated = kept.pop("sha256", None)
@@ -320,7 +348,10 @@ def _make_plain(entries: dict[str, str]) -> dict[str, str]:
 
 
 def find_baseline(name_or_path: str) -> Path:
-    """Find a run by its path, or the accepted state of this project's models by its name."""
+    """Find a run by its path, or the accepted state by its name.
+
+    The accepted state is that of this project's models.
+    """
     if not Path(name_or_path).exists() and (SHIPPED / name_or_path / TABLE).is_file():
         return SHIPPED / name_or_path
     return Path(name_or_path)

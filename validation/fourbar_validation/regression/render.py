@@ -13,7 +13,9 @@ SHOWN = tuple(
     for kind in Kind
     if kind not in (Kind.SAME, Kind.ROUND_OFF, Kind.NOT_RUN, *OTHER_QUESTION)
 )
-"""Kinds shown by engine and cause; rows that were not run, or ask another question, are named together."""
+"""Kinds shown by engine and cause. Rows that were not run, or answer another question,
+are named together.
+"""
 AT_MOST = 50
 """Engines and causes listed in text and Markdown."""
 HEADINGS = (
@@ -26,7 +28,10 @@ ROWS = 5
 
 
 def write_verdict(diff: Differences) -> str:
-    """Write one line: how many regressions among how many rows, what else moved, and the counts of the new run."""
+    """Write one line on how many rows regressed.
+
+    What else moved, and the counts of the new run, follow.
+    """
     counts = [f"{diff.kinds[kind]} {kind.value}" for kind in Kind if diff.kinds[kind]]
     many = diff.regressed
     if diff.weakened:
@@ -70,7 +75,10 @@ def write_line(change: Change) -> str:
 
 
 def write_text(diff: Differences) -> str:
-    """Write for a terminal: what is another question first, then what it was made with, then the rows."""
+    """Write for a terminal: what is another question first.
+
+    What the runs were made with follows, then the rows.
+    """
     lines = [f"Weaker rule: {weakening}" for weakening in diff.weakened]
     lines += [*map(str, diff.scenes), *diff.notes]
     lines += [f"{what}: {old} -> {new}" for what, old, new in diff.surroundings]
@@ -93,7 +101,10 @@ def _capitalise(text: str) -> str:
 
 
 def _group_rows(diff: Differences) -> tuple[list[Group], list[str]]:
-    """Group the rows that changed by engine and cause, the worst first; say how many more there are."""
+    """Group the rows that changed by engine and cause, the worst first.
+
+    Say how many more there are.
+    """
     groups = diff.fault.groups(SHOWN)
     more = len(groups) - AT_MOST
     return groups[:AT_MOST], [f"and {more} more engines and causes"] if more > 0 else []

@@ -1,7 +1,8 @@
-"""Rules that a run holds its engines to, and where a later run holds them to weaker ones.
+"""Rules that a run holds its engines to.
 
-A row says by how much it is wrong and how much was allowed. Whoever widens what is
-allowed makes every later error pass, so the rules themselves are kept with a run.
+A later run may hold them to weaker ones, which is told. A row says by how much it is
+wrong and how much was allowed. Whoever widens what is allowed makes every later error
+pass, so the rules themselves are kept with a run.
 """
 
 from collections.abc import Iterable, Mapping
@@ -33,8 +34,8 @@ YES, NO = "yes", "no"
 LOOSER = 1.0 + 1e-9
 """Factor by which a number of a rule has grown if it is another one."""
 NOTABLE = 10.0
-"""Growth of a row's allowance that is printed. The worst position moves with the kernels
-of a processor, and K eps/condition with it: 139 of 2093 allowances grew so.
+"""Growth of a row's allowance that is printed. The worst position moves with the
+kernels of a processor, and K eps/condition with it: 139 of 2093 allowances grew so.
 """
 CLASSES = {
     STATED,
@@ -44,7 +45,7 @@ CLASSES = {
 
 
 def list_rules(engines: Iterable[Engine]) -> Rules:
-    """List the rules of a run: of identities, of each engine, and each declared limit."""
+    """List the rules of a run: of identities, of engines, of declared limits."""
     rules: Rules = {"identities": _describe(IDENTITY), "K": {FACTOR: repr(K)}}
     for engine in engines:
         predicted = engine.predictor is not None or engine.residuals
@@ -120,15 +121,19 @@ def _number(text: str) -> float:
 
 
 def find_class(row: Row) -> str:
-    """Return the class of tolerance that a row's reason begins with; nothing if none."""
+    """Return the class of tolerance that a row's reason begins with.
+
+    Empty if there is none.
+    """
     words = row.reason.partition(":")[0]
     return words if words in CLASSES else ""
 
 
 def find_weakened_row(old: Row, new: Row) -> Weakening | None:
-    """Tell where two rows that agree are held to tolerances of another class, a wider one.
+    """Tell where two rows that agree have tolerances of another class.
 
-    It needs no record of the rules: a table says it by itself.
+    The later one is a wider class. It needs no record of the rules: a table says it by
+    itself.
     """
     if not old.verdict == new.verdict == AGREES or new.allowed <= old.allowed:
         return None

@@ -1,4 +1,7 @@
-"""Flatten a scene's file into entries in SI: two runs are compared where these are the same."""
+"""Flatten a scene's file into entries in SI units.
+
+Two runs are compared where these are the same.
+"""
 
 import tomllib
 from collections.abc import Iterable, Mapping
@@ -13,7 +16,9 @@ from fourbar_validation.scenes.suites import Suite
 Description = Mapping[str, str]
 
 MOST_DESCRIBED = 2000
-"""Scenes that a record describes, one or two kB each; random linkages follow from their seed."""
+"""Scenes that a record describes, one or two kB each. Random linkages follow from their
+seed.
+"""
 NO_QUESTION = ("title", "source", "pictures")
 """Entries of a scene file that change no number."""
 WHERE = ("motion.theta_2", "motion.free.steps", "motion.law.steps")
@@ -21,7 +26,10 @@ WHERE = ("motion.theta_2", "motion.free.steps", "motion.law.steps")
 
 
 def describe_scenes(suite: Suite) -> dict[str, dict[str, str]]:
-    """Describe each scene of a suite by its name; none of a suite of more than MOST_DESCRIBED."""
+    """Describe each scene of a suite by its name.
+
+    None of a suite of more than MOST_DESCRIBED is described.
+    """
     if len(suite) > MOST_DESCRIBED:
         return {}
     return {
@@ -31,7 +39,10 @@ def describe_scenes(suite: Suite) -> dict[str, dict[str, str]]:
 
 
 def describe_changes(scene: Scene) -> dict[str, str]:
-    """List the entries of the scene's file that change a number: "bars.output.inertia": "0.05 kg m^2"."""
+    """List the entries of the scene's file that change a number.
+
+    As "bars.output.inertia": "0.05 kg m^2".
+    """
     try:
         entries = tomllib.loads(dump(scene))
     except FourBarError:  # a scene that no file can state
@@ -90,7 +101,10 @@ def _shorten(old: str, new: str) -> str:
 def find_renamed(
     old: Mapping[str, Description], new: Mapping[str, Description]
 ) -> dict[str, str]:
-    """Find the scenes that state the same under a name that the other run does not have: old name to new name."""
+    """Find the scenes that state the same under another name.
+
+    The other run does not have the name; old name to new name.
+    """
     names: dict[str, list[str]] = {}
     for name in sorted(new.keys() - old.keys(), reverse=True):
         names.setdefault(repr(sorted(new[name].items())), []).append(name)

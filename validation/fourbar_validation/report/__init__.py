@@ -1,1 +1,4 @@
-"""The report: verdict first, then what was compared, how independent it was, what it cost."""
+"""The report: the verdict first, then what was compared.
+
+How independent it was, and what it cost, follow.
+"""

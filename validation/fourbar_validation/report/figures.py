@@ -1,4 +1,7 @@
-"""The pictures of one scene: the linkage, every engine's answer over the formulas, and the errors beneath."""
+"""The pictures of one scene.
+
+These are the linkage, every engine's answer over the formulas, and the errors beneath.
+"""
 
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
@@ -40,7 +43,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 MARKS = 10
-"""Marks of one engine on a curve. Every engine has its own positions, so no mark hides another."""
+"""Marks of one engine on a curve. Every engine has its own positions, so no mark hides
+another.
+"""
 STRETCHES = 24
 """Stretches of a sweep; the error shown in each is its largest."""
 PLOT_COLOURS = {
@@ -60,7 +65,10 @@ SUBSCRIPT = str.maketrans("234", "₂₃₄")
 
 
 def draw_scene_figure(record: Record) -> str | None:
-    """Draw the linkage and, for a sweep, the answers as SVGs; None where nothing assembles."""
+    """Draw the linkage and, for a sweep, the answers as SVGs.
+
+    None if nothing assembles.
+    """
     solution = record.solution
     if (
         record.scene is None
@@ -99,7 +107,10 @@ def _draw_linkage(name: str, scene: Scene, solution: Solution) -> str:
 
 
 def _draw_answers(record: Record, solution: Solution) -> str:
-    """Draw one SVG per quantity: values, and errors of the simulation and of the exact engines on axes of their own."""
+    """Draw one SVG per quantity: values and errors.
+
+    Errors of the simulation and of the exact engines have axes of their own.
+    """
     answers = [
         answer
         for answer in record.answers
@@ -163,7 +174,10 @@ def _draw_values(
     answers: list[Answer],
     jumps: list[Reversal],
 ) -> None:
-    """Draw the formulas as a band, broken at jumps, and each engine's marks on it at positions of its own."""
+    """Draw the formulas as a band, broken at jumps, and each engine's marks.
+
+    The marks stand at positions of their own.
+    """
     good = solution.status_code == OK
     ours = np.where(good, _take_plain(quantity, getattr(solution, quantity)), np.nan)
     base, line = _choose_base(solution, None), ours
@@ -198,7 +212,10 @@ def _draw_errors(
     solution: Solution,
     answers: list[Answer],
 ) -> None:
-    """Draw the largest error of each segment on a logarithmic axis, the worst one ringed, and what is allowed."""
+    """Draw the largest error of each segment on a logarithmic axis.
+
+    The worst one is ringed; what is allowed is drawn too.
+    """
     from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
     good, scene = solution.status_code == OK, record.scene
@@ -265,9 +282,10 @@ def _draw_errors(
 def find_worst_of_segments(
     error: Array, phase: float
 ) -> np.ndarray[Any, np.dtype[np.intp]]:
-    """Find the index of the largest error in each of STRETCHES stretches; `phase` in [0, 1) shifts where they begin.
+    """Find the index of the largest error in each of STRETCHES stretches.
 
-    What is not finite is left out: the table says that it fails.
+    `phase`: in [0, 1), shifts where they begin. What is not finite is left out: the
+    table says that it fails.
     """
     edges = (np.arange(STRETCHES + 2) - 1.0 + phase) * len(error) / STRETCHES
     bounds = np.clip(edges.astype(int), 0, len(error))
@@ -310,7 +328,10 @@ def _label(quantity: str, solution: Solution) -> str:
 
 
 def _choose_base(solution: Solution, command: Command | None) -> Array:
-    """Choose what a curve is drawn over: the time of a free motion, else theta_2 in degrees."""
+    """Choose what a curve is drawn over.
+
+    It is the time of a free motion, else theta_2 in degrees.
+    """
     angle = (solution.at if command is None else command).angle
     if solution.time is not None and len(solution.time) == len(angle):
         return solution.time
@@ -318,7 +339,10 @@ def _choose_base(solution: Solution, command: Command | None) -> Array:
 
 
 def _limit_to_bulk(axes: "Axes", values: Array) -> None:
-    """Limit the axis to 96 % of the positions; near a pole the curve leaves the picture."""
+    """Limit the axis to 96 % of the positions.
+
+    Near a pole the curve leaves the picture.
+    """
     low, high = np.nanpercentile(values, [2.0, 98.0])
     span = high - low
     if span > 0.0 and (

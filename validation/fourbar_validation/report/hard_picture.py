@@ -1,4 +1,7 @@
-"""The picture of the hard cases: error against distance to the singular position, per engine."""
+"""The picture of the hard cases, per engine.
+
+It is error against distance to the singular position.
+"""
 
 import math
 from dataclasses import dataclass
@@ -85,7 +88,10 @@ def list_approaches() -> list[Approach]:
 def list_errors(
     scene: Scene, quantity: str, engine: Engine
 ) -> tuple[Array, Array] | None:
-    """Return (theta_2, error relative to the value itself) of one engine, or None where it refuses."""
+    """Return (theta_2, error relative to the value itself) of one engine.
+
+    None if it refuses.
+    """
     command = command_of(scene)
     if engine.through_time:
         psi = np.abs(command.theta_2 - command.theta_2[0]) - abs(
@@ -111,7 +117,10 @@ def list_errors(
 
 
 def draw_picture() -> str:
-    """Draw the SVG of the page: a column per singular position, a row per quantity; law and prediction drawn in."""
+    """Draw the SVG of the page: a column per singular position, a row per quantity.
+
+    Law and prediction are drawn in.
+    """
     from matplotlib.figure import Figure
 
     columns = list_approaches()
@@ -173,7 +182,10 @@ def _draw(axes: Any, approach: Approach, quantity: str) -> None:
 
 
 def _find_singular(approach: Approach) -> float:
-    """Return theta_2 of the singular position: the positions lie at the distances from it."""
+    """Return theta_2 of the singular position.
+
+    The positions lie at the distances from it.
+    """
     theta_2 = command_of(approach.scene).theta_2
     side = math.copysign(1.0, float(theta_2[0] - theta_2[-1]))
     return float(theta_2[0]) - side * float(approach.distances[0])

@@ -1,4 +1,7 @@
-"""report.html, one self-contained page: every number leads to its row in results.csv, which it carries; report.md."""
+"""report.html, one self-contained page, and report.md.
+
+Every number leads to its row in results.csv, which the page carries.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -30,7 +33,9 @@ from fourbar_validation.report.templating import (
 )
 
 ALL_OPEN = 8
-"""Most scenes that are all shown open; the bodies of more are packed, and unpacked when they are opened."""
+"""Most scenes that are all shown open. The bodies of more are packed, and unpacked when
+they are opened.
+"""
 ORDER = (*UNKNOWNS, "torque_inertia", LINE.value, f"{LINE.value}_inertia")
 """Quantities in the order of the computation; others follow by name."""
 
@@ -59,7 +64,11 @@ class Cell(NamedTuple):
 
 
 class SectionFigure(NamedTuple):
-    """A picture of a section: an SVG drawn by our own code, which stands in the page, or an image as a data URI."""
+    """A picture of a section.
+
+    It is an SVG drawn by our own code, which stands in the page, or an image as a data
+    URI.
+    """
 
     alt: str
     caption: str
@@ -69,7 +78,10 @@ class SectionFigure(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Section:
-    """A part of the report that another module provides: pictures and a table, cells of plain text."""
+    """A part of the report that another module provides.
+
+    It has pictures and a table, cells of plain text.
+    """
 
     key: str
     """Anchor in the page, for example "hard"."""

@@ -8,7 +8,9 @@ from typing import NamedTuple
 from fourbar_validation.compare.rows import Row
 
 LISTED = 10_000
-"""Comparisons with a case of their own, besides as many that fail; the others are counted."""
+"""Comparisons with a case of their own, besides as many that fail. The others are
+counted.
+"""
 
 
 class JunitCase(NamedTuple):
@@ -24,7 +26,10 @@ class JunitCase(NamedTuple):
 
 
 def list_cases(rows: Iterable[Row]) -> Iterator[JunitCase]:
-    """List the rows of a run: what fails is a failure, and what was not compared is skipped."""
+    """List the rows of a run as cases.
+
+    What fails is a failure, and what was not compared is skipped.
+    """
     listed = failures = others = 0
     for row in rows:
         name = (row.scene, f"{row.scene}.{row.engine} {row.setting}", row.quantity)

@@ -1,4 +1,7 @@
-"""Describe where and with what a run was made: versions, machine, this code, and the build of each engine."""
+"""Describe where and with what a run was made.
+
+These are versions, machine, this code, and the build of each engine.
+"""
 
 import ctypes
 import hashlib
@@ -22,13 +25,20 @@ PACKAGES = {
 DISTRIBUTIONS = PACKAGES | {name: name for name in ("drake", "exudyn", "opensim")}
 """Distribution of each package, including those that need not be installed."""
 CODE = (".py", ".toml")
-"""Endings of the files that numbers come from; templates and accepted states change none."""
+"""Endings of the files that numbers come from. Templates and accepted states change
+none.
+"""
 BUILT = (".so", ".pyd", ".dylib", ".py")
-"""Endings of the files of an engine that decide its numbers; others hold where and when it was installed."""
+"""Endings of the files of an engine that decide its numbers. Others hold where and when
+it was installed.
+"""
 
 
 def list_versions() -> dict[str, str]:
-    """List the versions of Python and of every library that decides a number; "not installed" where missing."""
+    """List the versions of Python and of every library that decides a number.
+
+    A missing one is "not installed".
+    """
     versions = {"python": platform.python_version()}
     for name, package in DISTRIBUTIONS.items():
         try:
@@ -66,7 +76,10 @@ def _find_processor() -> str:
 
 
 def find_kernels() -> dict[str, str]:
-    """Find the BLAS kernel and vector instructions that NumPy took: with others the last digits differ."""
+    """Find the BLAS kernel and vector instructions that NumPy took.
+
+    With others the last digits differ.
+    """
     import numpy as np
 
     config: dict[str, Any] = np.show_config(mode="dicts")  # type: ignore[assignment]
@@ -79,7 +92,10 @@ def find_kernels() -> dict[str, str]:
 
 
 def find_blas() -> str:
-    """Find the kernel that NumPy's OpenBLAS took, such as "openblas SkylakeX"; nothing for another BLAS."""
+    """Find the kernel of NumPy's OpenBLAS, such as "openblas SkylakeX".
+
+    Empty for another BLAS.
+    """
     import numpy as np
 
     folder = (
@@ -103,7 +119,10 @@ def find_blas() -> str:
 
 @cache
 def name_code(*further: Path) -> dict[str, str]:
-    """Name and version or hash of everything that decides a number, `further` packages among it; one for a run."""
+    """Name everything that decides a number, with version or hash, for a run.
+
+    `further`: packages among it.
+    """
     builds = {name: build(package) for name, package in DISTRIBUTIONS.items()}
     build_hashes = {
         f"build of {name}": digest
@@ -118,7 +137,10 @@ def name_code(*further: Path) -> dict[str, str]:
 
 
 def hash_modules(*packages: Path) -> str:
-    """Hash of the modules of packages, wherever they lie; the scenes that come with a wheel are none of them."""
+    """Hash the modules of packages, wherever they lie.
+
+    The scenes that come with a wheel are none of them.
+    """
     digest = hashlib.sha256()
     for package in packages:
         for path in sorted(package.rglob("*")):
@@ -136,7 +158,10 @@ def hash_modules(*packages: Path) -> str:
 
 
 def build(package: str) -> str:
-    """Hash of what an installer wrote down of the files of a package: two builds of one version differ in it."""
+    """Hash what an installer wrote down of the files of a package.
+
+    Two builds of one version differ in it.
+    """
     try:
         lines = (distribution(package).read_text("RECORD") or "").splitlines()
     except PackageNotFoundError:

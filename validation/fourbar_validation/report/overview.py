@@ -1,4 +1,7 @@
-"""The first screen of a report: what agrees, how closely, and whose fault it is if not."""
+"""The first screen of a report.
+
+It says what agrees, how closely, and which engine is at fault if not.
+"""
 
 import math
 from collections import Counter
@@ -20,7 +23,9 @@ from fourbar_validation.report.record import Record
 from fourbar_validation.report.words import NUMBER
 
 OWN_ENGINES = (FORMULAS, *DERIVED)
-"""Engines whose rows check fourbar against itself: identities, and functions other than `solve`."""
+"""Engines whose rows check fourbar against itself. They are identities, and functions
+other than `solve`.
+"""
 TORQUE, PINS, MOTION = "torque", "pin forces", "motion"
 GROUPS = (TORQUE, PINS, MOTION)
 """Columns of the table."""
@@ -45,7 +50,9 @@ OTHERS = "other causes"
 NO_ANSWER = "no answer: "
 """Beginning of the cause of an engine that broke down."""
 SMALL = 1e-5
-"""Largest error, relative to a quantity's scale, of an engine that lacks digits rather than an equation."""
+"""Largest relative error of an engine that lacks digits, not an equation. It is over a
+quantity's scale.
+"""
 LIMIT, NO_VALUE, NO_DIGITS, DOES_NOT_APPLY = (
     "at declared limits of an engine",
     "where the formulas state no value",
@@ -98,7 +105,9 @@ class OverviewLine:
     compared: int = 0
     failed: int = 0
     answered: bool = False
-    """True if any number of it was compared; the reason why none was is not in the table."""
+    """True if any number of it was compared. The reason why none was is not in the
+    table.
+    """
     reasons: Counter[str] = field(default_factory=Counter)
     """Why it was not compared, by scene."""
 
@@ -202,7 +211,10 @@ class Overview:
             line.columns[group].add(row, float(find_used(row.error, row.allowed)))
 
     def _add_agreement(self, rows: Sequence[Row]) -> None:
-        """Count a scene whose torque and pin forces two engines compared, and agree on."""
+        """Count a scene on which two engines agree.
+
+        They compared its torque and pin forces.
+        """
         asked: dict[str, dict[str, bool]] = {}
         for row in rows:
             name = "torque" if row.quantity in DRIVES else row.quantity
@@ -233,7 +245,10 @@ class Overview:
 
     @property
     def causes(self) -> list[Cause]:
-        """Return what is wrong, engine by engine: the mistake that explains most first."""
+        """Return what is wrong, engine by engine.
+
+        The mistake that explains most comes first.
+        """
         causes = []
         for engine in dict.fromkeys(engine for engine, _ in self._kinds):
             left = {
@@ -283,7 +298,10 @@ class Overview:
 
     @property
     def silent(self) -> list[str]:
-        """Return the engines with nothing to compare, each with its commonest reason."""
+        """Return the engines with nothing to compare.
+
+        Each has its commonest reason.
+        """
         lines = []
         for line in sorted(self._lines.values(), key=lambda one: one.engine):
             if not line.compared and not line.failed and line.reasons:
@@ -341,7 +359,10 @@ def _take_reason(row: Row) -> str:
 
 
 def name_causes(scene: Record, engine: str, rows: Sequence[Row]) -> list[str]:
-    """Name the mistakes that explain the failing rows of an engine in a scene, or say what fails."""
+    """Name the mistakes that explain the failing rows of an engine in a scene.
+
+    If there are none, say what fails.
+    """
     whole = [row for row in rows if row.quantity == "all"]
     if whole:
         return [f"{NO_ANSWER}{NUMBER.sub('#', _take_reason(whole[0]))}"]

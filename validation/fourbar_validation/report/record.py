@@ -23,7 +23,11 @@ class Timing:
 
 @dataclass(slots=True)
 class Record:
-    """Record of one scene: while it is judged all that its picture needs, afterwards the small and storable part."""
+    """Record of one scene.
+
+    While it is judged it has all that its picture needs, afterwards the small and
+    storable part.
+    """
 
     name: str
     scene: Scene | None = None
@@ -73,7 +77,10 @@ class Record:
         )
 
     def kept_all(self) -> dict[str, Any]:
-        """Return everything that is kept, in lists and dictionaries, the rows sorted."""
+        """Return everything that is kept, in lists and dictionaries.
+
+        The rows are sorted.
+        """
         kept = asdict(replace(self, rows=[]))
         for name in ("scene", "solution", "answers", "jumps"):
             del kept[name]
@@ -97,7 +104,10 @@ class Record:
         )
 
     def joined(self, further: "Record") -> "Record":
-        """Add the answers of another set of engines; the rows of the formulas stand once."""
+        """Add the answers of another set of engines.
+
+        The rows of the formulas stand once.
+        """
         rows = set(self.rows)
         return replace(
             self,

@@ -1,4 +1,7 @@
-"""Parts of report.html from elsewhere: how each family of the hard cases came out, and the study of cost."""
+"""Parts of report.html from elsewhere.
+
+They are how each family of the hard cases came out, and the study of cost.
+"""
 
 import base64
 from collections.abc import Iterable
@@ -44,9 +47,10 @@ MOST = 3
 
 
 def collect_sections(hard: Iterable[Row] | None, out: Path) -> list[Section]:
-    """Collect the hard cases of this run or of one in OUT/hard, and the study in OUT/cost, where there are any.
+    """Collect the hard cases and the study of cost, if there are any.
 
-    Those of this run have their picture, and the limits of the engines with them.
+    The former are of this run or in OUT/hard, the latter in OUT/cost. Those of this run
+    have their picture, and the limits of the engines with them.
     """
     results, sections = out / HARD / "results.csv", []
     if hard is not None:

@@ -41,7 +41,10 @@ ALLOWANCE = attrgetter("allowed")
 
 @dataclass(frozen=True, slots=True)
 class Worst:
-    """The row of one scene and engine that comes nearest to, or goes furthest beyond, its allowance."""
+    """The row of one scene and engine that uses most of its allowance.
+
+    It may lie beyond it.
+    """
 
     row: Row
     used: float
@@ -52,7 +55,10 @@ class Worst:
 
 @dataclass(slots=True)
 class EngineLine:
-    """All that one independent engine, or our own consistency, answered: its counts and its worst row."""
+    """All that one independent engine, or our own consistency, answered.
+
+    It has its counts and its worst row.
+    """
 
     name: str
     version: str = ""
@@ -66,7 +72,9 @@ class EngineLine:
     microseconds: float = math.nan
     """Time per position, median over the scenes; our own is that of the formulas."""
     times_formulas: float = math.nan
-    """Time over that of the formulas on the same scene in the same process, median over the scenes."""
+    """Time over that of the formulas on the same scene, median over the scenes. Both
+    are of the same process.
+    """
     work: str = ""
     """Work that it did in that time."""
 
@@ -88,7 +96,9 @@ SCENES_SHOWN = 200
 SKETCHED = 60
 """Scenes with small pictures."""
 PICTURED = 24
-"""Scenes with pictures, if fewer fail: drawing one takes ten times as long as judging it by an exact engine."""
+"""Scenes with pictures, if fewer fail. Drawing one takes ten times as long as judging
+it by an exact engine.
+"""
 WORST_SHOWN = 80
 LOOSEST_SHOWN = 5
 ORDERS_SHOWN = 20
@@ -104,7 +114,10 @@ STATEMENT = (
 
 
 class Summary:
-    """The report in data, a run condensed scene by scene; what is kept does not grow with their number."""
+    """The report in data: a run condensed scene by scene.
+
+    What is kept does not grow with their number.
+    """
 
     def __init__(self) -> None:
         self.counts = Counts()
@@ -117,12 +130,16 @@ class Summary:
         self.failures: list[Row] = []
         """Failures, at most FAILURES_KEPT of them."""
         self.pairs = self.loose = 0
-        """Quantities of a scene that were compared, and those of them that no row judges tighter than degraded."""
+        """Quantities of a scene that were compared. Those that no row judges tighter
+        than degraded are counted too.
+        """
         self._loosest: list[Row] = []
         self.judged = 0
         """Pairs of scene and engine of which `worst` shows the worst."""
         self.measured_k: dict[str, float] = {}
-        """Largest error*condition/eps of each exact engine: what K would have sufficed."""
+        """Largest error*condition/eps of each exact engine. It is the K that would have
+        sufficed.
+        """
         self.independence: dict[str, tuple[str, str]] = {}
         """engine: (shared with the formulas, found alone)."""
         self.tolerances: Sequence[ErrorBound] = (IDENTITY, EQUIVALENCE, SIMULATED)
@@ -136,7 +153,9 @@ class Summary:
         self._first_reason: dict[tuple[str, str], str] = {}
         self._worst: list[Worst] = []
         self._times: dict[str, list[tuple[float, float]]] = {}
-        """Microseconds per position, and the ratio to the formulas, of at most TIMED scenes of each engine."""
+        """Microseconds per position, and the ratio to the formulas. They are of at most
+        TIMED scenes of each engine.
+        """
         self._orders: list[tuple[str, dict[str, float]]] = []
         self._failing: list[Record] = []
         self._holding: list[tuple[float, Record]] = []
@@ -256,7 +275,10 @@ class Summary:
 
     @property
     def loosest(self) -> str:
-        """Say how many quantities no engine judges tighter than degraded as predicted, and name the worst."""
+        """Say how many quantities no engine judges tighter than degraded.
+
+        They are degraded as predicted; the worst is named.
+        """
         if not self.loose:
             return ""
         worst = nlargest(LOOSEST_SHOWN, self._loosest, key=ALLOWANCE)
@@ -271,7 +293,10 @@ class Summary:
 
     @property
     def good(self) -> bool:
-        """Return whether everything that was to be compared was compared, and holds by no weaker rule."""
+        """Return whether everything that was to be compared holds.
+
+        All was compared, and by no weaker rule.
+        """
         if self.overview.weaker:
             return False
         return self.counts.status == HOLDS and not self.missing
@@ -297,7 +322,10 @@ class Summary:
 
     @property
     def worst(self) -> list[Worst]:
-        """Return the worst by scene and engine; of more than WORST_SHOWN those that used most, in that order."""
+        """Return the worst by scene and engine.
+
+        Of more than WORST_SHOWN they are those that used most, in that order.
+        """
         if self.judged > WORST_SHOWN:
             return nlargest(WORST_SHOWN, self._worst, key=lambda w: w.used)
         return sorted(
@@ -318,7 +346,10 @@ class Summary:
 
     @property
     def orders(self) -> list[tuple[str, dict[str, float]]]:
-        """Return (scene, errors at 4h and 2h and observed order) of simulations: at most ORDERS_SHOWN, lowest first."""
+        """Return (scene, errors at 4h and 2h and observed order) of simulations.
+
+        They are at most ORDERS_SHOWN, lowest first.
+        """
         few = len(self._orders) <= ORDERS_SHOWN
         return (
             self._orders
@@ -328,23 +359,35 @@ class Summary:
 
     @property
     def shown(self) -> list[Record]:
-        """Return the scenes shown, by name, at most SCENES_SHOWN: those that fail, then those that used most."""
+        """Return the scenes shown, by name, at most SCENES_SHOWN.
+
+        They are those that fail, then those that used most.
+        """
         return sorted(self._find_most_used(SCENES_SHOWN), key=lambda scene: scene.name)
 
     @property
     def pictured(self) -> list[Record]:
-        """Return the scenes that have pictures: all that fail, then those that used most of their allowed error."""
+        """Return the scenes that have pictures.
+
+        All that fail have one, then those that used most of their allowed error.
+        """
         return self._find_most_used(PICTURED)
 
     @property
     def sketched(self) -> list[Record]:
-        """Return the scenes with small pictures: those that fail, then the nearest to it."""
+        """Return the scenes with small pictures.
+
+        They are those that fail, then the nearest to it.
+        """
         scenes = self._find_most_used(SCENES_SHOWN)
         return [scene for scene in scenes if scene.thumbnail][:SKETCHED]
 
     @property
     def first(self) -> Record | None:
-        """Return the scene of the large figure: the one asked for, else the first that fails."""
+        """Return the scene of the large figure.
+
+        It is the one asked for, else the first that fails.
+        """
         drawn = [scene for scene in self.shown if scene.figure]
         failing = [scene for scene in self._failing if scene.figure]
         return next(iter([*failing, *drawn]), None)
@@ -364,7 +407,10 @@ def _list_left_out(scene: Record) -> set[tuple[str, str]]:
 
 
 def compute_shares(rows: Sequence[Row]) -> list[float]:
-    """Return error/allowed; infinite without an answer, 0 if the error is 0 or nothing was compared."""
+    """Return error/allowed.
+
+    It is infinite without an answer, 0 if the error is 0 or nothing was compared.
+    """
     of_all = find_used(
         np.array([row.error for row in rows]), np.array([row.allowed for row in rows])
     )
@@ -375,7 +421,10 @@ def compute_shares(rows: Sequence[Row]) -> list[float]:
 
 
 def _count_compared(rows: Sequence[Row]) -> tuple[int, list[Row]]:
-    """Count the quantities compared, and return the row that allows least of each that every row calls degraded."""
+    """Count the quantities compared, and return the tightest degraded rows.
+
+    Each is that which allows least of a quantity that every row calls degraded.
+    """
     by_quantity: dict[str, list[Row]] = {}
     for row in rows:
         if row.compared:

@@ -1,5 +1,6 @@
-"""A matplotlib figure as inline SVG: small, with ids of its own, its text as text, in the colours of the page.
+"""A matplotlib figure as inline SVG.
 
+It is small, with ids of its own, its text as text, in the colours of the page.
 Matplotlib draws with the light colours of page.css; in the page each is the custom
 property that it came from, which has a value for dark pages too (Okabe-Ito hues,
 darkened or lightened until every one has a contrast of 3:1 or more).
@@ -71,7 +72,9 @@ _MARKS = (("P", "✚"), ("X", "✖"), ("*", "★"), ("p", "⬟"))
 OTHERS = tuple(Style(f"--e{9 + n % 3}", *_MARKS[n % 4]) for n in range(12))
 """Styles of engines that are not named above, one after the other."""
 NUMBERS: dict[str, int] = {}
-"""Number of each engine's style among them, as a run numbers its engines, otherwise in the order of drawing."""
+"""Number of each engine's style among them. It is as a run numbers its engines,
+otherwise in the order of drawing.
+"""
 FLOOR = EPS / 16.0
 """Errors below this, zero among them, are drawn here."""
 LONG_NUMBER = re.compile(r"(\d+\.\d)\d+")
@@ -83,7 +86,10 @@ GROUP_NAME = re.compile(r'<g id="[^"]*"')
 
 
 def choose_style(engine: str) -> Style:
-    """Choose the style of an engine: one that is not named in `STYLES` has the next of `OTHERS`."""
+    """Choose the style of an engine.
+
+    One that is not named in `STYLES` has the next of `OTHERS`.
+    """
     return (
         STYLES.get(engine)
         or OTHERS[NUMBERS.setdefault(engine, len(NUMBERS)) % len(OTHERS)]
@@ -100,12 +106,18 @@ def set_frame(axes: Any) -> None:
 
 
 def write_svg(figure: Any, salt: str) -> str:
-    """Draw the figure, to stand in a page; `salt` keeps the ids of two figures in one page apart."""
+    """Draw the figure, to stand in a page.
+
+    `salt`: keeps the ids of two figures in one page apart.
+    """
     return shrink_svg(draw_svg(figure, salt))
 
 
 def write_alone(figure: Any, salt: str) -> str:
-    """Draw the figure as a file of its own, on paper that is light or dark as the reader's pages are."""
+    """Draw the figure as a file of its own.
+
+    Its paper is light or dark as the reader's pages are.
+    """
     svg = shrink_svg(draw_svg(figure, salt, transparent=False))
     light, dark = (
         "".join(f"{name}:{value};" for name, value in colours.items())
@@ -149,9 +161,10 @@ def shrink_svg(svg: str) -> str:
 
 
 def _name_styles(svg: str) -> str:
-    """Write each style once, as a class, as matplotlib repeats it on every mark and text.
+    """Write each style once, as a class.
 
-    A class is named by its content, so that equal names in one page mean equal styles.
+    matplotlib repeats it on every mark and text. A class is named by its content, so
+    that equal names in one page mean equal styles.
     """
     classes: dict[str, str] = {}
 

@@ -8,13 +8,16 @@ from fourbar_validation.compare.rows import make_plain
 from fourbar_validation.report.svg import choose_style
 
 PLAIN = (1e-2, 1e6)
-"""Numbers between these are written without a power of ten, the larger ones where they are whole."""
+"""Numbers between these are written without a power of ten. The larger ones are if they
+are whole.
+"""
 
 
 def render(package: str, name: str, /, **what: object) -> str:
-    """Fill in a template of a package, an unknown name in it an error; in a page every text is escaped for HTML.
+    """Fill in a template of a package.
 
-    It may build on those of the report: one page, one stylesheet, one form of a table.
+    An unknown name in it is an error; in a page every text is escaped for HTML. It may
+    build on those of the report: one page, one stylesheet, one form of a table.
     """
     from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 
@@ -76,12 +79,18 @@ def write_share(value: float) -> str:
 
 
 def write_number(value: float) -> str:
-    """Write an error: three significant digits and a power of ten; a dash where there is no number."""
+    """Write an error: three significant digits and a power of ten.
+
+    A dash stands for no number.
+    """
     return "-" if math.isnan(value) else f"{value:.2e}"
 
 
 def count_or_size(value: float) -> str:
-    """Write three significant digits: 628, 0.125, 3.10e-09; a dash where there is no number."""
+    """Write three significant digits: 628, 0.125, 3.10e-09.
+
+    A dash stands for no number.
+    """
     if math.isnan(value):
         return "-"
     if value == 0.0 or (float(value).is_integer() and abs(value) < PLAIN[1]):

@@ -16,7 +16,9 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 NARROWEST = 80
-"""Columns of the table at least: a narrower terminal breaks its lines, where rich would cut its numbers."""
+"""Least columns of the table. A narrower terminal breaks its lines, where rich would
+cut its numbers.
+"""
 MOST_CAUSES = 18
 """Causes of failures that are printed, one line each; the report has all."""
 MOST_NOTES = 10

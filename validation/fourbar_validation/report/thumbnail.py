@@ -1,4 +1,7 @@
-"""Small pictures of a scene, without words: the linkage, and the torque over the motion."""
+"""Small pictures of a scene, without words.
+
+They are the linkage, and the torque over the motion.
+"""
 
 from collections.abc import Callable
 

@@ -3,4 +3,5 @@
 import re
 
 NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
-"""Pattern of a number in a reason; reasons that differ in numbers alone count as one."""
+"""Pattern of a number in a reason. Reasons that differ in numbers alone count as one.
+"""

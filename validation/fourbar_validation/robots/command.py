@@ -1,4 +1,7 @@
-"""`fourbar-validation loops`: the closed loops of a robot's file, and a scene from one of them."""
+"""`fourbar-validation loops`: the closed loops of a robot's file.
+
+A scene is made from one of them.
+"""
 
 import math
 from pathlib import Path
@@ -72,7 +75,10 @@ def show_report(report: RobotReport) -> None:
 
 
 def write_scene(made: LoopScene) -> str:
-    """Write a scene file that says in comments where it is from and what it leaves out."""
+    """Write a scene file from a loop.
+
+    Its comments say where it is from and what it leaves out.
+    """
     lines = [*made.parts, *made.remarks, *made.notes]
     comments = "".join(f"# {make_plain(line)}\n" for line in lines)
     return f"{comments}\n{dump(made.scene)}"

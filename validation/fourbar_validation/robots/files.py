@@ -50,8 +50,9 @@ COUNTS = (
     "sdf_initpoints",
 )
 MOST_ITERATIONS = 1000
-"""Upper limit of each count in <option>, ten times the greatest of MuJoCo's defaults: MuJoCo
-already steps while it compiles, and with a tolerance of 0 nothing else may stop a solver.
+"""Upper limit of each count in <option>, ten times the greatest of MuJoCo's defaults:
+MuJoCo already steps while it compiles, and with a tolerance of 0 nothing else may stop
+a solver.
 """
 
 
@@ -185,7 +186,10 @@ class _RobotReading:
         return None
 
     def _may_read(self, resolved: Path) -> bool:
-        """Tell whether a file lies in the folder of the robot's, in one beside it, or in that of --assets."""
+        """Tell whether a file lies in a folder that may be read.
+
+        It is that of the robot's file, one beside it, or that of --assets.
+        """
         home = self.path.resolve().parent
         if resolved.is_relative_to(home):
             return True
@@ -228,7 +232,10 @@ class _RobotReading:
             self.contents[plain] = path.read_bytes()
 
     def _drop_pictures(self, root: ET.Element) -> None:
-        """Drop what only draws, and height fields, on which nothing of a robot hangs."""
+        """Drop what only draws, and height fields.
+
+        Nothing of a robot hangs on these.
+        """
         dropped = False
         for parent in root.iter():
             for child in list(parent):

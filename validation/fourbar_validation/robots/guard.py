@@ -20,10 +20,11 @@ SECONDS = 120.0
 def examine_guarded(
     mjcf: Path, seconds: float | None = None
 ) -> Iterator[Callable[..., Any]]:
-    """Examine a file, by an adapter and its arguments, in a process that may crash, hang or run out of memory.
+    """Examine a file, by an adapter and its arguments, in another process.
 
-    An adapter is "module:function"; its arguments and its result are pickled.
-    `seconds`: limit of each call; None: SECONDS.
+    The process may crash, hang or run out of memory. An adapter is "module:function";
+    its arguments and its result are pickled. `seconds`: limit of each call; None:
+    SECONDS.
     """
     seconds = SECONDS if seconds is None else seconds
     from multiprocessing import get_context
@@ -54,7 +55,8 @@ def examine_guarded(
             except ProcessExpired as error:
                 reason = f"MuJoCo crashed on it (exit code {error.exitcode})"
             except KeyboardInterrupt:
-                pool.stop()  # type: ignore[no-untyped-call]  # or the pool would wait for the file to its time limit
+                # or the pool would wait for the file to its time limit
+                pool.stop()  # type: ignore[no-untyped-call]
                 raise
             raise InputError("MJCF", mjcf.name, reason, str(mjcf))
 

@@ -1,4 +1,7 @@
-"""Torque and pin forces of a robot's loops against the formulas: what `check-mjcf` and `advise` ask."""
+"""Torque and pin forces of a robot's loops against the formulas.
+
+`check-mjcf` and `advise` ask for them.
+"""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -32,7 +35,9 @@ LIMIT = 600.0
 """s; a busy machine takes several times the two minutes of an idle one."""
 STATES, THROUGH_TIME = "single states", "through time"
 SLIP = 1e-9
-"""Part of the speeds below which a pin with dry friction is at rest, so that it may rub either way."""
+"""Part of the speeds below which a pin with dry friction is at rest. It may then rub
+either way.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +61,7 @@ class InsideError:
         return self.error / self.largest if self.largest else 0.0
 
     def cells(self) -> tuple[str, ...]:
-        """Return method, quantity, error, its part of the largest, and where it is, as text."""
+        """Return method, quantity, error, its relative size, and place, as text."""
         unit = UNITS[self.quantity]
         return (
             self.method,
@@ -78,7 +83,10 @@ def measure_robot(
 
 
 def list_errors(loop: LoopMeasurement) -> list[InsideError]:
-    """List the worst errors of torque and pin forces against the formulas, by method."""
+    """List the worst errors of torque and pin forces, by method.
+
+    They are against the formulas.
+    """
     errors = list(_compare(STATES, loop, loop.states))
     if loop.through_time is not None:
         errors += _compare(THROUGH_TIME, loop, loop.through_time)
@@ -86,7 +94,10 @@ def list_errors(loop: LoopMeasurement) -> list[InsideError]:
 
 
 def find_left_out(loop: LoopMeasurement) -> float:
-    """Return what the scene leaves out of the robot: the worst difference of rigid pins from the formulas, relative."""
+    """Return what the scene leaves out of the robot, relative.
+
+    It is the worst difference of rigid pins from the formulas.
+    """
     rigid = [replace(row, soft=row.rigid) for row in loop.states.rows]
     answer = replace(loop.states, rows=rigid)
     return max(error.part for error in _compare(STATES, loop, answer))
@@ -149,7 +160,9 @@ def read_torque(text: str | None) -> float | None:
 def read_measure_options(
     loop: str | None, wanted: float | None, robot: Mapping[str, Any]
 ) -> MeasureOptions:
-    """Read --loop, --error, and the values of the other options of a robot by their names.
+    """Read --loop, --error, and the values of the other options of a robot.
+
+    They are keyed by their names.
 
     Raises
     ------

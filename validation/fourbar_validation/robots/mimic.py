@@ -1,4 +1,7 @@
-"""A ratio in place of a loop: a joint equality's polynomial against the four-bar that it stands for."""
+"""A ratio in place of a loop.
+
+A joint equality's polynomial is held against the four-bar that it stands for.
+"""
 
 import math
 from dataclasses import dataclass, replace
@@ -19,11 +22,15 @@ from fourbar_validation.robots.guard import examine_guarded
 
 READ = "fourbar_validation.engines.mujoco.robots.mimic:read_joint_equality"
 DEGREES = (1, 2, 3, 4)
-"""Degrees of the polynomials that MuJoCo's polycoef holds; URDF's mimic has degree 1."""
+"""Degrees of the polynomials of MuJoCo's polycoef; URDF's mimic has degree 1."""
 SAMPLES = 1001
-"""Positions over the motion of the scene; a largest error between two of them is missed by some 1e-6 of it."""
+"""Positions over the motion of the scene. A largest error between two of them is missed
+by some 1e-6 of it.
+"""
 FEWEST = 6
-"""Positions of the scene from which a polynomial of degree 4 is fitted by least squares with an error to tell."""
+"""Least positions of the scene from which a polynomial of degree 4 is fitted. It is
+fitted by least squares with an error to tell.
+"""
 HEADINGS = ("degree", "fit", "angle, deg", "ratio", "polycoef")
 FITS = ("least squares", "smallest largest error")
 """Names of the fits of `MimicReport.squares` and `MimicReport.fitted`."""
@@ -53,7 +60,9 @@ class MimicReport:
     file: MimicError
     """Angle counted from the position of the loop at the zero of the file."""
     shifted: float
-    """Largest error of the angle with the constant of least squares in place of the file's, rad."""
+    """Largest error of the angle with the constant of least squares, rad. It replaces
+    the constant of the file.
+    """
     centred: float
     """Largest error of the angle with the constant that makes it smallest, rad."""
     squares: tuple[MimicError, ...]
@@ -67,7 +76,8 @@ def measure_mimic(
 ) -> MimicReport:
     """Hold the polynomial of a joint against the loop of a scene over its motion.
 
-    The leader's position is taken as theta_2, and the follower's zero is theta_4 where the leader is at its own.
+    The leader's position is taken as theta_2, and the follower's zero is theta_4 where
+    the leader is at its own.
 
     Parameters
     ----------
@@ -75,7 +85,8 @@ def measure_mimic(
 
     Raises
     ------
-    InputError : no such equality, or the loop does not close at the zero of the file or over the motion.
+    InputError : no such equality, or the loop does not close at the zero of the file or
+        over the motion.
     """
     file = read_robot(path, assets)
     with examine_guarded(path) as examined:

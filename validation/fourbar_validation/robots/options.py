@@ -51,7 +51,10 @@ _OPTIONS = (
 
 
 def pose_options(command: Command) -> Command:
-    """Add --pose, --key, --hold, --drive and --assets to a command: `pose`, `key`, `hold`, `drive`, `assets`."""
+    """Add --pose, --key, --hold, --drive and --assets to a command.
+
+    The parameters are `pose`, `key`, `hold`, `drive`, `assets`.
+    """
     for option in reversed(_OPTIONS):
         command = option(command)
     return command

@@ -1,4 +1,7 @@
-"""What was measured of a robot's loops, as sentences and tables: on the terminal, in Markdown, as CSV."""
+"""What was measured of a robot's loops, as sentences and tables.
+
+They are for the terminal, in Markdown, and as CSV.
+"""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -29,7 +32,9 @@ from fourbar_validation.robots.measure import (
 ERRORS = ("method", "quantity", "error", "of its largest", "at")
 SETTINGS = ("changed alone", "single states", "through time", "cost")
 ROUND_OFF = 1e-8
-"""Part of the largest torque and pin forces below which two exact answers differ by the digits of the scene."""
+"""Difference of two exact answers that the digits of the scene make. It is over the
+largest torque and pin forces.
+"""
 STATES_FILE = (
     *("loop", "method", "joint [deg]", "omega_2 [rad/s]", "alpha_2 [rad/s^2]"),
     *("torque [N m]", "torque of rigid pins [N m]"),

@@ -1,4 +1,8 @@
-"""Judge each engine's answer: over the scene's motion, on the linkage, and the inertial part of its torque."""
+"""Judge each engine's answer.
+
+It is judged over the scene's motion, on the linkage, and by the inertial part of its
+torque.
+"""
 
 import math
 from collections.abc import Iterator
@@ -41,7 +45,10 @@ def _answer(question: Question, engine: Engine) -> Iterator[Row]:
 
 
 def compare_answer(question: Question, engine: Engine, answer: Answer) -> list[Row]:
-    """Compare one answer with the formulas, at the motion that the engine really made."""
+    """Compare one answer with the formulas.
+
+    The motion is the one that the engine really made.
+    """
     if answer.at is not None and answer.at is not question.at:
         question = Question(question.name, question.scene, answer.at)
     name, scene, formulas = question.name, question.scene, question.solution
@@ -64,7 +71,10 @@ def compare_answer(question: Question, engine: Engine, answer: Answer) -> list[R
 
 
 def _observe_order(question: Question, engine: Engine) -> dict[str, float]:
-    """Measure the worst error of the torque and the pin forces at 4h and 2h, and the order in h that they show."""
+    """Measure the worst error of torque and pin forces at 4h and 2h.
+
+    The order in h that they show is returned too.
+    """
 
     def error(answer: Answer) -> float:
         rows = compare_answer(question, replace(engine, answers=FORCES), answer)
@@ -83,7 +93,10 @@ def _observe_order(question: Question, engine: Engine) -> dict[str, float]:
 
 
 def compare_statements(question: Question) -> Iterator[Row]:
-    """Compare what the formulas state of the linkage, whatever its motion, with every exact engine."""
+    """Compare what the formulas state of the linkage with every exact engine.
+
+    The statements do not depend on its motion.
+    """
     stated = Statements.of(question.scene, question.at)
     part = "statements of the linkage"
 
@@ -119,7 +132,10 @@ def compare_statements(question: Question) -> Iterator[Row]:
 
 
 class Statements(NamedTuple):
-    """Statements of the formulas on a linkage and over a motion, evaluated once for all engines."""
+    """Statements of the formulas on a linkage and over a motion.
+
+    They are evaluated once for all engines.
+    """
 
     limits: limit_positions.StatedLimits
     transmission: transmission.StatedTransmission
@@ -148,12 +164,15 @@ def check_statements(
     stated: Statements | None = None,
     predicted: Predicted | None = None,
 ) -> list[Row]:
-    """Make a row for each of `range`, `limit_positions`, `transmission`, and where there are change points `through`.
+    """Make a row for each of `range`, `limit_positions`, `transmission`.
+
+    If there are change points, `through` has one.
 
     Parameters
     ----------
     answer : what the engine found over the scene's own motion.
-    stated : what the formulas state, where several engines are held to it at one motion.
+    stated : what the formulas state, where several engines are held to it at one
+        motion.
     predicted : the errors to be expected of the answer.
     """
     if stated is None or (
@@ -181,9 +200,10 @@ def check_statements(
 
 
 def compare_inertia(question: Question) -> Iterator[Row]:
-    """Compare the inertial part of the torque by itself: loads can hide an inertia that is 24 times wrong.
+    """Compare the inertial part of the torque by itself.
 
-    An exact engine answers it in the same assembly; another one is started once more.
+    Loads can hide an inertia that is 24 times wrong. An exact engine answers it in the
+    same assembly; another one is started once more.
     """
     scene = question.scene
     if question.at.speed is None or not (scene.loads or scene.effects):
@@ -243,7 +263,10 @@ def _take_inertia(answer: Answer, drive: str) -> Answer:
 
 
 def check_mjcf(question: Question) -> Iterator[Row]:
-    """Check the generated MJCF as it is shipped, if one is, by the engine that runs it."""
+    """Check the generated MJCF as it is shipped, if one is.
+
+    The engine that runs it checks it.
+    """
     for engine in question.engines:
         if engine.generated:
             from fourbar_validation.engines.mujoco.shipped import compare_shipped

@@ -57,13 +57,19 @@ from fourbar_validation.run.question import Question, select_positions
 STAGES = ("omega_3", "alpha_3", COUPLE.value, LINE.value)
 """One quantity of each stage that a position may lack."""
 LARGE = 1e75
-"""Numbers beyond this, or their squares, may leave the range of doubles in between: 1e300 in a product of four."""
+"""Size of numbers beyond which they, or their squares, may overflow. A product of four
+is 1e300.
+"""
 OfSome = Callable[[NDArray[np.intp]], Array]
 """A number of each of some positions."""
 IN_ONE_LINE = 32.0 * 2.0**-53
-"""|sin(theta_4 - theta_3)| at which bars 3 and 4 may be called in line: their directions are rounded by that."""
+"""|sin(theta_4 - theta_3)| at which bars 3 and 4 may count as collinear. Their
+directions are rounded by that.
+"""
 SAMPLE = 5
-"""Positions of a scene with several solutions of friction, and with one, that are tried: each may take a search."""
+"""Positions of a scene that are tried for solutions of friction. Some have several,
+some one; each may take a search.
+"""
 NEAR = 1e-6
 """|sin(theta_4 - theta_3)| below which doubles have no word in it."""
 
@@ -85,10 +91,11 @@ def check_identities(question: Question) -> Iterator[Row]:
 
 
 def _check_sweep(question: Question) -> Row:
-    """Check a sweep that the scene leaves open: a whole turn, or one degree short of where the loop just closes.
+    """Check a sweep that the scene leaves open.
 
-    At the end of an interval narrower than four degrees it leaves out a quarter of
-    that, which is half of the sweep.
+    It is a whole turn, or one degree short of where the loop just closes. At the end of
+    an interval narrower than four degrees it leaves out a quarter of that, which is
+    half of the sweep.
     """
     command, linkage = question.at, question.scene.linkage
     start, stop = float(command.theta_2[0]), float(command.theta_2[-1])
@@ -107,7 +114,10 @@ def _check_sweep(question: Question) -> Row:
 def _make_row(
     question: Question, quantity: str, equation: str, error: Array, judged: Mask
 ) -> Row:
-    """Make the row of an equation from its error, in parts of its terms, where it is worst."""
+    """Make the row of an equation from its error where it is worst.
+
+    The error is in parts of its terms.
+    """
     condition = 1.0 / count_half_turns(
         question.scene.linkage.ground_angle, question.at.angle
     )
@@ -118,7 +128,10 @@ def _make_row(
 
 
 class _Balance:
-    """Forces, and moments about O2, that must vanish in sum, with the sums of their sizes."""
+    """Forces, and moments about O2, that must vanish in sum.
+
+    The sums of their sizes are kept too.
+    """
 
     def __init__(self) -> None:
         self.force: Any = 0.0
@@ -146,7 +159,10 @@ class _Balance:
 
 
 def _check_sums(question: Question) -> Iterator[Row]:
-    """Check that F12 + F14 + loads = sum of m a_G, the moments of the same about O2 with the torque, and the power."""
+    """Check that F12 + F14 + loads = sum of m a_G, and the power.
+
+    Likewise the moments of the same about O2 with the torque.
+    """
     scene, solution = question.scene, question.solution
     assert (
         solution.F12 is not None
@@ -205,7 +221,10 @@ def _check_sums(question: Question) -> Iterator[Row]:
 
 
 def _sum_actions(question: Question) -> tuple[Actions, Array]:
-    """Sum what acts at the speeds that were answered, not at another evaluation of them; also the place of O4."""
+    """Sum what acts at the speeds that were answered.
+
+    Another evaluation of them is not used; the place of O4 is returned too.
+    """
     scene, command, solution = question.scene, question.at, question.solution
     state = compute_state(scene, command)
     speeds = {
@@ -232,7 +251,10 @@ def _sum_actions(question: Question) -> tuple[Actions, Array]:
 
 
 def _check_power(question: Question, drive: str, judged: Mask) -> Row:
-    """Compare the power of the drive with its torque or force times the speed at which it works."""
+    """Compare the power of the drive with its effort times its speed.
+
+    The effort is a torque or a force.
+    """
     solution = question.solution
     works = getattr(solution, drive) * getattr(
         solution, f"omega_{solution.drive_bar}", solution.stroke_speed
@@ -251,7 +273,10 @@ def _compute_cross(u: Array, v: Array) -> Array:
 
 
 def check_status(question: Question) -> Iterator[Row]:
-    """Check that the formulas have no value exactly where another derivation has none."""
+    """Check that the formulas have no value exactly where they should not.
+
+    Another derivation has none there.
+    """
     reference, free_body = question.reference, question.free_body
     if reference is not None and question.at.speed is not None:
         yield compare_status(question, reference, *_solve_exactly(question))
@@ -261,7 +286,10 @@ def check_status(question: Question) -> Iterator[Row]:
 
 
 def _solve_exactly(question: Question) -> tuple[OfSome | None, OfSome | None]:
-    """Give the sine between bars 3 and 4 in many digits, and how many solutions friction has, at some positions."""
+    """Give the sine between bars 3 and 4 in many digits, at some positions.
+
+    The number of solutions that friction has is given too.
+    """
     scene, command = question.scene, question.at
     unknown = (
         command.remainder is not None
@@ -291,9 +319,10 @@ def compare_status(
     sines: OfSome | None = None,
     solutions: OfSome | None = None,
 ) -> Row:
-    """Count where the formulas have a value and `reference` has none, or the reverse, where it has digits left.
+    """Count where one of the formulas and `reference` alone has a value.
 
-    That a loop does not close is compared by itself where doubles can decide it.
+    Positions count where digits are left. That a loop does not close is compared by
+    itself where doubles can decide it.
 
     `sines`: sin(theta_4 - theta_3) in many digits at some positions, NaN where the loop
     does not close; near 0 it decides whether they are singular. None: nothing is.

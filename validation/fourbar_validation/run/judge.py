@@ -1,4 +1,7 @@
-"""One scene through every check: its rows, its timings, and what was left out and why."""
+"""One scene through every check.
+
+It gives its rows, its timings, and what was left out and why.
+"""
 
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -45,7 +48,9 @@ class Check(NamedTuple):
 
     make_rows: Callable[[Question], Iterable[Row]]
     derived: bool = False
-    """True if it checks a function of fourbar other than `solve`, whose name is then the engine of its rows."""
+    """True if it checks a function of fourbar other than `solve`. The function's name
+    is then the engine of its rows.
+    """
     free: bool = False
     """True if it checks a free motion, False for a prescribed one."""
     what: str = ""
@@ -193,7 +198,10 @@ def judge(
 
 
 def ask(name: str, scene: Scene, engines: Sequence[Engine]) -> Question:
-    """Ask the engines that a scene needs, each position once, and list what is left out."""
+    """Ask the engines that a scene needs, each position once.
+
+    List what is left out.
+    """
     command = command_of(scene)
     if scene.motion.free is not None:
         return Question(name, scene, command, engines)
@@ -215,7 +223,10 @@ def ask(name: str, scene: Scene, engines: Sequence[Engine]) -> Question:
 
 
 def _select_needed(engines: Iterable[Engine], question: Question) -> Iterator[Engine]:
-    """Select the engines that the question needs; the others are left out before they are imported."""
+    """Select the engines that the question needs.
+
+    The others are left out before they are imported.
+    """
     command = question.at
     for engine in engines:
         reason = None

@@ -1,4 +1,7 @@
-"""Parts of one run, judged in folders of their own, and the command that collects them."""
+"""Parts of one run, judged in folders of their own.
+
+A command collects them.
+"""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -26,7 +29,10 @@ MOST_NAMED = 5
 def judge_part(
     plan: Plan, part: RunPart, request: Request, progress: Progress = UNHEARD
 ) -> None:
-    """Judge a part of a run into the parts of its folder, which keeps what an interrupted one left."""
+    """Judge a part of a run into the parts of its folder.
+
+    The folder keeps what an interrupted one left.
+    """
     with open_store(plan, request.out) as store:
         keep_request(request, part, plan.suite, request.out)
         plan.judge(store, part, progress)
@@ -55,7 +61,7 @@ class Gathered:
                 self._stores.setdefault(int(path.name), store)
 
     def _require_all(self) -> None:
-        """Raise InputError that names the parts of which tasks are missing or damaged."""
+        """Raise InputError that names the parts with missing or damaged tasks."""
         chunks = range(len(self._plan.chunks))
         missing = [chunk for chunk in chunks if chunk not in self._stores]
         if not missing:
@@ -81,7 +87,10 @@ def collect(
     out: Path,
     progress: Progress = UNHEARD,
 ) -> Summary:
-    """Write tables and report of a run into `out` from the folders of its parts, which stay as they are."""
+    """Write tables and report of a run into `out` from its parts' folders.
+
+    These stay as they are.
+    """
     if any((out / "parts").glob("*")):
         raise InputError(
             "--out",
@@ -112,9 +121,10 @@ def collect(
 )
 @click.option("--verbose", is_flag=True, help="Print the worst row of each scene too.")
 def command(folders: tuple[Path, ...], out: Path, verbose: bool) -> int:
-    """Write tables and report of a run from the folders in which `run --part` judged its parts.
+    """Write tables and report of a run from the folders of its parts.
 
-    Parts of different runs are refused. If parts are missing, the command names them.
+    `run --part` judged the parts. Parts of different runs are refused. If parts are
+    missing, the command names them.
     """
     from fourbar_validation.report.terminal import print_table
 

@@ -1,4 +1,7 @@
-"""How a run is cut into tasks: what each machine judges alike, whichever of them judges it."""
+"""How a run is cut into tasks.
+
+Every machine cuts a run alike.
+"""
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
@@ -19,13 +22,16 @@ from fourbar_validation.scenes.suites import Files, Suite
 
 WORKERS = 2
 SAMPLE = 30
-"""Scenes in which everything else that is shipped is judged. In a scene that takes as long as judging thirty scenes:
-a tenth more for 10 000 random ones.
+"""Scenes in which everything else that is shipped is judged. In a scene that takes as
+long as judging thirty scenes: a tenth more for 10 000 random ones.
 """
 CHUNK = {True: 1, False: 20}
-"""Scenes per task: one where something is simulated or drawn (a second each), else twenty (a second together)."""
+"""Scenes per task. It is one if something is simulated or drawn (a second each), else
+twenty (a second together).
+"""
 MOST_PARTS = 10_000
-"""Files that a run keeps while it goes on: of a million scenes a hundred stand in each."""
+"""Files that a run keeps while it goes on. Of a million scenes a hundred stand in each.
+"""
 JUDGING, COLLECTING, DRAWING = "judging", "collecting", "drawing"
 """Stages of a run, as its progress is told."""
 
@@ -37,9 +43,13 @@ class RunOptions:
     workers: int = WORKERS
     """Number of processes."""
     drawn: bool = True
-    """True for pictures; a long suite has them at the end, of the scenes that fail or come nearest to failing."""
+    """True for pictures. A long suite has them at the end, of the scenes that fail or
+    come nearest to failing.
+    """
     against: Path | None = None
-    """Earlier run in which the failure that the verdict names is looked up, and whose rules must not be stricter."""
+    """Earlier run that `--against` names. The failure that the verdict names is looked
+    up there, and its rules must not be stricter.
+    """
     sample: int = SAMPLE
     """Scenes, evenly chosen, in which functions other than `solve` are checked."""
 
@@ -61,7 +71,10 @@ UNHEARD = Progress()
 
 
 class RunPart(NamedTuple):
-    """The share of a run that one machine judges: every `of`-th task, from task `number` on."""
+    """The share of a run that one machine judges.
+
+    It is every `of`-th task, from task `number` on.
+    """
 
     number: int = 1
     of: int = 1
@@ -86,7 +99,10 @@ WHOLE = RunPart()
 
 @dataclass(frozen=True)
 class Plan:
-    """A suite, the engines that are asked, and the tasks into which this is cut, the same on every machine."""
+    """A suite, the engines that are asked, and the tasks of this run.
+
+    The tasks are the same on every machine.
+    """
 
     suite: Suite
     engines: tuple[Engine, ...]
@@ -119,7 +135,10 @@ class Plan:
 
     @cached_property
     def identity(self) -> dict[str, Any]:
-        """Return all that a result depends on; two folders hold parts of one run if it is equal."""
+        """Return all that a result depends on.
+
+        Two folders hold parts of one run if it is equal.
+        """
         return {
             "scenes": self.suite.fingerprint(),
             "engines": [engine.fingerprint() for engine in self.engines],

@@ -1,4 +1,7 @@
-"""Scenes judged over processes; one that breaks down is judged again engine by engine."""
+"""Scenes judged over processes.
+
+One that breaks down is judged again engine by engine.
+"""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -15,7 +18,10 @@ from fourbar_validation.scenes.suites import Files, Suite
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """One scene for a worker: its place in a suite, its engines, and what is made of it."""
+    """One scene for a worker.
+
+    It has its place in a suite, its engines, and what is made of it.
+    """
 
     suite: Suite
     scene: int
@@ -80,7 +86,10 @@ def judge_job(job: Job) -> Record:
 def judge_by_engine(
     job: Job, _: BaseException, attempt: worker_processes.Attempt
 ) -> Record:
-    """Judge a scene that broke down one engine at a time; those at fault have a row that says of what."""
+    """Judge a scene that broke down one engine at a time.
+
+    Those at fault have a row that says of what.
+    """
     record: Record | None = None
     breakdowns = []
     for engines in ([], *([engine] for engine in job.engines)):
@@ -98,7 +107,10 @@ def judge_by_engine(
 
 
 def find_time_limit(suite: Suite, engines: Iterable[Engine]) -> float:
-    """Return the seconds after which a scene of the suite is taken to hang; guests have limits of their own besides."""
+    """Return the seconds after which a scene of the suite counts as hanging.
+
+    Guests have limits of their own besides.
+    """
     limit = worker_processes.SECONDS + SECONDS_PER_POSITION * (
         suite.positions if isinstance(suite, Files) else 0
     )
@@ -110,7 +122,10 @@ def find_time_limit(suite: Suite, engines: Iterable[Engine]) -> float:
 def judge_chunks(
     chunks: Iterable[tuple[int, list[Job]]], limit: float, workers: int
 ) -> Iterator[tuple[int, list[Record]]]:
-    """Judge numbered chunks of jobs, each as it is done; a job that takes longer than `limit` (s) hangs."""
+    """Judge numbered chunks of jobs, each as it is done.
+
+    A job that takes longer than `limit` (s) hangs.
+    """
     return worker_processes.apply_over_processes(
         judge_job, chunks, workers, seconds=limit, instead=judge_by_engine
     )

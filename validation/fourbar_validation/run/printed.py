@@ -1,4 +1,7 @@
-"""Check what is printed and no engine answers: error bars, the residual of friction, the motion's law, long sweeps."""
+"""Check what is printed and no engine answers.
+
+These are error bars, the residual of friction, the motion's law, long sweeps.
+"""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -46,11 +49,15 @@ from fourbar_validation.engines.registry import find_missing
 from fourbar_validation.run.question import Question, ask_at, select_positions
 
 SAMPLE = 5
-"""Positions of a scene at which the error bars are held to the true error, besides those nearest to a rest."""
+"""Positions of a scene at which the error bars are held to the true error. Those
+nearest to a rest are added.
+"""
 BARS = 10.0
 """Error bars: 2 in 100 million normal errors exceed ten of them."""
 ROUNDED_SOMEWHERE = 20
-"""Positions with loaded friction of which at least one leaves a residual: by rounding half of them do."""
+"""Positions with loaded friction of which one at least leaves a residual. By rounding
+half of them do.
+"""
 
 
 def check_points(question: Question) -> Iterator[Row]:
@@ -72,7 +79,9 @@ def compare_points(
     reference: Solution,
     least: float = 0.0,
 ) -> Row:
-    """Compare places, velocities and accelerations of a scene's own points, from the angles of another derivation.
+    """Compare places, velocities and accelerations of a scene's own points.
+
+    They follow from the angles of another derivation.
 
     `least`: the condition from which on they are judged.
     """
@@ -140,7 +149,10 @@ def _find_known(reference: Solution, quantity: str, n: int) -> Array:
 
 
 def check_blocks(question: Question) -> Iterator[Row]:
-    """Check a sweep of more than one block of positions, at the ends of its blocks, against the scene's own sweep."""
+    """Check a sweep of more than one block of positions.
+
+    The ends of its blocks are held against the scene's own sweep.
+    """
     scene, command, solution = question.scene, question.at, question.solution
     if command.speed is None or command.remainder is not None:
         return
@@ -199,7 +211,10 @@ def check_blocks(question: Question) -> Iterator[Row]:
 
 
 def check_error_bars(question: Question) -> Iterator[Row]:
-    """Check the error bars by the true error, in 320 bits; no bar may be larger than what a comparison is allowed."""
+    """Check the error bars by the true error, in 320 bits.
+
+    No bar may be larger than what a comparison is allowed.
+    """
     scene, command, solution = question.scene, question.at, question.solution
     if (
         command.omega_2 is None
@@ -280,7 +295,10 @@ def check_error_bars(question: Question) -> Iterator[Row]:
 def _compute_pulls(
     scene: Scene, command: Command, solution: Solution
 ) -> Iterator[Array]:
-    """Compute what each spring, torsion spring and load over a table does, by free bodies: (n,), N and N m together."""
+    """Compute what springs, torsion springs and loads over a table do, (n,).
+
+    They follow from free bodies, N and N m together.
+    """
     assert solution.theta_3 is not None and solution.theta_4 is not None
     motion = move(
         scene.linkage,
@@ -311,7 +329,10 @@ def _compute_pulls(
 
 
 def check_residual(question: Question) -> Iterator[Row]:
-    """Check that what remains of friction couples is rounding: not more, and somewhere not less."""
+    """Check that what remains of friction couples is rounding.
+
+    It may not be more, and somewhere not less.
+    """
     scene, solution = question.scene, question.solution
     residual, terms = solution.friction_residual, np.zeros(len(solution))
     if question.at.speed is None or residual is None:
@@ -350,9 +371,10 @@ def check_residual(question: Question) -> Iterator[Row]:
 
 
 def check_law(question: Question) -> Iterator[Row]:
-    """Check a motion law by its own table: the piecewise cubic through its points whose acceleration is continuous.
+    """Check a motion law by its own table.
 
-    Each piece is the cubic of Hermite through the table's angles with the speeds at its
+    It is the piecewise cubic through its points whose acceleration is continuous. Each
+    piece is the cubic of Hermite through the table's angles with the speeds at its
     ends; that it is the law's is decided by the accelerations of neighbouring pieces
     and by the ends alone. Angle, speed and acceleration of every position, and the
     conditions on the pieces, by the worst of them.
@@ -411,11 +433,12 @@ def check_law(question: Question) -> Iterator[Row]:
 
 
 def _check_rise(question: Question, law: Rise) -> Row:
-    """Check a rise, its dwell and its fall by other forms of the standard laws, part by part.
+    """Check a rise, its dwell and its fall, part by part.
 
-    cycloidal, with x = pi u:  u - sin x cos x/pi,  2 sin^2 x,  4 pi sin x cos x;
-    345: the polynomial of Bernstein with the coefficients 0, 0, 0, 1, 1, 1, and its
-    derivatives.
+    They are checked by other forms of the standard laws:
+
+        cycloidal, with x = pi u:  u - sin x cos x/pi,  2 sin^2 x,  4 pi sin x cos x;
+        345: the polynomial of Bernstein with the coefficients 0, 0, 0, 1, 1, 1.
     """
     command = question.at
     assert command.time is not None
@@ -461,7 +484,10 @@ def _restate_law(kind: str, u: Array) -> tuple[Array, Array, Array]:
 def _interpolate_hermite(
     s: Array, angle: Array, speed: Array, first: Array, last: Array, h: Array
 ) -> tuple[Array, Array, Array]:
-    """Compute angle, speed and acceleration a time s into a piece, from its acceleration at both ends."""
+    """Compute angle, speed and acceleration a time s into a piece.
+
+    They follow from its acceleration at both ends.
+    """
     jerk = (last - first) / h
     return (
         angle + s * (speed + s * (first / 2.0 + s * jerk / 6.0)),

@@ -7,7 +7,10 @@ from fourbar_validation.run.plan import DRAWING, Progress
 
 
 class ShownProgress(Progress):
-    """Progress of a run on standard error: a bar for each stage, and the notes above them."""
+    """Progress of a run on standard error.
+
+    It is a bar for each stage, and the notes above them.
+    """
 
     def __init__(self, scenes: int) -> None:
         from rich.console import Console

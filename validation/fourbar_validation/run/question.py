@@ -1,4 +1,7 @@
-"""A scene in question: its positions, what the formulas answer, and what each engine answers, computed once."""
+"""A scene in question: its positions, and what each engine answers.
+
+The answer of the formulas is among them; all are computed once.
+"""
 
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -28,7 +31,9 @@ from fourbar_validation.engines.registry import ENGINES, Engine
 from fourbar_validation.report.record import Record, Timing
 
 FREE_BODY = next(engine for engine in ENGINES if engine.name == FreeBody.name)
-"""The free-body solution supplies the condition numbers, so that no allowed error depends on the formulas it tests."""
+"""The free-body solution supplies the condition numbers. No allowed error then depends
+on the formulas it tests.
+"""
 
 
 class NotAskedError(Exception):
@@ -45,7 +50,9 @@ class Question:
     engines: Sequence[Engine] = ()
     """Engines that are to answer."""
     order: bool = False
-    """True if the observed order of what is simulated is wanted, which takes two more simulations."""
+    """True if the observed order of what is simulated is wanted. It takes two more
+    simulations.
+    """
     output: dict[str, str] = field(default_factory=dict)
     """Text that each engine printed."""
     left_out: list[str] = field(default_factory=list)
@@ -62,7 +69,10 @@ class Question:
     started: dict[str, Adapter] = field(default_factory=dict)
 
     def solve(self) -> Solution:
-        """Solve the scene as far as anything is compared: error bars take ten times as long as all the rest."""
+        """Solve the scene as far as anything is compared.
+
+        Error bars take ten times as long as all the rest.
+        """
         if self.scene.motion.free is not None:
             return solve(self.scene)
         return solve(
@@ -76,7 +86,10 @@ class Question:
 
     @cached_property
     def free_body(self) -> Answer | None:
-        """Return the answer of the free bodies, or None if they break down: a row of their own fails."""
+        """Return the answer of the free bodies, or None if they break down.
+
+        A row of their own fails then.
+        """
         try:
             with np.errstate(all="ignore"):
                 return self.answer(FREE_BODY)
@@ -85,7 +98,10 @@ class Question:
 
     @cached_property
     def reference(self) -> Solution | None:
-        """Conditions and sizes by free bodies, the reference of every comparison; None: an answer has its own."""
+        """Conditions and sizes by free bodies, the reference of every comparison.
+
+        None: an answer has its own.
+        """
         try:
             with np.errstate(all="ignore"):
                 return (
@@ -124,7 +140,10 @@ class Question:
         return ()
 
     def reversing(self, slip: float) -> Mask:
-        """Mark where dry friction reverses: a pin slips by no more than this part of its speeds."""
+        """Mark where dry friction reverses.
+
+        A pin slips there by no more than this part of its speeds.
+        """
         return mark_reversing(self.scene, self.solution, slip)
 
     def row(
@@ -182,7 +201,10 @@ class Question:
     def attempt(
         self, check: Callable[[], Iterable[Row]], engine: str, part: str = ""
     ) -> Iterator[Row]:
-        """Yield the rows of a check; what it raises is a failure of its own, in a row of its own."""
+        """Yield the rows of a check.
+
+        What it raises is a failure of its own, in a row of its own.
+        """
         try:
             yield from check()
         except NotAskedError as reason:
@@ -192,7 +214,10 @@ class Question:
 
 
 def ask_at(adapter: Adapter, scene: Scene, command: Command) -> Answer:
-    """Give an engine what is commanded, with the sign of its sine at each position; nothing of the formulas besides."""
+    """Give an engine what is commanded, with the sign of its sine.
+
+    The sign is at each position; nothing else of the formulas is given.
+    """
     bare = remove_angles(with_signs(scene.linkage, command))
     answer = adapter.answer(scene, bare)
     if answer.at is bare:
@@ -205,7 +230,10 @@ def ask_at(adapter: Adapter, scene: Scene, command: Command) -> Answer:
 
 
 def remove_angles(command: Command) -> Command:
-    """Take out of a command by a stroke the bar's motion, which the formulas computed from it: NaN."""
+    """Put NaN for the bar's motion in a command by a stroke.
+
+    The formulas computed it from the stroke.
+    """
     if command.stroke is None:
         return command
     unknown = np.full_like(command.angle, np.nan)

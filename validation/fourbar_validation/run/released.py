@@ -1,8 +1,8 @@
-"""Free motions: every engine against the exact solution where there is one, otherwise against the formulas.
+"""Free motions of every engine against the exact solution.
 
-An engine's error is predicted by itself: it runs twice, with its step and with twice
-its step, and the difference is what the coarser motion errs by. The finer one must not
-err by more than ten times that.
+Where there is none, they are held against the formulas. An engine's error is predicted
+by itself: it runs twice, with its step and with twice its step, and the difference is
+what the coarser motion errs by. The finer one must not err by more than ten times that.
 """
 
 import math
@@ -63,18 +63,24 @@ FORWARD = {
     "mujoco-forward": (_answer_mujoco, 1e-3, "mujoco"),
     "pinocchio-forward": (_answer_pinocchio, 1e-3, "pinocchio"),
 }
-"""Engines that integrate by themselves: function that starts one with a step, longest step (s), and library."""
+"""Engines that integrate by themselves. Each has a function that starts it with a step,
+the longest step (s), and its library.
+"""
 LONGEST_STEP = 2e-3
 """s, of a guest."""
 FULL = {"theta_2": 1e-9, "omega_2": 1e-8, "energy": 1e-10}
-"""Errors (rad, of the greatest speed, of the greatest energies) at which a free motion agrees: the
-formulas hold theta_2 to 1e-9 rad over 5 s; a motion of 100 s may amplify that by its duration, so 5 s is the unit.
+"""Errors (rad, of the greatest speed, of the greatest energies) at which a free motion
+agrees: the formulas hold theta_2 to 1e-9 rad over 5 s; a motion of 100 s may amplify
+that by its duration, so 5 s is the unit.
 """
 UNIT = 5.0
 
 
 class Pendulum(NamedTuple):
-    """A parallelogram that stays parallel is a pendulum: J phi'' = W sin phi, phi from the upright."""
+    """A parallelogram that stays parallel is a pendulum: J phi'' = W sin phi.
+
+    phi is from the upright.
+    """
 
     J: float
     W: float
@@ -82,7 +88,10 @@ class Pendulum(NamedTuple):
     omega_0: float
 
     def motion(self, times: Array) -> tuple[Array, Array]:
-        """Compute phi and phi' (rad, rad/s) of a pendulum that turns over, by Jacobi's elliptic functions."""
+        """Compute phi and phi' (rad, rad/s) of a pendulum that turns over.
+
+        They follow by Jacobi's elliptic functions.
+        """
         from scipy.special import ellipj, ellipk, ellipkinc
 
         k, sense = self.W / self.J, math.copysign(1.0, self.omega_0)
@@ -105,7 +114,10 @@ class Pendulum(NamedTuple):
 
 
 def make_pendulum(scene: Scene) -> Pendulum | None:
-    """Give the pendulum that the scene is, or None; it must turn over, or none of this is an answer."""
+    """Give the pendulum that the scene is, or None.
+
+    It must turn over.
+    """
     d, a, b, c = scene.linkage.lengths
     effects = scene.effects
     if not (
@@ -142,9 +154,10 @@ def make_pendulum(scene: Scene) -> Pendulum | None:
 
 
 def check_released(question: Question) -> Iterator[Row]:
-    """Compare every forward engine's free motion with that of the formulas, and the forces of each instant.
+    """Compare every forward engine's free motion with that of the formulas.
 
-    The motion goes on through limit positions and change points.
+    The forces of each instant are compared too. The motion goes on through limit
+    positions and change points.
     """
     name, scene, solution = question.name, question.scene, question.solution
     free = scene.motion.free
@@ -191,10 +204,11 @@ def check_released(question: Question) -> Iterator[Row]:
 
 
 def _compare_forces(question: Question) -> Iterator[Row]:
-    """Compare motion, pin forces and the torque, which is none, of every instant, by engines that answer one by one.
+    """Compare motion, pin forces and torque of every instant.
 
-    They are given theta_2, omega_2 and alpha_2; that these balance without a torque is
-    the equation of motion.
+    The torque is zero; engines that answer one by one are asked. They are given
+    theta_2, omega_2 and alpha_2; that these balance without a torque is the equation of
+    motion.
     """
     name, scene, solution = question.name, question.scene, question.solution
     none = solution.torque if solution.drive is None else solution.drive_force
@@ -242,7 +256,10 @@ def _compare_forces(question: Question) -> Iterator[Row]:
 def _keep_worst_forces(
     engine: Engine, driven: list[tuple[Question, Solution]]
 ) -> list[Row]:
-    """Compare what one engine answers to each part of the motion, and keep the worst row of each quantity."""
+    """Compare what one engine answers to each part of the motion.
+
+    Keep the worst row of each quantity.
+    """
     return keep_worst(
         row
         for question, solution in driven
@@ -288,11 +305,12 @@ def _compare_forces_by(
 def _prescribe(
     scene: Scene, command: Command
 ) -> Iterator[tuple[Scene, NDArray[np.intp]]]:
-    """Prescribe the instants at which the linkage moves, and each standstill with the couples of dry friction there.
+    """Prescribe the instants at which the linkage moves.
 
-    An engine has no friction at rest. A standstill that lasts is held: every pin takes
-    the same part of its torque, and no more than all of it; one that ends begins to
-    move against the whole torque.
+    Each standstill is prescribed with the couples of dry friction there. An engine has
+    no friction at rest. A standstill that lasts is held: every pin takes the same part
+    of its torque, and no more than all of it; one that ends begins to move against the
+    whole torque.
     """
     assert command.omega_2 is not None
     friction = next(
@@ -366,9 +384,8 @@ def _make_rows(
 
     def numbers(answer: ReleasedAnswer) -> dict[str, Array]:
         series = {"theta_2": answer.theta_2[:n], "omega_2": answer.omega_2[:n]}
-        if (
-            coarse is not None
-        ):  # the formulas integrate the energy equation itself; their drift is part of their test
+        if coarse is not None:
+            # the formulas integrate the energy equation; its drift is part of their test
             series["energy"] = answer.energy[:n] - answer.energy[0]
         return series
 

@@ -1,4 +1,7 @@
-"""What a run is asked for: the options of its command line, its suite and its engines, and how a part keeps them."""
+"""Options of a run: its command line, its suite and its engines.
+
+A part keeps them.
+"""
 
 import json
 from dataclasses import asdict, dataclass
@@ -48,7 +51,10 @@ KEPT = (
 
 @dataclass(frozen=True, kw_only=True)
 class Request:
-    """Everything that the command line of a run states, by the names of its options; None where it states nothing."""
+    """Everything that the command line of a run states, by its options' names.
+
+    None where it states nothing.
+    """
 
     scenes: tuple[Path, ...] = ()
     out: Path = Path("results")
@@ -76,7 +82,10 @@ class Request:
         return {form: getattr(self, form) for form in FORMS}
 
     def require_consistent(self) -> None:
-        """Refuse options that contradict each other or would do nothing, and files that cannot be written."""
+        """Refuse options that contradict each other or would do nothing.
+
+        Files that cannot be written are refused too.
+        """
         for option, excluded, why in EXCLUDED:
             if getattr(self, option) is not None and getattr(self, excluded) not in (
                 None,
@@ -122,7 +131,9 @@ class Request:
 
 
 def make_plan(request: Request, files: Files | None = None) -> Plan:
-    """Read the scenes and make the engines ready; DependencyError where one that is named cannot answer here.
+    """Read the scenes and make the engines ready.
+
+    Raises DependencyError if one that is named cannot answer here.
 
     `files`: the scenes as a part kept them.
     """
@@ -133,7 +144,10 @@ def make_plan(request: Request, files: Files | None = None) -> Plan:
 
 
 def keep_request(request: Request, part: RunPart, suite: Suite, out: Path) -> None:
-    """Write what was asked for beside a part, with the text of scene files, which another machine need not have."""
+    """Write what was asked for beside a part, with the text of scene files.
+
+    Another machine need not have the files.
+    """
     asked = {name: getattr(request, name) for name in KEPT}
     kept: dict[str, Any] = {"parts": part.of, "asked": asked}
     if isinstance(suite, Files):
@@ -142,7 +156,10 @@ def keep_request(request: Request, part: RunPart, suite: Suite, out: Path) -> No
 
 
 def read_request(folder: Path) -> tuple[int, Request, Files | None]:
-    """Read beside a part how many there are, what was asked for, and the scene files; InputError without it."""
+    """Read beside a part how many there are, and what was asked for.
+
+    The scene files are read too; InputError without them.
+    """
     try:
         kept = json.loads((folder / REQUEST).read_text(encoding="utf-8"))
         asked = kept["asked"]
@@ -211,7 +228,10 @@ def read_linkage_types(text: str) -> tuple[DrawnType, ...]:
 def find_askable(
     engines: tuple[Engine, ...], *, by_name: bool
 ) -> tuple[tuple[Engine, ...], list[tuple[str, str]]]:
-    """Find those that can answer here, and the others with the reason; DependencyError where those were named."""
+    """Find those that can answer here, and the others with the reason.
+
+    Raises DependencyError if those were named.
+    """
     missing = [
         (engine.name, reason) for engine in engines if (reason := engine.missing())
     ]

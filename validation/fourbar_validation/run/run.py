@@ -1,4 +1,7 @@
-"""The run: every scene judged, the results streamed to disk, the pictures drawn, the report written."""
+"""The run: every scene judged, and the report written.
+
+The results are streamed to disk, and the pictures drawn.
+"""
 
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -49,8 +52,8 @@ from fourbar_validation.scenes.suites import Suite
 
 TIMINGS = ("scene", "engine", "setting", "positions", "seconds", "times_formulas")
 OUTCOME = (TABLE, COLUMNS, ABOUT, "timings.csv", "report.md", "report.html", OUTPUT)
-"""Files that a run ends with. A run first removes those of an earlier run, so that none passes for its own if it ends
-early.
+"""Files that a run ends with. A run first removes those of an earlier run, so that none
+passes for its own if it ends early.
 """
 
 
@@ -62,7 +65,10 @@ def run(
     missing: Sequence[tuple[str, str]] = (),
     progress: Progress = UNHEARD,
 ) -> Summary:
-    """Judge a suite into a folder, which keeps what an interrupted run of the same suite, engines and versions left.
+    """Judge a suite into a folder.
+
+    The folder keeps what an interrupted run of the same suite, engines and versions
+    left.
 
     `missing`: the engines that cannot answer here, each with the reason.
     """
@@ -87,7 +93,10 @@ def open_store(plan: Plan, out: Path) -> Iterator[Store]:
 def write_outcome(
     plan: Plan, read: Callable[[int], list[Any]], out: Path, progress: Progress
 ) -> Summary:
-    """Write tables and report of what was judged; `read` returns the results of a task."""
+    """Write tables and report of what was judged.
+
+    `read`: returns the results of a task.
+    """
     suite, engines, options = plan.suite, plan.engines, plan.options
     summary = plan.summarise()
     first_lines = _collect(plan, read, out, summary, progress)
@@ -159,7 +168,10 @@ def _collect(
     summary: Summary,
     progress: Progress,
 ) -> dict[str, int]:
-    """Write the tables task by task, add each scene to the summary; return each scene's first line."""
+    """Write the tables task by task, and add each scene to the summary.
+
+    Return each scene's first line.
+    """
     with (
         Columns(out) as columns,
         draft_file(out / OUTPUT) as output,
@@ -189,9 +201,10 @@ def _collect(
 def _redraw(
     suite: Suite, scene: int, summary: Summary, engines: Sequence[Engine]
 ) -> pool.Job:
-    """Make the job of judging a scene once more, now with its pictures: its answers were not kept.
+    """Make the job of judging a scene once more, now with its pictures.
 
-    An engine that broke down, or hung, in the scene is not started in it again.
+    Its answers were not kept. An engine that broke down, or hung, in the scene is not
+    started in it again.
     """
     name = make_plain(suite.name(scene))
     rows = next(record.rows for record in summary.pictured if record.name == name)
@@ -203,7 +216,10 @@ def _redraw(
 
 
 def picture_models(suite: Suite, scenes: Iterable[int]) -> tuple[dict[str, str], str]:
-    """Picture the MJCF of some scenes by MuJoCo: base64 PNGs by name, and the reason where there are none."""
+    """Picture the MJCF of some scenes by MuJoCo, as base64 PNGs by name.
+
+    The reason is returned if there are none.
+    """
     texts = {}
     for index in scenes:
         try:
@@ -217,7 +233,10 @@ def picture_models(suite: Suite, scenes: Iterable[int]) -> tuple[dict[str, str],
 
 @contextmanager
 def draft_file(path: Path) -> Iterator[TextIO]:
-    """Write a text file line by line: in place once it is complete, and removed where it is empty."""
+    """Draft a text file line by line.
+
+    It is in place once it is complete, and removed if it is empty.
+    """
     draft = path.with_name(f".{path.name}.part")
     with name_file(path):
         try:
@@ -230,7 +249,10 @@ def draft_file(path: Path) -> Iterator[TextIO]:
 
 
 def list_timings(record: Record) -> Iterator[list[str]]:
-    """Give the seconds per answer, and their ratio to the formulas' on the same scene in the same process."""
+    """Give the seconds per answer, and their ratio to the formulas'.
+
+    Both are on the same scene in the same process.
+    """
     for timing in record.timings:
         ratio = timing.seconds / record.timings[0].seconds
         numbers = (str(timing.positions), f"{timing.seconds:.6f}", f"{ratio:.1f}")

@@ -1,9 +1,11 @@
 """The folder of whatever runs long: a lock, finished parts, and at the end the results.
 
 lock               held while a run goes on; the system frees it when the process dies
-run.json           what is being run; a rerun of the same thing resumes, of another starts over
-parts/000012       what chunk 12 came to, written whole: a line of JSON that says of which run it is, and the SHA-256
-                   of what follows; then a line of JSON for each result, packed by gzip
+run.json           what is being run; a rerun of the same thing resumes, of another
+                   starts over
+parts/000012       result of chunk 12, written atomically: a line of JSON that says of
+                   which run it is, and the SHA-256 of what follows; then a line of JSON
+                   for each result, packed by gzip
 """
 
 import gzip
@@ -25,7 +27,10 @@ class RunningError(FourBarError):
 
 
 class Store:
-    """The parts of one run in its folder: `identity` is what they depend on, `outcome` the files it ends with."""
+    """The parts of one run in its folder.
+
+    `identity`: what they depend on. `outcome`: the files it ends with.
+    """
 
     def __init__(
         self, folder: Path, identity: dict[str, Any], outcome: Sequence[str] = ()
@@ -42,7 +47,10 @@ class Store:
 
     @contextmanager
     def held(self) -> Iterator["Store"]:
-        """Hold the folder for one run and keep the parts that an interrupted run of the same thing left."""
+        """Hold the folder for one run.
+
+        The parts that an interrupted run of the same thing left are kept.
+        """
         from filelock import FileLock, Timeout
 
         self.folder.mkdir(parents=True, exist_ok=True)
@@ -85,7 +93,10 @@ class Store:
             write_text(marker, self._identity)
 
     def _name_difference(self, marker: Path) -> str:
-        """Name what the earlier run differs in from this one; nothing if they are the same run."""
+        """Name what the earlier run differs in from this one.
+
+        Empty if they are the same run.
+        """
         try:
             before = json.loads(marker.read_text(encoding="utf-8"))
             now = json.loads(self._identity)
@@ -108,7 +119,10 @@ class Store:
             raise InputError(key, str(self.folder), why)
 
     def done(self) -> set[int]:
-        """List the chunks whose parts are complete and of this run; others are removed, and noted."""
+        """List the chunks whose parts are complete and of this run.
+
+        Others are removed, and noted.
+        """
         done = set()
         for path, damage in self.examine():
             if damage:
@@ -121,7 +135,10 @@ class Store:
         return done
 
     def examine(self) -> Iterator[tuple[Path, str]]:
-        """Yield each part with what is wrong with it; nothing if it is complete and of this run."""
+        """Yield each part with what is wrong with it.
+
+        Empty if it is complete and of this run.
+        """
         for path in sorted(self.parts.iterdir()):
             try:
                 self._unpack(path)
@@ -144,7 +161,10 @@ class Store:
         return self.parts / f"{chunk:06d}"
 
     def _unpack(self, path: Path) -> bytes:
-        """Read what follows the first line of a part; ValueError that says what is wrong with it."""
+        """Read what follows the first line of a part.
+
+        Raises a ValueError that says what is wrong with it.
+        """
         if not path.is_file():
             raise ValueError("is no file")
         first, _, packed = path.read_bytes().partition(b"\n")
@@ -161,7 +181,10 @@ class Store:
         return packed
 
     def read(self, chunk: int) -> list[Any]:
-        """Read the results of a chunk, in order; DependencyError where the part was damaged meanwhile."""
+        """Read the results of a chunk, in order.
+
+        Raises DependencyError if the part was damaged meanwhile.
+        """
         path = self._find_path(chunk)
         try:
             lines = gzip.decompress(self._unpack(path)).decode().splitlines()

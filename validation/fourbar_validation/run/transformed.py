@@ -1,8 +1,9 @@
-"""The same linkage stated otherwise: mirrored, turned, scaled, read from its other end, in parts.
+"""The same linkage stated otherwise.
 
-A symmetry of mechanics takes the formulas' numbers of one scene into those of another,
-which other branches of the code compute; it needs no reference. Scaling by powers of
-two changes no digit at all.
+It is mirrored, turned, scaled, read from its other end, and in parts. A symmetry of
+mechanics takes the formulas' numbers of one scene into those of another, which other
+branches of the code compute; it needs no reference. Scaling by powers of two changes no
+digit at all.
 """
 
 import cmath
@@ -60,7 +61,9 @@ TURNED = 0.7
 SCALE = 2.0**7
 """Factor of every length."""
 PART, APART = 0.3, 0.4
-"""Part of a bar's mass that is split off, and how far apart both parts are, in radii of gyration of the bar."""
+"""Part of a bar's mass that is split off, and the distance of both parts. The distance
+is in radii of gyration of the bar.
+"""
 AT_A_REVERSAL = 1e-3
 """Part of its speeds below which a pin with dry friction may reverse."""
 FORCES = (*PIN_FORCES, "torque", "drive_force")
@@ -72,7 +75,7 @@ TRANSFORMED_QUANTITIES = (
 """Quantities that are compared, as far as the scene has them."""
 OTHER_BAR = {1: 1, 2: 4, 3: 3, 4: 2}
 OTHER_PIN = {"O2": "O4", "A": "B", "B": "A", "O4": "O2"}
-"""Bars and pins by their numbers and names where the linkage is read from its other end."""
+"""Bars and pins by their names in a linkage read from its other end."""
 OTHER_FORCE = {
     "F12": ("F14", 1.0),
     "F14": ("F12", 1.0),
@@ -96,14 +99,19 @@ class _QuantitySizes(NamedTuple):
 
 @dataclass(frozen=True)
 class _Few:
-    """A scene at a few positions that are well-conditioned, with what the formulas say of them."""
+    """A scene at a few positions that are well-conditioned.
+
+    It holds what the formulas say of them.
+    """
 
     scene: Scene
     command: Command
     solution: Solution
     question: Question
     fit: Mask
-    """Positions that are compared; the first, from which springs count their turns, need not be."""
+    """Positions that are compared. The first, from which springs count their turns,
+    need not be.
+    """
 
     @cached_property
     def quantities(self) -> list[str]:
@@ -145,11 +153,16 @@ class _Few:
         return with_signs(self.scene.linkage, self.command).branch
 
     def solve(self, scene: Scene, **changed: Any) -> Solution:
-        """Solve another scene at the same positions, some entries of the command changed."""
+        """Solve another scene at the same positions.
+
+        Some entries of the command are changed.
+        """
         return _solve(scene, self.command._replace(**changed))
 
     def solve_alike(self, scene: Scene, sense: int, **changed: Any) -> Solution:
-        """Solve another scene whose loop lies on the same side at each position, or on the other.
+        """Solve another scene whose loop lies on the same side, or on the other.
+
+        The side is that at each position.
 
         An assembly of a linkage with change points has another sign beyond each of
         them, and the rounding of the lengths decides whether there are any: the sign is
@@ -246,7 +259,10 @@ def _take_few(question: Question) -> _Few:
 
 
 def _solve(scene: Scene, command: Command) -> Solution:
-    """Solve a scene whose motion begins at the first position, from which springs count their turns."""
+    """Solve a scene whose motion begins at the first position.
+
+    Springs count their turns from there.
+    """
     bar, branch = command.bar, int(command.branch[0])
     begin: Any = {f"theta_{bar}": float(command.angle[0]), "branch": branch}
     return solve(replace(scene, motion=Motion(**begin)), "force", at=command)
@@ -262,7 +278,9 @@ class _Conversion:
     """What happens to each number of a scene."""
 
     length: float = 1.0
-    """Factor of lengths, accelerations and forces; of couples and inertias it is its square."""
+    """Factor of lengths, accelerations and forces. Of couples and inertias it is its
+    square.
+    """
     sense: float = 1.0
     """-1: angles and couples change their signs."""
     turn: float = 0.0
@@ -362,7 +380,10 @@ def _convert_springs(effect: Springs, to: _Conversion, linkage: FourBar) -> Spri
 
 
 def _convert_torsion(effect: Torsion, to: _Conversion, linkage: FourBar) -> Torsion:
-    """Convert springs at pins; read from the other end two bars at A or B change their order."""
+    """Convert springs at pins.
+
+    Read from the other end two bars at A or B change their order.
+    """
     rows = []
     square = to.length * to.length
     for pin, stiffness, rest, preload in effect.springs:
@@ -482,7 +503,10 @@ def _measure_turned(few: _Few) -> Array:
 
 
 def _measure_scaled(few: _Few) -> Array:
-    """Multiply lengths, and what grows with them, by a power of two; return what differs at all."""
+    """Multiply lengths, and what grows with them, by a power of two.
+
+    Return what differs at all.
+    """
     other = few.solve(_convert(few.scene, _Conversion(length=SCALE)))
     power = {"N": SCALE, "N m": SCALE**2, "W": SCALE**2}
     errors = []
@@ -535,7 +559,10 @@ def _measure_superposed(few: _Few) -> Array:
 
 
 def _measure_split_masses(few: _Few) -> Array:
-    """Sum the forces of two bodies that make up each bar; all but gravity acts with one of them."""
+    """Sum the forces of two bodies that make up each bar.
+
+    All but gravity acts with one of them.
+    """
     scene = few.scene
     _require_linear(scene)
     if any(load.arm is not None for load in scene.loads):
@@ -552,7 +579,7 @@ def _measure_split_masses(few: _Few) -> Array:
 
 
 def _take_part(linkage: FourBar, part: float) -> FourBar:
-    """Take a part of each bar's mass: 0.3 on one side of the centre, 0.7 on the other."""
+    """Take a part of each bar's mass: 0.3 on one side of the centre, or 0.7."""
     bars = []
     for bar in linkage.moving:
         assert bar.inertia is not None and bar.centre is not None
@@ -569,13 +596,19 @@ def _take_part(linkage: FourBar, part: float) -> FourBar:
 
 
 def _require_linear(scene: Scene) -> None:
-    """Raise NotAskedError where forces are not the sum of what each load and effect adds."""
+    """Raise NotAskedError where forces are not the sum of their parts.
+
+    A part is what a load or an effect adds.
+    """
     if any(isinstance(effect, NOT_IN_PARTS) for effect in scene.effects):
         raise NotAskedError("forces with dry friction are no sum of what each adds")
 
 
 def _measure_sum(few: _Few, parts: Sequence[Scene], bare: Scene | None = None) -> Array:
-    """Compare the forces with the sum of what scenes have, beyond a bare one if any, (q, n)."""
+    """Compare the forces with the sum of what scenes have, (q, n).
+
+    What a bare scene has, if there is one, is taken off.
+    """
     names = few.quantities[few.forces]
     solved = [few.solve(part) for part in parts]
     none = None if bare is None else few.solve(bare)

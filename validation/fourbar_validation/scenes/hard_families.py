@@ -1,4 +1,8 @@
-"""The hard cases: each family a generator with named parameters and seeds, and one line on what must happen."""
+"""The hard cases: families of scenes that lie near singular positions.
+
+Each family is a generator with named parameters and seeds, and one line on what must
+happen.
+"""
 
 import math
 import tomllib
@@ -51,7 +55,10 @@ def draw_linkage(kind: DrawnType, seed: int) -> Lengths:
 
 
 def dress(lengths: Lengths, seed: int = 0) -> Scene:
-    """Make a scene on these lengths: offset mass centres, gravity, a force, a couple; 3 rad/s, 2 rad/s^2."""
+    """Make a scene on these lengths with loads, 3 rad/s and 2 rad/s^2.
+
+    It has offset mass centres, gravity, a force and a couple.
+    """
     rng = np.random.default_rng([seed, 4])
     d, *moving = lengths
     bars = draw_bars(rng, moving, BARS)
@@ -86,7 +93,10 @@ def replace_bars(scene: Scene, **bars: Bar) -> Scene:
 
 
 def _compute_corners(side: float, second_side: float, opposite: float) -> list[float]:
-    """Compute the angles, of either sign, between two sides of a triangle by its third side, if it closes."""
+    """Compute the angles between two sides of a triangle by its third side.
+
+    They are of either sign, if it closes.
+    """
     cosine = (
         (side * side + second_side * second_side - opposite * opposite)
         / (2 * side * second_side)
@@ -97,7 +107,10 @@ def _compute_corners(side: float, second_side: float, opposite: float) -> list[f
 
 
 def find_collinear_3_4(lengths: Lengths) -> list[tuple[float, bool]]:
-    """Find psi in (0, pi) with bars 3, 4 stretched (True) or folded: a^2 + d^2 - 2 a d cos psi = (b +- c)^2."""
+    """Find psi in (0, pi) with bars 3, 4 stretched (True) or folded.
+
+    There a^2 + d^2 - 2 a d cos psi = (b +- c)^2.
+    """
     d, a, b, c = lengths
     return [
         (psi, stretched)
@@ -107,7 +120,10 @@ def find_collinear_3_4(lengths: Lengths) -> list[tuple[float, bool]]:
 
 
 def find_collinear_2_3(lengths: Lengths) -> list[tuple[float, int]]:
-    """Find (psi, branch) where bars 2, 3 are collinear, so omega_4 = 0: triangle O2, B, O4 with O2 B = |a +- b|."""
+    """Find (psi, branch) where bars 2, 3 are collinear, so omega_4 = 0.
+
+    They follow from the triangle O2, B, O4 with O2 B = |a +- b|.
+    """
     d, a, b, c = lengths
     places = []
     for along in (a + b, a - b):
@@ -118,7 +134,10 @@ def find_collinear_2_3(lengths: Lengths) -> list[tuple[float, int]]:
 
 
 def find_parallel_2_4(lengths: Lengths) -> list[tuple[float, int]]:
-    """Find (psi, branch) where bars 2, 4 are parallel, omega_3 = 0: (a - c) e^{i psi} + b e^{i psi_3} = d, or a + c."""
+    """Find (psi, branch) where bars 2, 4 are parallel, so omega_3 = 0.
+
+    There (a - c) e^{i psi} + b e^{i psi_3} = d, or a + c.
+    """
     d, a, b, c = lengths
     places = []
     for joined, side in ((a - c, 1.0), (a + c, -1.0)):
@@ -158,7 +177,10 @@ def toggle(*, distances: tuple[float, ...] = TOGGLE, seeds: range = range(2)) ->
 def approach_poles(
     *, bar: int, distances: tuple[float, ...] = POLE, seeds: range = range(2)
 ) -> Scenes:
-    """Approach the position where the driven bar 3 or 4 stands still, from both sides."""
+    """Approach the position where the driven bar 3 or 4 stands still.
+
+    It is approached from both sides.
+    """
     offsets = np.array(
         [*(-x for x in (*REGULAR, *distances)), *distances[::-1], *REGULAR[::-1]]
     )
@@ -173,7 +195,10 @@ def approach_poles(
 
 
 def driven_output(*, steps: int = 180, seeds: range = range(2)) -> Scenes:
-    """Drive on bar 4 through a whole turn of the input, across both positions where omega_4 = 0."""
+    """Drive on bar 4 through a whole turn of the input.
+
+    The turn leads across both positions where omega_4 = 0.
+    """
     for seed in seeds:
         scene = dress(draw_linkage(CRANK, seed), seed)
         for branch, name in BRANCH_NAMES.items():
@@ -187,7 +212,9 @@ CHANGE_POINTS: dict[str, tuple[Lengths, int, tuple[float, ...]]] = {
     "kite a = b": ((0.3, 0.1, 0.1, 0.3), 1, (math.pi,)),
     "kite a = d": ((0.1, 0.1, 0.3, 0.3), 1, (0.0,)),
 }
-"""Lengths, branch just beyond psi = 0, change points psi. The kite a = d has A on O4 at its own."""
+"""Lengths, branch just beyond psi = 0, change points psi. The kite a = d has A on O4 at
+its own.
+"""
 
 
 def approach_change_point(*, distances: tuple[float, ...] = CHANGE) -> Scenes:
@@ -217,7 +244,10 @@ def sweep_change_point(*, steps: int = 145) -> Scenes:
 def miss_grashof(
     *, gaps: tuple[float, ...] = (1e-3, 1e-6, 1e-9, 1e-12), steps: int = 60
 ) -> Scenes:
-    """Miss s + l = p + q by a hair on either side: the sweep passes close to where it would change."""
+    """Miss s + l = p + q by a hair on either side.
+
+    The sweep passes close to where it would change.
+    """
     for gap in gaps:
         for sign in (1.0, -1.0):
             d, a, b = 0.4, 0.1, 0.25
@@ -263,7 +293,10 @@ def vary_mass_ratio(*, exponents: tuple[int, ...] = (-6, -3, 3, 6)) -> Scenes:
 
 
 def remove_inertia() -> Scenes:
-    """Take bars without rotational inertia, without mass, and loads only on massless bars."""
+    """Take bars without rotational inertia, and without mass.
+
+    Some have loads only on massless bars.
+    """
     base = sweep_turn(dress(PLAIN))
     for name, bar in list_moving(base):
         yield (
@@ -339,7 +372,10 @@ def sweep_out_and_back(
 
 
 def drive_thesis_to_limits(*, steps: int = 120) -> Scenes:
-    """Drive the thesis's double rocker (bars 20, 48, 55, 20 cm) from one limit position to the other."""
+    """Drive the thesis's double rocker from one limit position to the other.
+
+    Its bars are 20, 48, 55 and 20 cm.
+    """
     bars = (Bar(0.48, 57.0, 11.119275, (0.765, 0.0)), Bar(0.55, 0.544), Bar(0.20, 0.2))
     linkage = FourBar(0.20, *bars, math.radians(45.0))
     (psi, _), *_ = find_collinear_3_4(linkage.lengths)
@@ -353,7 +389,10 @@ def drive_thesis_to_limits(*, steps: int = 120) -> Scenes:
 def released(
     *, durations: tuple[float, ...] = (10.0, 100.0), steps: int = 100
 ) -> Scenes:
-    """Release IFToMM benchmark A02 with one window: 1 m, 1 kg links, upright, first pin at 1 m/s, gravity 9.81."""
+    """Release IFToMM benchmark A02 with one window.
+
+    It has 1 m, 1 kg links, upright, the first pin at 1 m/s, gravity 9.81.
+    """
     bar = Bar(1.0, 1.0)
     linkage = FourBar(1.0, bar, bar, bar)
     for duration in durations:
@@ -400,7 +439,10 @@ FAMILIES = tuple(
 
 
 class Hard:
-    """Every scene of every family, by name; a worker makes them again from the parameters alone."""
+    """Every scene of every family, by name.
+
+    A worker makes them again from the parameters alone.
+    """
 
     def __len__(self) -> int:
         return len(_make_scenes())

@@ -1,4 +1,7 @@
-"""Random scenes: a family is data, and every scene follows from its family and a random generator alone."""
+"""Random scenes: a family is data.
+
+Every scene follows from its family and a random generator alone.
+"""
 
 import math
 from collections.abc import Callable, Sequence
@@ -77,7 +80,9 @@ class Ranges:
     centre_angle: Draw
     ground_angle: Draw = ANY_ANGLE
     load: Draw = ANY_PART
-    """Load: a force in parts of the weight of all bars, a moment in parts of that weight at the bar's length."""
+    """Load: a force in parts of the weight of all bars, and a moment. The moment is in
+    parts of that weight at the bar's length.
+    """
     arm: Draw = ANY_PART
     """Distance from G at which a load acts, in parts of the length."""
     without_force: float = 0.0
@@ -91,7 +96,9 @@ class Ranges:
     friction: float = 0.0
     """Shares of the scenes that have such an effect."""
     sprung: float = 0.0
-    """Share of the scenes that have a spring; likewise of a torsion spring, and of a flywheel."""
+    """Share of the scenes that have a spring. Likewise of a torsion spring, and of a
+    flywheel.
+    """
     pushed: float = 0.0
     """Share of the scenes that a force at a point drives."""
     by_length: bool = True
@@ -101,7 +108,7 @@ class Ranges:
 Angles = Callable[[np.random.Generator, FourBar], Any]
 """Commanded theta_2, rad, of a linkage whose bars are drawn."""
 DrawnLinkage = tuple[Sequence[float], Angles]
-"""Lengths (ground, input, coupler, output), m, and the angles that are commanded of them."""
+"""Lengths (ground, input, coupler, output), m, and the angles commanded."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,7 +206,10 @@ def _draw_load(
 def _draw_springs(
     rng: np.random.Generator, linkage: FourBar, weight: float, ranges: Ranges
 ) -> list[Any]:
-    """Draw springs, torsion springs and flywheels that carry the weights about as they are loaded."""
+    """Draw springs, torsion springs and flywheels.
+
+    They carry the weights about as they are loaded.
+    """
     effects: list[Any] = []
     size = weight * abs(ranges.load(rng))
     if rng.random() < ranges.sprung:
@@ -260,18 +270,25 @@ SHORTEST = {
     DrawnType.DOUBLE_ROCKER: 2,
     DrawnType.ROCKER_CRANK: 3,
 }
-"""Index in (ground, input, coupler, output) of the shortest bar of a Grashof linkage of each type."""
+"""Index in (ground, input, coupler, output) of the shortest bar, by type. The linkage
+is a Grashof one.
+"""
 UNEVEN_TYPE = "uneven"
 """Name that stands for the family `UNEVEN_FAMILY` in place of types."""
 POSITIONS = 37
 CLEARANCE = 0.02
-"""A random linkage keeps this part of its longest bar away from the change-point equality s + l = p + q."""
+"""Distance of a random linkage from the equality of change points. It is this part of
+its longest bar, from s + l = p + q.
+"""
 
 
 def draw_lengths(
     rng: np.random.Generator, kind: DrawnType
 ) -> tuple[float, float, float, float]:
-    """Draw (ground, input, coupler, output) of the given type, longest bar 1, away from change points."""
+    """Draw (ground, input, coupler, output) of the given type.
+
+    The longest bar is 1, and change points are kept away from.
+    """
     while True:
         lengths = np.sort(rng.uniform(0.1, 1.0, 4))
         lengths[3] = 1.0
@@ -291,10 +308,10 @@ def draw_lengths(
 def draw_uneven_lengths(
     rng: np.random.Generator, crank: Draw, coupler: Draw
 ) -> tuple[Sequence[float], float]:
-    """Draw (ground, input, coupler, output), m, and an angle theta_2 - theta_1 at which they close, rad.
+    """Draw (ground, input, coupler, output), m, and an angle at which they close.
 
-    `crank` and `coupler`: of the ground, and of the diagonal from A to O4 at that
-    angle.
+    The angle is theta_2 - theta_1, rad. `crank` and `coupler`: of the ground, and of
+    the diagonal from A to O4 at that angle.
     """
     d = float(rng.uniform(0.1, 1.0))
     a = d * crank(rng)
@@ -337,7 +354,9 @@ def _draw_uneven_place(rng: np.random.Generator) -> DrawnLinkage:
 
 
 UNEVEN_FAMILY = RandomFamily(_draw_uneven_place, UNEVEN)
-"""Linkages whose lengths, masses, arms and loads are in ratios of 1e-5 to 1e5, with every kind of effect."""
+"""Linkages with ratios of 1e-5 to 1e5, and with every kind of effect. The ratios are
+those of lengths, masses, arms and loads.
+"""
 
 
 MACHINES = Ranges(
@@ -354,7 +373,10 @@ MACHINES = Ranges(
 
 
 def _draw_machine_place(kind: DrawnType, rng: np.random.Generator) -> DrawnLinkage:
-    """Draw a linkage of a type, with POSITIONS angles over the range in which it can move."""
+    """Draw a linkage of a type, with POSITIONS angles over its range.
+
+    It can move over that range.
+    """
     size = 10.0 ** rng.uniform(-1.5, 1.0)
     lengths = [size * x for x in draw_lengths(rng, kind)]
     return lengths, lambda _, linkage: Sweep(*choose_range(linkage), POSITIONS - 1)

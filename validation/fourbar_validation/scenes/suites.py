@@ -1,4 +1,7 @@
-"""Collect the scenes that a run judges: the named mechanisms of `models/`, the files given, or random linkages."""
+"""Collect the scenes that a run judges.
+
+They are the mechanisms of `models/`, the files given, or random linkages.
+"""
 
 import hashlib
 import math
@@ -19,15 +22,22 @@ from fourbar_validation.places import MODELS
 from fourbar_validation.scenes.random import DrawnType, draw_random_scene
 
 MOST_POSITIONS = 100_000
-"""Most positions of a scene in a run, where every engine solves each of them: 3 ms each, with all engines."""
+"""Most positions of a scene in a run. Every engine solves each of them: 3 ms each, with
+all engines.
+"""
 MOST_SECONDS = 100.0
-"""Longest free motion in a run, s: the engines go through it in steps of 1 to 4 ms, a second in about a second."""
+"""Longest free motion in a run, s. The engines go through it in steps of 1 to 4 ms, a
+second in about a second.
+"""
 AS_LONG_AS = 100
 """Positions that take as long as a second of free motion, generously."""
 
 
 class Suite(Protocol):
-    """An ordered set of named scenes; each is made where it is judged, so a long suite takes no memory."""
+    """An ordered set of named scenes.
+
+    Each is made where it is judged, so a long suite takes no memory.
+    """
 
     def __len__(self) -> int: ...
 
@@ -71,7 +81,10 @@ class Files:
 
 @dataclass(frozen=True, slots=True)
 class Random:
-    """`count` random linkages of the given types, or uneven ones; scene i depends on (seed, i) alone."""
+    """`count` random linkages of the given types, or uneven ones.
+
+    Scene i depends on (seed, i) alone.
+    """
 
     count: int
     seed: int
@@ -102,18 +115,21 @@ def list_model_files() -> list[Path]:
 
 
 def read_default_suite() -> Files:
-    """Read the scene files of `models/` and the suite of small scenes that together use every capability."""
+    """Read the scene files of `models/` and the suite of small scenes.
+
+    The small scenes together use every capability.
+    """
     capabilities = sorted((MODELS / "capabilities").glob("*.toml"))
     suite = read_scene_files([*list_model_files(), *capabilities])
     return replace(suite, not_drawn=frozenset(file.stem for file in capabilities))
 
 
 def read_scene_files(paths: Iterable[Path]) -> Files:
-    """Read and check scene files; each is named by its stem, or by its path where two stems are alike.
+    """Read and check scene files.
 
-    What does not print in a name is written as its escape. Raises InputError for a file
-    that is bad, and for two of one name, at once: a long run does not start on bad
-    input.
+    Each is named by its stem, or by its path if two stems are alike. What does not
+    print in a name is written as its escape. Raises InputError for a file that is bad,
+    and for two of one name, at once: a long run does not start on bad input.
     """
     files = list(dict.fromkeys(Path(path) for path in paths))
     stems = Counter(_write_printed(file.stem) for file in files)
@@ -142,7 +158,10 @@ def _write_printed(name: str) -> str:
 
 
 def _count_positions(scene: Scene, file: Path) -> int:
-    """Count the positions that a scene asks for, or what takes as long; InputError beyond the most."""
+    """Count the positions that a scene asks for, or what takes as long.
+
+    Raises InputError beyond the most.
+    """
     require_steps(scene.motion, MOST_POSITIONS, "in a run", str(file))
     for stated in (scene.motion.angle, scene.motion.law, scene.motion.free):
         if isinstance(stated, (Sweep, Law, Rise, Free)):
@@ -162,10 +181,10 @@ LARGEST_LIST = 16 * 2**20
 
 
 def read_suite(path: Path) -> Files:
-    """Read the scenes that a file lists, named from its own folder: TOML with `scenes = [...]`, or one per line.
+    """Read the scenes that a file lists, named from its own folder.
 
-    An entry may hold * for any name. InputError where an entry leaves the folder or
-    names no file.
+    The file is TOML with `scenes = [...]`, or has one per line. An entry may hold * for
+    any name. InputError where an entry leaves the folder or names no file.
     """
 
     def refuse(entry: object, allowed: str) -> InputError:

@@ -1,1 +1,4 @@
-"""Compare what the formulas state of a linkage, independently of its motion, with the engines."""
+"""Compare what the formulas state of a linkage with the engines.
+
+The statements do not depend on its motion.
+"""

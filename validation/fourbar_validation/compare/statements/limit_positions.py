@@ -1,4 +1,6 @@
-"""Check the range of each bar: the loop closes inside it and not beyond its limits, and at a limit the bar is at rest.
+"""Check the range of each bar: the loop closes inside it and not beyond.
+
+At a limit the bar is at rest.
 
 The loop is a sum of vectors, d u_1 = a u_2 + b u_3 - c u_4, and any moving bar may come
 first in it: an engine that turns bar 2 alone is given the linkage with bar k in that
@@ -47,7 +49,10 @@ OF_BARS = [name for name in UNKNOWNS if name not in FORCES]
 
 
 class Finding(NamedTuple):
-    """Error of a statement against the engine (rad, or the number of wrong answers), and the allowed error."""
+    """Error of a statement against the engine, and the allowed error.
+
+    The error is in rad, or the number of wrong answers.
+    """
 
     error: float
     allowed: float
@@ -58,7 +63,7 @@ class Finding(NamedTuple):
 def make_worst_row(
     name: str, answer: Answer, quantity: str, findings: Sequence[Finding]
 ) -> Row:
-    """Make the row of a quantity of the finding that exceeds what it is allowed by most."""
+    """Make the row of the finding that exceeds most what it is allowed."""
     error, allowed, theta_2 = (
         np.array(column)
         for column in zip(*(finding[:3] for finding in findings), strict=True)
@@ -70,9 +75,10 @@ def make_worst_row(
 
 
 def look(engine: Adapter, linkage: FourBar, places: Iterable[Place]) -> Seen:
-    """Ask an engine at some places where bar 2 turns at 1 rad/s; the bars are uniform: masses play no part.
+    """Ask an engine at some places where bar 2 turns at 1 rad/s.
 
-    `assembled` is 1.0 where it finds that the loop closes, 0.0 elsewhere.
+    The bars are uniform: masses play no part. `assembled` is 1.0 where it finds that
+    the loop closes, 0.0 elsewhere.
     """
     # neighbours in turn: an engine starts from the position before
     ordered = sorted(set(places), key=lambda place: place[::-1])
@@ -108,7 +114,10 @@ def require_answer(engine: Adapter, scene: Scene, command: Command) -> Answer:
 def compare_angles(
     what: str, stated: Sequence[float], answered: Sequence[float], linkage: FourBar
 ) -> Finding:
-    """Compare lists of angles, modulo 2 pi in any order: the largest distance of one from the nearest of the other."""
+    """Compare lists of angles, modulo 2 pi in any order.
+
+    Return the largest distance of one from the nearest of the other.
+    """
     if not stated or not answered:
         return Finding(
             0.0 if len(stated) == len(answered) else math.inf, 0.0, 0.0, what
@@ -124,7 +133,9 @@ def compare_angles(
 
 
 BEYOND = 4.0 * TOUCHING_MARGIN
-"""Part of the sum of the lengths by which the loop closes, or misses, past a limit where the engine is tried."""
+"""Distance past a limit at which the engine is tried. The loop closes or misses by this
+part of the sum of the lengths.
+"""
 
 LENGTHS_ROUNDED = (EPS / 4.0, 2.125 * EPS)
 """Bounds of the gap, in parts of the perimeter, between which either answer holds.
@@ -133,13 +144,18 @@ A length that is computed, as the distance of two points, is right to four units
 round-off, 2 EPS; an eighth of EPS is for the comparison's own round-off.
 """
 PAST = 1e-3
-"""rad. This far on either side of a change point the speeds of the two motions differ visibly."""
+"""Distance on either side of a change point, rad. The speeds of the two motions differ
+visibly there.
+"""
 FAR = 0.1
 """rad. As far as a sweep goes on."""
 
 
 def _compare_change_points(linkage: FourBar) -> Finding:
-    """Decide by exact sums of the lengths in which of the two positions with input and ground in line all bars are."""
+    """Decide by exact sums of the lengths in which position all bars are collinear.
+
+    Input and ground are collinear in two positions.
+    """
     d, a, b, c = (Fraction(length) for length in linkage.lengths)
     missing = {0.0: abs(abs(d - a) - abs(b - c)), math.pi: abs(d + a - b - c)}
     stated, wrong, decided = mobility.change_points(linkage), 0, 0
@@ -157,7 +173,10 @@ def _compare_change_points(linkage: FourBar) -> Finding:
 
 
 def compute_step_beyond(linkage: FourBar, theta_2: float) -> float:
-    """Compute the angle, rad, by which bar 2 turns until the loop closes, or misses, by BEYOND more."""
+    """Compute the angle by which bar 2 turns beyond a limit, rad.
+
+    The loop then closes, or misses, by BEYOND more.
+    """
     d, a, *_ = linkage.lengths
     psi, little = theta_2 - linkage.ground_angle, BEYOND * sum(linkage.lengths)
     e = max(abs(d - a * np.exp(1j * psi)), little)
@@ -168,7 +187,10 @@ def compute_step_beyond(linkage: FourBar, theta_2: float) -> float:
 
 
 class _Trial(NamedTuple):
-    """Scene and command that an engine is tried with for one bar, and what the formulas state of them."""
+    """Scene and command that an engine is tried with for one bar.
+
+    It holds too what the formulas state of them.
+    """
 
     scene: Scene
     """The linkage with the bar in the place of bar 2."""
@@ -254,14 +276,17 @@ def _try_bar(linkage: FourBar, bar: int) -> _Trial:
 
 
 def _compute_inwards(linkage: FourBar, theta_2: float) -> float:
-    """Compute the little that bar 2 turns from its limit to where the loop closes, rad."""
+    """Compute the angle of bar 2 from its limit to where the loop closes, rad."""
     step = compute_step_beyond(linkage, theta_2)
     ahead, behind = find_margin(linkage, np.array([theta_2 + step, theta_2 - step]))
     return step if ahead > behind else -step
 
 
 def _mark_collinear(linkage: FourBar, bar: int) -> list[bool]:
-    """Return for each limit of a bar whether all bars are collinear there, apart from rounding."""
+    """Mark the limits of a bar at which all bars are collinear.
+
+    Rounding counts as collinear.
+    """
     angles = np.array(
         [limit.theta_2 for limit in mobility.limit_positions(linkage, bar)]
     )
@@ -272,7 +297,10 @@ def _mark_collinear(linkage: FourBar, bar: int) -> list[bool]:
 
 
 class _Passage(NamedTuple):
-    """An assembly through a change point, and the sign of sin(theta_4 - theta_3) that is stated on either side."""
+    """An assembly through a change point, and the signs stated on either side.
+
+    They are those of sin(theta_4 - theta_3).
+    """
 
     point: float
     """theta_2, rad."""
@@ -282,7 +310,10 @@ class _Passage(NamedTuple):
 
     @property
     def places(self) -> list[Place]:
-        """Places before the change point and beyond it, there with the stated sign and with the other one."""
+        """Places before the change point and beyond it.
+
+        Beyond it they have the stated sign and the other one.
+        """
         beyond = self.point + PAST
         return [
             (self.point - PAST, self.before),
@@ -304,15 +335,22 @@ def _list_passages(linkage: FourBar) -> Iterator[_Passage]:
 
 
 class StatedLimits(NamedTuple):
-    """Statements of the formulas on the limits of a linkage, evaluated once for all engines."""
+    """Statements of the formulas on the limits of a linkage.
+
+    They are evaluated once for all engines.
+    """
 
     linkage: FourBar
     trials: dict[int, _Trial]
     """Trials by moving bar."""
     inside: list[tuple[mobility.LimitPosition, float]]
-    """Limits of bar 2, and the little that it turns from each: at the limit rounding decides if the loop closes."""
+    """Limits of bar 2, and the small angle that it turns from each. At the limit
+    rounding decides if the loop closes.
+    """
     collinear: dict[int, list[bool]]
-    """True for each limit of bars 3 and 4 at which all bars are collinear, apart from rounding."""
+    """True for each limit of bars 3 and 4 at which all bars are collinear. Rounding
+    counts as collinear.
+    """
     passages: list[_Passage]
 
     @classmethod
@@ -346,7 +384,10 @@ class StatedLimits(NamedTuple):
 def compare_ranges(
     stated: StatedLimits, engine: Adapter, seen: Seen
 ) -> Iterator[Finding]:
-    """Compare ranges, limits and full turns of every moving bar, the range of a sweep, and the change points."""
+    """Compare ranges, limits and full turns of every moving bar.
+
+    The range of a sweep and the change points are compared too.
+    """
     for bar, tried in stated.trials.items():
         if bar == 2:
             closes = np.array(
@@ -387,7 +428,10 @@ def choose_places(stated: StatedLimits) -> list[Place]:
 
 
 def compare_limit_positions(stated: StatedLimits, seen: Seen) -> Iterator[Finding]:
-    """Compare the limits of every moving bar; where all bars are collinear no side can be stated."""
+    """Compare the limits of every moving bar.
+
+    Where all bars are collinear no side can be stated.
+    """
     yield Finding(0.0, 0.0, stated.linkage.ground_angle, "the same positions")
     yield from _check_input(stated, seen)
     for bar in (3, 4):
@@ -395,7 +439,10 @@ def compare_limit_positions(stated: StatedLimits, seen: Seen) -> Iterator[Findin
 
 
 def _check_input(stated: StatedLimits, seen: Seen) -> Iterator[Finding]:
-    """Check just inside each limit that bars 3 and 4 are off their common line by the same angles on both branches."""
+    """Check bars 3 and 4 just inside each limit of bar 2.
+
+    They are off their common line by the same angles on both branches.
+    """
     linkage = stated.linkage
     d, a, *_ = linkage.lengths
     for limit, step in stated.inside:
@@ -433,7 +480,10 @@ def _check_input(stated: StatedLimits, seen: Seen) -> Iterator[Finding]:
 
 
 def _compute_moved(linkage: FourBar, bar: int, limit: mobility.LimitPosition) -> float:
-    """Compute what rounding may turn a limit by: the triangle of the ground, the bar and the other two in one line."""
+    """Compute by what rounding may turn a limit.
+
+    The triangle is that of the ground, the bar, and the other two in one line.
+    """
     upright = abs(math.sin(limit[MOVING_BARS.index(bar)] - linkage.ground_angle))
     d, *moving = linkage.lengths
     spread = sum(linkage.lengths) / d * (1.0 + sum(moving) / linkage.bar(bar).length)
@@ -499,7 +549,10 @@ def _check_dead_centres(
 
 
 def check_through(stated: StatedLimits, seen: Seen) -> Iterator[Finding]:
-    """Check the assemblies through a change point: the engine finds the speeds of each one continuous."""
+    """Check the assemblies through a change point.
+
+    The engine finds the speeds of each one continuous.
+    """
     for passage in stated.passages:
         rates = np.array(
             [

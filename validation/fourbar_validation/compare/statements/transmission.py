@@ -1,4 +1,8 @@
-"""Check the transmission angle between bars 3 and 4, its extremes, and the ratios of speed and of stroke times."""
+"""Check the transmission angle, its extremes, and ratios.
+
+The angle is that between bars 3 and 4; the ratios are those of speed and of stroke
+times.
+"""
 
 import math
 from collections.abc import Iterator
@@ -35,14 +39,19 @@ RADII = (0.2, 0.3)
 
 
 class StatedTransmission(NamedTuple):
-    """Statements of the formulas on the angle at B and on the strokes, evaluated once for all engines."""
+    """Statements of the formulas on the angle at B and on the strokes.
+
+    They are evaluated once for all engines.
+    """
 
     linkage: FourBar
     extremes: transmission.TransmissionExtremes
     collinear: list[float]
     """theta_2 where bars 3 and 4 are collinear on either branch, rad."""
     strokes: tuple[float, tuple[float, float]] | None
-    """What bar 2 turns while bar 4 goes between its limits, and theta_2 amid that and the rest, rad."""
+    """Turn of bar 2 while bar 4 goes between its limits, rad. theta_2 in the middle of
+    that turn and of the rest follow.
+    """
 
     @classmethod
     def of(cls, linkage: FourBar) -> "StatedTransmission":
@@ -52,7 +61,10 @@ class StatedTransmission(NamedTuple):
 
     @property
     def ends(self) -> tuple[tuple[float, float, float], ...]:
-        """The least and the greatest angle at B, theta_2 there, and the angle where bars 3 and 4 are collinear."""
+        """Return the extremes of the angle at B, and theta_2 there.
+
+        The angle where bars 3 and 4 are collinear follows.
+        """
         extremes = self.extremes
         return (extremes.least, extremes.theta_2_least, 0.0), (
             extremes.greatest,
@@ -62,7 +74,10 @@ class StatedTransmission(NamedTuple):
 
 
 class StatedOver(NamedTuple):
-    """Statements of the formulas over a motion, evaluated once for all engines; each (n,)."""
+    """Statements of the formulas over a motion, each (n,).
+
+    They are evaluated once for all engines.
+    """
 
     scene: Scene
     command: Command
@@ -76,7 +91,9 @@ class StatedOver(NamedTuple):
     advantage: Array
     """Mechanical advantage of forces at RADII."""
     to_singular: Finding
-    """Distance to a singular position, against the limits and dead centres that are stated."""
+    """Distance to a singular position. It is held against the limits and dead centres
+    that are stated.
+    """
 
     @classmethod
     def of(cls, scene: Scene, command: Command) -> "StatedOver":
@@ -100,7 +117,10 @@ class StatedOver(NamedTuple):
 
 
 def choose_places(stated: StatedTransmission) -> list[Place]:
-    """Return the places where an engine is evaluated: the extremes that are no limits, and both strokes of bar 4."""
+    """Return the places where an engine is evaluated.
+
+    They are the extremes that are no limits, and both strokes of bar 4.
+    """
     places = [
         (theta_2, 1) for value, theta_2, collinear in stated.ends if value != collinear
     ]
@@ -116,7 +136,10 @@ def compare_transmission(
     answer: Answer,
     predicted: Predicted | None,
 ) -> Iterator[Finding]:
-    """Compare over a motion, if there is one, at the stated extremes, and between bar 4's stated limits."""
+    """Compare over a motion, at extremes, and between bar 4's limits.
+
+    The motion is left out if there is none.
+    """
     if over is not None:
         yield from _compare_over(over, answer, predicted)
     yield from _compare_extremes(stated, seen)
@@ -124,7 +147,10 @@ def compare_transmission(
 
 
 class _Claim(NamedTuple):
-    """One statement over a motion: its error and what is allowed at each position, and where it is demanded, (n,)."""
+    """One statement over a motion: its error and the allowed one, (n,).
+
+    It says too at which positions the statement is demanded.
+    """
 
     what: str
     error: Array
@@ -167,7 +193,10 @@ def _compare_over(
 
 
 def _list_claims(over: StatedOver, answer: Answer) -> Iterator[_Claim]:
-    """List what the formulas state at each position, against the engine's angles and speeds."""
+    """List what the formulas state at each position.
+
+    It is held against the engine's angles and speeds.
+    """
     command, linkage, drive = (
         over.command,
         over.scene.linkage,
@@ -224,7 +253,10 @@ def _list_claims(over: StatedOver, answer: Answer) -> Iterator[_Claim]:
 
 
 def _compare_distance(scene: Scene, command: Command) -> Finding:
-    """Compare how far it is to a singular position with the limits and dead centres that are stated."""
+    """Compare the distance to a singular position.
+
+    It is held against the limits and dead centres that are stated.
+    """
     drive = scene.drive_bar or 2
     ours = transmission.distance_to_singular(
         scene.linkage, command.theta_2, drive, command.branch
@@ -254,7 +286,10 @@ def _find_collinear(linkage: FourBar) -> list[float]:
 
 
 def _compute_to_singular(scene: Scene, command: Command) -> Array:
-    """Compute the angle to the nearest position where bars must not be collinear and are; inf where there is none."""
+    """Compute the angle to the nearest singular position.
+
+    Bars that must not be collinear are so there; inf if there is none.
+    """
     drive, always = scene.drive_bar or 2, _find_collinear(scene.linkage)
     dead = mobility.limit_positions(scene.linkage, drive) if drive != 2 else ()
     theta_2 = command.theta_2
@@ -310,9 +345,10 @@ def _compare_extremes(stated: StatedTransmission, seen: Seen) -> Iterator[Findin
 
 
 def _find_strokes(linkage: FourBar) -> tuple[float, tuple[float, float]] | None:
-    """Find what bar 2 turns (rad) while bar 4 goes between its limits on a branch, and theta_2 amid that and the rest.
+    """Find the turn of bar 2 while bar 4 goes between its limits, rad.
 
-    Bar 4 turns in the other sense for the rest of the turn.
+    It is on one branch; theta_2 in the middle of it and of the rest follow. Bar 4 turns
+    in the other sense for the rest of the turn.
     """
     dead = [
         limit.theta_2

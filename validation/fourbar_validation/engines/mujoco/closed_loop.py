@@ -1,4 +1,7 @@
-"""A compiled MJCF as a closed loop: MuJoCo's own kinematics, assembly, velocities and pin forces."""
+"""A compiled MJCF as a closed loop.
+
+It has MuJoCo's own kinematics, assembly, velocities and pin forces.
+"""
 
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -35,7 +38,10 @@ WARNINGS = (
 
 
 def load_force(model: mujoco.MjModel, data: mujoco.MjData, actuator: int) -> Array:
-    """Return the world force of an actuator on a site, (3,): MuJoCo counts it into the force of the parent."""
+    """Return the world force of an actuator on a site, (3,).
+
+    MuJoCo counts it into the force of the parent.
+    """
     site, frame = model.actuator_trnid[actuator]
     axes = data.site_xmat[frame if frame >= 0 else site].reshape(3, 3)
     return np.asarray(
@@ -46,7 +52,10 @@ def load_force(model: mujoco.MjModel, data: mujoco.MjData, actuator: int) -> Arr
 def _split_load(
     model: mujoco.MjModel, actuator: int
 ) -> tuple[int, int, tuple[float, float]]:
-    """Return an actuator, the site whose axes its force is in, and that force of size one in the plane."""
+    """Return an actuator, its site, and its force of size one in the plane.
+
+    The force is in the site's axes.
+    """
     site, frame = model.actuator_trnid[actuator]
     x, y = model.actuator_gear[actuator, :2].tolist()
     return actuator, int(frame if frame >= 0 else site), (x, y)
@@ -62,7 +71,10 @@ def open_model(text: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
 
 
 def make_stepper(text: str) -> Callable[[int], None]:
-    """Make a function that steps a text on from its first keyframe, as often as wanted."""
+    """Make a function that steps a text on from its first keyframe.
+
+    It may be called as often as wanted.
+    """
     return partial(mujoco.mj_step, *open_model(text))
 
 
@@ -124,7 +136,9 @@ class ClosedLoop(Assembled):
         return {name: x[self.site[site]][:2].copy() for name, site in names.items()}
 
     def branch(self, bar: int = 2) -> int:
-        """Return the branch of the state that was last forwarded, of a command of a bar.
+        """Return the branch of the state that was last forwarded.
+
+        It is that of a command of a bar.
 
         The null vector of the gap's derivative turns bars 2, 3 and 4 in proportion to
             -b c sin(theta_4 - theta_3),
@@ -135,7 +149,10 @@ class ClosedLoop(Assembled):
         return int(np.sign(turn if bar != 2 else -turn))
 
     def set_state(self, q: Sequence[float], speed: float, bar: int | None = 2) -> None:
-        """Start from own joint angles at the speed of a bar or of the stroke, with the gap kept closed."""
+        """Start from own joint angles at the speed of a bar or of the stroke.
+
+        The gap is kept closed.
+        """
         mujoco.mj_resetData(self.model, self.data)
         self.place(q)
         self.data.qvel[:3] = solve_closed(
@@ -143,7 +160,10 @@ class ClosedLoop(Assembled):
         )
 
     def forward(self) -> None:
-        """Evaluate the present state: after a Runge-Kutta step some fields are still of the step before."""
+        """Evaluate the present state.
+
+        After a Runge-Kutta step some fields are still of the step before.
+        """
         mujoco.mj_forward(self.model, self.data)
         mujoco.mj_rnePostConstraint(self.model, self.data)
 
@@ -159,10 +179,10 @@ class ClosedLoop(Assembled):
         }
 
     def carried(self) -> dict[str, Array]:
-        """Read the force of the parent on each bar and all that the bar carries, world axes, N.
+        """Read the force of the parent on each bar, world axes, N.
 
-        That is cfrc_int without the forces of actuators on sites, which MuJoCo counts
-        into it, unlike those of tendons.
+        It includes all that the bar carries. That is cfrc_int without the forces of
+        actuators on sites, which MuJoCo counts into it, unlike those of tendons.
         """
         on = {name: force.copy() for name, force in self._carried.items()}
         for actuator, site, (along, across), names in self._borne:
@@ -187,13 +207,19 @@ class ClosedLoop(Assembled):
         )
 
     def crank_torque(self) -> float:
-        """Return T2: what the flywheel gives the crank, and the motor next to it, N m."""
+        """Return T2, N m.
+
+        It is what the flywheel gives the crank, and the motor next to it.
+        """
         flywheel = -self.model.dof_armature[O2] * self.data.qacc[O2]
         motor = 0.0 if self.drive is None else self.data.actuator_force[self.drive]
         return float(flywheel + motor)
 
     def drive_column(self, drive_bar: int | None) -> Array:
-        """Return the derivative of the driven bar's rotation by the joint angles, or of the cylinder's stroke, (3,)."""
+        """Return the derivative of what is driven by the joint angles, (3,).
+
+        Driven is the bar's rotation, or the cylinder's stroke.
+        """
         if drive_bar is not None:
             return COLUMN_OF[drive_bar]
         start, end = ENDS
@@ -217,7 +243,10 @@ class ClosedLoop(Assembled):
         return float(np.hypot(*self.line()))
 
     def drive_drift(self, drive_bar: int | None) -> float:
-        """Return the second derivative of what `drive_column` is of at the present speeds, nothing accelerating."""
+        """Return the second derivative of what `drive_column` is of.
+
+        It is at the present speeds, with nothing accelerating.
+        """
         if drive_bar is not None:
             return 0.0
         (start, end), line, stroke, v = ENDS, self.line(), self.stroke(), self.data.qvel
@@ -238,7 +267,10 @@ class ClosedLoop(Assembled):
         return dot[:2]
 
     def cylinder(self, bar: int) -> tuple[complex, complex]:
-        """Measure from the ground pin of a bar, at angle 0, to the cylinder's end on it and that on the ground, m."""
+        """Measure from the ground pin of a bar to the cylinder's ends, m.
+
+        The end on the bar is at angle 0 of the bar; the other is on the ground.
+        """
         self.place((0.0, 0.0, 0.0))
         ground = self.model.body("ground").id
         ends = sorted(
@@ -250,7 +282,10 @@ class ClosedLoop(Assembled):
         return x, y
 
     def work(self, drive_bar: int | None, size: float, correction: float = 0.0) -> None:
-        """Let a couple act on the driven bar, N m, or the cylinder's actuator push, N; and a couple on the crank."""
+        """Let a couple act on the driven bar, N m, or the actuator push, N.
+
+        The actuator is that of the cylinder. A couple acts on the crank too.
+        """
         applied = self.data.qfrc_applied
         applied[O2], applied[A], applied[O4] = correction, 0.0, 0.0
         if drive_bar is None:
@@ -267,9 +302,9 @@ class ClosedLoop(Assembled):
         correction: float = 0.0,
         refinements: int = 0,
     ) -> float | None:
-        """Solve for the couple or push that gives the crank an acceleration (rad/s^2); None where it does not move it.
+        """Solve for the couple or push that accelerates the crank (rad/s^2).
 
-        The state is left under it, to be read.
+        None if it does not move the crank. The state is left under it, to be read.
         """
 
         def crank_acceleration(size: float) -> float:
@@ -282,7 +317,10 @@ class ClosedLoop(Assembled):
         return size
 
     def bad(self) -> int:
-        """Count warnings of a bad position, velocity or acceleration: each resets the data."""
+        """Count warnings of a bad position, velocity or acceleration.
+
+        Each resets the data.
+        """
         return sum(int(self.data.warning[kind].number) for kind in WARNINGS)
 
 
@@ -293,12 +331,12 @@ def solve_couple_elsewhere(
     alpha_2: float,
     crank_torque: float,
 ) -> float | None:
-    """Solve for what accelerates the crank as before; None where it does not move the crank.
+    """Solve for what accelerates the crank as before.
 
-    That is a couple on bar 3 or 4, or the force of the actuator between the cylinder's
-    two sites. The accelerations are linear in it; two trials of the size of the crank's
-    torque (T2, N m) give it, and `light`, the same linkage with a light flywheel, is
-    left at a third, to be read.
+    None if it does not move the crank. That is a couple on bar 3 or 4, or the force of
+    the actuator between the cylinder's two sites. The accelerations are linear in it;
+    two trials of the size of the crank's torque (T2, N m) give it, and `light`, the
+    same linkage with a light flywheel, is left at a third, to be read.
 
     `alpha_2`: what the flywheel's motor was given, rad/s^2.
     """
@@ -325,11 +363,12 @@ def solve_couple(
     high: float,
     refinements: int = 0,
 ) -> float | None:
-    """Solve for the couple under which an acceleration, linear in it, is the wanted one, and which was evaluated last.
+    """Solve for the couple under which an acceleration is the wanted one.
 
-    None where it does not depend on the couple. The difference of the two trials loses
-    digits: each refinement, from where the couple before leads, brings some of them
-    back.
+    The acceleration is linear in it. The couple that was evaluated last is returned
+    too. None where it does not depend on the couple. The difference of the two trials
+    loses digits: each refinement, from where the couple before leads, brings some of
+    them back.
     """
     at_low, at_high = acceleration(low), acceleration(high)
     slope = (at_high - at_low) / (high - low)

@@ -16,13 +16,21 @@ from fourbar_validation.engines.mujoco.closed_loop import solve_couple
 REFINEMENTS = 3
 """Secant steps after the first: each gains the digits that the one before has."""
 LEAST = 1e-6
-"""Acceleration of the driven joint, over that of the open tree's joints, below which it is not told from none."""
+"""Acceleration of the driven joint that is not told from none. It is over that of the
+open tree's joints.
+"""
 MISSED = 1e-9
-"""Part of the acceleration sought that a linear solve may leave: its rounding is 1e-12, also near a change point."""
+"""Part of the acceleration sought that a linear solve may leave. Its rounding is 1e-12,
+also near a change point.
+"""
 NOISE = 1e-3
-"""Part of it that the noise of the file's solver may leave; where the acceleration jumps, all of it is left."""
+"""Part of it that the noise of the file's solver may leave. Where the acceleration
+jumps, all of it is left.
+"""
 DOUBLINGS = 40
-"""Times the size of a trial is doubled, to both sides, in search of a couple: beyond 1e12 times it nothing is found."""
+"""Times that a trial's size is doubled in search of a couple, to both sides. Beyond
+1e12 times the size nothing is found.
+"""
 
 
 def find_couple(
@@ -31,13 +39,15 @@ def find_couple(
     acceleration: Callable[[float], float],
     wanted: float,
 ) -> float | None:
-    """Find the couple that gives an acceleration, and which was evaluated last; NaN where none gives it.
+    """Find the couple that gives an acceleration; NaN where none does.
 
-    None where the acceleration does not depend on the couple.
+    The couple that was evaluated last is returned too. None where the acceleration does
+    not depend on the couple.
 
     Parameters
     ----------
-    acceleration : evaluates `model` and `data` under a couple, N m, and returns an acceleration, rad/s^2.
+    acceleration : evaluates `model` and `data` under a couple, N m, and returns an
+        acceleration, rad/s^2.
     """
     free = acceleration(0.0)
     # without a couple it may already accelerate as wanted, to the rounding of the
@@ -63,11 +73,12 @@ def find_couple(
 def bracket_couple(
     acceleration: Callable[[float], float], wanted: float, trial: float, allowed: float
 ) -> float | None:
-    """Solve for the couple under which an acceleration is the wanted one, and which was evaluated last.
+    """Solve for the couple under which an acceleration is the wanted one.
 
-    The acceleration is continuous in the couple and need not be linear: dry friction,
-    joint limits and clamped actuators make it piecewise linear. None where no couple
-    gives the acceleration to within `allowed`.
+    The couple that was evaluated last is returned too. The acceleration is continuous
+    in the couple and need not be linear: dry friction, joint limits and clamped
+    actuators make it piecewise linear. None where no couple gives the acceleration to
+    within `allowed`.
     """
     from scipy.optimize import brentq
 

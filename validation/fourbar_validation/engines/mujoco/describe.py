@@ -1,8 +1,9 @@
-"""The entries of a four-bar's MJCF that decide its motion and forces: read from a compiled model, set in the generated.
+"""The entries of a four-bar's MJCF that decide its motion and forces.
 
-Each entry stands under a name by which two files can be compared, whatever the tree of
-their bodies, their axes and their names. What an entry costs is seen by setting it,
-alone, in the generated file.
+They are read from a compiled model, and set in the generated one. Each entry stands
+under a name by which two files can be compared, whatever the tree of their bodies,
+their axes and their names. What an entry costs is seen by setting it, alone, in the
+generated file.
 """
 
 import math
@@ -29,9 +30,13 @@ PIN = {
     "stiffness": ("jnt_stiffness", "stiffness", "spring"),
     "armature": ("dof_armature", "armature", ""),
 }
-"""Property of a pin: field of MjModel, attribute of its joint, and the flag that switches it off."""
+"""Property of a pin as field of MjModel and attribute of its joint. The flag switches
+it off.
+"""
 FRICTION = {"dof_solref": "solreffriction", "dof_solimp": "solimpfriction"}
-"""How dry friction yields: field of MjModel and attribute; compared where there is any."""
+"""Fields of MjModel and attributes by which dry friction yields. They are compared if
+there is any.
+"""
 TENDON = {
     "stiffness": "stiffness",
     "damping": "damping",
@@ -66,7 +71,9 @@ SOFTEST, STIFFEST = 1e-4, 0.9999
 
 
 def describe_model(topology: Topology, flywheel: float = 0.0) -> Described:
-    """Describe lengths, masses, pins, gravity, closure, loads, tendons and options, as compiled.
+    """Describe lengths, masses, pins, gravity, closure, loads, and more, as compiled.
+
+    Tendons and options are described too.
 
     `flywheel`: the part of the armature of pin O2 that drives, kg m^2, and so is no
     inertia of the input.
@@ -107,7 +114,10 @@ def describe_model(topology: Topology, flywheel: float = 0.0) -> Described:
 
 
 def _is_on(model: mujoco.MjModel, *flags: str) -> bool:
-    """Return whether no flag switches a feature off; a flag that this MuJoCo does not have switches nothing."""
+    """Return whether no flag switches a feature off.
+
+    A flag that this MuJoCo does not have switches nothing.
+    """
     bits = (
         int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{flag.upper()}", 0))
         for flag in flags
@@ -128,9 +138,10 @@ def _name_element(tag: str, name: str, number: int) -> str:
 
 
 def _describe_bar(topology: Topology, bar: int, flywheel: float) -> Described:
-    """Describe mass, inertia about the mass centre, and its place from the first pin, with all that is welded to it.
+    """Describe mass, inertia about the mass centre, and its place.
 
-    The armature of a hinge on the ground turns with the bar, and is inertia of it.
+    The place is from the first pin; all that is welded to the bar is included. The
+    armature of a hinge on the ground turns with the bar, and is inertia of it.
     """
     model, data = topology.model, topology.data
     parts = np.flatnonzero(model.body_weldid == topology.root[bar])
@@ -269,11 +280,12 @@ def _sum_inverse_weights(topology: Topology, number: int) -> float:
 
 
 def _describe_loads(topology: Topology) -> Described:
-    """Describe what actuators exert with a control of 0: at sites the sum on each bar, at hinges the couple.
+    """Describe what actuators exert with a control of 0.
 
-    Forces that keep their axes add up to one force, one couple, and the first moments r
-    x F and r . F about the bar's first pin, which tell where the force acts. The drive
-    is taken off, and is no load.
+    At sites it is the sum on each bar, at hinges the couple. Forces that keep their
+    axes add up to one force, one couple, and the first moments r x F and r . F about
+    the bar's first pin, which tell where the force acts. The drive is taken off, and is
+    no load.
     """
     model, data = topology.model, topology.data
     sums: dict[str, Array] = {}
@@ -345,10 +357,11 @@ def _describe_loads(topology: Topology) -> Described:
 
 
 def _read_bias(model: mujoco.MjModel, actuator: int) -> Array:
-    """Read what an actuator exerts without a control: its force, and its force per length and per speed, (3,).
+    """Read what an actuator exerts without a control, (3,).
 
-    Of direct-current motors that have no control, those are read whose force is
-    constant: a cogging without a period.
+    It is its force, and its force per length and per speed. Of direct-current motors
+    that have no control, those are read whose force is constant: a cogging without a
+    period.
     """
     bias, kinds = model.actuator_biasprm[actuator, :3], mujoco.mjtBias
     if model.actuator_biastype[actuator] == kinds.mjBIAS_AFFINE:
@@ -362,7 +375,10 @@ def _read_bias(model: mujoco.MjModel, actuator: int) -> Array:
 
 
 def _name_tendon(topology: Topology, number: int) -> str:
-    """Name a tendon by the pins that it runs over, or by the bars that it runs between."""
+    """Name a tendon by the pins that it runs over.
+
+    Otherwise it is named by the bars that it runs between.
+    """
     model, joints = (
         topology.model,
         {joint: pin for pin, joint in topology.hinge.items()},
@@ -383,7 +399,10 @@ def _name_tendon(topology: Topology, number: int) -> str:
 
 
 def _describe_tendons(topology: Topology) -> Described:
-    """Describe every tendon: its path, and what it does. Their paths tell several between the same bars apart."""
+    """Describe every tendon: its path, and what it does.
+
+    Their paths tell several between the same bars apart.
+    """
     model, data, tendons = (
         topology.model,
         topology.data,
@@ -450,7 +469,9 @@ def _describe_tendons(topology: Topology) -> Described:
 def set_entry(
     text: str, generated: Mapping[str, ModelEntry], key: str, value: Value | None
 ) -> str | None:
-    """Set one entry of the generated file, all others as they are; None where it cannot be set alone.
+    """Set one entry of the generated file, all others as they are.
+
+    None if it cannot be set alone.
 
     `generated`: its description. `value`: None for what is not there.
     """
@@ -479,7 +500,10 @@ def set_entry(
 
 
 def _find(root: ET.Element, element: str) -> ET.Element:
-    """Find an element of the generated file by tag and name; KeyError where there is none."""
+    """Find an element of the generated file by tag and name.
+
+    Raises KeyError if there is none.
+    """
     tag, _, name = element.partition(" ")
     tags = {"tendon": ("fixed", "spatial"), "actuator": ("general",)}.get(tag, (tag,))
     for each_tag in tags:
@@ -490,7 +514,10 @@ def _find(root: ET.Element, element: str) -> ET.Element:
 
 
 def _set_attribute(root: ET.Element, entry: ModelEntry, key: str, value: Value) -> None:
-    """Set the attribute that states an entry; a pin's flag is taken off, so that the entry acts."""
+    """Set the attribute that states an entry.
+
+    A pin's flag is taken off, so that the entry acts.
+    """
     element = _find(root, entry.element)
     if not entry.attribute or entry.attribute == "axis":
         raise KeyError(key)
@@ -530,7 +557,10 @@ def _write_value(value: Value) -> str:
 def _set_length(
     root: ET.Element, generated: Mapping[str, ModelEntry], bar: str, value: float
 ) -> None:
-    """Move the pin at the end of a bar along its line; the ground's is that of the output."""
+    """Move the pin at the end of a bar along its line.
+
+    The pin of the ground is that of the output.
+    """
     if bar in ("ground", "ground_angle"):
         length, angle = (
             float(generated[f"lengths.{name}"].value)  # type: ignore[arg-type]
@@ -582,7 +612,10 @@ def _set_load(
     name: str,
     value: Value | None,
 ) -> None:
-    """Add what a load lacks of another: the sum of the two is the load with this one entry, the others kept."""
+    """Add what a load lacks of another.
+
+    The sum of the two is the load with this one entry, the others kept.
+    """
     bar, axes = key.split(", ")
     if axes not in ("world axes", f"axes of the {bar}"):
         raise KeyError(axes)
@@ -615,11 +648,11 @@ def _set_load(
 
 
 def mend_entry(topology: Topology, key: str, value: Value | None) -> bool:
-    """Make one entry of a compiled model that of the generated file; False where that is not possible.
+    """Make one entry of a compiled model that of the generated file.
 
-    A weld becomes a pin, contacts are switched off, a stop and the motors at a pin are
-    removed, the loop is made as stiff as MuJoCo lets it be, and a setting gets its
-    value.
+    False if that is not possible. A weld becomes a pin, contacts are switched off, a
+    stop and the motors at a pin are removed, the loop is made as stiff as MuJoCo lets
+    it be, and a setting gets its value.
     """
     model, (subject, _, rest) = topology.model, key.partition(".")
     pin, _, what = rest.partition(".")

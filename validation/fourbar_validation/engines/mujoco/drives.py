@@ -12,15 +12,24 @@ from fourbar.mjcf.model import join as numbers
 from fourbar_validation.engines.mujoco.closed_loop import O2, ClosedLoop
 
 WHEEL = 1e8
-"""Armature of the kinematic wheel that a joint equality follows, relative to the crank's dof inertia."""
+"""Armature of the kinematic wheel that a joint equality follows. It is relative to the
+crank's dof inertia.
+"""
 POSITION_GAIN, VELOCITY_GAIN = 1e6, 1e4
-"""kp of the stiff servo, per (inertia omega^2), and kv of servo and velocity actuator, per (inertia omega)."""
+"""kp of the stiff servo, and kv of servo and velocity actuator. kp is per (inertia
+omega^2), kv per (inertia omega).
+"""
 GENTLE_GAIN = 1.0
-"""Gain of position and of speed that an explicit integrator can follow; the drive droops."""
+"""Gain of position and of speed that an explicit integrator can follow. The drive
+droops.
+"""
 
 
 class Softened(ClosedLoop):
-    """The compiled model's body_invweight0 scaled: the softness of the closure goes in proportion."""
+    """The compiled model's body_invweight0 scaled.
+
+    The softness of the closure goes in proportion.
+    """
 
     def __init__(self, mjcf: str, factor: float) -> None:
         super().__init__(mjcf)
@@ -55,7 +64,10 @@ class Driven(ClosedLoop):
 
 
 class Actuated(Driven):
-    """An actuator on O2: of speed alone, or a position servo whose target turns at omega, as `intvelocity`'s does.
+    """An actuator on O2.
+
+    It is of speed alone, or a position servo whose target turns at omega, as that of
+    `intvelocity` does.
 
     `position`: kp per (inertia omega^2); none: kv (omega - omega_2), without a control
     input, by the affine bias. `velocity`: kv per (inertia omega).
@@ -102,10 +114,16 @@ GentleVelocityActuator = partial(Actuated, position=0.0, velocity=GENTLE_GAIN)
 
 
 class WheelEquality(Driven):
-    """A joint equality to a kinematic wheel: a second, heavy body that turns at omega next to the linkage."""
+    """A joint equality to a kinematic wheel.
+
+    The wheel is a second, heavy body that turns at omega next to the linkage.
+    """
 
     def __init__(self, mjcf: str, omega: float, softness: float = 1.0) -> None:
-        """Set `softness`, a factor on dof_invweight0 that is edited after compile; 1: plain MJCF."""
+        """Set `softness`, a factor on dof_invweight0.
+
+        It is edited after the compilation; 1: plain MJCF.
+        """
         super().__init__(mjcf, omega)
         self.model.dof_invweight0[:] *= softness
         self.row = 3  # the closure takes three rows, the joint equality the next
@@ -145,16 +163,24 @@ class WheelEquality(Driven):
         self.data.qvel[3] = speed
 
     def crank_torque(self) -> float:
-        """Read the multiplier of the joint equality: its row of the Jacobian is 1 at the crank."""
+        """Read the multiplier of the joint equality.
+
+        Its row of the Jacobian is 1 at the crank.
+        """
         return float(self.data.efc_force[self.row])
 
 
 StiffWheelEquality = partial(WheelEquality, softness=1e-8)
-"""Drive by a wheel equality whose softness is edited down as far as the pads do it for the closure."""
+"""Drive by a wheel equality whose softness is edited down. The pads do as much for the
+closure.
+"""
 
 
 def remove_attributes(mjcf: str, attributes: Mapping[str, Sequence[str]]) -> str:
-    """Remove these attributes of the elements at these paths from a text: what they say is left to MuJoCo."""
+    """Remove these attributes of the elements at these paths from a text.
+
+    What they state is left to MuJoCo.
+    """
     root = ET.fromstring(mjcf)
     for path, names in attributes.items():
         element = root.find(path)
@@ -165,7 +191,10 @@ def remove_attributes(mjcf: str, attributes: Mapping[str, Sequence[str]]) -> str
 
 
 def restore_defaults(mjcf: str, _: float = 0.0) -> ClosedLoop:
-    """Leave solref, solimp and the solver to MuJoCo: 0.02 s, impedance 0.9 to 0.95, Newton to 1e-8."""
+    """Leave solref, solimp and the solver to MuJoCo.
+
+    These are 0.02 s, impedance 0.9 to 0.95, and Newton to 1e-8.
+    """
     return ClosedLoop(
         remove_attributes(
             mjcf,

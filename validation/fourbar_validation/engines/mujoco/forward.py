@@ -1,4 +1,6 @@
-"""MuJoCo's forward dynamics of the generated MJCF without its flywheel: of a released linkage, and at one state.
+"""MuJoCo's forward dynamics of the generated MJCF without its flywheel.
+
+It is that of a released linkage, and at one state.
 
 At one state the torque is that with which the closed loop accelerates as commanded. At
 an exactly closed state the only error is the closure's softness, in proportion to
@@ -33,8 +35,9 @@ from fourbar_validation.engines.mujoco.runner import Stepper
 RELEASED, ONE_STATE = "mujoco-forward", "mujoco-one-state"
 """Names of the engines."""
 TIME_CONSTANT_STEPS = 2.0
-"""Time constant of the loop's closure, in timesteps. Through change points the closure takes energy out: 1e-6 of it in
-ten seconds at 1 ms with 2, three hundred times as much with 10.
+"""Time constant of the loop's closure, in timesteps. Through change points the closure
+takes energy out: 1e-6 of it in ten seconds at 1 ms with 2, three hundred times as much
+with 10.
 """
 FRICTION = (
     mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF,
@@ -101,7 +104,10 @@ class MujocoForward:
 
 
 class _Work:
-    """Work of loads, damping and dry friction on the bars, by MuJoCo's own powers at the ends of each step, J."""
+    """Work of loads, damping and dry friction on the bars, J.
+
+    It follows from MuJoCo's own powers at the ends of each step.
+    """
 
     def __init__(
         self, model: mujoco.MjModel, data: mujoco.MjData, timestep: float
@@ -114,7 +120,10 @@ class _Work:
         self.before = self._compute_power()
 
     def add(self) -> None:
-        """Add the step just made; after a Runge-Kutta step some fields are still of the step before."""
+        """Add the step just made.
+
+        After a Runge-Kutta step some fields are still of the step before.
+        """
         if self.any:
             mujoco.mj_forward(self.model, self.data)
             now = self._compute_power()
@@ -134,7 +143,10 @@ RUNGS = (0.9999, 0.9998, 0.9996, 0.9992)
 
 @dataclass(slots=True)
 class MujocoOneState:
-    """Forward dynamics at each position by itself, at one impedance or extrapolated from several."""
+    """Forward dynamics at each position by itself.
+
+    It is at one impedance, or extrapolated from several.
+    """
 
     impedances: tuple[float, ...] = RUNGS
     name: str = ONE_STATE
@@ -176,7 +188,10 @@ class MujocoOneState:
 def extrapolate(
     impedances: tuple[float, ...], rungs: list[dict[str, Array]]
 ) -> dict[str, Array]:
-    """Extrapolate to x = 0 the polynomial in x = (1-d)/d through the rungs (Lagrange)."""
+    """Extrapolate to x = 0 the polynomial through the rungs (Lagrange).
+
+    It is in x = (1-d)/d.
+    """
     x = np.array([(1.0 - d) / d for d in impedances])
     weights = [
         float(np.prod([xj / (xj - xi) for j, xj in enumerate(x) if j != i]))

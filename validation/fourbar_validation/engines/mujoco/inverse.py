@@ -1,4 +1,7 @@
-"""MuJoCo's inverse dynamics on the open tree, constraints off; the loop is closed by multipliers."""
+"""MuJoCo's inverse dynamics on the open tree, constraints off.
+
+Multipliers close the loop.
+"""
 
 from collections.abc import Iterable, Sequence
 from copy import copy
@@ -36,10 +39,11 @@ def find_refusal(scene: Scene) -> str:
 
 @cache
 def compile_bars() -> mujoco.MjModel:
-    """Compile the open tree of three bars of unit length and mass, constraints off; what is fixed lies at 0.
+    """Compile the open tree of three bars of unit length and mass.
 
-    Only numbers differ from tree to tree, and to compile takes a hundred times as long
-    as to write them. What the compiler takes from nobody, `find_refusal` refuses.
+    Constraints are off; what is fixed lies at 0. Only numbers differ from tree to tree,
+    and to compile takes a hundred times as long as to write them. What the compiler
+    takes from nobody, `find_refusal` refuses.
     """
     spec = mujoco.MjSpec()
     spec.option.disableflags |= (
@@ -68,7 +72,10 @@ def compile_bars() -> mujoco.MjModel:
 
 
 class MujocoTree(Tree):
-    """The open tree, its numbers written from the description; `memory`: of a tree that is no longer asked."""
+    """The open tree, its numbers written from the description.
+
+    `memory`: of a tree that is no longer asked.
+    """
 
     def __init__(
         self, scene: Scene, memory: tuple[mujoco.MjModel, mujoco.MjData] | None = None
@@ -165,7 +172,10 @@ class MujocoTree(Tree):
     def needed(
         self, field: tuple[float, float], wrenches: dict[int, list[float]]
     ) -> Array:
-        """Return the result of mj_inverse less what loads and effects do on the coordinates."""
+        """Return the result of mj_inverse less what loads and effects do.
+
+        It is on the coordinates.
+        """
         self.model_gravity[:2] = field
         self.xfrc_applied[:] = 0.0
         mujoco.mj_inverse(self.model, self.data)
@@ -199,7 +209,10 @@ class MujocoTree(Tree):
 
 
 class MujocoInverse(Exact):
-    """Trees in the memory of the one before: allocating it takes MuJoCo longer than all its work."""
+    """Trees in the memory of the one before.
+
+    Allocating it takes MuJoCo longer than all its work.
+    """
 
     def __init__(self) -> None:
         super().__init__("mujoco-inverse", self._make_tree)

@@ -1,14 +1,19 @@
-"""Monitor a simulation's own error: the loop's residuals, the power balance, and what both do to the answer.
+"""Monitor a simulation's own error.
 
+It is judged by the loop's residuals, the power balance, and what both do to the answer.
 A small closure gap proves little: an explicit step with a closure stiffer than it can
 follow holds the gap at micrometres while accelerations and forces are anything. At
 every sample this asks
 
-- how far the loop is open in position, in velocity (J v) and in acceleration (J a + J' v),
-- whether the drive's power is that of the moving bars:  T_k omega_k = v . (M a + bias - applied),
-- whether the forces that were read carry the bars:  J^T F43 + e_k T_k = M a + bias - applied,
-- how far speeds, accelerations, forces and torque would move if the loop were closed exactly at the
-  same theta_2, omega_2, alpha_2: the error to expect, by MuJoCo's own inverse dynamics.
+- how far the loop is open in position, in velocity (J v) and in acceleration
+  (J a + J' v),
+- whether the drive's power is that of the moving bars:
+      T_k omega_k = v . (M a + bias - applied),
+- whether the forces that were read carry the bars:
+      J^T F43 + e_k T_k = M a + bias - applied,
+- how far speeds, accelerations, forces and torque would move if the loop were closed
+  exactly at the same theta_2, omega_2, alpha_2: the error to expect, by MuJoCo's own
+  inverse dynamics.
 
 The bars alone are evaluated, without flywheel, motor and closure, on data of their own.
 """
@@ -96,11 +101,13 @@ class _Motion:
     jacobian: Array
     """Derivative of the gap by the joint angles, (2, 3)."""
     drive: Array
-    """Derivative of the driven bar's rotation, or of the cylinder's stroke, by the joint angles, (3,)."""
+    """Derivative of what is driven by the joint angles, (3,). Driven is the bar's
+    rotation, or the cylinder's stroke.
+    """
     needed: Array
-    """Torque that the motion needs in each joint beyond loads and effects, (3,), N m."""
+    """Torque of the motion in each joint beyond loads and effects, (3,), N m."""
     answer: dict[str, Array]
-    """theta, omega, alpha of bars 3 and 4, and what inverse dynamics makes of the motion."""
+    """theta, omega, alpha of bars 3 and 4, and the result of inverse dynamics."""
 
 
 class ResidualMonitor:
@@ -120,7 +127,10 @@ class ResidualMonitor:
     def look(
         self, loop: ClosedLoop, torque: float, loop_force: Array
     ) -> dict[str, float]:
-        """Take in a forwarded state, the drive's torque and F43 as read; the error to expect of each quantity."""
+        """Take in a forwarded state, and return the error to expect of each quantity.
+
+        The drive's torque and F43 are as read.
+        """
         q, v, a = (
             np.array(field)
             for field in (loop.data.qpos, loop.data.qvel, loop.data.qacc)
@@ -171,7 +181,10 @@ class ResidualMonitor:
         self._most[name] = max(self._most[name], size)
 
     def evidence(self) -> dict[str, float]:
-        """Return the worst of each residual, by the largest term that it is a residual of."""
+        """Return the worst of each residual.
+
+        It is over the largest term that it is a residual of.
+        """
         most = self._most
         return {
             name: worst / most[name] if most[name] else worst
@@ -203,7 +216,10 @@ class ResidualMonitor:
         return _Motion(gap, jacobian @ v, jerk, a_B, jacobian, drive, needed, answer)
 
     def _compute_pins(self, loop_force: Array, drive: float) -> dict[str, Array]:
-        """Compute F12, F32, F14: what carries the bars on the open tree, and the loop force put back."""
+        """Compute F12, F32, F14.
+
+        They are what carries the bars on the open tree, with the loop force put back.
+        """
         bars, d = self.bars, self.bars.data
         if self.drive_bar is None:  # its line crosses the pins, a couple does not
             d.ctrl[bars.ram] = drive
@@ -216,7 +232,10 @@ class ResidualMonitor:
         return {name: np.array(force) for name, force in pins.items()}
 
     def _close(self, q: Array, v: Array, a: Array, seen: _Motion) -> _Motion:
-        """Close the loop at the same theta_2, omega_2, alpha_2 in position, velocity and acceleration."""
+        """Close the loop at the same theta_2, omega_2, alpha_2.
+
+        It is closed in position, velocity and acceleration.
+        """
         q, v, a = q.copy(), v.copy(), a.copy()
         others = [A, O4]
         q[others] -= np.linalg.solve(self.bars.jacobian()[:, others], seen.gap)

@@ -1,8 +1,9 @@
-"""Draw off-screen pictures of MJCF texts by MuJoCo's own renderer, in a separate process.
+"""Draw off-screen pictures of MJCF texts by MuJoCo's own renderer.
 
-A missing or broken OpenGL may end the process that asks for it, so `render_pictures`
-asks from outside: ``python -m fourbar_validation.engines.mujoco.picture`` reads {name:
-MJCF} and answers {name: base64 of a PNG}.
+It runs in a separate process. A missing or broken OpenGL may end the process that asks
+for it, so `render_pictures` asks from outside: ``python -m
+fourbar_validation.engines.mujoco.picture`` reads {name: MJCF} and answers {name: base64
+of a PNG}.
 """
 
 import base64
@@ -22,7 +23,10 @@ BACKENDS = ("egl", "osmesa") if sys.platform == "linux" else ("glfw",)
 
 
 def render_pictures(texts: dict[str, str]) -> tuple[dict[str, str], str]:
-    """Render MJCF texts at their keyframes as base64 PNGs; return also the reason where there are none."""
+    """Render MJCF texts at their keyframes as base64 PNGs.
+
+    Return also the reason if there are none.
+    """
     if not texts:
         return {}, ""
     if len(texts) > MOST:
@@ -67,6 +71,5 @@ def draw(texts: dict[str, str]) -> dict[str, str]:
 if __name__ == "__main__":
     json.dump(draw(json.load(sys.stdin)), sys.stdout)
     sys.stdout.flush()
-    os._exit(
-        0
-    )  # some drivers crash while Python takes them down, when the pictures are long drawn
+    # some drivers crash while Python takes them down, after the pictures are drawn
+    os._exit(0)

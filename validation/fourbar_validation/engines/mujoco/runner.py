@@ -1,7 +1,8 @@
-"""Run a model through a motion: its segments, its steps, and the forces that MJCF cannot express.
+"""Run a model through a motion.
 
-MuJoCo is supplied with loads over theta_2 and the acceleration of a law at each stage
-of a step, from the description alone, at its own angle and time.
+It has its segments, its steps, and the forces that MJCF cannot express. MuJoCo is
+supplied with loads over theta_2 and the acceleration of a law at each stage of a step,
+from the description alone, at its own angle and time.
 
 Where another bar or the cylinder is commanded the input is led so that it moves as
 told. With J the derivative of the gap by the joint angles and c that of the commanded
@@ -44,7 +45,9 @@ from fourbar_validation.engines.mujoco.closed_loop import (
 from fourbar_validation.engines.tree import solve_closed
 
 LOOKED_AT = 2000
-"""Instants at which a law is searched for its greatest speed and acceleration; between them it hardly differs."""
+"""Instants at which a law is searched for its greatest speed and acceleration. Between
+them it hardly differs.
+"""
 
 
 class SteadySegment:
@@ -68,15 +71,24 @@ class SteadySegment:
         self.fastest = self.turning = self.run.fastest
 
     def timestep(self, settings: Settings) -> float:
-        """Choose the timestep for this segment, s: at least as many steps as positions; any where there is but one."""
+        """Choose the timestep for this segment, s.
+
+        There are at least as many steps as positions; any where there is but one.
+        """
         return self.run.timestep(settings, at_least=self.width) if self.width else 1e-3
 
     def seconds(self, index: int) -> float:
-        """Return the time at which it passes a position, by the angle from the start of the segment."""
+        """Return the time at which it passes a position.
+
+        The angle from the start of the segment gives it.
+        """
         return self.run.time(float(self.theta_2[index]))
 
     def speed(self, turned: float, seconds: float) -> float:
-        """Return |omega_2| that is due after a turn (rad) and a time: by the angle turned."""
+        """Return |omega_2| that is due after a turn (rad) and a time.
+
+        The angle turned gives it.
+        """
         return math.sqrt(max(self.run.omega**2 + 2.0 * self.run.alpha * turned, 0.0))
 
 
@@ -103,7 +115,7 @@ class LawSegment:
         self.width = float(np.ptp(angles))
 
     def timestep(self, settings: Settings) -> float:
-        """Divide the time from each position to the next into a whole number of steps."""
+        """Divide the time from each position to the next into whole steps."""
         if not self.intervals:
             return 1e-3
         turned = self.duration * self.fastest
@@ -122,7 +134,10 @@ class LawSegment:
         return float(abs(self.law.at(np.array([self.began + seconds]))[1][0]))
 
     def alpha(self, seconds: float) -> float:
-        """Interpolate linearly, as the second derivative of cubic pieces is; that of a rise is its own."""
+        """Interpolate linearly, as the second derivative of cubic pieces is.
+
+        That of a rise is its own.
+        """
         instant, t, f = self.began + seconds, self.knots, self.at_knots
         if isinstance(self.law, Rise):
             return float(self.law.at(np.array([instant]))[2][0])
@@ -135,21 +150,27 @@ MotionSegment = SteadySegment | LawSegment
 
 
 def find_extremes(law: Law | Rise) -> tuple[float, float]:
-    """Find the greatest |omega_2| and |alpha_2| of a law, for which flywheel and closure are laid out."""
+    """Find the greatest |omega_2| and |alpha_2| of a law.
+
+    Flywheel and closure are laid out for them.
+    """
     _, omega, alpha = law.at(np.linspace(law.time[0], law.time[-1], LOOKED_AT))
     return float(np.abs(omega).max()), float(np.abs(alpha).max())
 
 
 def order_in_time(values: Array, time: Array | None, speed: float) -> NDArray[np.intp]:
-    """Order the positions as they are passed, by what is commanded or by the times of a law, as indices."""
+    """Order the positions as they are passed, as indices.
+
+    The order is by what is commanded or by the times of a law.
+    """
     return np.argsort(
         time if time is not None else values if speed > 0.0 else -values, kind="stable"
     )
 
 
 LIGHT_FLYWHEEL = 1e4
-"""Flywheel of the model that gives T3 or T4: heavy enough to keep the closure's softness
-small, light enough that the torque it needs does not drown in its rounding.
+"""Flywheel of the model that gives T3 or T4: heavy enough to keep the closure's
+softness small, light enough that the torque it needs does not drown in its rounding.
 """
 Found = tuple[float, float, float] | None
 """Own joint angles (O2, A, O4), None where the loop does not close."""
@@ -164,7 +185,10 @@ class Stepper:
         self.model, self.data, self.timestep, self.done = model, data, timestep, 0
 
     def to(self, seconds: float, each: Callable[[float], None] | None = None) -> None:
-        """Step on to the step nearest to a time; `each` is called with the time after every step."""
+        """Step on to the step nearest to a time.
+
+        `each` is called with the time after every step.
+        """
         steps = round(seconds / self.timestep) - self.done
         if each is None:
             if steps > 0:
@@ -182,12 +206,18 @@ class Stepper:
         return self.done * self.timestep
 
     def lost(self) -> bool:
-        """Tell whether MuJoCo reset the data: that starts time again, and clears the warnings."""
+        """Tell whether MuJoCo reset the data.
+
+        That starts time again, and clears the warnings.
+        """
         return bool(self.data.time < self.time * (1.0 - 1e-6))
 
 
 class SimulatedRun:
-    """One segment of positions at a prescribed motion; `light` is the model that a drive elsewhere is read from."""
+    """One segment of positions at a prescribed motion.
+
+    `light`: the model that a drive elsewhere is read from.
+    """
 
     def __init__(
         self,
@@ -206,7 +236,9 @@ class SimulatedRun:
         )
         wound = unwind(scene, start)
         self.turns = wound[O2] - start[O2]
-        """Whole turns by which MuJoCo's theta_2 is ahead: springs at pins count them, rad."""
+        """Whole turns by which MuJoCo's theta_2 is ahead, rad. Springs at pins count
+        them.
+        """
         loop.set_state(wound, motion_segment.omega, motion_segment.bar)
         self.begins = self.progress()
         self.stepper = Stepper(loop.model, loop.data, timestep)
@@ -224,9 +256,10 @@ class SimulatedRun:
         self.stepper.to(self.motion_segment.seconds(index))
 
     def read(self) -> tuple[float | None, dict[str, Array]]:
-        """Read the torque (N m, or a cylinder's force, N) and the pin forces of the state that was last forwarded.
+        """Read the drive and the pin forces of the state last forwarded.
 
-        The torque is None where it does not move the input.
+        The drive is a torque (N m), or the force of a cylinder (N). The torque is None
+        where it does not move the input.
         """
         torque = self.loop.crank_torque()
         if self.light is None:
@@ -240,7 +273,10 @@ class SimulatedRun:
 def find_assembled(
     position: Assembler, command: Command, order: Iterable[int]
 ) -> list[Found]:
-    """Own joint angles of every commanded position, found one after the other in an order."""
+    """Find the joint angles of every commanded position, one after the other.
+
+    They are found in an order.
+    """
     assembled: list[Found] = [None] * len(command.angle)
     for index in order:
         assembled[index] = position.find(
@@ -254,7 +290,10 @@ def split_segments(
     order: Iterable[int],
     joined: Callable[[int, int], bool] = lambda one, other: True,
 ) -> list[list[int]]:
-    """Split the positions, in order of time, where the loop does not close, or two neighbours are not joined."""
+    """Split the positions, in order of time, into segments.
+
+    They end where the loop does not close, or two neighbours are not joined.
+    """
     split: list[list[int]] = [[]]
     for index in order:
         if assembled[index] is None or (split[-1] and not joined(split[-1][-1], index)):
@@ -265,13 +304,17 @@ def split_segments(
 
 
 MOST_UNEVEN = 20.0
-"""Greatest speed of the input over its mean: near a limit of what is commanded it grows without bound, and with it the
-steps of a window, which are those of the fastest throughout; here they are 40 000.
+"""Greatest speed of the input over its mean: near a limit of what is commanded it grows
+without bound, and with it the steps of a window, which are those of the fastest
+throughout; here they are 40 000.
 """
 
 
 class Lead:
-    """Command of another bar or of the stroke, and how the input then moves at each position."""
+    """Command of another bar or of the stroke, and the input's motion.
+
+    The motion is that at each position.
+    """
 
     def __init__(self, scene: Scene, command: Command) -> None:
         motion = scene.motion
@@ -331,7 +374,10 @@ class Lead:
         self.of_input = Command(theta_2, branch[self.closes], *most)
 
     def alpha_2(self, model: mujoco.MjModel, data: mujoco.MjData) -> float:
-        """Solve for the acceleration of the input at a state that MuJoCo is evaluating, rad/s^2."""
+        """Solve for the acceleration of the input at a state, rad/s^2.
+
+        MuJoCo is evaluating the state.
+        """
         loop = copy(self.loop)
         loop.model, loop.data = model, data
         drift = (loop.rate_at("B3") - loop.rate_at("B4")) @ data.qvel
@@ -343,7 +389,10 @@ class Lead:
         )
 
     def least_sine(self) -> float:
-        """Compute the least |sin(theta_4 - theta_3)| on the way; 0 where it changes its sign."""
+        """Compute the least |sin(theta_4 - theta_3)| on the way.
+
+        It is 0 if the sine changes its sign.
+        """
         if np.ptp(self.of_input.branch):
             return 0.0
         return compute_least_sine(
@@ -381,13 +430,18 @@ class LedSegment(SteadySegment):
 
 
 OVERRUN = 1e-7
-"""rad; by so little a simulated crank may turn too far, 1e-9 in healthy runs, and 1e-5 is what it is judged by."""
+"""Angle by which a simulated crank may turn too far, rad. It is 1e-9 in healthy runs,
+and 1e-5 is what it is judged by.
+"""
 ActuatorForce = Callable[[mujoco.MjModel, mujoco.MjData], float]
 """The force of an actuator, in units of its gear."""
 
 
 def take_full_size(scene: Scene) -> Scene:
-    """Give the scene with loads over theta_2 at the largest size that they ever have: what MJCF can say of them."""
+    """Give the scene with loads over theta_2 at their largest size.
+
+    MJCF can state that of them.
+    """
     loads = []
     for load in scene.loads:
         peak = _find_peak(load)
@@ -401,7 +455,10 @@ def _find_peak(load: Load) -> float:
 
 
 def evaluate_loads(scene: Scene) -> dict[str, ActuatorForce]:
-    """Evaluate each load over theta_2, by the actuator's name: its factor at MuJoCo's own theta_2, by the largest."""
+    """Evaluate each load over theta_2, by the actuator's name.
+
+    It is the factor at MuJoCo's own theta_2, over the largest.
+    """
 
     def force_of(load: Load) -> ActuatorForce:
         table, peak = load.table, _find_peak(load)
@@ -424,7 +481,10 @@ def evaluate_loads(scene: Scene) -> dict[str, ActuatorForce]:
 
 
 def clip_angles(scene: Scene, theta_2: Array) -> Array:
-    """Put angles that overran the end of a table by a rounding of the motion back on it; LimitError beyond that."""
+    """Put angles that overran the end of a table back on it.
+
+    The overrun is a rounding of the motion; LimitError beyond that.
+    """
     inside = theta_2.copy()
     for load in scene.loads:
         if load.table is None:
@@ -443,7 +503,7 @@ def clip_angles(scene: Scene, theta_2: Array) -> Array:
 
 
 def receive_forces(loop: ClosedLoop, supplied: dict[str, ActuatorForce]) -> ClosedLoop:
-    """Let the actuators of these names in a loop take their force from `supply_forces`."""
+    """Let the actuators of these names take their force from `supply_forces`."""
     for number in range(loop.model.nu):
         if loop.model.actuator(number).name in supplied:
             loop.model.actuator_biastype[number] = mujoco.mjtBias.mjBIAS_USER
@@ -452,7 +512,10 @@ def receive_forces(loop: ClosedLoop, supplied: dict[str, ActuatorForce]) -> Clos
 
 @contextmanager
 def supply_forces(supplied: dict[str, ActuatorForce]) -> Iterator[None]:
-    """Supply forces to MuJoCo as long as this lasts; its callbacks are of the whole process."""
+    """Supply forces to MuJoCo as long as this lasts.
+
+    Its callbacks are of the whole process.
+    """
     if not supplied:
         yield
         return

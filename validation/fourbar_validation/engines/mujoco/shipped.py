@@ -1,4 +1,7 @@
-"""The generated MJCF as it is shipped: it opens closed, its keyframe moves at omega_2, its drive brings it there."""
+"""The generated MJCF as it is shipped.
+
+It opens closed, its keyframe moves at omega_2, and its drive brings it there.
+"""
 
 import math
 
@@ -21,17 +24,24 @@ from fourbar_validation.engines.mujoco.closed_loop import O2, ClosedLoop
 NAME = "mujoco-simulated"
 QUANTITY = "as shipped"
 OPEN = 1e4 * K * EPS
-"""Gap in parts of the lengths, and gap speed in parts of the speeds: one rounding near a limit position, where |sin mu|
-is 1e-4 and less MuJoCo is not run.
+"""Gap in parts of the lengths, and gap speed in parts of the speeds: one rounding near
+a limit position, where |sin mu| is 1e-4 and less MuJoCo is not run.
 """
 STEPS = 200
-"""A servo of two steps' time constant has brought the input to its speed to e^-100 by then."""
+"""Time after which the servo has brought the input to its speed, to e^-100. Its time
+constant is two steps.
+"""
 SPEED = 100.0 * SIMULATED.factor
-"""Allowed error of the speed, from loads and the closure in as many steps; ten times what was measured."""
+"""Allowed error of the speed, from loads and the closure in as many steps. It is ten
+times what was measured.
+"""
 
 
 def compare_shipped(name: str, scene: Scene, command: Command) -> Row | None:
-    """Compare the file's rest pose, its keyframe and its drive; give the worst, None where nothing moves."""
+    """Compare the file's rest pose, its keyframe and its drive.
+
+    Give the worst; None if nothing moves.
+    """
     omega = scene.motion.omega_2
     if not omega or scene.motion.law is not None:
         return None

@@ -1,4 +1,7 @@
-"""MuJoCo simulates the closed loop of the generated MJCF, driven at omega_2 through the sweep."""
+"""MuJoCo simulates the closed loop of the generated MJCF.
+
+It is driven at omega_2 through the sweep.
+"""
 
 import math
 import time
@@ -63,7 +66,9 @@ OWN = (
 FINE = np.radians(2.0)
 """Greatest step between positions at which the loop is tried for closure, rad."""
 COLLINEAR = 1e-9
-"""Part of the sum of the lengths, and of half a turn: below what the time step itself can resolve."""
+"""Part of the sum of the lengths, and of half a turn, that counts as none. The time
+step itself resolves no less.
+"""
 OF_TENDON = ("stroke", "stroke_speed")
 """Quantities of a cylinder that MuJoCo has."""
 RESIDUALS = (
@@ -94,7 +99,10 @@ class MujocoSimulated:
         return replace(self, settings=settings)
 
     def answer(self, scene: Scene, command: Command) -> Answer:
-        """Run the sweep through in time; read every quantity at the crank's own angle, speed and acceleration."""
+        """Run the sweep through in time, and read every quantity.
+
+        It is read at the crank's own angle, speed and acceleration.
+        """
         scene = state_from_pins(scene)
         if isinstance(scene.drive, PointDrive):
             return Answer(self.name, "", refusal=NO_PUSH)
@@ -139,12 +147,17 @@ def _require_run(scene: Scene, command: Command) -> None:
     if reason := find_exceeded(run, abs(run.motion.omega_2 or 0.0)):
         raise LimitError(reason)
     if _passes_change_point(scene, command):
-        raise LimitError("the sweep meets a change point, where all bars are collinear and MuJoCo's closure loses a "
-                         "direction")  # fmt: skip
+        raise LimitError(
+            "the sweep meets a change point, where all bars are collinear and MuJoCo's"
+            " closure loses a direction"
+        )
 
 
 def _passes_change_point(scene: Scene, command: Command) -> bool:
-    """Tell whether all four bars come to lie along the ground within the sweep: +-a +-b +-c = d."""
+    """Tell whether all four bars become collinear within the sweep.
+
+    They do if +-a +-b +-c = d.
+    """
     d, a, b, c = scene.linkage.lengths
     least, most = (
         float(x) - scene.linkage.ground_angle
@@ -163,7 +176,10 @@ def _passes_change_point(scene: Scene, command: Command) -> bool:
 
 
 def make_run_scene(scene: Scene, command: Command) -> Scene:
-    """Make the scene whose MJCF is run through, a law by its greatest speed and acceleration."""
+    """Make the scene whose MJCF is run through.
+
+    A law is stated by its greatest speed and acceleration.
+    """
     if scene.motion.law is not None:
         omega, alpha = find_extremes(scene.motion.law)
         motion = Motion(command.theta_2, omega, alpha, scene.motion.branch)
@@ -178,7 +194,10 @@ def make_run_scene(scene: Scene, command: Command) -> Scene:
 
 
 class _Simulation:
-    """One scene: its own assembly, then each segment of positions that assembles, run through in time."""
+    """One scene: its own assembly, then each segment run through in time.
+
+    A segment is of positions that assemble.
+    """
 
     def __init__(
         self,
@@ -406,10 +425,10 @@ class _Simulation:
 def observe_order(
     scene: Scene, command: Command, error: Callable[[Answer], float]
 ) -> tuple[float, float, float]:
-    """Return errors at 4h and 2h with the closure's time constant held in seconds, and log2 of their ratio.
+    """Return errors at 4h and 2h, and log2 of their ratio.
 
-    At the recipe's own h the softness is already of the size of the truncation; the
-    order shows above it.
+    The closure's time constant is held in seconds. At the recipe's own h the softness
+    is already of the size of the truncation; the order shows above it.
     """
     errors = [
         error(

@@ -76,7 +76,9 @@ MOST_STEPS = 400_000
 PRICING = 60.0
 """Seconds in which differences are tried one by one; each takes two evaluations."""
 DRIVING = 1e3
-"""Armature over the inertia of all else from which it is a flywheel that drives: the speed then ripples by 1e-3."""
+"""Armature over all other inertia from which it is a flywheel that drives. The speed
+then ripples by 1e-3.
+"""
 SAME_GRAVITY = 1e-9
 """Part of gravity by which its direction may differ in the axes of a scene."""
 GENERATED = Path("generated.xml")
@@ -102,7 +104,10 @@ class Examined:
 
 @contextmanager
 def collect_warnings() -> Iterator[list[str]]:
-    """Collect the warnings of MuJoCo, each once, in place of printing and logging them."""
+    """Collect the warnings of MuJoCo, each once.
+
+    They are neither printed nor logged.
+    """
     heard: list[str] = []
 
     def hear(warning: str) -> None:
@@ -125,14 +130,15 @@ def compile_topology(
 
 
 def orient(topology: Topology, scene: Scene) -> Topology:
-    """Return a four-bar in the axes of a scene, as far as gravity has the same direction there; else as it is.
+    """Return a four-bar in the axes of a scene.
 
-    A linkage that is turned in its plane together with gravity, or seen from the other
-    side, is the same one.
+    It stays as it is if gravity has another direction there. A linkage that is turned
+    in its plane together with gravity, or seen from the other side, is the same one.
     """
     model = topology.model
     if not np.all(np.isfinite(topology.rest_angles)):
-        return topology  # its lengths are beyond the range of doubles, which is said of them
+        # its lengths are beyond the range of doubles, which is said of them
+        return topology
     gravity = model.opt.gravity * is_enabled(model, "gravity")
     wanted = sum(
         (effect.vector for effect in scene.effects if isinstance(effect, Gravity)),
@@ -148,7 +154,10 @@ def orient(topology: Topology, scene: Scene) -> Topology:
 
 
 def examine(scene: Scene, file: RobotFile | None, names: Mapping[str, str]) -> Examined:
-    """Describe an MJCF, evaluate it at single states and through time; None: the one generated from the scene."""
+    """Describe an MJCF, and evaluate it at single states and through time.
+
+    None: the one generated from the scene.
+    """
     with collect_warnings() as warnings:
         examined = _examine(
             scene, file or RobotFile(GENERATED, write_mjcf(scene)), names
@@ -176,7 +185,10 @@ def _examine(scene: Scene, file: RobotFile, names: Mapping[str, str]) -> Examine
 
 
 def _free_unmet_stops(described: Described, loop: "UserLoop") -> Iterator[str]:
-    """Describe as free what no stop ended at any state, and yield a note of each such joint."""
+    """Describe as free what no stop ended at any state.
+
+    Yield a note of each such joint.
+    """
     for pin, joint in loop.topology.hinge.items():
         stops = loop.topology.stops(pin)
         if stops is None or joint in loop.stopped:
@@ -193,10 +205,10 @@ def _free_unmet_stops(described: Described, loop: "UserLoop") -> Iterator[str]:
 def examine_changed(
     scene: Scene, changes: Sequence[tuple[str, Value | None]]
 ) -> list[list[Answer] | None]:
-    """Answer with the generated file, without a drive, as it is; then with each entry alone changed in it.
+    """Answer with the generated file, then with each entry alone changed.
 
-    None stands for an entry that cannot be set alone. After PRICING seconds the rest
-    are not evaluated either.
+    The file is without a drive, and first as it is. None stands for an entry that
+    cannot be set alone. After PRICING seconds the rest are not evaluated either.
     """
     start, answered = time.perf_counter(), list[list[Answer] | None]()
     file = RobotFile(GENERATED, write_mjcf(scene, drive="none"))
@@ -223,7 +235,10 @@ def examine_mended(
     names: Mapping[str, str],
     changes: Sequence[tuple[str, Value | None]],
 ) -> list[list[Answer] | None]:
-    """Answer with a file one entry of which is that of the generated one; None where it cannot be."""
+    """Answer with a file whose one entry is that of the generated one.
+
+    None if it cannot be.
+    """
     start, answered = time.perf_counter(), list[list[Answer] | None]()
     seen = compile_topology(file, names, scene)
     for key, value in changes:
@@ -240,12 +255,12 @@ def examine_mended(
 def predict_softness(
     scene: Scene, file: RobotFile, names: Mapping[str, str]
 ) -> dict[str, float]:
-    """Predict what the stiffest constraint of MuJoCo leaves of the torque and the pin forces of a file, N m and N.
+    """Predict what MuJoCo's stiffest constraint leaves in a file, N m and N.
 
-    The error of a soft constraint goes as (1 - d)/d in its impedance d. Between
-    STIFFEST and an impedance of twice that yield it grows by itself, so the error is
-    measured without anything to compare the file with. Empty where no connect or weld
-    closes the loop.
+    It is that of the torque and the pin forces. The error of a soft constraint goes as
+    (1 - d)/d in its impedance d. Between STIFFEST and an impedance of twice that yield
+    it grows by itself, so the error is measured without anything to compare the file
+    with. Empty where no connect or weld closes the loop.
     """
     answers, seen = [], compile_topology(file, names, scene)
     if seen.closure is None:
@@ -311,7 +326,10 @@ def _answer(name: str, scene: Scene, ask: Callable[[], Answer]) -> Answer:
 
 
 class UserLoop(Assembled):
-    """Somebody's model with its drive taken off; coordinates x = (theta_2, theta_3 - theta_2, theta_4)."""
+    """Somebody's model with its drive taken off.
+
+    Its coordinates are x = (theta_2, theta_3 - theta_2, theta_4).
+    """
 
     def __init__(self, topology: Topology, scene: Scene) -> None:
         self.topology, self.scene, self.model = topology, scene, topology.model
@@ -334,7 +352,9 @@ class UserLoop(Assembled):
             0.0 if self.crank is None else float(self.model.dof_armature[self.crank])
         )
         self.flywheel = self._find_flywheel()
-        """The part of the armature that keeps the speed: its torque is the drive's, kg m^2."""
+        """Part of the armature that keeps the speed, kg m^2. Its torque is that of the
+        drive.
+        """
         self._take_off_the_drive()
         self._loads = [
             i
@@ -344,7 +364,10 @@ class UserLoop(Assembled):
         self._jac = np.zeros((3, self.model.nv))
 
     def _find_flywheel(self) -> float:
-        """Return the armature of pin O2 if it is so heavy that it drives; else it is inertia like any other."""
+        """Return the armature of pin O2 if it is so heavy that it drives.
+
+        Otherwise it is inertia like any other.
+        """
         mass_matrix = float(self.model.dof_M0.sum() - self.model.dof_armature.sum())
         of_scene = sum(
             effect.inertia
@@ -409,7 +432,10 @@ class UserLoop(Assembled):
         mujoco.mj_comPos(self.model, self.data)
 
     def gap(self) -> tuple[float, float]:
-        """Return the opening of the cut pin, m: for any pin +-(A + b e^{i theta_3} - O4 - c e^{i theta_4})."""
+        """Return the opening of the cut pin, m.
+
+        For any pin it is +-(A + b e^{i theta_3} - O4 - c e^{i theta_4}).
+        """
         first, second = (
             self.topology.world(self.data, bar, self.topology.cut)
             for bar in PINS[self.topology.cut]
@@ -430,7 +456,10 @@ class UserLoop(Assembled):
         return np.asarray(rows[0] - rows[1])
 
     def positions(self) -> dict[str, Array]:
-        """Locate A, B, O4, and the end of bar 4, laid off bar by bar from O2, (2,), m."""
+        """Locate A, B, O4, and the end of bar 4, (2,), m.
+
+        They are laid off bar by bar from O2.
+        """
         line = {bar: self.topology.line(self.data, bar) for bar in (1, 2, 3, 4)}
         return {
             "A": line[2],
@@ -440,11 +469,17 @@ class UserLoop(Assembled):
         }
 
     def speeds(self, omega_2: float) -> Array:
-        """Compute the joint speeds that keep the gap closed where the model is placed, (3,)."""
+        """Compute the joint speeds that keep the gap closed, (3,).
+
+        The model is placed at the position.
+        """
         return np.asarray(self.to_joints @ solve_closed(self.jacobian(), omega_2))
 
     def ask(self, q: Array, v: Array, alpha_2: float) -> dict[str, Array | float]:
-        """Evaluate a state at which the crank accelerates at alpha_2, and solve for the driven bar's couple."""
+        """Evaluate a state at which the crank accelerates at alpha_2.
+
+        The couple of the driven bar is solved for.
+        """
         data, drive = self.data, self.scene.drive_bar
         active = data.eq_active.copy()
         mujoco.mj_resetData(self.model, data)
@@ -485,7 +520,10 @@ class UserLoop(Assembled):
     def _solve_drive(
         self, acceleration: Callable[[float], float], wanted: float
     ) -> float:
-        """Solve for the couple or force of the drive; NaN where none gives the acceleration, which is noted."""
+        """Solve for the couple or force of the drive.
+
+        NaN if none gives the acceleration, which is noted.
+        """
         couple = find_couple(self.model, self.data, acceleration, wanted)
         if couple is None:
             what = (
@@ -505,7 +543,10 @@ class UserLoop(Assembled):
         self.stopped.update(self.data.efc_id[limits].tolist())
 
     def _read_forces(self) -> dict[str, Array]:
-        """Read F12, F32, F43, F14 in the plane; NaN at a cut pin that no connect or weld holds."""
+        """Read F12, F32, F43, F14 in the plane.
+
+        NaN at a cut pin that no connect or weld holds.
+        """
         data, topology = self.data, self.topology
         on: dict[tuple[int, int], Array] = {}
         for pin in topology.hinge:
@@ -582,7 +623,10 @@ def answer_one_state(loop: UserLoop, command: Command) -> Answer:
 
 
 def answer_through_time(loop: UserLoop, command: Command) -> Answer:
-    """Run the longest segment of positions that assembles at the file's own timestep."""
+    """Run the longest segment of positions at the file's own timestep.
+
+    The positions assemble.
+    """
     model, data = loop.model, mujoco.MjData(loop.model)
     data.eq_active[:] = loop.data.eq_active
     if loop.crank is None:

@@ -1,5 +1,6 @@
-"""The four-bar in somebody's compiled MJCF: which body is which bar, where its pins are, what holds the loop closed.
+"""The four-bar in somebody's compiled MJCF.
 
+It tells which body is which bar, where its pins are, and what holds the loop closed.
 Any cut is understood: three of the pins are hinges, the fourth is an equality (connect,
 weld) or two sites by name. The plane may be any.
 """
@@ -22,7 +23,7 @@ PIN_OF = {frozenset(bars): pin for pin, bars in PINS.items()}
 ENDS = {1: ("O2", "O4"), **MOVING_ENDS}
 """The pins between which a bar's line runs."""
 PLANES = {2: ("x-y", (0, 1)), 1: ("x-z", (0, 2)), 0: ("y-z", (1, 2))}
-"""World axis of the hinges: the plane they move in, and the world axes that stand for x and y there."""
+"""World axis of the hinges: the plane, and the world axes for x and y there."""
 STRAIGHT = 1e-9
 """A hinge tilted by more than this (sine) leaves the plane."""
 ROLES = tuple(BAR_NAMES[bar] for bar in MOVING_BARS)
@@ -47,7 +48,10 @@ def list_bodies(model: mujoco.MjModel) -> str:
 
 
 def find_stated_body(model: mujoco.MjModel, names: Mapping[str, str], role: str) -> int:
-    """Find the body of a bar by its given name, or by the bar's; InputError where there is none."""
+    """Find the body of a bar by its given name, or by the bar's.
+
+    Raises InputError if there is none.
+    """
     name = names.get(role, role)
     body = find_body(model, name)
     if body is None:
@@ -60,7 +64,10 @@ def find_stated_body(model: mujoco.MjModel, names: Mapping[str, str], role: str)
 
 
 class Topology:
-    """Bars, pins, hinges and closure of a compiled model; everything is measured in its rest state."""
+    """Bars, pins, hinges and closure of a compiled model.
+
+    Everything is measured in its rest state.
+    """
 
     def __init__(
         self,
@@ -68,7 +75,10 @@ class Topology:
         names: Mapping[str, str],
         axes: Array | None = None,
     ) -> None:
-        """Read a model; `axes`: x and y of its plane, (2, 3), None: those of the world that are in it."""
+        """Read a model.
+
+        `axes`: x and y of its plane, (2, 3); None: those of the world that are in it.
+        """
         self.model, self.data, self.names = model, mujoco.MjData(model), dict(names)
         mujoco.mj_kinematics(model, self.data)
         mujoco.mj_comPos(model, self.data)
@@ -123,7 +133,10 @@ class Topology:
         return [i for i in on_joints if model.actuator_trnid[i, 0] == joint]
 
     def stops(self, pin: str) -> tuple[float, float] | None:
-        """Return the range of a pin, rad, from the line of its bearer to its bar's; None without stops."""
+        """Return the range of a pin, rad, or None without stops.
+
+        It is from the line of its bearer to its bar's.
+        """
         model, joint = self.model, self.hinge[pin]
         if not self._is_limited(joint):
             return None
@@ -137,7 +150,10 @@ class Topology:
         return bool(self.model.jnt_limited[joint]) and not off
 
     def cylinders(self) -> list[int]:
-        """List the actuators along a tendon that take a control: without one a spring is such an actuator too."""
+        """List the actuators along a tendon that take a control.
+
+        Without one a spring is such an actuator too.
+        """
         model = self.model
         on_tendons = np.flatnonzero(
             model.actuator_trntype == mujoco.mjtTrn.mjTRN_TENDON
@@ -145,7 +161,10 @@ class Topology:
         return [i for i in on_tendons if model.actuator_gainprm[i].any()]
 
     def bar(self, body: int) -> int | None:
-        """Find the bar that a body belongs to; None where it is no part of the four-bar."""
+        """Find the bar that a body belongs to.
+
+        None if it is no part of the four-bar.
+        """
         return self.bar_of_root.get(int(self.model.body_weldid[body]))
 
     def _find_plane(self) -> None:
@@ -220,7 +239,10 @@ class Topology:
         )
 
     def _find_closure(self, names: Mapping[str, str]) -> None:
-        """Find the equality between the two bars of the cut pin, or two sites that mark it."""
+        """Find the equality between the two bars of the cut pin.
+
+        Two sites may mark it instead.
+        """
         model, kinds = self.model, mujoco.mjtEq
         for number in range(model.neq):
             kind = kinds(model.eq_type[number])
@@ -288,7 +310,10 @@ class Topology:
         )
 
     def line(self, data: mujoco.MjData, bar: int) -> Array:
-        """Return a bar's line from its first pin to its second, in the plane, (2,), m."""
+        """Return a bar's line from its first pin to its second, (2,), m.
+
+        It is in the plane.
+        """
         first, second = (self.world(data, bar, pin) for pin in ENDS[bar])
         return self.in_plane(second - first)
 
@@ -307,7 +332,10 @@ class Topology:
         return self._line[1], self._line[2], self._line[4]
 
     def turned(self, ground_angle: float, *, behind: bool = False) -> "Topology":
-        """Return the same four-bar in axes in which theta_1 is this angle, rad; `behind`: seen from the other side."""
+        """Return the same four-bar in axes in which theta_1 is this angle, rad.
+
+        `behind`: seen from the other side.
+        """
         x, y = self.axes
         y = -y if behind else y
         angle = (-self.ground_angle if behind else self.ground_angle) - ground_angle
@@ -320,12 +348,18 @@ class Topology:
         return Topology(copy(self.model), self.names, self.axes)
 
     def rest_angle(self, pin: str) -> float:
-        """Measure a hinge in the rest state: from the line of its bearer to that of the bar that hangs on it."""
+        """Measure a hinge in the rest state.
+
+        It is from the line of its bearer to that of the bar that hangs on it.
+        """
         child, parent = self.turning(pin)
         return self._line[child] - self._line[parent]
 
     def along_bar(self, bar: int, world: Array) -> tuple[float, float]:
-        """Locate a point from a bar's first pin in the rest state: along its line and to its left, m."""
+        """Locate a point from a bar's first pin in the rest state, m.
+
+        It is along the bar's line and to its left.
+        """
         return self.turned_back(bar, world - self.world(self.data, bar, ENDS[bar][0]))
 
     def turned_back(self, bar: int, vector: Array) -> tuple[float, float]:
@@ -350,7 +384,7 @@ class Topology:
         return matrix
 
     def turning(self, pin: str) -> tuple[int, int]:
-        """Return the bar that hangs on the hinge of a pin, and the bar that bears it."""
+        """Return the bar that hangs on the hinge of a pin, and its bearer."""
         body = self.model.jnt_bodyid[self.hinge[pin]]
         child = self.bar(body)
         assert child is not None
@@ -387,7 +421,9 @@ class Topology:
 def find_topology(
     model: mujoco.MjModel, names: Mapping[str, str], lengths: Sequence[float]
 ) -> tuple[Topology, list[str]]:
-    """Find the four-bar in a model; add a note on what was guessed. Names that are given, or in the file, stand.
+    """Find the four-bar in a model; add a note on what was guessed.
+
+    Names that are given, or in the file, stand.
 
     `lengths`: of ground, input, coupler and output in the scene, m: the guess that fits
     them best is taken.
@@ -481,7 +517,10 @@ def _open_sites(model: mujoco.MjModel) -> bool:
 def _list_sites(
     model: mujoco.MjModel, roles: Mapping[str, str], names: Mapping[str, str]
 ) -> list[dict[str, str]]:
-    """List pairs of sites that may mark pin B; none need be given where a connect or a weld closes the loop."""
+    """List pairs of sites that may mark pin B.
+
+    None need be given if a connect or a weld closes the loop.
+    """
     if (
         not _open_sites(model)
         or names.keys() & {*SITES}

@@ -1,9 +1,10 @@
-"""MuJoCo's settings for a wanted error, and one scene run through in time with any of them.
+"""MuJoCo's settings for a wanted error.
 
-From the laws that the study of cost measured:
+One scene is run through in time with any of them. From the laws that the study of cost
+measured:
 
-    the closure's time constant    error = STIFF (h/tc)^4, whatever the timestep        -> tc in steps
-    the timestep                   error ~ h^ORDER until a floor                         -> steps
+    error = STIFF (h/tc)^4, whatever the timestep    -> tc, the closure's time constant
+    error ~ h^ORDER until a floor                    -> h, the timestep
 
 The scene is assembled once by the engine itself; each trial compiles the generated MJCF
 anew, with the drive to be tried, and reports its own motion, torque and pin forces.
@@ -47,11 +48,15 @@ from fourbar_validation.engines.mujoco.runner import (
 from fourbar_validation.engines.mujoco.simulate import MujocoSimulated
 
 STIFF = 4e-2
-"""error (tc/h)^4 of RK4 with tc in steps: measured 1.3e-2 to 6e-2 on crank-rocker, drag link and double rocker."""
+"""Value of error (tc/h)^4 of RK4, with tc in steps. Measured: 1.3e-2 to 6e-2 on
+crank-rocker, drag link and double rocker.
+"""
 SHORTEST = 3.0
 """Steps of the time constant: below 2 the closure follows no integrator."""
 LONGEST = 400.0
-"""Beyond it nothing is gained above 1e-12, and the loop is no longer held together over a revolution."""
+"""Time constant beyond which nothing is gained above 1e-12. The loop is then no longer
+held together over a revolution.
+"""
 ORDER = 4.0
 """Order of RK4, for the first guess of the next number of steps; it decides nothing."""
 FIRST_STEPS, FIRST_ERROR = 60.0, 1e-5
@@ -59,7 +64,9 @@ FIRST_STEPS, FIRST_ERROR = 60.0, 1e-5
 FEWEST_STEPS = 6.0
 """A revolution cannot be followed by less."""
 FLYWHEEL = 1e5
-"""Lighter than the recipe's: the torque, armature times acceleration, is rounded in proportion to it."""
+"""Flywheel, lighter than the recipe's. The torque, armature times acceleration, is
+rounded in proportion to it.
+"""
 MOST_READINGS = 100
 """Readings that are timed at once, at most."""
 Build = Callable[[str, float], ClosedLoop]
@@ -67,14 +74,20 @@ Build = Callable[[str, float], ClosedLoop]
 
 
 def guess(error: float) -> tuple[float, float]:
-    """Compute the steps per revolution and the time constant in steps that the laws say for an error."""
+    """Compute the steps per revolution and the time constant for an error.
+
+    The laws give them; the time constant is in steps.
+    """
     tc = (STIFF / (error / 2.0)) ** (1.0 / ORDER)
     steps = FIRST_STEPS * (FIRST_ERROR / error) ** (1.0 / ORDER)
     return max(steps, FEWEST_STEPS), min(max(tc, SHORTEST), LONGEST)
 
 
 def make_settings(steps_per_revolution: float, time_constant_steps: float) -> Settings:
-    """Give the recommended settings at a number of steps and a time constant; a window has no steps of its own."""
+    """Give the recommended settings at a number of steps and a time constant.
+
+    A window has no steps of its own.
+    """
     return Settings(
         steps_per_revolution=steps_per_revolution,
         steps_per_window=1,
@@ -98,7 +111,11 @@ def describe_settings(settings: Settings, steps_per_revolution: float) -> str:
 
 @contextmanager
 def silence() -> Iterator[None]:
-    """Silence MuJoCo: a setting that fails is a result here, neither printed nor logged in the working folder."""
+    """Silence MuJoCo.
+
+    A setting that fails is a result here, neither printed nor logged in the working
+    folder.
+    """
     before = mujoco.get_mju_user_warning()
     mujoco.set_mju_user_warning(lambda _: None)
     try:
@@ -119,13 +136,18 @@ class Trial:
     steps_per_revolution: float = 0.0
     """Steps per revolution at the fastest speed of the run."""
     segments: tuple[tuple[slice, int], ...] = ()
-    """The samples of each segment, and its steps: several samples are of one step where these are fewer."""
+    """Samples of each segment, and its steps. Several samples are of one step if the
+    steps are fewer.
+    """
     broken: str = ""
     """Report of the engine on itself, if it lost the motion."""
 
     @property
     def readings(self) -> int:
-        """Number of states that are read: one a position, or one a step where these are fewer."""
+        """Number of states that are read.
+
+        It is one a position, or one a step if the steps are fewer.
+        """
         count = 0
         for rows, steps in self.segments:
             positions = len(np.unique(self.at.theta_2[rows]))
@@ -200,12 +222,12 @@ class TrialSetup:
         closure: Build | None = None,
         drive: Build | None = None,
     ) -> tuple[ClosedLoop, ClosedLoop | None]:
-        """Build the loop that is stepped, and the one that a drive elsewhere is read from.
+        """Build the loop that is stepped.
 
-        Both are closed alike: at a state that a soft closure has reached, another
-        closure asks for other forces. Pads stiffen the closure of a crank with a
-        flywheel alone, so with pads the second loop has a light one; otherwise it is
-        the linkage by itself.
+        The one from which a drive elsewhere is read is built too. Both are closed
+        alike: at a state that a soft closure has reached, another closure asks for
+        other forces. Pads stiffen the closure of a crank with a flywheel alone, so with
+        pads the second loop has a light one; otherwise it is the linkage by itself.
         """
         text = self.text(settings, timestep)
         loop = (drive or closure or _keep_text)(text, self.omega)
@@ -254,7 +276,9 @@ class TrialSetup:
         closure: Build | None = None,
         drive: Build | None = None,
     ) -> Trial:
-        """Run through every segment that assembles; read at the step nearest to each position.
+        """Run through every segment that assembles.
+
+        It reads at the step nearest to each position.
 
         Parameters
         ----------
@@ -388,7 +412,10 @@ class SimulatedToError:
     name: str = "mujoco-simulated"
 
     def answer(self, scene: Scene, command: Command) -> Answer:
-        """Simulate with as many steps as the laws ask for, and more while its own residuals say so."""
+        """Simulate with as many steps as the laws ask for.
+
+        There are more while its own residuals say so.
+        """
         steps, tc = guess(self.error)
         spent, runs = 0.0, 0
         for _ in range(ROUNDS):
@@ -414,7 +441,10 @@ class SimulatedToError:
 
 
 def compute_expected_error(scene: Scene, answer: Answer) -> float:
-    """Compute the worst error that the engine predicts, relative to a quantity's largest magnitude (angles: 1 rad)."""
+    """Compute the worst error that the engine predicts.
+
+    It is relative to a quantity's largest magnitude (angles: 1 rad).
+    """
     worst = 0.0
     for name, predicted in answer.predicted.items():
         if name not in COMPARED_QUANTITIES:

@@ -1,8 +1,8 @@
-"""Internal forces: each bar is cut, and the piece beyond the cut freed; nothing of the formulas' beam is used.
+"""Internal forces of each bar, cut, with the piece beyond the cut freed.
 
-The free bodies give pin forces and the drive. A piece of a uniform bar is a rigid bar
-of its own, with a mass, a centre and an inertia; of any other bar all of that is in the
-piece that has G's foot on the line.
+Nothing of the formulas' beam is used. The free bodies give pin forces and the drive. A
+piece of a uniform bar is a rigid bar of its own, with a mass, a centre and an inertia;
+of any other bar all of that is in the piece that has G's foot on the line.
 """
 
 from dataclasses import dataclass
@@ -33,7 +33,9 @@ from fourbar_validation.run.derived.variants import ask_free_bodies, make_row, t
 from fourbar_validation.run.question import Question
 
 WHERE = (0.0, 0.137, 0.479, 0.863)
-"""Cuts, in parts of the bar's length from its first pin; just beyond that pin, and none at another foot."""
+"""Cuts, in parts of the bar's length from its first pin. The first is just beyond that
+pin, and none is at another foot.
+"""
 CUT = ErrorBound(
     "cut bars",
     "1e-10 of the sum of the absolute terms: pin forces at conditions of at least 0.1"
@@ -45,7 +47,10 @@ CUT = ErrorBound(
 
 
 def internal_forces(question: Question) -> list[Row]:
-    """Judge N, V, M of each bar at a few cuts and positions, and that no cut bends more than the largest moment."""
+    """Judge N, V, M of each bar at a few cuts and positions.
+
+    No cut may bend more than the largest moment.
+    """
     scene = take_few(question)
     command = command_of(scene)
     answer, solution = ask_free_bodies(scene, command), fourbar.solve(scene)
@@ -93,7 +98,10 @@ def move_bars(scene: Scene, command: Command, answer: Answer) -> BodyMotion:
 
 @dataclass
 class Piece(BodyWrenches):
-    """The piece of a bar beyond a cut: forces in the bar's axes and their moment about the cut, counter-clockwise."""
+    """The piece of a bar beyond a cut, with the forces in the bar's axes.
+
+    Their moment is about the cut, counter-clockwise.
+    """
 
     bar: int
     cut: float
@@ -109,7 +117,10 @@ class Piece(BodyWrenches):
         """Sums of the absolute terms of the whole bar, N and N m."""
 
     def push(self, bar: int, force: Any, arm: Any) -> None:
-        """Add a force, world axes, at an arm from the bar's first pin, to the piece on which its foot lies."""
+        """Add a force, world axes, at an arm from the bar's first pin.
+
+        It acts on the piece on which its foot lies.
+        """
         if bar != self.bar:
             return
         turned, lever = (
@@ -197,7 +208,10 @@ def free_piece(
 def _push_rigid(
     piece: Piece, mass: float, ends: tuple[float, float], a_pin: Any, gravity: Any
 ) -> None:
-    """Put weight and inertia of a piece of a uniform bar on it, as of a rigid bar between two places."""
+    """Put weight and inertia of a piece of a uniform bar on it.
+
+    The piece is that of a rigid bar between two places.
+    """
     start, end = ends
     middle, bar = 0.5 * (start + end), piece.bar
     arm = middle * piece.motion.unit[bar]
@@ -208,7 +222,10 @@ def _push_rigid(
 
 
 def _push_drive(scene: Scene, motion: BodyMotion, answer: Answer, piece: Piece) -> None:
-    """Put the couple of the drive at the first pin of its bar, or its force at the ends of its line."""
+    """Put the couple of the drive at the first pin of its bar.
+
+    A force of the drive acts at the ends of its line.
+    """
     if scene.drive is None:
         if scene.drive_bar == piece.bar:
             piece.couple(piece.bar, answer.quantities["torque"])

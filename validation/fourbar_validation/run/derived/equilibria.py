@@ -1,4 +1,6 @@
-"""Judge equilibria by the linkage held at rest in 320-bit arithmetic: its torque, the slope of that and its inertia.
+"""Judge equilibria by the linkage held at rest in 320-bit arithmetic.
+
+Its torque, the slope of that and its inertia are compared.
 
 With T the torque that holds the independent bar and J the torque per unit of its
 acceleration,
@@ -39,13 +41,19 @@ from fourbar_validation.run.derived.variants import make_row
 from fourbar_validation.run.question import NotAskedError, Question
 
 SAMPLES = 720
-"""Positions of a turn of the input: between two of them the torque changes its sign at an odd number of equilibria."""
+"""Positions of a turn of the input. Between two of them the torque changes its sign at
+an odd number of equilibria.
+"""
 OFF_GRID = 0.381966
-"""Part of a sample's step by which the samples are moved: no equilibrium of a round angle falls on one."""
+"""Part of a sample's step by which the samples are moved. No equilibrium of a round
+angle falls on one.
+"""
 ANGLES = ("theta", "rest", "phi", "angle")
 """Parts of the names of inputs that are angles: they are rounded as 1 rad at least."""
 AT_LIMIT = EPS**-0.5
-"""Most roundings by which a rounding of theta_2 moves theta_4, at a limit of theta_2."""
+"""Most roundings by which a rounding of theta_2 moves theta_4. It is at a limit of
+theta_2.
+"""
 REST = ErrorBound(
     "rest",
     "K eps of the sum of what moving each stored number by its own size would change,"
@@ -64,7 +72,10 @@ class Derived(NamedTuple):
 
 
 def equilibria(question: Question) -> Iterator[Row]:
-    """Judge the torque, its slope and the frequency at every equilibrium, and that there are no others."""
+    """Judge the torque, its slope and the frequency at every equilibrium.
+
+    There may be no other equilibria.
+    """
     scene = _at_rest(question.scene)
     if missing := find_missing("flint"):
         raise NotAskedError(missing)
@@ -133,7 +144,10 @@ def _at_rest(scene: Scene) -> Scene:
 
 
 def _list_samples(question: Question) -> Array:
-    """List the input's angles at which it is held: all that it reaches from the first one, of a sweep those in it."""
+    """List the input's angles at which it is held.
+
+    They are all that it reaches from the first one, of a sweep those in it.
+    """
     solution, motion, linkage = (
         question.solution,
         question.scene.motion,
@@ -164,7 +178,10 @@ def _list_samples(question: Question) -> Array:
 
 
 def _hold(scene: Scene, angle: Array, branch: int) -> Array:
-    """Ask the free bodies for the torque on the input at rest; NaN where it is ill-conditioned or does not assemble."""
+    """Ask the free bodies for the torque on the input at rest.
+
+    NaN where it is ill-conditioned or does not assemble.
+    """
     command = Command(
         angle,
         np.full(angle.shape, branch, dtype=np.int8),
@@ -189,7 +206,9 @@ def _count_missed(
     torque: Array,
     places: list[tuple[float, float]],
 ) -> int:
-    """Count the steps in which the torque changes its sign and no equilibrium was found, or the reverse.
+    """Count the steps with a sign change of the torque and no equilibrium.
+
+    The reverse counts too.
 
     `places`: angles of the equilibria on the branch, and how far off each may be: a
     step that one may be in or not is not counted, nor one at an end of which 320 bits
@@ -227,10 +246,10 @@ def _count_missed(
 
 
 def _judge(scene: Scene, equilibrium: Equilibrium) -> tuple[float, dict[str, float]]:
-    """Compare torque, slope, inertia and frequency; also, how far off the equilibrium may be, rad.
+    """Compare torque, slope, inertia and frequency.
 
-    No errors where nothing is decided: that near to a singular position first order
-    predicts nothing.
+    It gives too by how much the equilibrium may be off, rad. No errors where nothing is
+    decided: that near to a singular position first order predicts nothing.
     """
     place, bar = equilibrium.place, int(equilibrium.angle[-1])
     theta = {2: place.theta_2, 3: place.theta_3, 4: place.theta_4}
@@ -273,11 +292,11 @@ def _divide(apart: float, size: float) -> float:
 def _derive(
     scene: Scene, bar: int, angle: float, branch: int
 ) -> tuple[Derived, Derived, Derived] | None:
-    """Derive the torque on a bar held at rest, its slope over the bar's angle, and the bar's inertia.
+    """Derive the torque on a bar held at rest, its slope, and the bar's inertia.
 
-    None where there are none, or where the rounding of the inputs decides the angles of
-    the others. The bar's angle may be off by as much as makes theta_2 round otherwise:
-    a place is stated by theta_2.
+    The slope is over the bar's angle. None where there are none, or where the rounding
+    of the inputs decides the angles of the others. The bar's angle may be off by as
+    much as makes theta_2 round otherwise: a place is stated by theta_2.
     """
     from flint import arb
 
@@ -300,7 +319,10 @@ def _derive(
     step, commanded = arb(2) ** -STEP_BITS, f"theta_{bar}"
 
     def derive(**changed: Any) -> tuple[list[Any], dict[str, Any], Any] | None:
-        """Return torque, slope, inertia and angles; all outputs; and the change of theta_2 per rad of the bar."""
+        """Return torque, slope, inertia and angles; all outputs; and a ratio.
+
+        The ratio is the change of theta_2 per rad of the bar.
+        """
         base_inputs = x | changed
         turned = [
             base_inputs | {commanded: base_inputs[commanded] + side * step}
@@ -361,7 +383,10 @@ def _derive(
 
 
 def _sum_inertias(scene: Scene) -> float:
-    """Sum m L^2 and I of the bars, L the linkage's longest reach, and the inertias of flywheels."""
+    """Sum m L^2 and I of the bars, and the inertias of flywheels.
+
+    L is the linkage's longest reach.
+    """
     linkage: FourBar = scene.linkage
     bars = [linkage.bar(number) for number in MOVING_BARS]
     reach = max(linkage.lengths) + max(abs(find_centre(bar)[0]) for bar in bars)

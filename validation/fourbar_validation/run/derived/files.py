@@ -1,4 +1,7 @@
-"""The files of other simulators, SDF and USD, read as text and assembled by the free bodies."""
+"""The files of other simulators, SDF and USD, read as text.
+
+The free bodies assemble them.
+"""
 
 import cmath
 import math
@@ -49,7 +52,9 @@ class Contents(NamedTuple):
     pins: dict[str, complex]
     """Places of the pins in the world; NaN if the two bars of a pin do not meet."""
     turns: list[dict[str, float]]
-    """Statements of the angles of all bars, rad: by the bodies, by the joints, in words."""
+    """Statements of the angles of all bars, rad. They are by the bodies, by the joints,
+    and in words.
+    """
     gravity: complex
     damping: dict[str, float]
     """Damping by pin, as the next field."""
@@ -69,7 +74,10 @@ def usd(question: Question) -> list[Row]:
 def _judge_file(
     question: Question, engine: str, read: Callable[[Scene], Contents]
 ) -> list[Row]:
-    """Compare a file at its own position and at some more; loads are what a simulator adds."""
+    """Compare a file at its own position and at some more.
+
+    Loads are what a simulator adds.
+    """
     # a drive at a named point keeps its place without the point
     few = state_from_pins(take_few(question))
     scene = replace(few, loads=(), points=())
@@ -102,7 +110,10 @@ def _judge_file(
 
 
 def build_scene(held: Contents, scene: Scene) -> Scene:
-    """Build the scene that a file describes, in the motion and with the drive of another."""
+    """Build the scene that a file describes.
+
+    Its motion and drive are those of another scene.
+    """
     bodies, pins = held.bodies, held.pins
     span = pins["O4"] - pins["O2"]
     ends = {

@@ -1,4 +1,7 @@
-"""Studies, sensitivities and tolerances, by differences and cubature of what free bodies say of changed linkages."""
+"""Studies, sensitivities and tolerances, by differences and cubature.
+
+These are of what free bodies say of changed linkages.
+"""
 
 import math
 from contextlib import suppress
@@ -33,7 +36,9 @@ from fourbar_validation.run.derived.variants import (
 from fourbar_validation.run.question import NotAskedError, Question
 
 MEMBERS = 5
-"""Members of the study, as many as positions: a square study, whose axes only its numbers tell apart."""
+"""Members of the study, as many as positions. It is a square study, whose axes only its
+numbers tell apart.
+"""
 APART = 1e-2
 """Difference of its numbers from member to member, relative, for angles in rad."""
 CORNERS = (0.07, 2.3, 4.1, 0.07 + 2.0 * np.pi)
@@ -41,7 +46,10 @@ CORNERS = (0.07, 2.3, 4.1, 0.07 + 2.0 * np.pi)
 
 
 def furnish(scene: Scene, question: Question) -> Scene:
-    """Give the scene a point on each bar and a load over a table, as large as its forces, where it has none."""
+    """Give the scene a point on each bar and a load over a table, if it has none.
+
+    The load is as large as the scene's forces.
+    """
     coupler, first = scene.linkage.coupler, float(question.solution.theta_2[0])
     if not scene.points:
         arms = {
@@ -118,12 +126,17 @@ def study(question: Question) -> list[Row]:
 
 
 STEP = 1e-4
-"""Relative step of each number, for an angle in rad: truncation at fourth order and rounding are then about equal."""
+"""Relative step of each number, for an angle in rad. Truncation at fourth order and
+rounding are then about equal.
+"""
 SMALL = 1e-8
-"""Step of the first order that tolerances are held to: rounding adds 1e-7, and what bends a curve nothing."""
+"""Step of the first order that tolerances are held to. Rounding adds 1e-7, and what
+bends a curve nothing.
+"""
 CONVERGED = 1e-5
-"""Most that the fourth order may change the second by, in parts of the sum of the absolute terms: it leaves out some
-hundred times the square of that. Elsewhere a linkage that does not assemble is too near for differences.
+"""Most that the fourth order may change the second by, in parts of the sum of the
+absolute terms: it leaves out some hundred times the square of that. Elsewhere a linkage
+that does not assemble is too near for differences.
 """
 DIFFERENCES = ErrorBound(
     "differences",
@@ -135,7 +148,7 @@ DIFFERENCES = ErrorBound(
 )
 """Tolerance of the derivatives along one direction in which every number changes."""
 SAMPLES, DRAWN = 1024, 20_000
-"""Number of samples of the tolerances, and of the first-order sum by which percentiles are judged."""
+"""Samples of the tolerances, and of the first-order sum for percentiles."""
 SPREAD = ErrorBound(
     "spread",
     "3 % of a deviation or of a worst case, of a percentile 30 % of one: 1024"
@@ -145,21 +158,29 @@ SPREAD = ErrorBound(
     conditioned=False,
 )
 NEARLY_STRAIGHT, STRAIGHT = 0.1, 1e-4
-"""Relative differences of cubature and first order. Below the first, three points are enough for a deviation; below the
-second, percentiles are those of the first order: what bends a curve by q skews it by q and widens it by q^2.
+"""Relative differences of cubature and first order. Below the first, three points are
+enough for a deviation; below the second, percentiles are those of the first order: what
+bends a curve by q skews it by q and widens it by q^2.
 """
 SLIGHT = 1e-3
-"""Part of the greatest worst case of a quantity, below which differences and rounding are as large as their result."""
+"""Part of the greatest worst case of a quantity that is not judged. Differences and
+rounding are there as large as their result.
+"""
 MOST = 3
 """Tolerances of a scene that are judged together: three points each."""
 GIVEN = 1e-4
 """Tolerance that the run gives the lengths, in parts of the shortest bar."""
 NODES = {False: (0.6**0.5, 5.0 / 18.0), True: (3.0**0.5, 1.0 / 6.0)}
-"""Outer nodes, in parts of the width, and weights of Gauss's three points of an even and of a normal distribution."""
+"""Outer nodes and weights of Gauss's three points. They are of an even and of a normal
+distribution; the nodes are in parts of the width.
+"""
 
 
 def sensitivity(question: Question) -> list[Row]:
-    """Judge the derivatives of the unknowns and of the scene's points along one direction."""
+    """Judge the derivatives of the unknowns and of the scene's points.
+
+    They are along one direction.
+    """
     scene = take_few(question)
     derivatives = fourbar.sensitivity(scene)
     file = SceneFile(scene)
@@ -211,7 +232,10 @@ def sensitivity(question: Question) -> list[Row]:
 
 
 def tolerances(question: Question) -> list[Row]:
-    """Judge the spread that a few tolerances make: the scene's own, or those that the run gives it."""
+    """Judge the spread that a few tolerances make.
+
+    They are those of the scene, or those that the run gives it.
+    """
     scene = take_few(question)
     width, names = GIVEN * min(scene.linkage.lengths), ("input", "coupler", "output")
     defaults = (
@@ -251,14 +275,21 @@ class Expected(NamedTuple):
     first_order: Array
     worst: Array
     bent: Array
-    """Relative difference of cubature and first order: of their deviations, or the square of the skewness."""
+    """Relative difference of cubature and first order. It is that of their deviations,
+    or the square of the skewness.
+    """
     low: Array
-    """Percentiles of the first order, from the nominal value; NaN where the quantity is not straight."""
+    """Percentiles of the first order, from the nominal value. NaN where the quantity is
+    not straight.
+    """
     high: Array
 
 
 def _compute_expected(scene: Scene) -> dict[str, Expected]:
-    """Compute what the free bodies of changed linkages answer, by the parts of the unknowns."""
+    """Compute what the free bodies of changed linkages answer.
+
+    The result is by the parts of the unknowns.
+    """
     bare = replace(scene, tolerances=())
     nominal = split_parts(ask_free_bodies(bare))
     file = SceneFile(bare)

@@ -1,8 +1,9 @@
-"""What `analyze` prints and its JSON holds, against free bodies at many positions and plain sums.
+"""What `analyze` prints and its JSON holds.
 
-Each peak and each end of a range is taken at the place that is printed with it, and
-none of many positions between the scene's own may exceed it. Means and energies are
-summed anew from the free bodies' forces.
+Free bodies at many positions and plain sums judge it. Each peak and each end of a range
+is taken at the place that is printed with it, and none of many positions between the
+scene's own may exceed it. Means and energies are summed anew from the free bodies'
+forces.
 """
 
 import math
@@ -42,9 +43,13 @@ ROWS = ("ranges", "peaks", "means", "pins", "frame_force", "bending", "bore")
 FINE = 1440
 """Intervals of the motion at whose ends nothing may exceed a peak or a range."""
 BETWEEN = 1e-3
-"""Part by which a largest value without a place may exceed that of many positions, which it lies between."""
+"""Part by which a largest value without a place may exceed many positions'. It lies
+between these.
+"""
 LEAST_CONDITION = 1e-2
-"""A motion that is worse conditioned somewhere has poles, beside which peaks are those of its positions."""
+"""Least condition of a motion without poles. Beside a pole peaks are those of the
+positions.
+"""
 PRESSURE = 1e6
 """Pressure of the cylinder whose bore is judged, Pa."""
 PRINTED = ErrorBound(
@@ -113,18 +118,27 @@ class _SummaryJudge:
         self.add(row, math.nan if ours is None else abs(ours - theirs) / abs(theirs))
 
     def add_peak(self, row: str, peak: Peak, at_peak: Array, fine: Array) -> None:
-        """Add by how much a peak is no value at its place, and by how much another one exceeds it."""
+        """Add by how much a peak is no value at its place.
+
+        Another value may exceed it; by how much is added too.
+        """
         size = abs(peak.value)
         self.add(row, np.abs(np.abs(at_peak) - size) / size)
         self.add_excess(row, (np.abs(fine).max() - size) / size)
 
     def add_excess(self, row: str, *excess: Any) -> None:
-        """Add the largest of some excesses, or zero where none is one; NaN where one is no number."""
+        """Add the largest of some excesses, or zero where none is one.
+
+        NaN if one is no number.
+        """
         self.add(row, np.max((*excess, 0.0)))
 
 
 def summary(question: Question) -> list[Row]:
-    """Judge ranges, peaks, means, energies, pin loads, shaking force, bending and bore."""
+    """Judge ranges, peaks, means, energies, pin loads and more.
+
+    Shaking force, bending and bore are judged too.
+    """
     judged = _SummaryJudge(question, _summarize(question))
     _judge_ranges(judged)
     _judge_drive(judged)
@@ -147,7 +161,10 @@ def summary(question: Question) -> list[Row]:
 
 
 def _summarize(question: Question) -> Facts:
-    """Summarize the scene; NotAskedError where its motion has nothing between its positions, or poles."""
+    """Summarize the scene.
+
+    Raises NotAskedError if its motion has nothing between its positions, or poles.
+    """
     scene, solution = question.scene, question.solution
     listed = isinstance(scene.motion.angle, (float, np.ndarray, FromLimit))
     if listed or len(solution) < 2 or scene.motion.free is not None:
@@ -237,7 +254,10 @@ def _judge_drive(judged: _SummaryJudge) -> None:
 
 
 def _judge_energy(judged: _SummaryJudge, entry: dict[str, Any], power: Array) -> None:
-    """Judge both energies: the trapezoidal rule over the times at which the positions are passed."""
+    """Judge both energies by the trapezoidal rule.
+
+    It is over the times at which the positions are passed.
+    """
     at = judged.solution.at
     if at.time is not None:
         spans = np.diff(at.time)
@@ -274,7 +294,10 @@ def _judge_bore(judged: _SummaryJudge, fine: Array) -> None:
 
 
 def _judge_pins(judged: _SummaryJudge) -> None:
-    """Judge peak, place and mean of each pin's load, as printed and in the JSON, and the force on the frame."""
+    """Judge peak, place and mean of each pin's load, printed and in the JSON.
+
+    The force on the frame is judged too.
+    """
     facts, solution = judged.facts, judged.solution
     entry = write_motor(judged.scene, solution, {})
     assert entry is not None
@@ -307,7 +330,10 @@ def _judge_pins(judged: _SummaryJudge) -> None:
 
 
 def _judge_bending(judged: _SummaryJudge) -> None:
-    """Judge the largest bending moment of each bar: at its place by cutting there, and at many positions."""
+    """Judge the largest bending moment of each bar.
+
+    It is cut at its place, and at many positions.
+    """
     stated = state_from_pins(judged.scene)
     fine_motion = move_bars(judged.scene, _command_of(judged.fine), judged.fine)
     for bar in MOVING_BARS:
@@ -339,15 +365,19 @@ def _judge_bending(judged: _SummaryJudge) -> None:
 
 
 def _exceed_rounding(pieces: Sequence[Piece]) -> float:
-    """Return zero where no moment of some pieces exceeds the rounding of its terms, or else infinity."""
+    """Return zero if no moment of some pieces exceeds the rounding of its terms.
+
+    Otherwise return infinity.
+    """
     vanish = [np.abs(piece.M) <= CUT.factor * piece.turning for piece in pieces]
     return 0.0 if np.all(vanish) else math.inf
 
 
 def _judge_growth(judged: _SummaryJudge) -> None:
-    """Fail what is said to grow without bound where the bars are far from every pole throughout the motion.
+    """Fail what is said to grow without bound far from every pole.
 
-    What grows has no peak that could be judged, so none of it is believed.
+    The bars are far from poles throughout the motion. What grows has no peak that could
+    be judged, so none of it is believed.
     """
     facts = judged.facts
     grows = any(bending.grows for bending in facts.bending.values())
@@ -364,7 +394,9 @@ def _judge_growth(judged: _SummaryJudge) -> None:
 
 
 CUT_BESIDE = 1e-10
-"""Part of the length by which a bar is cut on either side of a place: a couple that acts there makes a jump."""
+"""Part of the length by which a bar is cut on either side of a place. A couple that
+acts there makes a jump.
+"""
 
 
 def _command_of(answer: Answer) -> Any:

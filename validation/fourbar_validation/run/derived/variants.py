@@ -1,4 +1,7 @@
-"""Provide what the checks of derived results share: scenes with other numbers, and the rows of a comparison."""
+"""Provide what the checks of derived results share.
+
+These are scenes with other numbers, and the rows of a comparison.
+"""
 
 import json
 import math
@@ -37,14 +40,20 @@ from fourbar_validation.run.question import FREE_BODY, NotAskedError, Question, 
 SAMPLE = 5
 """Positions at which whatever takes more than one call is judged."""
 FROM_A_CORNER = 0.02
-"""rad; so near to a point of a load's table, where its slope jumps, no differences are formed."""
+"""Distance from a point of a load's table without differences, rad. The table's slope
+jumps at the point.
+"""
 NOT_AT_REST = 1e-3
-"""Part of the speeds over sin^2 mu; if a dry pin slips less, small changes of a number may reverse it."""
+"""Part of the speeds over sin^2 mu below which a dry pin may reverse. Small changes of
+a number reverse it then.
+"""
 GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 
 
 def take_few(question: Question) -> Scene:
-    """Take the scene at a few of its positions, such that small changes of its numbers change its quantities little.
+    """Take the scene at a few of its positions.
+
+    Small changes of its numbers change its quantities little there.
 
     Raises NotAskedError where there are none.
     """
@@ -91,14 +100,20 @@ def at_places(scene: Scene, places: Array) -> Scene:
 
 
 class FileNumber(NamedTuple):
-    """A number that a scene's file states, and what it may be moved by: most of itself, of an angle most of 1 rad."""
+    """A number that a scene's file states, and what it may be moved by.
+
+    Most of itself, or of an angle most of 1 rad.
+    """
 
     number: float
     step: float
 
 
 class SceneFile:
-    """The text of a scene's file, in which numbers are moved; what it leaves out follows the lengths."""
+    """The text of a scene's file, in which numbers are moved.
+
+    What it leaves out follows the lengths.
+    """
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
@@ -108,7 +123,10 @@ class SceneFile:
         }
 
     def find_stated(self, keys: Iterable[str]) -> dict[str, FileNumber]:
-        """Find those of the keys whose numbers the file states; of motion.theta_2 the first."""
+        """Find those of the keys whose numbers the file states.
+
+        Of motion.theta_2 it is the first.
+        """
         stated = {}
         for index, key in enumerate(keys):
             with suppress(KeyError):
@@ -124,7 +142,9 @@ class SceneFile:
         return stated
 
     def move(self, changes: Mapping[str, float]) -> Scene:
-        """Read the file after some of its numbers were changed by so much; motion.theta_2 moves every position.
+        """Read the file after some of its numbers were changed by so much.
+
+        motion.theta_2 moves every position.
 
         Raises NotAskedError where the changed linkage can never assemble.
         """
@@ -158,7 +178,10 @@ class SceneFile:
 
 
 def _place(document: Any, key: str) -> tuple[Any, Any]:
-    """Find the table that holds a number, and its name or index there; KeyError where the file leaves it out."""
+    """Find the table that holds a number, and its name or index there.
+
+    Raises KeyError if the file leaves it out.
+    """
     *path, last = [int(part) if part.isdecimal() else part for part in key.split(".")]
     for part in path:
         document = document[part]
@@ -197,7 +220,10 @@ def ask_free_bodies(scene: Scene, command: Command | None = None) -> Answer:
 def hold_to(
     question: Question, engine: str, scene: Scene, solution: Solution, answer: Answer
 ) -> list[Row]:
-    """Compare a solution that a public call gave for a scene with the answer of the free bodies."""
+    """Compare a solution with the answer of the free bodies.
+
+    A public call gave the solution for a scene.
+    """
     answer = replace(answer, engine=engine)
     assert answer.at is not None
     predicted = make_prediction(FREE_BODY, scene, answer.at, answer)
@@ -243,7 +269,10 @@ def make_row(
     theta_2: Array,
     reason: str,
 ) -> Row:
-    """Make the row of a quantity whose errors at some positions are held to one tolerance."""
+    """Make the row of a quantity whose errors are held to one tolerance.
+
+    The errors are those at some positions.
+    """
     who = (question.name, engine, "exact")
     return Row.judged(
         who, quantity, error, tolerance.factor, f"{tolerance.name}: {reason}", theta_2
@@ -264,7 +293,10 @@ def take_member(study: Solution, index: int | NDArray[np.intp]) -> Solution:
 
 
 def split_parts(answer: Answer) -> dict[str, Array]:
-    """Split the unknowns of a position: vectors as components, pin forces also as their magnitudes."""
+    """Split the unknowns of a position.
+
+    Vectors become components, pin forces also their magnitudes.
+    """
     parts = {}
     for name in (name for name in (*UNKNOWNS, LINE.value) if name in answer.quantities):
         values = answer.quantities[name]

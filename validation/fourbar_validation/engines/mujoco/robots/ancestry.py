@@ -23,7 +23,10 @@ def list_joints(model: mujoco.MjModel, body: int) -> range:
 
 
 def find_roots(model: mujoco.MjModel, held: set[int]) -> list[int]:
-    """Return for each body the highest one that it is rigidly joined to, if some joints are held."""
+    """Return for each body the highest one that it is rigidly joined to.
+
+    Some joints may be held.
+    """
     roots = [0]
     for body in range(1, model.nbody):
         moves = any(joint not in held for joint in list_joints(model, body))
@@ -69,7 +72,10 @@ def takes_control(model: mujoco.MjModel, actuator: int) -> bool:
 
 
 def is_enabled(model: mujoco.MjModel, *flags: str) -> bool:
-    """Tell whether no flag switches a feature off; a flag that this MuJoCo does not have switches nothing."""
+    """Tell whether no flag switches a feature off.
+
+    A flag that this MuJoCo does not have switches nothing.
+    """
     bits = (
         int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{flag.upper()}", 0))
         for flag in flags

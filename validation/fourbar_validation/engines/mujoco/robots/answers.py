@@ -15,14 +15,17 @@ QUANTITIES = ("torque", *PIN_FORCES)
 
 
 class LoopMotion(NamedTuple):
-    """Angles of bar 2 in the plane of the loop, rad, and its speed and acceleration there."""
+    """Angles of bar 2 in the plane of the loop, rad, with speed and acceleration."""
 
     theta_2: tuple[float, ...]
     omega_2: float
     alpha_2: float
 
     def thin_out(self, most: int) -> "LoopMotion":
-        """Return the motion with at most so many of the angles, spread evenly, both ends among them."""
+        """Return the motion with at most so many of the angles.
+
+        They are spread evenly, both ends among them.
+        """
         count = min(len(self.theta_2), most)
         keep = np.linspace(0, len(self.theta_2) - 1, count).round().astype(int)
         return self._replace(theta_2=tuple(self.theta_2[i] for i in keep))
@@ -58,7 +61,9 @@ class InsideRow:
     soft: PinsAndTorque
     """As MuJoCo has them."""
     rigid: PinsAndTorque
-    """As rigid pins would have them, at the closed state of the same theta_2, omega_2, alpha_2."""
+    """Values with rigid pins. They are at the closed state of the same theta_2,
+    omega_2, alpha_2.
+    """
     gap: float
     """Distance of the ends of the closure, m."""
     sticking: tuple[str, ...] = ()
@@ -76,7 +81,10 @@ class InsideAnswer:
     """Processor time of a step of the whole robot, s."""
 
     def errors(self) -> dict[str, Array]:
-        """Return the size of the error of the torque and of each pin force at each state, (n,), N m and N."""
+        """Return the errors of the torque and of each pin force, (n,).
+
+        They are sizes at each state, N m and N.
+        """
         sizes = {}
         for name in QUANTITIES:
             soft, rigid = (
@@ -87,7 +95,10 @@ class InsideAnswer:
         return sizes
 
     def scales(self) -> dict[str, float]:
-        """Return the largest torque and the largest of each pin force that rigid pins would have, N m and N."""
+        """Return the largest torque and the largest of each pin force.
+
+        They are those of rigid pins, N m and N.
+        """
         return {
             name: float(
                 measure_sizes([row.rigid.values()[name] for row in self.rows]).max()
@@ -109,7 +120,10 @@ class TornState:
 
 @dataclass(frozen=True, slots=True)
 class RobotSettings:
-    """Settings of the closures of one loop and of the stepping of its robot, as MJCF calls them."""
+    """Settings of the closures of one loop and of the stepping of its robot.
+
+    They have MJCF's names.
+    """
 
     solref: tuple[float, ...]
     solimp: tuple[float, ...]
@@ -120,7 +134,7 @@ class RobotSettings:
     tolerance: float
 
     def list_changes(self, other: "RobotSettings") -> dict[str, str]:
-        """List the attributes in which this differs from another, as MJCF writes them."""
+        """List the attributes in which this differs from another, as MJCF has them."""
         return {
             name: _write(getattr(self, name))
             for name in self.__slots__
@@ -136,7 +150,9 @@ class TriedSettings:
     changes: dict[str, str]
     """Attributes that differ from the file's."""
     states: float
-    """Worst error of torque and pin forces at single states, of the largest of each; infinite without an answer."""
+    """Worst error of torque and pin forces at single states. It is over the largest of
+    each; infinite without an answer.
+    """
     through_time: float
     """The same at the states of a simulation."""
     gap: float
@@ -181,7 +197,9 @@ class MeasureOptions:
     speed: float | None = None
     """Speed of the driven bar, rad/s; None: that of the scene."""
     torque: float | None = None
-    """Torque of the motor under which the loop may come apart, N m; None: it is not asked."""
+    """Torque of the motor under which the loop may come apart, N m. None: it is not
+    asked.
+    """
     error: float | None = None
     """Error for which settings are looked for; None: none are."""
 
@@ -208,7 +226,9 @@ class LoopMeasurement:
     refusal: str
     """Why it was not simulated; empty where it was."""
     influence: float
-    """What holding the joints a tenth as firmly changes in the errors, of the largest torque and pin forces."""
+    """Change of the errors if the joints are held a tenth as firmly. It is over the
+    largest torque and pin forces.
+    """
     torn: tuple[TornState, ...]
     advice: SettingsAdvice | None
 

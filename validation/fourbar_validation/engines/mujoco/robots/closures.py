@@ -46,7 +46,9 @@ from fourbar_validation.engines.mujoco.robots.pose import (
 )
 
 PARALLEL = math.radians(0.5)
-"""Axes further apart make no planar linkage: forces across the plane reach a hundredth."""
+"""Angle between axes from which they make no planar linkage. Forces across the plane
+then reach a hundredth.
+"""
 COINCIDE = 1e-6
 """Two pins are one where they are nearer than this part of the longest bar."""
 LEVEL = 1e-6
@@ -71,7 +73,10 @@ NUMBERS = {
 def list_closures(
     file: RobotFile, options: PoseOptions, name: str | None = None
 ) -> RobotReport:
-    """Compile a robot's file, pose it, and describe each of its equalities, or the one of a name."""
+    """Compile a robot's file, pose it, and describe each of its equalities.
+
+    A name chooses one of them.
+    """
     compiled = compile_robot(file)
     posed = pose_robot(compiled.model, options)
     closures = find_closures(posed, options)
@@ -85,7 +90,8 @@ def find_closures(posed: PosedRobot, options: PoseOptions) -> list[RobotClosure]
 
     Raises
     ------
-    InputError : a joint that is held or drives is none of the robot's, or drives no loop.
+    InputError : a joint that is held or drives is none of the robot's, or drives no
+        loop.
     """
     finder = _Finder(posed, options)
     closures = [finder.describe(number) for number in range(posed.model.neq)]
@@ -113,7 +119,10 @@ def find_closure(closures: Sequence[RobotClosure], name: str) -> RobotClosure:
 
 
 def choose_loop(closures: Sequence[RobotClosure], name: str) -> RobotLoop:
-    """Return the four-bar of a closure, or raise an InputError that says why there is none."""
+    """Return the four-bar of a closure.
+
+    Raises an InputError that says why there is none.
+    """
     closure = find_closure(closures, name)
     if closure.loop is None:
         raise InputError("--loop", name, f"is no four-bar: {closure.reason}")
@@ -121,7 +130,10 @@ def choose_loop(closures: Sequence[RobotClosure], name: str) -> RobotLoop:
 
 
 def describe_equality(model: mujoco.MjModel, number: int) -> str:
-    """Name an equality: as the file does, or by the two bodies or joints that it ties."""
+    """Name an equality as the file does.
+
+    Otherwise it is named by the two bodies or joints that it ties.
+    """
     if model.equality(number).name:
         return str(model.equality(number).name)
     kind = KINDS.get(int(model.eq_type[number]))
@@ -171,7 +183,10 @@ def find_ends(posed: PosedRobot, number: int) -> tuple[ClosureEnd, ClosureEnd]:
 
 
 class _Chain:
-    """Joints from one end of a closure over the common ancestor to the other, and the bars between them."""
+    """Joints from one end of a closure to the other, and the bars between them.
+
+    They lead over the common ancestor.
+    """
 
     def __init__(self, finder: "_Finder", first: int, second: int) -> None:
         self.model = finder.model
@@ -352,7 +367,10 @@ class _Finder:
     def _explain_count(
         self, chain: _Chain, hinges: int, number: int, *, is_pin: bool
     ) -> str:
-        """Say what another number of hinges makes, and what would make it a four-bar."""
+        """Say what another number of hinges makes.
+
+        It says too what would make it a four-bar.
+        """
         freedoms = hinges - 3
         names = [name_joint(self.model, j) for j in chain.joints]
         count = NUMBERS.get(hinges, f"{hinges} hinges")
@@ -401,7 +419,10 @@ class _Finder:
         )
 
     def _list_shared(self, chain: _Chain, number: int) -> str:
-        """Name other closures that tie bodies of the chain: together they may be a six-bar."""
+        """Name other closures that tie bodies of the chain.
+
+        Together they may be a six-bar.
+        """
         bars = {bar for bar in chain.bars if bar is not None} - {chain.ground}
         names = []
         for other in range(self.model.neq):
@@ -417,7 +438,10 @@ class _Finder:
         return f"{', '.join(names)} ties its bars too" if names else ""
 
     def _find_bar(self, body: int, bars: set[int]) -> int | None:
-        """Return the bar that carries a body, however far down; None where none does."""
+        """Return the bar that carries a body, however far down.
+
+        None if no bar does.
+        """
         while body:
             if self.root[body] in bars:
                 return self.root[body]
@@ -522,7 +546,10 @@ class _Finder:
         motors: list[tuple[int, int]],
         number: int,
     ) -> tuple[int, list[str]]:
-        """Choose the driven hinge among those of the ground; say so where no motor decides it."""
+        """Choose the driven hinge among those of the ground.
+
+        It says so if no motor decides it.
+        """
         model = self.model
         at_ground = [joint for joint in (first, last) if joint is not None]
         if self.options.drive is not None:
@@ -552,7 +579,10 @@ class _Finder:
         return chosen, [f"{acts}: {taken}"]
 
     def _find_pushed(self, at_ground: list[int], number: int) -> tuple[int | None, str]:
-        """Return the one hinge of the ground whose bar another closure moves, and that closure's name."""
+        """Return the one hinge of the ground whose bar another closure moves.
+
+        That closure's name is returned too.
+        """
         pushed: dict[int, str] = {}
         bars = {self.root[int(self.model.jnt_bodyid[j])]: j for j in at_ground}
         for other in range(self.model.neq):
@@ -575,9 +605,10 @@ class _Finder:
         layout: "_Layout",
         cut: str | None,
     ) -> tuple[list[int], list[int | str]]:
-        """Return the equalities that hold the closing pin, and others that act on the moving bars.
+        """Return the equalities that hold the closing pin, and others.
 
-        A text among the others says that one leaves the loop no freedom.
+        The others act on the moving bars. A text among the others says that one leaves
+        the loop no freedom.
         """
         model = self.model
         bars = {root: bar for bar, roots in bodies.items() for root in roots}
@@ -642,7 +673,10 @@ class _Layout:
         self.axis = self._to_ground(self.normal)
 
     def _find_normal(self) -> Array:
-        """Return the mean axis of the hinges in world axes; about it the driven joint turns bar 2 counter-clockwise."""
+        """Return the mean axis of the hinges in world axes.
+
+        About it the driven joint turns bar 2 counter-clockwise.
+        """
         joint = self.hinges["O2"]
         reference = self.data.xaxis[joint] * self._side("O2", joint)
         total = np.zeros(3)
@@ -652,7 +686,7 @@ class _Layout:
         return np.asarray(total / np.linalg.norm(total))
 
     def _side(self, pin: str, joint: int) -> float:
-        """Return +1 where the second bar of a pin hangs on its joint, -1 where the first does."""
+        """Return +1 if the second bar of a pin hangs on its joint, -1 if the first."""
         root = self.finder.root[int(self.model.jnt_bodyid[joint])]
         first, second = PAIRS[pin]
         if root in self.bodies[second]:
@@ -665,7 +699,10 @@ class _Layout:
         return np.asarray(self.data.xmat[ground].reshape(3, 3).T @ vector)
 
     def measure(self, cut: str | None) -> str:
-        """Measure pins, lengths and angles; return a reason where they make no four-bar."""
+        """Measure pins, lengths and angles.
+
+        Return a reason if they make no four-bar.
+        """
         for pin, joint in self.hinges.items():
             turned = self.data.xaxis[joint] @ self.normal * self._side(pin, joint)
             self.senses[pin] = math.copysign(1.0, float(turned))
@@ -696,7 +733,10 @@ class _Layout:
         return next(bar for bar in PAIRS[cut] if root in self.bodies[bar])
 
     def _choose_along(self) -> Array:
-        """Return x of the plane in world axes: across gravity where the plane is not level, else from O2 to O4."""
+        """Return x of the plane in world axes.
+
+        It is across gravity unless the plane is level, else from O2 to O4.
+        """
         gravity = self.model.opt.gravity
         in_plane = gravity - (gravity @ self.normal) * self.normal
         size = float(np.linalg.norm(in_plane))

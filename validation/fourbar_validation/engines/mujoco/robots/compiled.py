@@ -1,4 +1,7 @@
-"""A robot's file compiled as MuJoCo compiles it, without what is missing and moves nothing."""
+"""A robot's file compiled as MuJoCo compiles it.
+
+What is missing and moves nothing is left out.
+"""
 
 import math
 from dataclasses import dataclass
@@ -77,11 +80,12 @@ def compile_robot(file: RobotFile) -> CompiledRobot:
 
 
 def list_unknown_parts(robot: CompiledRobot, bodies: set[int]) -> list[str]:
-    """List those of some bodies whose mass is unknown, and that are parts of another body.
+    """List the bodies of unknown mass that are parts of another body.
 
     Raises
     ------
-    InputError : a body that has joints of its own is among them: nothing else of it is known.
+    InputError : a body that has joints of its own is among them: nothing else of it is
+        known.
     """
     model = robot.model
     unknown = [number for number in robot.unknown_masses if number in bodies]
@@ -99,7 +103,10 @@ def list_unknown_parts(robot: CompiledRobot, bodies: set[int]) -> list[str]:
 
 
 def _take_out_meshes(spec: mujoco.MjSpec, file: RobotFile) -> tuple[set[str], set[str]]:
-    """Take out the missing meshes and their geoms; return files left out, and bodies whose mass they were."""
+    """Take out the missing meshes and their geoms.
+
+    Return files left out, and bodies whose mass they were.
+    """
     gone = {mesh.name: mesh for mesh in spec.meshes if mesh.file in file.missing}
     left_out: set[str] = set()
     unknown: set[str] = set()

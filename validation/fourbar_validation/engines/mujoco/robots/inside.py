@@ -1,9 +1,10 @@
-"""A four-bar inside somebody's whole robot: the torque and the pin forces that MuJoCo gives it there.
+"""A four-bar inside somebody's whole robot.
 
-No joint is removed, for that would change the softness that is measured: MuJoCo sizes a
-constraint's softness by the bodies of the whole model. The loop's driven hinge moves as
-commanded, the other joints of the robot stay where they are, contacts, joint limits and
-motors are off, and so are equalities between the moving bars and joints that stay.
+MuJoCo gives its torque and pin forces there. No joint is removed, for that would change
+the softness that is measured: MuJoCo sizes a constraint's softness by the bodies of the
+whole model. The loop's driven hinge moves as commanded, the other joints of the robot
+stay where they are, contacts, joint limits and motors are off, and so are equalities
+between the moving bars and joints that stay.
 
 At a state the joint forces follow from MuJoCo's own inverse dynamics of its soft
 constraints. The driven hinge has the acceleration alpha, a held joint none, and the
@@ -52,21 +53,25 @@ CLOSED = 1e-12
 """m or rad; residual of the closure at which a state is closed."""
 CLOSING_STEPS = 50
 OPEN = 1e-6
-"""m or rad; a residual that is left above this is a position at which the loop does not close."""
+"""Residual above which the loop does not close at a position, m or rad."""
 STRIDE = math.radians(2.0)
-"""Largest turn of the driven hinge from one closed state to the next, so that the assembly is kept."""
+"""Largest turn of the driven hinge from one closed state to the next. The assembly is
+kept so.
+"""
 SOLVE_STEPS = 60
 """Newton steps for the hinges' accelerations; without friction one is enough."""
 BALANCED = 1e-10
 """Part of the generalized forces that may be left on a hinge on which nothing acts."""
 HEAVY = 1e4
-"""Armature that holds a joint while the model is stepped, over the largest inertia of the robot. It lets the joints
-move by about its inverse; beyond 1e5 MuJoCo's solver loses the light bars beside it: at 1e6 the gap was three times
-too large.
+"""Armature that holds a joint while the model is stepped, over the largest inertia of
+the robot. It lets the joints move by about its inverse; beyond 1e5 MuJoCo's solver
+loses the light bars beside it: at 1e6 the gap was three times too large.
 """
 LIMIT = int(mujoco.mjtDisableBit.mjDSBL_LIMIT)
 SETTLED = 5.0
-"""Time constants after which the loop has yielded but for 1 %, at most half of the motion."""
+"""Time constants after which the loop has yielded but for 1 %. They are at most half of
+the motion.
+"""
 REACHED = 1.0 - 1e-6
 """Part of its couple at which dry friction acts in full."""
 MOST_STEPS = 60_000
@@ -92,7 +97,10 @@ class RobotState:
 
 
 class LoopInside:
-    """A loop of a robot whose driven hinge moves while every other joint of the robot is held."""
+    """A loop of a robot whose driven hinge moves.
+
+    Every other joint of the robot is held.
+    """
 
     def __init__(self, model: mujoco.MjModel, loop: RobotLoop) -> None:
         self.loop, self.model = loop, copy(model)
@@ -127,7 +135,9 @@ class LoopInside:
         self.borne = {body: self._find_borne(body) for body in bodies}
         """Actuators on sites of each body of a hinge and of all that it bears."""
         self.lift = {body: self._find_lift(body) for body in bodies}
-        """What lifts each body of a hinge, and all that it bears, against gravity (gravcomp), (3,), N."""
+        """Gravity compensation of each body of a hinge (gravcomp), (3,), N. It is that
+        of all that the body bears too.
+        """
 
     def angle(self, qpos: Array) -> float:
         """Return theta_2 of a pose, rad."""
@@ -140,7 +150,10 @@ class LoopInside:
         return float(self.loop.qpos[self.address] + self.sense * turned)
 
     def close(self, theta_2: float) -> Array | None:
-        """Return the pose at an angle of bar 2, reached from the last one in small strides; None where it is open."""
+        """Return the pose at an angle of bar 2, or None if the loop is open.
+
+        It is reached from the last one in small strides.
+        """
         start = self.angle(self._last)
         strides = max(math.ceil(abs(theta_2 - start) / STRIDE), 1)
         qpos = self._last.copy()
@@ -152,7 +165,10 @@ class LoopInside:
         return qpos
 
     def _close_gap(self, qpos: Array) -> bool:
-        """Move the hinges that are not driven until the closure's residual is least; tell whether it is closed."""
+        """Move the hinges that are not driven until the residual is least.
+
+        The residual is that of the closure. Tell whether it is closed.
+        """
         size = math.inf
         for _ in range(CLOSING_STEPS):
             residual, jacobian = self._evaluate_closure(qpos)
@@ -178,7 +194,10 @@ class LoopInside:
         return data.efc_pos[: data.nefc].copy(), jacobian.copy()
 
     def state(self, theta_2: float, omega_2: float) -> RobotState | None:
-        """Return the closed state at an angle and a speed of bar 2; None where the loop does not close."""
+        """Return the closed state at an angle and a speed of bar 2.
+
+        None if the loop does not close.
+        """
         qpos = self.close(theta_2)
         if qpos is None:
             return None
@@ -192,7 +211,9 @@ class LoopInside:
         return RobotState(qpos, qvel, theta_2)
 
     def ask(self, qpos: Array, qvel: Array, alpha_2: float) -> InsideRow:
-        """Evaluate a state in which bar 2 accelerates at alpha_2, and solve for the couple on it.
+        """Evaluate a state in which bar 2 accelerates at alpha_2.
+
+        The couple on it is solved for.
 
         Raises
         ------
@@ -228,7 +249,10 @@ class LoopInside:
         return InsideRow(theta_2, omega_2, alpha_2, joint, soft, rigid, gap, sticking)
 
     def _list_sticking(self) -> tuple[str, ...]:
-        """List the hinges of the loop that turn and whose dry friction has not reached its couple."""
+        """List the hinges of the loop that turn and stick.
+
+        Their dry friction has not reached its couple.
+        """
         model, data = self.model, self.data
         rubbing = (
             data.efc_type[: data.nefc] == mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF
@@ -254,7 +278,10 @@ class LoopInside:
     def _solve_rigid(
         self, state: RobotState, alpha_2: float
     ) -> tuple[PinsAndTorque, Array]:
-        """Solve for torque and pin forces with rigid pins at a closed state; return all accelerations too, (nv,)."""
+        """Solve for torque and pin forces with rigid pins at a closed state.
+
+        Return all accelerations too, (nv,).
+        """
         model, data = self.closure, self.closing
         data.qpos[:], data.qvel[:] = state.qpos, state.qvel
         mujoco.mj_forward(model, data)
@@ -281,7 +308,10 @@ class LoopInside:
         return PinsAndTorque(float(self.sense * couple), forces), accelerations
 
     def _balance(self, start: Array) -> Array:
-        """Return the joint forces under which the hinges that are not driven are left to themselves, (nv,)."""
+        """Return the joint forces that leave the other hinges alone, (nv,).
+
+        The hinges are those that are not driven.
+        """
         model, data = self.model, self.data
         accelerations = start.copy()
         mujoco.mj_forward(model, data)
@@ -322,7 +352,10 @@ class LoopInside:
         return np.asarray(left)
 
     def _read_forces(self, data: mujoco.MjData) -> dict[str, Array]:
-        """Read the pin forces of a state that was evaluated, in the axes of the plane, (2,) each, N."""
+        """Read the pin forces of a state that was evaluated, (2,) each, N.
+
+        They are in the axes of the plane.
+        """
         ground = data.xmat[self.loop.bodies[1][0]].reshape(3, 3)
         axes = np.array(
             [
@@ -366,7 +399,10 @@ class LoopInside:
         return np.asarray(-lifted[borne].sum() * model.opt.gravity)
 
     def _read_closure(self, data: mujoco.MjData, pin: str) -> tuple[Array, int]:
-        """Sum the forces of the equalities at the cut pin; return the sum and the bar that it acts on."""
+        """Sum the forces of the equalities at the cut pin.
+
+        Return the sum and the bar that it acts on.
+        """
         total = np.zeros(3)
         bars = []
         for equality in self.loop.closures:
@@ -405,11 +441,12 @@ class LoopInside:
         alpha_2: float,
         heavy: float = HEAVY,
     ) -> InsideAnswer:
-        """Step the whole robot through the angles, at the file's own timestep, integrator and solver.
+        """Step the whole robot through the angles.
 
-        Each joint that is held, and the driven one, gets an armature of `heavy` times
-        the robot's largest inertia. The couple that a state asks for acts on the driven
-        one until the next, so that its speed is kept.
+        Timestep, integrator and solver are those of the file. Each joint that is held,
+        and the driven one, gets an armature of `heavy` times the robot's largest
+        inertia. The couple that a state asks for acts on the driven one until the next,
+        so that its speed is kept.
         """
         answer = InsideAnswer()
         angles = sorted(theta_2, reverse=omega_2 < 0.0)
@@ -469,10 +506,10 @@ class LoopInside:
     def answer_under_torque(
         self, theta_2: Iterable[float], torque: float, seconds: float
     ) -> list[TornState]:
-        """From rest at each angle let a motor's torque act for some time, the other joints held.
+        """Let a motor's torque act from rest at each angle, for some time.
 
-        A state is the one of the largest gap on the way from each angle; of a motion
-        that MuJoCo loses there is none.
+        The other joints are held. A state is the one of the largest gap on the way from
+        each angle; of a motion that MuJoCo loses there is none.
         """
         states = []
         model, data = copy(self.model), mujoco.MjData(self.model)
@@ -506,7 +543,10 @@ class LoopInside:
 
 
 def _find_instant(start: float, angle: float, omega: float, alpha: float) -> float:
-    """Return the time at which a motion passes an angle, s; LimitError where it comes to rest before."""
+    """Return the time at which a motion passes an angle, s.
+
+    Raises LimitError if it comes to rest before.
+    """
     turned = angle - start
     squared = omega**2 + 2.0 * alpha * turned
     if squared <= 0.0:
@@ -517,7 +557,10 @@ def _find_instant(start: float, angle: float, omega: float, alpha: float) -> flo
 def _copy_for_closures(
     model: mujoco.MjModel, closures: Sequence[int]
 ) -> mujoco.MjModel:
-    """Copy a model so that a loop's closures are its only constraints, with a dense derivative."""
+    """Copy a model so that a loop's closures are its only constraints.
+
+    The derivative is dense.
+    """
     alone = copy(model)
     alone.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
     for name in ("CONTACT", "LIMIT", "FRICTIONLOSS", "ISLAND"):

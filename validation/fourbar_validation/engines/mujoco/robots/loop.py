@@ -1,4 +1,7 @@
-"""What is asked of a robot's file, and what is known of its closed loops: plain data, without MuJoCo."""
+"""Questions to a robot's file, and facts on its closed loops.
+
+They are plain data, without MuJoCo.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -14,7 +17,7 @@ PAIRS = {"O2": (1, 2), "A": (2, 3), "B": (3, 4), "O4": (1, 4)}
 
 @dataclass(frozen=True, slots=True)
 class RobotFile:
-    """Screened text of a robot's file with its includes, and the contents of its meshes."""
+    """Screened text of a robot's file with its includes, and its meshes."""
 
     path: Path
     text: str
@@ -27,7 +30,7 @@ class RobotFile:
 
 @dataclass(frozen=True, slots=True)
 class PoseOptions:
-    """Pose in which a robot is looked at, and the joints that are held or drive there."""
+    """Pose of a robot, and the joints that are held or drive in it."""
 
     joints: Mapping[str, str] = field(default_factory=dict)
     """Position of each joint that is stated, with its unit."""
@@ -89,7 +92,10 @@ class RobotLoop:
         return self.hinges["O2"]
 
     def seen_from_behind(self) -> "RobotLoop":
-        """Return the same loop with the other normal of its plane: all angles turn the other way."""
+        """Return the loop with the other normal of its plane.
+
+        All angles then turn the other way.
+        """
         return replace(
             self,
             axis=-self.axis,
@@ -144,7 +150,9 @@ class LoopScene:
     scene: Scene
     loop: RobotLoop
     parts: tuple[str, ...]
-    """Which joint is which pin, which body which bar, and what is held, in sentences."""
+    """Sentences that say which joint is which pin, and which body which bar. They say
+    too what is held.
+    """
     remarks: tuple[str, ...]
     """What was chosen, and what the scene leaves out, with its size."""
     notes: tuple[str, ...] = ()

@@ -1,4 +1,7 @@
-"""Torque, pin forces and gap of the loops of a robot's file: what `check-mjcf` and `advise` ask of MuJoCo."""
+"""Torque, pin forces and gap of the loops of a robot's file.
+
+`check-mjcf` and `advise` ask them of MuJoCo.
+"""
 
 import math
 from dataclasses import replace
@@ -42,7 +45,9 @@ POSITIONS = 37
 TORN_POSITIONS = 5
 """Positions from which a motor's torque acts."""
 CONSTANTS = 10.0
-"""Time constants of the closure during which it acts: the loop has then yielded as far as it does."""
+"""Time constants of the closure during which the torque acts. The loop has then yielded
+as far as it does.
+"""
 ALIKE = 1e-6
 """Difference of logarithms of lengths below which two ways round fit a scene alike."""
 LIGHTER = 0.1
@@ -56,7 +61,8 @@ def measure_loops(
 
     Parameters
     ----------
-    scene : of the loop, of several the one whose lengths fit; None: it is made from the file.
+    scene : of the loop, of several the one whose lengths fit; None: it is made from the
+        file.
 
     Raises
     ------
@@ -93,7 +99,10 @@ def measure_loops(
 def _turn_to(
     scene: Scene, posed: PosedRobot, loop: RobotLoop, options: MeasureOptions
 ) -> RobotLoop:
-    """Return the loop as the scene has it: its input driven, and its plane seen from the same side."""
+    """Return the loop as the scene has it.
+
+    Its input is driven, and its plane is seen from the same side.
+    """
     apart, turned = _miss_lengths(scene, loop)
     output = loop.hinges.get("O4")
     if options.pose.drive is None and output is not None and turned < apart - ALIKE:
@@ -105,7 +114,10 @@ def _turn_to(
 
 
 def _miss_lengths(scene: Scene, loop: RobotLoop) -> tuple[float, float]:
-    """Return by how much a loop's lengths miss those of a scene, as it is driven and driven at its output."""
+    """Return by how much a loop's lengths miss those of a scene.
+
+    The loop is as it is driven, and driven at its output.
+    """
     ground, *moving = np.log(loop.lengths)
     wanted = np.log(scene.linkage.lengths)
     apart, turned = (
@@ -174,7 +186,10 @@ def _measure_loop(
 
 
 def _find_turn(scene: Scene, loop: RobotLoop) -> float:
-    """Return the angle from a scene's axes to those of the loop's plane, by whole turns near the pose, rad."""
+    """Return the angle from a scene's axes to those of the loop's plane, rad.
+
+    Whole turns bring it near the pose.
+    """
     turned = loop.angles[0] - scene.linkage.ground_angle
     middle = float(np.mean(command(scene).theta_2)) + turned
     return turned - math.tau * round((middle - loop.angles[1]) / math.tau)
@@ -190,10 +205,10 @@ def _choose_motion(scene: Scene, turned: float) -> LoopMotion:
 
 
 def _compare(one: InsideAnswer, other: InsideAnswer) -> float:
-    """Return by how much the errors of two runs differ at the same angles, of the largest of each quantity.
+    """Return by how much the errors of two runs differ at the same angles.
 
-    Each is the error at its own state: the motions differ too, and near a limit
-    position the forces with them.
+    It is over the largest of each quantity. Each is the error at its own state: the
+    motions differ too, and near a limit position the forces with them.
     """
     scales, worst = one.scales(), 0.0
     if one.lost or other.lost:

@@ -1,4 +1,7 @@
-"""A joint equality of a robot's file: the polynomial by which one joint follows another."""
+"""A joint equality of a robot's file.
+
+By its polynomial one joint follows another.
+"""
 
 import math
 from dataclasses import dataclass
@@ -27,7 +30,7 @@ class JointEquality:
     leader_zero: float
     """x0, rad: the leader in the rest pose of the file."""
     sense: float
-    """+1 where both joints turn about the same direction, -1 where about opposite ones."""
+    """+1 if both joints turn about the same direction, -1 if about opposite ones."""
 
 
 def read_joint_equality(file: RobotFile, name: str) -> JointEquality:
@@ -35,7 +38,8 @@ def read_joint_equality(file: RobotFile, name: str) -> JointEquality:
 
     Raises
     ------
-    InputError : no such joint, no equality by which it follows, or a joint that is no hinge.
+    InputError : no such joint, no equality by which it follows, or a joint that is no
+        hinge.
     """
     model = compile_robot(file).model
     joint = find_joint(model, name, "--mimic")

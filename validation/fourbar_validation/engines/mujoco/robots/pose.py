@@ -1,8 +1,9 @@
-"""The pose in which a robot is looked at: as the file has it, as stated, closed again by least squares.
+"""The pose in which a robot is looked at.
 
-The residuals are those of MuJoCo's own active equalities, the unknowns the joints that
-they depend on. A step of Gauss and Newton is a linear least-squares problem within the
-joints' ranges; damping keeps the pose near the one that was stated.
+It is that of the file, or the stated one, closed again by least squares. The residuals
+are those of MuJoCo's own active equalities, the unknowns the joints that they depend
+on. A step of Gauss and Newton is a linear least-squares problem within the joints'
+ranges; damping keeps the pose near the one that was stated.
 """
 
 from dataclasses import dataclass
@@ -33,7 +34,9 @@ MOST_STEPS = 100
 LONGEST_STEP = 0.3
 """rad or m; longer steps leave the region where the loops are nearly linear."""
 DAMPING = 1e-4
-"""Weight of a step against the residuals: keeps what no equality decides where it is."""
+"""Weight of a step against the residuals. It keeps what no equality decides where it
+is.
+"""
 OUTSIDE = 1e-6
 """rad or m; a joint is outside its range beyond the rounding of a file."""
 
@@ -55,7 +58,8 @@ def pose_robot(model: mujoco.MjModel, options: PoseOptions) -> PosedRobot:
 
     Raises
     ------
-    InputError : an unknown joint or keyframe, a position without a unit or of another kind.
+    InputError : an unknown joint or keyframe, a position without a unit or of another
+        kind.
     """
     stated, origin = _choose_start(model, options)
     fixed = {find_joint(model, name, "--hold") for name in options.held}
@@ -95,7 +99,10 @@ def pose_robot(model: mujoco.MjModel, options: PoseOptions) -> PosedRobot:
 
 
 def find_joint(model: mujoco.MjModel, name: str, option: str) -> int:
-    """Find a joint by its name, as it is printed, or raise an InputError that lists what is there."""
+    """Find a joint by its name, as it is printed.
+
+    Raises an InputError that lists the joints.
+    """
     names = [name_joint(model, joint) for joint in range(model.njnt)]
     if name not in names:
         listed = ", ".join(names) or "none"
@@ -145,7 +152,10 @@ def _read_position(name: str, text: str, unit: str) -> float:
 
 
 def _list_bounds(model: mujoco.MjModel) -> tuple[Array, Array]:
-    """Return the range of each degree of freedom, (nv,) each, infinite where it has none."""
+    """Return the range of each degree of freedom, (nv,) each.
+
+    It is infinite if it has none.
+    """
     low, high = np.full(model.nv, -np.inf), np.full(model.nv, np.inf)
     for joint in range(model.njnt):
         if model.jnt_limited[joint] and int(model.jnt_type[joint]) in UNITS:
@@ -188,7 +198,10 @@ class _Closing:
         return list(range(first, first + count))
 
     def _residuals(self) -> tuple[Array, Array]:
-        """Return residuals of the equalities and their derivatives, (m,) and (m, nv)."""
+        """Return residuals of the equalities and their derivatives.
+
+        They are (m,) and (m, nv).
+        """
         data = self.data
         if not data.nefc:
             return np.zeros(0), np.zeros((0, self.model.nv))
@@ -207,7 +220,10 @@ class _Closing:
         return float(np.abs(residuals).max(initial=0.0))
 
     def close(self, start: Array) -> Array:
-        """Return the pose within the ranges, near `start`, with the least residuals, (nq,)."""
+        """Return the pose within the ranges with the least residuals, (nq,).
+
+        It is near `start`.
+        """
         from scipy.optimize import lsq_linear
 
         qpos = self._bring_inside(start)
@@ -270,7 +286,10 @@ def _list_tied_joints(model: mujoco.MjModel) -> list[int]:
 
 
 def _copy_for_equalities(model: mujoco.MjModel) -> mujoco.MjModel:
-    """Copy a model so that its equalities are the only constraints, with a dense Jacobian."""
+    """Copy a model so that its equalities are the only constraints.
+
+    The Jacobian is dense.
+    """
     from copy import copy
 
     alone = copy(model)

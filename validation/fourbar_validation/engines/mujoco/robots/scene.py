@@ -1,7 +1,8 @@
-"""A scene from a loop of a robot: lengths, masses, effects and range, in the pose, everything else held.
+"""A scene from a loop of a robot.
 
-What hangs on a bar by other joints is held as it stands and counts with its mass. What
-a scene cannot hold is named with its size.
+It has lengths, masses, effects and range, in the pose, with everything else held. What
+hangs on a bar by other joints is held as it stands and counts with its mass. What a
+scene cannot hold is named with its size.
 """
 
 import cmath
@@ -56,10 +57,13 @@ from fourbar_validation.engines.mujoco.robots.pose import (
 )
 
 DIGITS = 12
-"""Significant digits of a number of the scene; those beyond are round-off of the compiler."""
+"""Significant digits of a number of the scene. Those beyond are round-off of the
+compiler.
+"""
 FLAT = 2e-3
-"""rad; where the outputs of both assemblies are nearer the pose does not tell which it is: a
-loop that is closed to 1e-12 m leaves about half as much open where its bars are in line.
+"""rad; where the outputs of both assemblies are nearer the pose does not tell which it
+is: a loop that is closed to 1e-12 m leaves about half as much open where its bars are
+in line.
 """
 STEPS = 120
 """Intervals of the sweep."""
@@ -125,7 +129,10 @@ def make_scene(
 
 
 def list_carried(model: mujoco.MjModel, loop: RobotLoop) -> dict[int, list[int]]:
-    """List the bodies that move with each moving bar, those included that hang on it by held joints."""
+    """List the bodies that move with each moving bar.
+
+    Those that hang on it by held joints are included.
+    """
     bars = {body: bar for bar, bodies in loop.bodies.items() for body in bodies}
     carried: dict[int, list[int]] = {bar: [] for bar in MOVING_BARS}
     for body in range(1, model.nbody):
@@ -136,12 +143,18 @@ def list_carried(model: mujoco.MjModel, loop: RobotLoop) -> dict[int, list[int]]
 
 
 def reflect_armature(model: mujoco.MjModel, joint: int) -> float:
-    """Return the armature of a hinge with that of its motors behind their gears, kg m^2."""
+    """Return the armature of a hinge, kg m^2.
+
+    That of its motors behind their gears is included.
+    """
     return _sum_over_motors(model, joint, model.dof_armature, "actuator_armature")
 
 
 def reflect_damping(model: mujoco.MjModel, joint: int) -> float:
-    """Return the damping of a hinge with that of its motors behind their gears, N m s/rad."""
+    """Return the damping of a hinge, N m s/rad.
+
+    That of its motors behind their gears is included.
+    """
     damping = model.dof_damping * is_enabled(model, "damper", "passive")
     return _sum_over_motors(model, joint, damping, "actuator_damping")
 
@@ -169,7 +182,10 @@ def round_angle(angle: float) -> float:
 
 
 def _miss_output(scene: Scene, theta_1: float, theta_2: float, theta_4: float) -> float:
-    """Return by how much the output of a scene misses that of a loop in its pose, rad; infinite where it is open."""
+    """Return by how much the output of a scene misses that of a loop, rad.
+
+    The loop is in its pose; infinite if it is open.
+    """
     linkage = scene.linkage
     angle = np.array([theta_2 - theta_1 + linkage.ground_angle])
     sign = np.array([scene.motion.branch], dtype=np.int8)
@@ -182,9 +198,10 @@ def _miss_output(scene: Scene, theta_1: float, theta_2: float, theta_4: float) -
 def is_seen_from_behind(
     scene: Scene, theta_1: float, theta_2: float, theta_4: float
 ) -> bool:
-    """Tell whether a loop in its pose has the output of a scene where its plane is seen from the other side.
+    """Tell whether the plane of a loop is seen from the other side.
 
-    All angles turn the other way there.
+    In its pose the loop then has the output of a scene. All angles turn the other way
+    there.
     """
     missed = _miss_output(scene, theta_1, theta_2, theta_4)
     missed_behind = _miss_output(scene, -theta_1, -theta_2, -theta_4)
@@ -284,7 +301,10 @@ class _SceneOfLoop:
         return np.asarray(self.data.xpos[body] + turn @ self.loop.points[bar, pin])
 
     def _find_polar(self, bar: int, place: Array) -> tuple[float, float]:
-        """Return a place from the first pin of a bar: distance, m, and angle from its line, rad."""
+        """Return a place from the first pin of a bar: distance, m, and angle, rad.
+
+        The angle is from the bar's line.
+        """
         first, second = PINS_OF_BAR[bar]
         pin = self._locate(bar, first)
         line = self._in_plane(self._locate(bar, second) - pin)
@@ -390,7 +410,10 @@ class _SceneOfLoop:
             )
 
     def _list_loads(self) -> Iterator[Load]:
-        """List the forces by which bodies are held against gravity (gravcomp), where they act."""
+        """List the forces by which bodies are held against gravity (gravcomp).
+
+        They act where the bodies have them.
+        """
         model, data = self.model, self.data
         if not hasattr(model, "body_gravcomp"):
             return
@@ -406,7 +429,10 @@ class _SceneOfLoop:
             yield Load(bar, (size, angle), from_pin=from_pin)
 
     def _find_sweep(self, linkage: FourBar) -> "_Path":
-        """Follow the loop over the range of the driven hinge, as far as it assembles and no other hinge stops it."""
+        """Follow the loop over the range of the driven hinge.
+
+        It ends where the loop does not assemble or another hinge stops it.
+        """
         theta_2 = self.loop.angles[1]
         low, high = self._find_range("O2", theta_2)
         first, last = _find_assembling(linkage, theta_2)
@@ -443,7 +469,10 @@ class _SceneOfLoop:
         )
 
     def _find_range(self, pin: str, beta: float) -> tuple[float, float]:
-        """Return the angles between the bars of a pin at which its hinge stops, rad; `beta`: that in the pose."""
+        """Return the angles between the bars of a pin at which its hinge stops.
+
+        They are in rad. `beta`: that in the pose.
+        """
         model, loop = self.model, self.loop
         joint = loop.hinges[pin]
         if not model.jnt_limited[joint] or not is_enabled(model, "limit", "constraint"):
@@ -455,7 +484,10 @@ class _SceneOfLoop:
     def _follow(
         self, linkage: FourBar, angles: Array, in_pose: int
     ) -> dict[str, Array]:
-        """Return the angle between the bars of each pin along theta_2, continuous, rad."""
+        """Return the angle between the bars of each pin along theta_2, rad.
+
+        It is continuous.
+        """
         branch = self._find_branch(linkage, self.loop.angles[1])
         motion = Motion(angles, branch=branch)
         solution = solve(Scene(linkage, motion), "position")
@@ -531,7 +563,10 @@ class _SceneOfLoop:
         self.remarks.append(f"not in the scene: {what}")
 
     def _remark_tendons_and_motors(self) -> None:
-        """Name tendons and actuators that act on the loop besides the motor of the driven hinge."""
+        """Name tendons and actuators that act on the loop.
+
+        The motor of the driven hinge is left out.
+        """
         model, bodies = self.model, {b for c in self.carried.values() for b in c}
         joints = {*self.loop.hinges.values()}
         for number in range(model.ntendon):
@@ -572,7 +607,9 @@ class _Path:
     start: float
     stop: float
     betas: dict[str, tuple[float, float]]
-    """Angle between the bars of each pin in the pose, and where the path starts, rad."""
+    """Angle between the bars of each pin in the pose, rad. It is also that where the
+    path starts.
+    """
 
 
 def _find_run(free: NDArray[np.bool_], near: int) -> NDArray[np.intp]:
@@ -584,7 +621,10 @@ def _find_run(free: NDArray[np.bool_], near: int) -> NDArray[np.intp]:
 
 
 def _find_assembling(linkage: FourBar, theta_2: float) -> tuple[float, float]:
-    """Return the range of theta_2 around a position in which the loop assembles, a little less than it."""
+    """Return the range of theta_2 in which the loop assembles.
+
+    It is around a position, and a little less than the whole.
+    """
     if turns_fully(linkage):
         return -math.inf, math.inf
     ranges = []

@@ -1,7 +1,8 @@
-"""What to type into a robot's file: each setting of a loop's softness and of the stepping, measured in the file itself.
+"""Settings to type into a robot's file.
 
-A setting is changed alone first. Then combinations are tried, those that cost least
-time first, until one keeps the torque and the pin forces within the wanted error.
+Each setting of a loop's softness and of the stepping is measured in the file itself. A
+setting is changed alone first. Then combinations are tried, those that cost least time
+first, until one keeps the torque and the pin forces within the wanted error.
 """
 
 import math
@@ -28,7 +29,9 @@ from fourbar_validation.engines.mujoco.robots.inside import LoopInside
 from fourbar_validation.engines.mujoco.robots.loop import RobotFile, RobotLoop
 
 SECONDS = 75.0
-"""Seconds of processor time in which combinations are tried; with the rest the command stays within two minutes."""
+"""Processor time in which combinations are tried, s. With the rest the command stays
+within two minutes.
+"""
 POSITIONS = 9
 """Positions of a trial."""
 STIFF = (0.9999, 0.9999, 0.001, 0.5, 2.0)
@@ -41,11 +44,15 @@ FINER = (0.5, 0.2, 0.1)
 """Factors on the timestep."""
 INTEGRATORS = ("Euler", "implicit", "implicitfast", "RK4")
 EVALUATIONS = {"RK4": 4.0}
-"""Evaluations of a step, for the order in which combinations are tried; the others have one."""
+"""Evaluations of a step, for the order in which combinations are tried. The others have
+one.
+"""
 SOLVER = ("Newton", 100, 1e-10)
 """Solver, iterations and tolerance at which the solver leaves nothing."""
 FIRST_CONSTANT = 0.02
-"""s; MuJoCo's own time constant, tried where the file states a stiffness in its place."""
+"""MuJoCo's own time constant, s. It is tried if the file states a stiffness in its
+place.
+"""
 
 
 def read_settings(model: mujoco.MjModel, loop: RobotLoop) -> RobotSettings:
@@ -71,7 +78,10 @@ def _name(kinds: type, value: int, words: Sequence[str]) -> str:
 def set_settings(
     model: mujoco.MjModel, loop: RobotLoop, settings: RobotSettings
 ) -> mujoco.MjModel:
-    """Return a copy of a compiled model with other settings; all closures of the loop get the same."""
+    """Return a copy of a compiled model with other settings.
+
+    All closures of the loop get the same.
+    """
     changed = copy(model)
     for equality in loop.closures:
         changed.eq_solref[equality] = settings.solref
@@ -147,7 +157,10 @@ class SettingsSearch:
             yield replace(own, tolerance=tolerance)
 
     def _list_values(self) -> dict[str, list[Any]]:
-        """List the values of each setting that combinations are made of, the file's own first."""
+        """List the values of each setting that combinations are made of.
+
+        Those of the file come first.
+        """
         own = self.own
         constant = own.solref[0] if own.solref[0] > 0.0 else FIRST_CONSTANT
         ratio = own.solref[1] if own.solref[0] > 0.0 else 1.0
@@ -165,7 +178,10 @@ class SettingsSearch:
         }
 
     def _find_cheapest(self, wanted: float) -> tuple[TriedSettings, bool]:
-        """Try combinations in the order of their cost and the number of changes, until one serves."""
+        """Try combinations until one serves.
+
+        They are ordered by their cost and the number of changes.
+        """
         values = self._list_values()
         solvers: list[dict[str, Any]] = [{}]
         name, iterations, tolerance = SOLVER
@@ -191,14 +207,20 @@ class SettingsSearch:
         return min(self.tried.values(), key=lambda one: one.error), False
 
     def _rank(self, settings: RobotSettings) -> tuple[float, int, float]:
-        """Return the order of combinations: evaluations of a simulated second, changes, stiffness."""
+        """Return the order of combinations.
+
+        It is by evaluations of a simulated second, changes, stiffness.
+        """
         evaluations = EVALUATIONS.get(settings.integrator, 1.0) / settings.timestep
         changes = settings.list_changes(self.own)
         return evaluations, len(changes), -settings.solref[0]
 
 
 def _find_worst(answer: InsideAnswer) -> float:
-    """Return the worst error of torque and pin forces over the largest of each; infinite without an answer."""
+    """Return the worst error of torque and pin forces over the largest of each.
+
+    It is infinite without an answer.
+    """
     if answer.lost or not answer.rows:
         return math.inf
     scales = answer.scales()
@@ -215,7 +237,10 @@ def _find_worst(answer: InsideAnswer) -> float:
 def write_elements(
     file: RobotFile, loop: RobotLoop, tried: TriedSettings
 ) -> tuple[str, ...]:
-    """Write the elements of the file that are to be changed, as they are to stand there."""
+    """Write the elements of the file that are to be changed.
+
+    They are written as they are to stand there.
+    """
     written = []
     option = {
         name: value
