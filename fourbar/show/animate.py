@@ -153,6 +153,10 @@ def collect_live_data(
             )
             for number in MOVING_BARS
         },
+        "bars": {
+            str(number): [(bar := linkage.bar(number)).mass, bar.moment_of_inertia]
+            for number in MOVING_BARS
+        },
         "drive_bar": scene.drive_bar,
         "branch": motion.branch,
         "points": [

@@ -103,6 +103,7 @@ function drawChart() {
   if (behind.length) curve(behind, reference.over, "curve behind");
   curve(values, over, "curve");
   byId("compared").textContent = comparison(wanted, values);
+  byId("plotted").textContent = QUANTITIES.find(q => q[0] === wanted)[1];
   plotted.cursor = make(chart, "line", { class: "cursor", y1: 10, y2: height - bottom });
   plotted.dot = make(chart, "circle", { class: "dot", r: 4.5 });
 }

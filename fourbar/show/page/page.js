@@ -169,11 +169,37 @@ document.addEventListener("keydown", event => {
 });
 new ResizeObserver(() => { if (Math.max(280, picture.parentElement.clientWidth) !== view.width) refresh(); }).observe(picture.parentElement);
 
+// The bars as a sheet lists them: about G the inertia, from the first pin the place of G along the bar and to its left.
+const BAR_NAMES = { 1: "ground", 2: "input", 3: "coupler", 4: "output" };
+function listBars() {
+  const body = byId("bars").querySelector("tbody");
+  body.replaceChildren();
+  for (const k of [1, 2, 3, 4]) {
+    const line = body.insertRow(), [mass, inertia] = data.bars[k] ?? [null, null], centre = data.centres[k];
+    const heading = document.createElement("th");
+    heading.scope = "row";
+    heading.textContent = `${k} ${BAR_NAMES[k]}`;
+    line.append(heading);
+    const place = centre ? centre.map(z => text(z * unit.factor)).join(", ") : "\u2013";
+    for (const shownText of [text(lengths[k - 1] * unit.factor), text(mass), text(inertia), place]) line.insertCell().textContent = shownText;
+  }
+}
+
+// A printed page is a sheet: the linkage stands still, and each bar shows its length.
+let dimensioned = false;
+window.addEventListener("beforeprint", () => {
+  if (playing) play(false);
+  dimensioned = byId("show-dimensions").checked;
+  if (!dimensioned) toggle("show-dimensions");
+});
+window.addEventListener("afterprint", () => { if (!dimensioned) toggle("show-dimensions"); });
+
 // What of the page depends on the data: names, units, and what there is to show.
 function furnish() {
   ceilings = {};
   QUANTITIES = quantitiesOf();
   furnishTolerances();
+  listBars();
   byId("drive").textContent = data.drive_bar;
   for (const element of document.querySelectorAll("[data-unit]")) element.textContent = nameOf(element.dataset.unit);
   byId("branch").value = branch;

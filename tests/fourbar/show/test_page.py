@@ -1,5 +1,6 @@
 """The moving page in a real browser, its picture and numbers against the formulas in Python."""
 
+import base64
 import math
 import time
 from dataclasses import replace
@@ -700,3 +701,40 @@ def test_a_scene_without_bands_says_why_or_shows_nothing(browse) -> None:
         .find_element("id", "tolerances")
         .is_displayed()
     )
+
+
+def test_a_printed_page_is_one_sheet_with_lengths_bars_and_the_chart_s_name(
+    browse,
+) -> None:
+    scene = crank_rocker()
+    driver = browse(animate.write_page(scene), dark=True)
+    assert not driver.find_element("id", "bars").is_displayed()
+    printed = driver.execute_cdp_cmd("Page.printToPDF", {"printBackground": True})
+    pdf = base64.b64decode(printed["data"])
+    assert pdf.count(b"/Type /Page\n") == 1
+
+    driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
+    driver.execute_script("window.dispatchEvent(new Event('beforeprint'))")
+    labels = driver.find_element("id", "labels").text
+    for bar, length in enumerate((300, 100, 250, 220), start=1):
+        assert f"{bar}: {length} mm" in labels
+    assert driver.find_element("id", "plotted").text == "torque on bar 2, N m"
+    rows = driver.find_elements("css selector", "#bars tbody tr")
+    cells = [row.find_elements("tag name", "td") for row in rows]
+    for moving, row in zip((2, 3, 4), cells[1:], strict=True):
+        bar = scene.linkage.bar(moving)
+        shown_numbers = [number(cell.text) for cell in row[:3]]
+        stated = [1e3 * bar.length, bar.mass, bar.moment_of_inertia]
+        assert shown_numbers == pytest.approx(stated, rel=PRINTED)
+        along, off = (number(part) for part in row[3].text.split(", "))
+        centre = 1e3 * bar.to_centre
+        assert (along, off) == pytest.approx(
+            (centre.real, centre.imag), rel=PRINTED, abs=PRINTED
+        )
+    background = "return getComputedStyle(document.body).backgroundColor"
+    assert driver.execute_script(background) == "rgb(255, 255, 255)"
+    hidden = ("play", "show-labels", "quantity", "download")
+    assert not any(driver.find_element("id", name).is_displayed() for name in hidden)
+
+    driver.execute_script("window.dispatchEvent(new Event('afterprint'))")
+    assert "300 mm" not in driver.find_element("id", "labels").text
