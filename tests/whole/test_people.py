@@ -15,6 +15,7 @@ import pytest
 import fourbar
 from fourbar.cli import status
 from fourbar.errors import HOLDS
+from tests.support.texts import COORDINATES, HUNG, PULL
 
 WIDTH = 80
 PRINTED = 1e-5
@@ -172,20 +173,6 @@ def test_four_pins_and_the_speed_of_the_output_as_they_are_drawn(
     )
 
 
-COORDINATES = """\
-title = "Four-bar from joint coordinates"
-[pins]
-O2 = ["4.1 cm", "3.75 cm"]
-A = ["1.244 cm", "0.196 cm"]
-B = ["-2.32 cm", "-2.293 cm"]
-O4 = ["0.165 cm", "1.322 cm"]
-[motion]
-omega_2 = "10 rpm"
-[points]
-E = { bar = 3, from_pin = { drawn = ["-2.591 cm", "1.657 cm"] } }
-"""
-
-
 def test_a_linkage_by_the_coordinates_of_its_joints(ask: Steps, tmp_path: Path) -> None:
     """E stands where it is drawn, in the coordinates of the drawing, and its path goes through it."""
     (tmp_path / "joints.toml").write_text(COORDINATES)
@@ -301,46 +288,11 @@ def test_a_given_couple_moves_two_parallel_links_from_rest(
     assert row_of(text, "F14 at O4")[2] == pytest.approx(2.139, rel=1e-3)
 
 
-HUNG = """\
-title = "Weight hung at the tip of the rocker"
-[lengths]
-ground = "300 mm"
-input = "100 mm"
-coupler = "250 mm"
-output = "220 mm"
-[motion]
-theta_2 = ["0 deg", "90 deg", "180 deg", "270 deg"]
-omega_2 = "0 rad/s"
-[[loads]]
-bar = 4
-force = ["10 N", "-90 deg"]
-from_pin = ["300 mm", "0 deg"]
-"""
-
-
 def test_a_weight_hung_at_the_tip_of_the_rocker(ask: Steps, tmp_path: Path) -> None:
     (tmp_path / "hung.toml").write_text(HUNG)
     rows = list_columns(ask("analyze", "hung.toml", "--columns", "theta_2,torque"))
     right = [0.441477, -0.417152, -0.621733, 0.532516]
     assert [torque for _, torque in rows] == pytest.approx(right, rel=PRINTED)
-
-
-PULL = """\
-title = "Force along x at the rocker's end"
-[lengths]
-ground = "12 cm"
-input = "5 cm"
-coupler = "10 cm"
-output = "8 cm"
-[motion]
-theta_2 = "60 deg"
-omega_2 = "10 deg/s"
-alpha_2 = "5 deg/s^2"
-[[loads]]
-bar = 4
-force = ["50 N", "0 deg"]
-from_pin = ["8 cm", "0 deg"]
-"""
 
 
 def test_a_force_along_x_at_the_end_of_the_rocker(ask: Steps, tmp_path: Path) -> None:

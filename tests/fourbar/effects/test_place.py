@@ -14,55 +14,24 @@ from fourbar.errors import InputError
 from fourbar.files import dump, loads
 from fourbar.scene import Scene
 from tests.support.scenes import crank_rocker
+from tests.support.texts import HUNG, PULL
 
 PRINTED = 6e-7
 """N m: a half of the last digit of right values with six decimals."""
 ROUND_OFF = 1e-13
 """Relative; two evaluations of some fifty roundings each, far from limits."""
 
-HUNG_WEIGHT = """
-title = "Weight hung at the tip of the rocker"
-[lengths]
-ground = "300 mm"
-input = "100 mm"
-coupler = "250 mm"
-output = "220 mm"
-[motion]
-theta_2 = ["0 deg", "90 deg", "180 deg", "270 deg"]
-omega_2 = "0 rad/s"
-[[loads]]
-bar = 4
-force = ["10 N", "-90 deg"]
-from_pin = ["300 mm", "0 deg"]
-"""
-PULL_AT_THE_TIP = """
-title = "Force along x at the rocker's end"
-[lengths]
-ground = "12 cm"
-input = "5 cm"
-coupler = "10 cm"
-output = "8 cm"
-[motion]
-theta_2 = "60 deg"
-omega_2 = "10 deg/s"
-alpha_2 = "5 deg/s^2"
-[[loads]]
-bar = 4
-force = ["50 N", "0 deg"]
-from_pin = ["8 cm", "0 deg"]
-"""
-
 
 def test_a_weight_hung_at_the_tip_of_the_rocker() -> None:
     """Right values by virtual work with a circle intersection, apart from this program."""
-    torque = fourbar.solve(loads(HUNG_WEIGHT)).torque
+    torque = fourbar.solve(loads(HUNG)).torque
     right = [0.441477, -0.417152, -0.621733, 0.532516]
     assert torque is not None
     np.testing.assert_allclose(torque, right, atol=PRINTED, rtol=0.0)
 
 
 def test_a_pull_at_the_tip_of_massless_bars() -> None:
-    torque = fourbar.solve(loads(PULL_AT_THE_TIP)).torque
+    torque = fourbar.solve(loads(PULL)).torque
     assert torque is not None
     assert torque[0] == pytest.approx(1.656231, abs=PRINTED)
 

@@ -2,6 +2,7 @@
 
 import math
 import os
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -37,6 +38,14 @@ def random_pins(random: np.random.Generator, kind: str) -> list[complex]:
         O4 = O2 + along * ((A - O2) / along).conjugate()
     shift = 10.0 ** random.uniform(-2.0, 1.0) * np.exp(1j * random.uniform(0.0, 7.0))
     return [complex(scale * (pin + shift)) for pin in (O2, A, B, O4)]
+
+
+def write_pins(pins: Sequence[complex]) -> str:
+    """Write O2, A, B, O4 as a scene file has them, to a tenth of a millimetre."""
+    rows = ["[pins]"]
+    for name, pin in zip(("O2", "A", "B", "O4"), pins, strict=True):
+        rows.append(f'{name} = ["{pin.real:.1f} mm", "{pin.imag:.1f} mm"]')
+    return "\n".join(rows) + "\n"
 
 
 def find_gap(pins: list[complex]) -> float:
@@ -257,12 +266,7 @@ def test_a_parallelogram_drawn_on_a_grid_is_one() -> None:
         if abs(np.sin(np.angle(arm / base))) < 0.1:
             continue
         pins = (O2, O2 + arm, O2 + arm + base, O2 + base)
-        rows = (f'["{pin.real:.1f} mm", "{pin.imag:.1f} mm"]' for pin in pins)
-        text = "\n".join(
-            f"{name} = {row}"
-            for name, row in zip(("O2", "A", "B", "O4"), rows, strict=True)
-        )
-        scene = loads(f"[pins]\n{text}\n")
+        scene = loads(write_pins(pins))
         tried += 1
         recognised += scene.linkage.ground == pytest.approx(
             scene.linkage.coupler.length, rel=1e-14
@@ -312,15 +316,9 @@ def test_a_study_of_a_drawing_names_the_lengths_that_follow() -> None:
 @pytest.mark.parametrize("bar", [2, 4])
 def test_a_commanded_bar_that_stands_still_as_drawn_is_refused(bar: int) -> None:
     """A kite folded onto one pin: two bars turn together about it, and the others rest."""
-    folded = {
-        2: ((0, 0), (300, 0), (300, 200), (300, 0)),
-        4: ((0, 0), (150, 80), (0, 0), (300, 0)),
-    }[bar]
-    rows = "\n".join(
-        f'{name} = ["{x} mm", "{y} mm"]'
-        for name, (x, y) in zip(("O2", "A", "B", "O4"), folded, strict=True)
-    )
-    text = f'[pins]\n{rows}\n[motion]\ntheta_{bar} = "drawn"\nomega_{bar} = "1 rad/s"\n'
+    folded = {2: (0, 300, 300 + 200j, 300), 4: (0, 150 + 80j, 0, 300)}[bar]
+    motion = f'[motion]\ntheta_{bar} = "drawn"\nomega_{bar} = "1 rad/s"\n'
+    text = write_pins(folded) + motion
     with pytest.raises(InputError, match="stands still: command another bar"):
         loads(text)
     other = 6 - bar

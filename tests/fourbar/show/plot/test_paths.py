@@ -11,21 +11,10 @@ from fourbar.show.plot.figures import draw_figure
 from fourbar.show.plot.paths import trace
 from fourbar.show.plot.view import make_view
 from tests.support.scenes import crank_rocker
+from tests.support.texts import COORDINATES
 
 LONGEST = 2.0 / 150.0
 """Of a chord of a drawn path, as a part of its extent: 2 mm in a figure of 150 mm."""
-NEAR_IN_LINE = """\
-title = "Four-bar from joint coordinates"
-[pins]
-O2 = ["4.1 cm", "3.75 cm"]
-A = ["1.244 cm", "0.196 cm"]
-B = ["-2.32 cm", "-2.293 cm"]
-O4 = ["0.165 cm", "1.322 cm"]
-[motion]
-omega_2 = "10 rpm"
-[points]
-E = { bar = 3, from_pin = { drawn = ["-2.591 cm", "1.657 cm"] } }
-"""
 
 
 def measure_chords(path: np.ndarray) -> tuple[float, float]:
@@ -38,7 +27,7 @@ def measure_chords(path: np.ndarray) -> tuple[float, float]:
 
 def test_the_whole_circuit_is_traced_without_a_corner() -> None:
     """By degrees of the input this path has chords of 40 mm; its extent is 120 mm."""
-    view = make_view(loads(NEAR_IN_LINE))
+    view = make_view(loads(COORDINATES))
     traced = trace(view)
     assert traced.circuit
     path = traced.path(traced.solution.points["E"])
@@ -72,7 +61,7 @@ def test_a_stated_sweep_keeps_its_ends() -> None:
 
 
 def test_the_coupler_figure_draws_that_path() -> None:
-    scene = loads(NEAR_IN_LINE)
+    scene = loads(COORDINATES)
     figure = draw_figure(scene, "coupler").figure
     (axes,) = (axes for axes in figure.axes if axes.get_title(loc="left"))
     lines = {line.get_label(): line.get_xydata() for line in axes.lines}

@@ -1,0 +1,45 @@
+"""Scene files that several tests share, as text."""
+
+COORDINATES = """\
+title = "Four-bar from joint coordinates"
+[pins]
+O2 = ["4.1 cm", "3.75 cm"]
+A = ["1.244 cm", "0.196 cm"]
+B = ["-2.32 cm", "-2.293 cm"]
+O4 = ["0.165 cm", "1.322 cm"]
+[motion]
+omega_2 = "10 rpm"
+[points]
+E = { bar = 3, from_pin = { drawn = ["-2.591 cm", "1.657 cm"] } }
+"""
+HUNG = """\
+title = "Weight hung at the tip of the rocker"
+[lengths]
+ground = "300 mm"
+input = "100 mm"
+coupler = "250 mm"
+output = "220 mm"
+[motion]
+theta_2 = ["0 deg", "90 deg", "180 deg", "270 deg"]
+omega_2 = "0 rad/s"
+[[loads]]
+bar = 4
+force = ["10 N", "-90 deg"]
+from_pin = ["300 mm", "0 deg"]
+"""
+PULL = """\
+title = "Force along x at the rocker's end"
+[lengths]
+ground = "12 cm"
+input = "5 cm"
+coupler = "10 cm"
+output = "8 cm"
+[motion]
+theta_2 = "60 deg"
+omega_2 = "10 deg/s"
+alpha_2 = "5 deg/s^2"
+[[loads]]
+bar = 4
+force = ["50 N", "0 deg"]
+from_pin = ["8 cm", "0 deg"]
+"""
