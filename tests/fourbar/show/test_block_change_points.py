@@ -271,8 +271,7 @@ def test_rounding_is_written_as_zero() -> None:
     assert "-0 " not in text and "digits left" not in text
     kite = fourbar.Scene(fourbar.uniform(0.1, 0.1, 0.3, 0.3), motion)
     text = "\n".join(write_block(kite, fourbar.solve(kite, "error")))
-    exponents = re.findall(r"e-([0-9]+) (?:deg|mm|m|N)", text)
-    assert all(int(exponent) < 9 for exponent in exponents)
+    assert not re.search(r"e-[0-9]+ (?:deg|mm|m|N)\b", text)
 
 
 def test_the_peak_of_a_release_over_change_points_is_said_to_grow() -> None:
