@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from fourbar.scene import Scene
+from fourbar_validation.compare.answer import Answer
 from fourbar_validation.engines.mujoco.robots.loop import RobotFile
 from fourbar_validation.engines.mujoco.theirs import Examined, examine
 
@@ -108,6 +109,13 @@ def examine_text(scene: Scene, text: str | None, names: Mapping[str, str]) -> Ex
     """Examine a text as a file that names no other; None: the file generated from the scene."""
     file = None if text is None else RobotFile(Path("theirs.xml"), text)
     return examine(scene, file, names)
+
+
+def answer_of(examined: Examined, how: str) -> Answer:
+    """Return the answer of one engine to a file; it has one."""
+    (answer,) = (answer for answer in examined.answers if answer.engine == how)
+    assert answer.refusal is None, answer.refusal
+    return answer
 
 
 @dataclass

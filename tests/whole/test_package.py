@@ -21,7 +21,7 @@ from pathlib import Path
 import pytest
 
 from fourbar.cli import status
-from fourbar.errors import BAD_INPUT, BROKEN, HOLDS, DependencyError, say_install
+from fourbar.errors import BAD_INPUT, BROKEN, HOLDS, say_install
 from fourbar.files import save
 from fourbar_lab.cli import status as lab
 from fourbar_validation.cli import status as harness
@@ -198,14 +198,6 @@ def test_an_extra_that_is_missing_is_one_line(
     err = capsys.readouterr().err
     assert err.count("\n") == 1 and f'pip install ".[{extra}]" in the checkout' in err
     assert sorted(tmp_path.iterdir()) == before
-
-
-def test_pandas_missing_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
-    import fourbar
-
-    monkeypatch.setitem(sys.modules, "pandas", None)
-    with pytest.raises(DependencyError, match="pip install pandas"):
-        fourbar.solve(crank_rocker(), "position").to_pandas()
 
 
 def built(folder: Path) -> tuple[Path, Path]:

@@ -49,6 +49,7 @@ from fourbar_validation.engines.mujoco.theirs import (
 )
 from fourbar_validation.engines.processes import WORKER_MEMORY
 from fourbar_validation.robots import guard
+from tests.support.robots import answer_of
 from tests.support.robots import examine_text as examine
 
 CRANK_ROCKER = fourbar.load(Path(__file__).parents[3] / "models" / "crank_rocker.toml")
@@ -99,11 +100,9 @@ def rows_of(scene: Scene, answers: Sequence[Answer]) -> list[Row]:
 
 
 def errors(scene: Scene, examined: Examined, how: str) -> dict[str, float]:
-    (answer,) = (answer for answer in examined.answers if answer.engine == how)
-    assert answer.refusal is None, answer.refusal
     return {
         row.quantity: row.error
-        for row in rows_of(scene, [answer])
+        for row in rows_of(scene, [answer_of(examined, how)])
         if row.quantity != "assembled"
     }
 

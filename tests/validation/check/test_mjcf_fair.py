@@ -21,7 +21,6 @@ from fourbar.scene import Scene
 from fourbar.solving import solve
 from fourbar_validation.check.differences import find_differences
 from fourbar_validation.check.mjcf import ModelReport, examine_model
-from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.rows import AGREES, DEGRADED
 from fourbar_validation.engines.mujoco.robots.loop import RobotFile
 from fourbar_validation.engines.mujoco.theirs import (
@@ -30,6 +29,7 @@ from fourbar_validation.engines.mujoco.theirs import (
     Examined,
     predict_softness,
 )
+from tests.support.robots import answer_of
 from tests.support.robots import examine_text as examine
 from tests.support.scenes import mirrored
 
@@ -65,12 +65,6 @@ def rotor_as_armature() -> str:
     text = write_mjcf(replace(ROTOR, effects=()), drive="none")
     assert 'armature="0"' in text
     return text.replace('armature="0"', 'armature="0.02"')
-
-
-def answer_of(examined: Examined, how: str) -> Answer:
-    (answer,) = (answer for answer in examined.answers if answer.engine == how)
-    assert answer.refusal is None, answer.refusal
-    return answer
 
 
 def error_of(scene: Scene, examined: Examined, how: str, name: str) -> float:
