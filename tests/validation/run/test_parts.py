@@ -6,8 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from fourbar.errors import BAD_INPUT, HOLDS, InputError
+from fourbar.errors import BAD_INPUT, BROKEN, HOLDS, InputError
 from fourbar_validation.cli import status
+from fourbar_validation.engines.registry import Engine
 from fourbar_validation.run import plan
 from fourbar_validation.run.plan import RunPart
 from tests.support.here import judge_here
@@ -125,6 +126,29 @@ def test_scene_files_need_not_be_where_parts_are_collected(tmp_path: Path) -> No
     out = tmp_path / "all"
     assert status(["collect", part, "-o", str(out)]) == HOLDS
     assert (out / "results.csv").read_text().count("\nmine,") > 20
+
+
+def test_an_engine_that_is_missing_has_the_status_of_a_whole_run(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    def miss(engine: Engine) -> str | None:
+        return f"{engine.library} is not installed" if engine.library else None
+
+    monkeypatch.setattr(Engine, "missing", miss)
+    options = ["--random", "3", "--no-pictures"]
+    folders = [str(tmp_path / f"part-{k}") for k in (1, 2)]
+    for k, folder in enumerate(folders, 1):
+        assert status(["run", *options, "--part", f"{k}/2", "-o", folder]) == BROKEN
+    for line in (
+        ["run", *options, "-o", str(tmp_path / "whole")],
+        ["collect", *folders, "-o", str(tmp_path / "all")],
+    ):
+        capsys.readouterr()
+        assert status(line) == BROKEN
+        assert "is not installed, or say --engines free-body" in capsys.readouterr().err
+        assert (Path(line[-1]) / "results.csv").is_file()
 
 
 @pytest.mark.parametrize(

@@ -5,20 +5,14 @@ from typing import Any
 
 import click
 
-from fourbar.errors import FAILED, HOLDS, DependencyError
+from fourbar.errors import HOLDS
 from fourbar.writing import write_text
 from fourbar_validation.compare.columns import read_columns
-from fourbar_validation.compare.rows import FAILS
 from fourbar_validation.regression.accept import add_output_options, report_differences
 from fourbar_validation.regression.record import COLUMNS
 from fourbar_validation.report.junit import list_cases, write_document
 from fourbar_validation.run.parts import judge_part
-from fourbar_validation.run.plan import (
-    SAMPLE,
-    WORKERS,
-    Plan,
-    RunPart,
-)
+from fourbar_validation.run.plan import SAMPLE, WORKERS, RunPart
 from fourbar_validation.run.progress import ShownProgress
 from fourbar_validation.run.request import ALL_TYPES, Request, make_plan
 from fourbar_validation.run.run import run
@@ -145,7 +139,7 @@ def command(**stated: Any) -> int:
         with ShownProgress(scenes) as progress:
             judge_part(plan, part, request, progress)
         click.echo(f"part {request.part}: {scenes} scenes, in {request.out / 'parts'}")
-        require_engines(plan)
+        plan.require_engines()
         return HOLDS
     with ShownProgress(len(plan.suite)) as progress:
         summary = run(
@@ -169,17 +163,4 @@ def command(**stated: Any) -> int:
                 summary.verdict, list_cases(read_columns(request.out / COLUMNS))
             ),
         )
-    if summary.counts[FAILS] or worse:
-        return FAILED
-    require_engines(plan)
-    return summary.counts.status
-
-
-def require_engines(plan: Plan) -> None:
-    """Raise DependencyError if an engine could not answer here."""
-    if plan.missing:
-        names = ",".join(engine.name for engine in plan.engines)
-        raise DependencyError(
-            f"{plan.missing[0][1]}, or say --engines {names} where those are all that "
-            "is wanted"
-        )
+    return plan.conclude(summary.counts, worse=worse)

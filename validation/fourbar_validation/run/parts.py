@@ -133,4 +133,4 @@ def command(folders: tuple[Path, ...], out: Path, verbose: bool) -> int:
     with ShownProgress(len(plan.suite)) as progress:
         summary = collect(plan, folders, parts, out, progress)
     print_table(summary, out, verbose=verbose)
-    return summary.counts.status
+    return plan.conclude(summary.counts)

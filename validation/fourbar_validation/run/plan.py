@@ -10,7 +10,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from fourbar.errors import InputError
+from fourbar.errors import FAILED, DependencyError, InputError
+from fourbar_validation.compare.rows import FAILS, Counts
 from fourbar_validation.compare.tolerance import IDENTITY
 from fourbar_validation.engines.guests import Guest
 from fourbar_validation.engines.registry import Engine
@@ -196,3 +197,23 @@ class Plan:
             if isinstance(engine, Guest)
         }
         return summary
+
+    def conclude(self, counts: Counts, *, worse: bool = False) -> int:
+        """Return the exit status of a run; DependencyError if only an engine is missing.
+
+        `worse`: whether the run is worse than the one that it is compared with.
+        """
+        if counts[FAILS] or worse:
+            return FAILED
+        self.require_engines()
+        return counts.status
+
+    def require_engines(self) -> None:
+        """Raise DependencyError if an engine could not answer here."""
+        if not self.missing:
+            return
+        names = ",".join(engine.name for engine in self.engines)
+        raise DependencyError(
+            f"{self.missing[0][1]}, or say --engines {names} where those are all that"
+            " is wanted"
+        )

@@ -232,11 +232,16 @@ def find_askable(
 
     Raises DependencyError if those were named.
     """
-    missing = [
-        (engine.name, reason) for engine in engines if (reason := engine.missing())
-    ]
+    present: list[Engine] = []
+    missing: list[tuple[str, str]] = []
+    for engine in engines:
+        reason = engine.missing()
+        if reason is None:
+            present.append(engine)
+        else:
+            missing.append((engine.name, reason))
     if missing and by_name:
         raise DependencyError(
             "; ".join(f"{name}: {reason}" for name, reason in missing)
         )
-    return tuple(engine for engine in engines if not engine.missing()), missing
+    return tuple(present), missing
