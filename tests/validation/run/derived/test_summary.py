@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import fourbar
+from fourbar.show import duty
 from fourbar.show.summary import Facts
 from fourbar_validation.compare.rows import Row
 from fourbar_validation.run.derived import summary as module
@@ -237,6 +238,32 @@ def test_what_is_missing_in_the_json_or_no_number_fails(
     question = ask("scene", TURN, ())
     rows = [*question.attempt(lambda: summary(question), "summary")]
     assert [row.quantity for row in rows if row.failed] == [name]
+
+
+@pytest.mark.parametrize("turns", (1, 2, 3))
+def test_a_turn_that_is_taken_for_an_open_motion_fails(
+    turns: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Both the means of the package and its word for a closed motion follow from it."""
+    sweep = fourbar.Sweep(0.1, 0.1 + 2 * np.pi * turns, 36 * turns)
+    scene = crank_rocker(motion=fourbar.Motion(sweep, 9.0))
+    assert not [row for row in judge(scene).values() if row.failed]
+    count = duty.count_turns
+    monkeypatch.setattr(duty, "count_turns", lambda *of: 5 * count(*of))
+    failing = {row.quantity for row in judge(scene).values() if row.failed}
+    assert failing == {"means", "pins"}
+
+
+def test_an_open_motion_that_is_taken_for_a_turn_fails(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    sweep = fourbar.Sweep(0.1, 0.1 + 1.5 * np.pi, 36)
+    scene = crank_rocker(motion=fourbar.Motion(sweep, 9.0))
+    assert not [row for row in judge(scene).values() if row.failed]
+    count = duty.count_turns
+    monkeypatch.setattr(duty, "count_turns", lambda *of: 0.75 * count(*of))
+    failing = {row.quantity for row in judge(scene).values() if row.failed}
+    assert failing == {"means", "pins"}
 
 
 @pytest.mark.parametrize("factor", (1.0 - 2e-3, 1.0 + 2e-3))

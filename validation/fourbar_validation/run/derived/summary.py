@@ -20,7 +20,7 @@ from fourbar.quantities import OK
 from fourbar.scene import Scene, command_at
 from fourbar.scene.motion import FromLimit
 from fourbar.show.block import write_block, write_motor
-from fourbar.show.duty import is_once_round, read_drive, shaking_force
+from fourbar.show.duty import shaking_force
 from fourbar.show.summary import Facts, Peak, summarize
 from fourbar.solution import Solution
 from fourbar_validation.compare.answer import Answer
@@ -34,12 +34,15 @@ from fourbar_validation.compare.tolerance import (
     magnitude,
     wrap_angle,
 )
+from fourbar_validation.engines.description import name_driving
 from fourbar_validation.run.derived.cuts import CUT, WHERE, Piece, free_piece, move_bars
 from fourbar_validation.run.derived.variants import ask_free_bodies, make_row
 from fourbar_validation.run.question import NotAskedError, Question
 
 ROWS = ("ranges", "peaks", "means", "pins", "frame_force", "bending", "bore")
 """Names of the rows."""
+CUT_BESIDE = 1e-10
+"""Part of the length by which a bar is cut on either side of a place: a couple that acts there makes a jump."""
 FINE = 1440
 """Intervals of the motion at whose ends nothing may exceed a peak or a range."""
 BETWEEN = 1e-3
@@ -49,6 +52,10 @@ between these.
 LEAST_CONDITION = 1e-2
 """Least condition of a motion without poles. Beside a pole peaks are those of the
 positions.
+"""
+REPEATS = 1e-9
+"""Greatest difference, rad, of angles of which one repeats the other, and of rates in
+parts of the largest.
 """
 PRESSURE = 1e6
 """Pressure of the cylinder whose bore is judged, Pa."""
@@ -104,6 +111,34 @@ class _SummaryJudge:
         """Return their answer at many positions."""
         places = self.solution.at.places
         return self.ask(np.linspace(places[0], places[-1], FINE + 1))
+
+    @cached_property
+    def motor(self) -> dict[str, Any]:
+        """Return the entry of the JSON."""
+        entry = write_motor(self.scene, self.solution, {})
+        assert entry is not None
+        return entry
+
+    @cached_property
+    def closed(self) -> bool:
+        """Return whether the free bodies end as they begin, after whole turns."""
+        at = self.solution.at
+        if at.stroke is not None or abs(at.angle[-1] - at.angle[0]) < math.pi:
+            return False
+        for bar in MOVING_BARS:
+            theta = self.own.quantities[f"theta_{bar}"]
+            if abs(wrap_angle(theta[-1] - theta[0])) > REPEATS:
+                return False
+            for name in (f"omega_{bar}", f"alpha_{bar}"):
+                rate = self.own.quantities[name]
+                if abs(rate[-1] - rate[0]) > REPEATS * np.abs(rate).max():
+                    return False
+        return True
+
+    @property
+    def counted(self) -> slice:
+        """Select the positions of a mean: the last one of a closed motion is its first."""
+        return slice(None, -1) if self.closed else slice(None)
 
     def ask(self, places: Any) -> Answer:
         """Ask the free bodies at other positions of the motion."""
@@ -182,10 +217,10 @@ def _judge_ranges(judged: _SummaryJudge) -> None:
     """Judge the ends of the ranges of all bars, and the smallest transmission angle."""
     for bar in MOVING_BARS:
         ends = judged.facts.angles[bar]
-        there = _take(judged, judged.ask([end.place for end in ends]), f"theta_{bar}")
         low, high = ends
+        there = judged.ask([low.place, high.place]).quantities[f"theta_{bar}"]
         judged.add("ranges", np.abs(wrap_angle(there - [low.value, high.value])))
-        fine = np.unwrap(_take(judged, judged.fine, f"theta_{bar}"))
+        fine = np.unwrap(judged.fine.quantities[f"theta_{bar}"])
         fine -= 2.0 * math.pi * round((fine.min() - low.value) / (2.0 * math.pi))
         judged.add_excess("ranges", fine.max() - high.value, low.value - fine.min())
     least = judged.facts.transmission
@@ -198,48 +233,36 @@ def _judge_ranges(judged: _SummaryJudge) -> None:
     judged.add_excess("ranges", math.sin(least.value) - sines[1].min())
 
 
-def _take(judged: _SummaryJudge, answer: Answer, name: str) -> Array:
-    """Return a quantity that the free bodies found or were commanded."""
-    if name in answer.quantities:
-        return np.array(answer.quantities[name])
-    assert answer.at is not None
-    return np.array(answer.at.angle)
-
-
 def _find_work(judged: _SummaryJudge, answer: Answer) -> tuple[Array, Array]:
     """Return torque or force of the drive, and its speed."""
-    drive = read_drive(judged.solution)
-    values = np.array(answer.quantities[drive.keys.value])
-    if judged.scene.drive is None:
-        assert answer.at is not None
-        name = f"omega_{judged.scene.drive_bar}"
-        speed = answer.quantities.get(name, answer.at.speed)
-        return values, np.broadcast_to(np.asarray(speed, float), values.shape)
-    reference = make_reference(judged.scene, answer)
+    scene = judged.scene
+    values = answer.quantities[name_driving(scene)]
+    if scene.drive is None:
+        return values, answer.quantities[f"omega_{scene.drive_bar}"]
+    reference = make_reference(scene, answer)
     assert reference is not None and reference.stroke_speed is not None
     return values, reference.stroke_speed
 
 
 def _judge_drive(judged: _SummaryJudge) -> None:
     """Judge peak, mean, power and energies of the drive, as printed and in the JSON."""
-    facts, solution = judged.facts, judged.solution
-    entry = write_motor(judged.scene, solution, {})
-    assert facts.peak is not None and facts.duty is not None and entry is not None
+    facts, entry = judged.facts, judged.motor
+    assert facts.peak is not None and facts.duty is not None
     values, speed = _find_work(judged, judged.own)
     if np.abs(values).max() == 0.0:
         return
     power = values * speed
-    name = read_drive(solution).keys.value
+    name = name_driving(judged.scene)
     fine_values, fine_speed = _find_work(judged, judged.fine)
     kind = "force" if facts.linear else "torque"
     if name not in facts.between.growing:
         at_peak, _ = _find_work(judged, judged.ask(facts.peak.place))
         judged.add_peak("peaks", facts.peak, at_peak, fine_values)
         judged.add_value("peaks", entry[f"peak_{kind}"], abs(facts.peak.value))
-    counted = slice(None, -1) if bool(is_once_round(solution)) else slice(None)
+    judged.add("means", float(entry["closed"] != judged.closed))
     for key, of_own in ((f"rms_{kind}", values), ("rms_power", power)):
         if np.abs(of_own).max() != 0.0:
-            mean = math.sqrt(np.square(of_own[counted]).mean())
+            mean = math.sqrt(np.square(of_own[judged.counted]).mean())
             judged.add_value("means", entry[key], mean)
     for key, fine in (
         ("peak_speed", fine_speed),
@@ -298,16 +321,13 @@ def _judge_pins(judged: _SummaryJudge) -> None:
 
     The force on the frame is judged too.
     """
-    facts, solution = judged.facts, judged.solution
-    entry = write_motor(judged.scene, solution, {})
-    assert entry is not None
-    counted = slice(None, -1) if bool(is_once_round(solution)) else slice(None)
+    facts = judged.facts
     for pin, name in PIN_FORCE.items():
         load = facts.pins[pin]
         own = magnitude(judged.own.quantities[name])
         if own.max() == 0.0:
             continue
-        mean = math.sqrt(np.square(own[counted]).mean())
+        mean = math.sqrt(np.square(own[judged.counted]).mean())
         judged.add_value("pins", load.rms, mean)
         if name in facts.between.growing:
             continue
@@ -315,17 +335,17 @@ def _judge_pins(judged: _SummaryJudge) -> None:
         at_peak = magnitude(there.quantities[name])
         fine = magnitude(judged.fine.quantities[name])
         judged.add_peak("pins", load.peak, at_peak, fine)
-        of_pin = entry["pins"][pin]
+        of_pin = judged.motor["pins"][pin]
         judged.add_value("pins", of_pin["peak"], load.peak.value)
         judged.add_value("pins", of_pin["rms"], mean)
-        apart = _take(judged, there, "theta_2") - of_pin["theta_2"]
+        apart = there.quantities["theta_2"] - of_pin["theta_2"]
         judged.add("pins", np.abs(wrap_angle(apart)))
     if judged.scene.drive is None:
         on_frame = -(judged.own.quantities["F12"] + judged.own.quantities["F14"])
         size = magnitude(judged.own.quantities["F12"]).max()
         size += magnitude(judged.own.quantities["F14"]).max()
         if size != 0.0:
-            apart = magnitude(shaking_force(solution) - on_frame)
+            apart = magnitude(shaking_force(judged.solution) - on_frame)
             judged.add("frame_force", apart / size)
 
 
@@ -335,13 +355,14 @@ def _judge_bending(judged: _SummaryJudge) -> None:
     It is cut at its place, and at many positions.
     """
     stated = state_from_pins(judged.scene)
-    fine_motion = move_bars(judged.scene, _command_of(judged.fine), judged.fine)
+    commanded = judged.solution.at
+    fine_motion = move_bars(judged.scene, commanded, judged.fine)
     for bar in MOVING_BARS:
         largest = judged.facts.bending[bar]
         if largest.grows:
             continue
         there = judged.ask(largest.peak.place)
-        motion = move_bars(judged.scene, _command_of(there), there)
+        motion = move_bars(judged.scene, commanded, there)
         length = judged.scene.linkage.bar(bar).length
         beside = [
             largest.x * (1.0 + off) + off * length for off in (-CUT_BESIDE, CUT_BESIDE)
@@ -391,14 +412,3 @@ def _judge_growth(judged: _SummaryJudge) -> None:
     least = conditions.min() - np.abs(np.diff(conditions)).max()
     if least > LEAST_CONDITION:
         judged.add("peaks", math.inf)
-
-
-CUT_BESIDE = 1e-10
-"""Part of the length by which a bar is cut on either side of a place. A couple that
-acts there makes a jump.
-"""
-
-
-def _command_of(answer: Answer) -> Any:
-    assert answer.at is not None
-    return answer.at
