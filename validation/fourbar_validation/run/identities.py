@@ -52,7 +52,7 @@ from fourbar_validation.compare.tolerance import (
 from fourbar_validation.engines.exact import compute_sines
 from fourbar_validation.engines.free_body import count_solutions
 from fourbar_validation.engines.registry import find_missing
-from fourbar_validation.run.question import Question, select_positions
+from fourbar_validation.run.question import Question, select_positions, spread_evenly
 
 STAGES = ("omega_3", "alpha_3", COUPLE.value, LINE.value)
 """One quantity of each stage that a position may lack."""
@@ -377,7 +377,7 @@ def compare_status(
     ):
         differ[many] |= solutions(many) < 2
     if solutions is not None and len(ok := np.flatnonzero(formulas.status_code == OK)):
-        some = ok[np.unique(np.linspace(0, len(ok) - 1, SAMPLE).astype(int))]
+        some = spread_evenly(ok, SAMPLE)
         differ[some] |= solutions(some) > 1
     index, wrong = find_worst(differ.astype(float)), np.count_nonzero(differ)
     stated = ", ".join(

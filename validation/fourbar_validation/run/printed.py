@@ -46,7 +46,12 @@ from fourbar_validation.engines.free_body import move
 from fourbar_validation.engines.free_body_effects import sum_acting
 from fourbar_validation.engines.prediction import predict_from_data
 from fourbar_validation.engines.registry import find_missing
-from fourbar_validation.run.question import Question, ask_at, select_positions
+from fourbar_validation.run.question import (
+    Question,
+    ask_at,
+    select_positions,
+    spread_evenly,
+)
 
 SAMPLE = 5
 """Positions of a scene at which the error bars are held to the true error. Those
@@ -229,18 +234,11 @@ def check_error_bars(question: Question) -> Iterator[Row]:
     )
     if not len(usable):
         return
-    spread = np.linspace(0, len(usable) - 1, SAMPLE).astype(int).tolist()
-    indices = usable[
-        np.unique(
-            [
-                *spread,
-                *(
-                    int(np.argmin(pull[usable]))
-                    for pull in _compute_pulls(scene, command, solution)
-                ),
-            ]
-        )
+    nearest = [
+        usable[np.argmin(pull[usable])]
+        for pull in _compute_pulls(scene, command, solution)
     ]
+    indices = np.union1d(spread_evenly(usable, SAMPLE), nearest).astype(int)
     sampled = select_positions(command, indices)
     exact, ours = (
         ask_at(BallArithmetic(), scene, sampled),

@@ -213,6 +213,17 @@ class Question:
             yield make_breakdown(self.name, engine, error, part)
 
 
+def spread_evenly(
+    indices: NDArray[np.intp], count: int, *, inside: bool = False
+) -> NDArray[np.intp]:
+    """Choose some of many positions evenly, with both ends or between them."""
+    last = len(indices) - 1
+    places = np.linspace(0, last, count)
+    if inside:
+        places = np.linspace(0, last, count + 2)[1:-1]
+    return np.asarray(indices[np.unique(places.astype(int))])
+
+
 def ask_at(adapter: Adapter, scene: Scene, command: Command) -> Answer:
     """Give an engine what is commanded, with the sign of its sine.
 

@@ -52,7 +52,7 @@ from fourbar_validation.compare.tolerance import (
     mark_touching,
 )
 from fourbar_validation.engines.description import find_inertia, find_mass
-from fourbar_validation.run.question import NotAskedError, Question
+from fourbar_validation.run.question import NotAskedError, Question, spread_evenly
 
 SAMPLE = 5
 """Positions of a scene that are stated otherwise."""
@@ -242,7 +242,7 @@ def _take_few(question: Question) -> _Few:
     if not len(indices):
         raise NotAskedError("no position is well-conditioned")
     begin = int(np.argmax(solution.assembled))
-    chosen = indices[np.unique(np.linspace(0, len(indices) - 1, SAMPLE).astype(int))]
+    chosen = spread_evenly(indices, SAMPLE)
     positions = np.concatenate([[begin], chosen[chosen != begin]])
     command = at.part(positions)._replace(remainder=None)
     placed, link = state_from_pins(scene), scene.linkage

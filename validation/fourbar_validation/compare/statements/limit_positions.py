@@ -147,8 +147,6 @@ PAST = 1e-3
 """Distance on either side of a change point, rad. The speeds of the two motions differ
 visibly there.
 """
-FAR = 0.1
-"""rad. As far as a sweep goes on."""
 
 
 def _compare_change_points(linkage: FourBar) -> Finding:

@@ -42,7 +42,9 @@ from fourbar_validation.run.question import NotAskedError, Question
 ROWS = ("ranges", "peaks", "means", "pins", "frame_force", "bending", "bore")
 """Names of the rows."""
 CUT_BESIDE = 1e-10
-"""Part of the length by which a bar is cut on either side of a place: a couple that acts there makes a jump."""
+"""Part of the length by which a bar is cut on either side of a place. A couple that
+acts there makes a jump.
+"""
 FINE = 1440
 """Intervals of the motion at whose ends nothing may exceed a peak or a range."""
 BETWEEN = 1e-3

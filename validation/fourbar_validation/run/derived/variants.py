@@ -35,7 +35,13 @@ from fourbar_validation.compare.tolerance import (
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.registry import make_prediction
 from fourbar_validation.run.printed import compare_points
-from fourbar_validation.run.question import FREE_BODY, NotAskedError, Question, ask_at
+from fourbar_validation.run.question import (
+    FREE_BODY,
+    NotAskedError,
+    Question,
+    ask_at,
+    spread_evenly,
+)
 
 SAMPLE = 5
 """Positions at which whatever takes more than one call is judged."""
@@ -86,12 +92,8 @@ def take_few(question: Question) -> Scene:
     indices = np.flatnonzero(fit)
     if not len(indices):
         raise NotAskedError("no position that is well-conditioned and moves")
-    few = indices[
-        np.unique(np.linspace(0, len(indices) - 1, SAMPLE + 2).astype(int)[1:-1])
-    ]
-    return at_places(
-        replace(scene, title="", source="", pictures=()), command.places[few]
-    )
+    places = command.places[spread_evenly(indices, SAMPLE, inside=True)]
+    return at_places(replace(scene, title="", source="", pictures=()), places)
 
 
 def at_places(scene: Scene, places: Array) -> Scene:
