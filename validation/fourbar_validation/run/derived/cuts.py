@@ -15,10 +15,11 @@ from fourbar.linkage import ENDS, MOVING_BARS, PIN_FORCE, PINS
 from fourbar.scene import Command, Scene
 from fourbar.scene import command as command_of
 from fourbar_validation.compare.answer import Answer, Array
+from fourbar_validation.compare.derived import CUT
 from fourbar_validation.compare.line import place_line
 from fourbar_validation.compare.pins import find_centre, state_from_pins
 from fourbar_validation.compare.rows import Row
-from fourbar_validation.compare.tolerance import ErrorBound, divide
+from fourbar_validation.compare.tolerance import divide
 from fourbar_validation.engines.free_body import move
 from fourbar_validation.engines.free_body_effects import (
     BodyMotion,
@@ -36,14 +37,6 @@ WHERE = (0.0, 0.137, 0.479, 0.863)
 """Cuts, in parts of the bar's length from its first pin. The first is just beyond that
 pin, and none is at another foot.
 """
-CUT = ErrorBound(
-    "cut bars",
-    "1e-10 of the sum of the absolute terms: pin forces at conditions of at least 0.1"
-    " differ by some 1e-14, and terms that cancel in the balance of a piece stand in"
-    " the sum",
-    1e-10,
-    conditioned=False,
-)
 
 
 def internal_forces(question: Question) -> list[Row]:

@@ -24,13 +24,13 @@ from fourbar.scene import Command, Scene, with_signs
 from fourbar.scene.motion import Motion, Sweep
 from fourbar.studies.equilibrium import Equilibrium
 from fourbar_validation.compare.answer import Array
+from fourbar_validation.compare.derived import REST
 from fourbar_validation.compare.pins import find_centre, state_from_pins
 from fourbar_validation.compare.rows import Row
 from fourbar_validation.compare.tolerance import (
     EPS,
     ROUNDINGS,
     WELL_CONDITIONED,
-    ErrorBound,
     K,
 )
 from fourbar_validation.engines.description import find_inertia
@@ -54,14 +54,6 @@ AT_LIMIT = EPS**-0.5
 """Most roundings by which a rounding of theta_2 moves theta_4. It is at a limit of
 theta_2.
 """
-REST = ErrorBound(
-    "rest",
-    "K eps of the sum of what moving each stored number by its own size would change,"
-    " from differences in 320-bit arithmetic; of an inertia at least of the sum of m"
-    " L^2 and I",
-    K * EPS,
-    conditioned=False,
-)
 
 
 class Derived(NamedTuple):

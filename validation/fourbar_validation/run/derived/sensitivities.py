@@ -20,8 +20,9 @@ from fourbar.scene.numbers import Point
 from fourbar.studies.keys import command_key
 from fourbar.studies.spread import Spread
 from fourbar_validation.compare.answer import Array
+from fourbar_validation.compare.derived import DIFFERENCES, SPREAD
 from fourbar_validation.compare.rows import Row
-from fourbar_validation.compare.tolerance import ErrorBound, divide, magnitude
+from fourbar_validation.compare.tolerance import divide, magnitude
 from fourbar_validation.run.derived.variants import (
     SceneFile,
     ask_free_bodies,
@@ -138,25 +139,8 @@ CONVERGED = 1e-5
 absolute terms: it leaves out some hundred times the square of that. Elsewhere a linkage
 that does not assemble is too near for differences.
 """
-DIFFERENCES = ErrorBound(
-    "differences",
-    "1e-7 of the sum of the absolute terms: the fourth-order difference of free bodies"
-    " at positions whose condition is at least 0.1, where it leaves out 1e-11 and"
-    " rounding adds 1e-10",
-    1e-7,
-    conditioned=False,
-)
-"""Tolerance of the derivatives along one direction in which every number changes."""
 SAMPLES, DRAWN = 1024, 20_000
 """Samples of the tolerances, and of the first-order sum for percentiles."""
-SPREAD = ErrorBound(
-    "spread",
-    "3 % of a deviation or of a worst case, of a percentile 30 % of one: 1024"
-    " quasi-random samples against cubature and 20 000 draws, twice what they were seen"
-    " to differ by",
-    0.03,
-    conditioned=False,
-)
 NEARLY_STRAIGHT, STRAIGHT = 0.1, 1e-4
 """Relative differences of cubature and first order. Below the first, three points are
 enough for a deviation; below the second, percentiles are those of the first order: what

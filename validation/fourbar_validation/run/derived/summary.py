@@ -24,18 +24,23 @@ from fourbar.show.duty import shaking_force
 from fourbar.show.summary import Facts, Peak, summarize
 from fourbar.solution import Solution
 from fourbar_validation.compare.answer import Answer
+from fourbar_validation.compare.derived import (
+    CUT,
+    FOUR_DIGITS,
+    LOCATED_ROUGHLY,
+    PRINTED,
+)
 from fourbar_validation.compare.pins import state_from_pins
 from fourbar_validation.compare.rows import Row
 from fourbar_validation.compare.scales import make_reference
 from fourbar_validation.compare.tolerance import (
     Array,
-    ErrorBound,
     divide,
     magnitude,
     wrap_angle,
 )
 from fourbar_validation.engines.description import name_driving
-from fourbar_validation.run.derived.cuts import CUT, WHERE, Piece, free_piece, move_bars
+from fourbar_validation.run.derived.cuts import WHERE, Piece, free_piece, move_bars
 from fourbar_validation.run.derived.variants import ask_free_bodies, make_row
 from fourbar_validation.run.question import NotAskedError, Question
 
@@ -61,26 +66,6 @@ parts of the largest.
 """
 PRESSURE = 1e6
 """Pressure of the cylinder whose bore is judged, Pa."""
-PRINTED = ErrorBound(
-    "summary",
-    "1e-8 of the value: five calls leave a place to 1e-7 of a step, a range the fourth"
-    " power of 0.05 degrees",
-    1e-8,
-    conditioned=False,
-)
-LOCATED_ROUGHLY = ErrorBound(
-    "summary, bending",
-    "1e-6 of the moment: three calls of 40 cuts leave a place to 1e-4 of a step, a"
-    " maximum the square of that",
-    1e-6,
-    conditioned=False,
-)
-FOUR_DIGITS = ErrorBound(
-    "summary, printed",
-    "6e-4 of the value: what is printed has four digits",
-    6e-4,
-    conditioned=False,
-)
 TOLERANCES = {"bore": FOUR_DIGITS, "bending": LOCATED_ROUGHLY}
 
 
