@@ -1,1 +1,4 @@
-"""Trends over commits: `asv run`, `asv publish`, `asv find`; CONTRIBUTING.md has the commands."""
+"""Trends over commits: `asv run`, `asv publish`, `asv find`.
+
+CONTRIBUTING.md has the commands.
+"""

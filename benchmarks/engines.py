@@ -1,4 +1,7 @@
-"""Largest error, failing rows and time of every engine on every model, over commits and versions of the engines."""
+"""Largest error, failing rows and time of every engine on every model.
+
+They are over commits and versions of the engines.
+"""
 
 import math
 
@@ -41,7 +44,10 @@ class Verdict:
         return verdicts
 
     def track_worst_error(self, verdicts, engine, model):
-        """Return the largest error over the allowed one; NaN if the engine gave no answer to compare."""
+        """Return the largest error over the allowed one.
+
+        NaN if the engine gave no answer to compare.
+        """
         return verdicts[engine, model][0]
 
     def track_failing_rows(self, verdicts, engine, model):

@@ -1,4 +1,7 @@
-"""Time of the formulas over commits: `asv continuous HEAD~1 HEAD --bench Solve` compares two."""
+"""Time of the formulas over commits.
+
+`asv continuous HEAD~1 HEAD --bench Solve` compares two.
+"""
 
 import numpy as np
 

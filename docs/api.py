@@ -1,4 +1,7 @@
-"""Reference of the public names of `fourbar`, made of their docstrings; the site appends it to docs/api.md."""
+"""Reference of the public names of `fourbar`, made of their docstrings.
+
+The site appends it to docs/api.md.
+"""
 
 import ast
 import inspect
@@ -31,7 +34,10 @@ def is_of_class(statement: ast.AnnAssign) -> bool:
 
 
 def fields(kind: type) -> list[tuple[str, str, str]]:
-    """List name, type and docstring of the fields of a class; inherited quantities come last."""
+    """List name, type and docstring of the fields of a class.
+
+    Inherited quantities come last.
+    """
     rows: list[tuple[str, str, str]] = []
     last: ast.AnnAssign | None = None
     for statement in parse(kind).body:
@@ -59,7 +65,10 @@ NOT_STATED = ("init=False)", "kw_only=True)")
 
 
 def signature(thing: Any) -> str:
-    """Return the arguments as the source has them, without "self"; for a description, its fields."""
+    """Return the arguments as the source has them, without "self".
+
+    A description has its fields as arguments.
+    """
     node = parse(thing.fget if isinstance(thing, property) else thing)
     constructors = [
         part
@@ -85,7 +94,10 @@ def signature(thing: Any) -> str:
 
 
 def row(name: str, kind: str, meaning: str) -> str:
-    """Write one field as a row of a table; a quantity has its meaning from the table of quantities."""
+    """Write one field as a row of a table.
+
+    A quantity has its meaning from the table of quantities.
+    """
     if not meaning and name in QUANTITY:
         meaning = f"{QUANTITY[name].meaning}, {QUANTITY[name].unit}".removesuffix(", 1")
     return (
@@ -98,7 +110,10 @@ def row(name: str, kind: str, meaning: str) -> str:
 
 
 def unwrap(text: str) -> str:
-    """Join the lines of each paragraph, except in lists, underlined sections and examples."""
+    """Join the lines of each paragraph.
+
+    Lists, underlined sections and examples keep theirs.
+    """
     paragraphs = text.split("\n\n")
     return "\n\n".join(
         (

@@ -1,4 +1,7 @@
-"""Writes docs/architecture.svg: the layers of both packages, by their imports. `python docs/architecture.py`"""
+"""Writes docs/architecture.svg: the layers of both packages, by their imports.
+
+`python docs/architecture.py` runs it.
+"""
 
 import ast
 from collections import defaultdict
@@ -29,7 +32,10 @@ def imports(tree: ast.AST) -> Iterator[ast.stmt]:
 
 
 def uses(package: str) -> Uses:
-    """Find which layers each layer imports, inside functions too; a layer is a folder or a module of the package."""
+    """Find which layers each layer imports, inside functions too.
+
+    A layer is a folder or a module of the package.
+    """
     top = PACKAGES[package]
     imported: Uses = defaultdict(set)
     for path in sorted(top.rglob("*.py")):

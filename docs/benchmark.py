@@ -45,7 +45,9 @@ TABLE = DOCS / "examples" / "benchmark.csv"
 TORQUE_AND_FORCES = ("torque", *PIN_FORCES)
 BLOCK = re.compile(r"<!-- data (\w+) -->\n.*?<!-- end -->\n", re.DOTALL)
 SHOWN_AT = {"change_point": math.radians(40.0), "pinocchio_2729": math.radians(110.0)}
-"""Positions of figures, rad, where the position that the project's figures choose shows little."""
+"""Positions of figures, rad. They replace the position that the project's figures
+choose where that shows little.
+"""
 SIZE, LOW = (3.6, 2.6), (3.6, 1.4)
 """Sizes of a figure, and of one of a low mechanism, inches."""
 
@@ -78,7 +80,10 @@ def write_effect(value: Any) -> str:
 
 
 def write_data(problem: dict[str, Any]) -> list[str]:
-    """Write lengths and bars as a table, and effects, drive and command as its last rows."""
+    """Write lengths and bars as a table.
+
+    Effects, drive and command are its last rows.
+    """
     lengths, bars = problem["scene"]["lengths"], problem["scene"].get("bars", {})
     columns = [
         name
@@ -158,7 +163,10 @@ def read_rows() -> list[dict[str, str]]:
 
 
 def write_matrix(names: list[str]) -> list[str]:
-    """Write a row for each engine with two letters for each problem, and below why a letter is none of A and R."""
+    """Write a row for each engine with two letters for each problem.
+
+    Below it is written why a letter is none of A and R.
+    """
     letters: dict[str, dict[str, str]] = {}
     reasons: dict[str, list[str]] = {}
     for row in read_rows():
@@ -200,7 +208,10 @@ def name_together(engines: list[str]) -> str:
 
 
 def write_findings(*, known: bool) -> list[str]:
-    """Write an entry for each finding: those that its project knows or documents, or the others."""
+    """Write an entry for each finding.
+
+    The findings are those that its project knows or documents, or the others.
+    """
     lines = []
     for finding in read_findings():
         fields = finding.fields
@@ -218,7 +229,10 @@ def write_findings(*, known: bool) -> list[str]:
 
 
 def write_runs() -> list[str]:
-    """Write the worst error of torque and forces in one loop, for each engine in its finest timestep or at states."""
+    """Write the worst error of torque and forces in one loop, for each engine.
+
+    It is that in its finest timestep or at states.
+    """
     runs: dict[str, dict[str, dict[str, str]]] = {}
     for row in read_rows():
         if (
@@ -369,7 +383,9 @@ WRITERS: dict[str, Callable[[list[str]], list[str]]] = {
     "limits": lambda _: write_findings(known=True),
     "runs": lambda _: write_runs(),
 }
-"""Writers of the blocks that are no problem's, by name; each is given the names of the page's problems."""
+"""Writers of the blocks that are no problem's, by name. Each is given the names of the
+page's problems.
+"""
 
 
 if __name__ == "__main__":

@@ -1,4 +1,7 @@
-"""Tables of the commands of `fourbar` and their options; the site appends them to docs/commands.md."""
+"""Tables of the commands of `fourbar` and their options.
+
+The site appends them to docs/commands.md.
+"""
 
 import click
 
@@ -30,7 +33,10 @@ def describe(option: click.Option) -> str:
 
 
 def write_table(rows: list[str], last: str = "") -> str:
-    """Write rows of options as a table, with a third column of this heading if there is one."""
+    """Write rows of options as a table.
+
+    A third column has this heading if there is one.
+    """
     head = f"| option | meaning |{last and f' {last} |'}"
     return "\n".join((head, "|---|---|" + ("---|" if last else ""), *rows)) + "\n"
 

@@ -1,7 +1,7 @@
-"""The site of these pages: `sphinx-build -W docs site`, with what `pip install ".[docs]"` installs.
+"""The site of these pages: `sphinx-build -W docs site`.
 
-Formulas become MathML, which browsers draw by themselves: the site has no script for
-them and needs no network.
+`pip install ".[docs]"` installs what it needs. Formulas become MathML, which browsers
+draw by themselves: the site has no script for them and needs no network.
 """
 
 import re
@@ -31,7 +31,10 @@ SPACE = '<mspace width="0.17em" />'
 
 
 def append_reference(app, page, source):
-    """Append to a page what is made of the code: docstrings, and options of commands."""
+    """Append to a page what is made of the code.
+
+    That is docstrings, and options of commands.
+    """
     if page in ("api", "commands"):
         source[0] += (
             "\n" + runpy.run_path(str(Path(__file__).with_name(f"{page}.py")))["text"]()
@@ -39,7 +42,10 @@ def append_reference(app, page, source):
 
 
 def setup(app):
-    """Write formulas as MathML, in the line or below it, and complete the pages of reference."""
+    """Write formulas as MathML, in the line or below it.
+
+    The pages of reference are completed too.
+    """
 
     def written(display):
         def write(page, node):

@@ -1,7 +1,7 @@
-"""Writes docs/cost/*.svg, light and dark: `python docs/cost.py results/cost/crank_rocker`.
+"""Writes docs/cost/*.svg, light and dark.
 
-The argument is the folder of a study, by `fourbar-validation cost
-models/crank_rocker.toml`.
+`python docs/cost.py results/cost/crank_rocker` runs it. The argument is the folder of a
+study, by `fourbar-validation cost models/crank_rocker.toml`.
 """
 
 import csv
@@ -52,7 +52,10 @@ NO_DIGITS = K * EPS
 
 
 def list_hard_points() -> Iterator[tuple[Array, Array, str]]:
-    """Yield condition and error of each exact engine towards three kinds of singular position."""
+    """Yield condition and error of each exact engine near singular positions.
+
+    There are three kinds of them.
+    """
     for approach in list_approaches():
         solution = solve(approach.scene, "force")
         condition = find_condition(SHOWN, approach.scene.linkage, solution)
@@ -68,7 +71,10 @@ def list_hard_points() -> Iterator[tuple[Array, Array, str]]:
 
 
 def draw_hard() -> Any:
-    """Draw the error of the exact engines over the condition, towards three kinds of singular position."""
+    """Draw the error of the exact engines over the condition.
+
+    It is towards three kinds of singular position.
+    """
     figure = make_figure(
         4.6,
         "Near a singular position the error grows as\n1/condition, and stays below the"
@@ -147,7 +153,10 @@ def set_small(axes: Any, xlabel: str) -> None:
 
 
 def read_points(study: Path, curve: str) -> list[tuple[float, float, str]]:
-    """Read ms of a simulated second, error of the worst pin force, and setting of the points of a curve."""
+    """Read the points of a curve.
+
+    Each is ms of a simulated second, error of the worst pin force, and setting.
+    """
     with (study / "cost.csv").open(encoding="utf-8", newline="") as file:
         rows = [row for row in csv.DictReader(file) if row["curve"] == curve]
     return [

@@ -1,4 +1,7 @@
-"""Writes docs/theory.svg: the letters of the position and of its coefficients. `python docs/theory.py`"""
+"""Writes docs/theory.svg: the letters of the position and its coefficients.
+
+`python docs/theory.py` runs it.
+"""
 
 import cmath
 import math

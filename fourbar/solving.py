@@ -70,7 +70,7 @@ def solve(
 ) -> Solution:
     """Evaluate a scene, or a study of m linkages, with the closed formulas.
 
-    The evaluation goes as far as a stage.
+    The evaluation ends after the stage that is asked for.
 
     Parameters
     ----------

@@ -1,4 +1,7 @@
-"""Judge a run on the workers of a Dask cluster: python dask_run.py SCHEDULER PARTS DIR [options of run ...]."""
+"""Judge a run on the workers of a Dask cluster.
+
+Usage: python dask_run.py SCHEDULER PARTS DIR [options of run ...].
+"""
 
 import io
 import subprocess

@@ -49,7 +49,7 @@ BARS = {BAR_NAMES[number]: number for number in MOVING_BARS}
 
 
 def save(scene: Scene, path: str | Path) -> None:
-    """Write a scene to a TOML file, whole or not at all.
+    """Write a scene to a TOML file, atomically.
 
     Raises InputError as `dump` does, and for a picture that lies outside the file's
     folder.

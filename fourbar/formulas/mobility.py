@@ -133,10 +133,10 @@ def _wrap(angle: float) -> float:
 def limit_positions(linkage: FourBar, bar: int = 2) -> tuple[LimitPosition, ...]:
     """Find the positions in which a bar reverses, all mirror solutions included.
 
-    They are ordered counter-clockwise in theta_2 from theta_1.
+    They are ordered counter-clockwise in theta_2 from theta_1. With psi the angle
+    between the ground and the bar,
 
-    cos psi = (d^2 + l^2 - (x +- y)^2)/(2 d l), psi the angle between the ground and the
-    bar.
+        cos psi = (d^2 + l^2 - (x +- y)^2)/(2 d l).
 
     They are the limits of the input for bar 2 (bars 3, 4 collinear) and of the output
     for bar 4 (bars 2, 3 collinear), and the dead centres of a drive on that bar. A
@@ -255,7 +255,7 @@ def find_limit_angles(linkage: FourBar, bar: int = 2) -> tuple[float, ...]:
 def change_points(linkage: FourBar, bar: int = 2) -> tuple[float, ...]:
     """Find the angles of a bar at which all bars are collinear and branches cross, rad.
 
-    Without a bar it is theta_2:
+    They are those of bar 2 unless another bar is named:
 
         theta_1 where |a - d| = |b - c|,   theta_1 + pi where a + d = b + c,
 

@@ -373,7 +373,7 @@ def write(
     units: Conversion = SI,
     vectors: bool = False,
 ) -> None:
-    """Write a moving scene to a file, whole or not at all.
+    """Write a moving scene to a file, atomically.
 
     Parameters
     ----------

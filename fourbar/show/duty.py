@@ -155,7 +155,7 @@ def bearing_load(solution: Solution, pin: str) -> BearingLoad:
 def motor_duty(solution: Solution) -> MotorDuty | None:
     """Return peak and RMS torque and power, peak speed, and the energy in and out.
 
-    The energy follows by the trapezoidal rule.
+    The energy is computed by the trapezoidal rule.
 
     E = integral of P dt, dt = d theta/omega of the commanded bar, or ds/speed of the
     stroke, in a sweep; E_in of the positive part of P, E_out of the negative. Positions

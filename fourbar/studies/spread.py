@@ -182,7 +182,7 @@ def tolerances(
 ) -> Tolerances:
     """Compute the spread of every quantity at each position.
 
-    It is from quasi-random samples of the toleranced numbers.
+    It is estimated from quasi-random samples of the toleranced numbers.
 
     With the samples come first-order figures, from s_i = d(quantity)/d(number i): the
     worst case sum |s_i| t_i and the shares (s_i sigma_i)^2 of the variance.

@@ -1,1 +1,4 @@
-"""Studies of the formulas, the harness and the engines that no verdict needs: `python -m fourbar_lab`."""
+"""Studies of the formulas, the harness and the engines: `python -m fourbar_lab`.
+
+No verdict needs them.
+"""

@@ -1,4 +1,7 @@
-"""Judge the advice on linkages it has never seen: whether it is met, and how near it is to a search's cheapest."""
+"""Judge the advice on linkages it has never seen.
+
+It is judged whether it is met, and how near it is to the cheapest of a search.
+"""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -28,7 +31,9 @@ from fourbar_validation.run.store import Store
 from fourbar_validation.scenes.random import DrawnType, draw_random_scene
 
 COARSE, FINE = 2.0, 2.0 ** (1.0 / 3.0)
-"""Ratios of the ladder of steps: first by factors of two, then thirds of an octave below what serves."""
+"""Ratios of the ladder of steps. They are factors of two first, then thirds of an
+octave below what serves.
+"""
 TIME_CONSTANTS = (3.0, 5.0, 8.0, 12.0, 20.0, 35.0, 60.0, 120.0, 300.0)
 FIRST_ORDER = ("Euler", "implicit", "implicitfast", "discrete")
 FIRST_ORDER_TIME_CONSTANTS = (2.0, 3.0, 6.0, 12.0)
@@ -42,14 +47,21 @@ ERRORS = (-7.0, -2.0)
 WINDOW = 0.8
 """Part of the range of a rocker that is run through: away from its limits."""
 GENTLE = 0.02
-"""|alpha_2| / omega_2^2: over a turn the speed changes by an eighth and never vanishes."""
+"""Value of |alpha_2|/omega_2^2. Over a turn the speed changes by an eighth and never
+vanishes.
+"""
 POSITIONS, DENSER, SEARCHED = 36, 4, 2
-"""Intervals of the scene; the answer is judged at so many times more, the search decides at so many times more."""
+"""Intervals of the scene. The answer is judged at a multiple of them, and the search
+decides at another.
+"""
 NEEDED_MET, NEEDED_CHEAP, CHEAP = 0.95, 0.80, 3.0
 
 
 def time_relative_costs(setup: TrialSetup) -> dict[tuple[str, bool], float]:
-    """Time a step by integrator and pads, relative to RK4 with pads: medians of interleaved rounds."""
+    """Time a step by integrator and pads, relative to RK4 with pads.
+
+    The times are medians of interleaved rounds.
+    """
     kinds = [("RK4", True), ("RK4", False), *((name, False) for name in FIRST_ORDER)]
     clocks = {
         kind: setup.make_clocks(change_kind(kind, make_settings(628.0, 20.0)))[0]
@@ -71,9 +83,10 @@ def change_kind(kind: tuple[str, bool], settings: Settings) -> Settings:
 def find_cheapest(
     setup: TrialSetup, error: float, costs: Mapping[tuple[str, bool], float]
 ) -> float | None:
-    """Try every integrator, with and without pads, over time constants and steps: the least cost of a run that serves.
+    """Try every integrator, with and without pads, over time constants and steps.
 
-    In recommended RK4 steps; None where nothing serves.
+    The result is the least cost of a run that serves. In recommended RK4 steps; None
+    where nothing serves.
     """
     best: float | None = None
     for kind, ratio in costs.items():
@@ -135,19 +148,28 @@ class AdviceCase:
 
     @property
     def met(self) -> bool:
-        """Return whether it is within the required error, or rightly called unreachable."""
+        """Return whether it is within the required error.
+
+        An error that is rightly called unreachable counts too.
+        """
         return self.error <= self.asked if self.reached else math.isnan(self.cheapest)
 
     @property
     def cheap(self) -> bool:
-        """Return whether it is within CHEAP times the cheapest; rightly unreachable counts."""
+        """Return whether it is within CHEAP times the cheapest.
+
+        An error that is rightly called unreachable counts too.
+        """
         if not self.reached:
             return self.met
         return not self.cost > CHEAP * self.cheapest
 
 
 def draw_scene(seed: int, index: int) -> tuple[Scene, float]:
-    """Draw a linkage away from its limits, at a random speed, and the error required of it."""
+    """Draw a linkage away from its limits, with a random speed and error.
+
+    The error is the one that is required of it.
+    """
     scene = draw_random_scene(seed, index, TYPES)
     rng = np.random.default_rng([seed, index, 1])
     omega = float(rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(*SPEEDS))
@@ -204,7 +226,10 @@ def compute_wilson(successes: int, n: int) -> float:
 
 
 def find_enough(missed: int) -> int:
-    """Find the least number of cases whose bound is the needed one where so many are not met."""
+    """Find the least number of cases whose bound is the needed one.
+
+    A given number of them is not met.
+    """
     n = missed + 1
     while compute_wilson(n - missed, n) < NEEDED_MET:
         n += 1
@@ -212,7 +237,10 @@ def find_enough(missed: int) -> int:
 
 
 def measure(seed: int, count: int, out: Path) -> Iterator[AdviceCase]:
-    """Yield the cases, each kept as it comes; those that an interrupted run left are read."""
+    """Yield the cases, each kept as it comes.
+
+    Those that an interrupted run left are read.
+    """
     with Store(out, {"seed": seed, **name_code(LAB)}).held() as store:
         done, first = store.done(), draw_scene(seed, 0)[0]
         costs: dict[tuple[str, bool], float] = {}
@@ -244,10 +272,11 @@ def measure(seed: int, count: int, out: Path) -> Iterator[AdviceCase]:
     default=Path("results/advise-study"),
 )
 def study(count: int, seed: int, out: Path) -> int:
-    """Measure the advice on random linkages; exit 1 where it is not met or not cheap often enough.
+    """Measure the advice on random linkages.
 
-    That it is met often enough is a statement on all linkages, which few of them cannot
-    prove: the count that it needs is stated.
+    Exit with status 1 if it is not met, or not cheap often enough. That it is met often
+    enough is a statement on all linkages, which few of them cannot prove: the count
+    that it needs is stated.
     """
     from rich.console import Console
     from rich.progress import track

@@ -1,4 +1,7 @@
-"""Speed side by side in one process: stages, the 13x13 system, C, a judged scene; ratios that hold."""
+"""Speed side by side in one process, and ratios that hold.
+
+It is that of stages, the 13x13 system, C, and a judged scene.
+"""
 
 import os
 import subprocess
@@ -51,15 +54,21 @@ Array = NDArray[np.float64]
 
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 WITH_LIMITS = FourBar(0.3, Bar(0.25, 0.2), Bar(0.1, 0.5), Bar(0.22, 0.4))
-"""Linkage whose input swings between limit positions, so that each of its positions has to be examined."""
+"""Linkage whose input swings between limit positions. Each of its positions has to be
+examined.
+"""
 THIRTEEN_BATCH = 20_000
-"""Positions per batch of the 13x13 system: larger batches are slower per position (27 MB of matrices each)."""
+"""Positions per batch of the 13x13 system. Larger batches are slower per position
+(27 MB of matrices each).
+"""
 OVER_POSITIONS = (
     "all unknowns of a position, over the number of positions (1e6 at once at most)"
 )
 OVER_LINKAGES = "all forces of a linkage at one position, over the number of linkages"
 SOLVED = 100_000
-"""Positions where every array is allocated, and for the error bars, whose numbers take ten times as long."""
+"""Positions where every array is allocated, and for the error bars. The numbers of
+error bars take ten times as long.
+"""
 ALONE = 20
 """Calls of one position each."""
 PER_SCENE = 50_000
@@ -90,7 +99,10 @@ PLAIN_LOOPS = {
 
 
 class SpeedLimit(NamedTuple):
-    """Limit of a row of the table, and why; a ratio, which holds with and without AVX-512."""
+    """Limit of a row of the table, and why.
+
+    It is a ratio, which holds with and without AVX-512.
+    """
 
     sign: str
     bound: float
@@ -196,7 +208,10 @@ class Measured(NamedTuple):
 
 
 def import_cost() -> float:
-    """Compare the CPU time that `import fourbar` adds with that of `import numpy`: median over fresh interpreters."""
+    """Compare the CPU time of `import fourbar` with that of `import numpy`.
+
+    It is the median over fresh interpreters.
+    """
     clock = "time.process_time()"
     code = (
         f"import time; a = {clock}; import numpy; b = {clock};"
@@ -233,7 +248,10 @@ def measure_memory(n: int) -> float:
 
 
 def make_floor(theta_2: Array, out: dict[str, Array]) -> Callable[[], object]:
-    """Make what no formula for two angles does without: a tangent, a square root and two arctangents, by blocks."""
+    """Make what no formula for two angles does without, by blocks.
+
+    It is a tangent, a square root and two arctangents.
+    """
 
     def action() -> None:
         for start in range(0, len(theta_2), BLOCK):
@@ -402,7 +420,10 @@ def measure(positions: int, rounds: int, largest: int) -> Measured:
 
 
 def compare_adapters(rounds: int) -> dict[str, float]:
-    """Divide the time of each adapter by that of a plain loop that reads the same quantities."""
+    """Divide the time of each adapter by that of a plain loop.
+
+    Both read the same quantities.
+    """
     scene, command = make_example(), make_command(ASKED)
     adapters = {engine.name: engine for engine in ENGINES}
     actions: dict[str, Callable[[], object]] = {}
@@ -420,7 +441,10 @@ def compare_adapters(rounds: int) -> dict[str, float]:
 
 
 def read_plainly(loop: PlainLoop, command: Command) -> list[object]:
-    """Answer by a plain loop, and read the places, angles, rates and accelerations of each position besides."""
+    """Answer by a plain loop, and read more of each position.
+
+    It reads the places, angles, rates and accelerations.
+    """
     tree, inverse = loop.tree, loop.inverse
     answered: list[object] = []
 
@@ -447,7 +471,10 @@ def read_plainly(loop: PlainLoop, command: Command) -> list[object]:
 
 
 def time_judging(engines: list[Engine], scenes: int) -> float:
-    """Time the check of a random scene as `run` does it, nothing drawn: median CPU time in s."""
+    """Time the check of a random scene as `run` does it, nothing drawn.
+
+    It is the median CPU time in s.
+    """
     suite = Random(scenes + 1, 0, tuple(DrawnType))
     judgings = (
         partial(judge_for_report, suite.name(i), suite.scene(i), engines, draw=False)

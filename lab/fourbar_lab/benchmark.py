@@ -1,4 +1,7 @@
-"""`python -m fourbar_lab benchmark`: every engine is asked every problem; a table, and a page with letters."""
+"""`python -m fourbar_lab benchmark`: every engine is asked every problem.
+
+It writes a table, and a page with letters.
+"""
 
 import json
 import math
@@ -45,7 +48,9 @@ from fourbar_validation.report.templating import render
 ENGINES = Path(__file__).parent / FILE
 REFUSED = "R"
 DIFFERENTIATED = "crank_rocker"
-"""Problem whose errors are drawn over time, and at which an engine that has derivatives is asked for them."""
+"""Problem whose errors are drawn over time. An engine that has derivatives is asked for
+them at it.
+"""
 COLUMNS = (
     "problem",
     "engine",
@@ -60,7 +65,9 @@ COLUMNS = (
 )
 """Columns of the table."""
 KIND = re.compile(r" \((released|slider-crank)\)$")
-"""End of the name of an entry that answers one kind of problem for the row that the rest of its name names."""
+"""End of the name of an entry that answers one kind of problem. It answers for the row
+that the rest of its name names.
+"""
 
 
 class Run(NamedTuple):
@@ -78,7 +85,9 @@ class MatrixCell:
     """What one engine answered to one problem."""
 
     letters: str = MISSING
-    """Reactions and torque, of a released motion reactions and motion, in the finest of its timesteps."""
+    """Reactions and torque, in the finest of its timesteps. Of a released motion they
+    are reactions and motion.
+    """
     reason: str = ""
     runs: list[Run] = field(default_factory=list)
     order: float | None = None
@@ -96,7 +105,9 @@ class MatrixRow:
     hello: dict[str, Any] = field(default_factory=dict)
     cells: dict[str, MatrixCell] = field(default_factory=dict)
     slopes: list[tuple[str, dict[str, str]]] = field(default_factory=list)
-    """Ways of differentiation with the relative error of the torque and of each of its derivatives."""
+    """Ways of differentiation with their relative errors. They are those of the torque
+    and of each of its derivatives.
+    """
     changed: str = ""
     """Changes to the engine's input or defaults that its adapter states."""
 
@@ -106,7 +117,7 @@ class MatrixRow:
 
 
 def name_row(engine: str, version: str) -> str:
-    """Name an engine with its version, which stands before the way in which it is used."""
+    """Name an engine with its version before the way in which it is used."""
     program, colon, way = engine.partition(":")
     return (
         engine
@@ -124,7 +135,10 @@ def read_reasons(file: Path) -> dict[str, str]:
 
 
 class Benchmark:
-    """A run over engines and problems; what an earlier one was answered by the same version is not asked again."""
+    """A run over engines and problems.
+
+    An engine is not asked again what the same version answered in an earlier run.
+    """
 
     def __init__(
         self,
@@ -243,7 +257,10 @@ class Benchmark:
         question: dict[str, Any],
         running: Running,
     ) -> dict[str, Any]:
-        """Take the result of an earlier run by the same version, unless it broke down, or ask and store it."""
+        """Take the result of an earlier run by the same version, or ask.
+
+        The result is stored; one that broke down is asked for again.
+        """
         file = self.out / "results" / re.sub(r"[^\w.-]+", "-", label) / f"{stem}.json"
         result = json.loads(file.read_text(encoding="utf-8")) if file.is_file() else {}
         if result.get("version") != row.text("version") or result.get(
@@ -294,12 +311,18 @@ class Benchmark:
         cell.order = _find_order(cell.runs)
 
     def _explain(self, label: str) -> str:
-        """Find the sentence for a row's letters: the longest name that the row begins with."""
+        """Find the sentence for a row's letters.
+
+        It is that of the longest name that the row begins with.
+        """
         names = [name for name in self.reasons if label.startswith(name)]
         return self.reasons[max(names, key=len)] if names else ""
 
     def list_rows(self) -> list[list[Any]]:
-        """List the rows of the table, problem by problem; of coarser timesteps without a level."""
+        """List the rows of the table, problem by problem.
+
+        Those of coarser timesteps have no level.
+        """
         table: list[list[Any]] = []
         for problem in self.problems:
             for label, row in self.rows.items():
@@ -355,7 +378,10 @@ class Benchmark:
 
 
 def draw_work_precision(rows: Mapping[str, MatrixRow]) -> str:
-    """Draw the worst error of torque and pin forces over processor time, a line an engine, as SVG; "" if none ran."""
+    """Draw the worst error of torque and pin forces over processor time, as SVG.
+
+    Each engine has a line; "" if none ran.
+    """
     from matplotlib import colormaps
     from matplotlib.figure import Figure
 
@@ -425,7 +451,10 @@ def _ask(running: Running, question: dict[str, Any]) -> dict[str, Any]:
 def compare_slopes(
     problem: dict[str, Any], slopes: Iterable[Any]
 ) -> list[tuple[str, dict[str, str]]]:
-    """Compare derivatives of the torque with the formulas' at the state that the engine took: relative errors."""
+    """Compare derivatives of the torque with those of the formulas.
+
+    The state is the one that the engine took; the errors are relative.
+    """
     scene, _ = protocol.command_from_json(
         protocol.scene_from_json(problem["scene"]), problem["command"]
     )
@@ -461,7 +490,10 @@ def compare_slopes(
 
 
 def _find_order(runs: list[Run]) -> float | None:
-    """Return the order of the torque's error in the timestep, from the last two runs; None where there is none."""
+    """Return the order of the torque's error in the timestep.
+
+    It is from the last two runs; None if there is none.
+    """
     if len(runs) < 2:
         return None
     errors, steps = [], []
@@ -502,11 +534,11 @@ def _find_order(runs: list[Run]) -> float | None:
 def command(
     engines: Path | None, problems: tuple[str, ...], out: Path, time_limit: float
 ) -> None:
-    """Ask every engine every problem of models/problems, and write benchmark.csv and one page.
+    """Ask every engine every problem of models/problems.
 
-    Each engine runs in its environment, which pip makes once. An engine that runs
-    through time is asked at each of its numbers of steps. What was answered before is
-    not asked again.
+    It writes benchmark.csv and one page. Each engine runs in its environment, which pip
+    makes once. An engine that runs through time is asked at each of its numbers of
+    steps. What was answered before is not asked again.
     """
     find_checkout("benchmark")
     for name in problems:

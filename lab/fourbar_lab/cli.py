@@ -1,4 +1,7 @@
-"""Commands of the lab; each lives in its own module and is imported when it is called."""
+"""Commands of the lab.
+
+Each lives in its own module and is imported when it is called.
+"""
 
 import sys
 
@@ -49,5 +52,8 @@ def main(arguments: list[str] | None = None) -> None:
 
 
 def status(arguments: list[str] | None = None) -> int:
-    """Run a command; what goes wrong becomes one line on standard error and an exit status."""
+    """Run a command and return its exit status.
+
+    An error becomes one line on standard error.
+    """
     return run(group, PROGRAM, arguments)

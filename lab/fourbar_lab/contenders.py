@@ -1,4 +1,7 @@
-"""Time the libraries that evaluate positions of one linkage, and linkages of one position, and draw the times."""
+"""Time the libraries that evaluate positions, and draw the times.
+
+They are positions of one linkage, and linkages of one position.
+"""
 
 import ctypes
 import shutil
@@ -29,8 +32,8 @@ Array = NDArray[np.float64]
 Times = dict[str, dict[int, float]]
 """ns for each, by who and by how many."""
 Loop = Callable[[Array, Array], None]
-"""Writes theta_3, theta_4, omega_3, omega_4, alpha_3, alpha_4, F12, F32, F43, F14 (two rows each) and the torque at n
-angles into an array (15, n).
+"""Writes theta_3, theta_4, omega_3, omega_4, alpha_3, alpha_4, F12, F32, F43, F14 (two
+rows each) and the torque at n angles into an array (15, n).
 """
 SOURCE = Path(__file__).with_name("bench_loop.c")
 FLAGS = ("-O3", "-march=native")
@@ -43,12 +46,16 @@ LOOKS = (
 )
 """Colours and marks in the order of the contenders."""
 AT_ONCE = 1_000_000
-"""Positions of a call: more are evaluated in pieces of this many, so that their memory is bounded (150 MB)."""
+"""Positions of a call. More are evaluated in pieces of this many, so that their memory
+is bounded (150 MB).
+"""
 SHORTEST = 200_000
 """Positions of one timing: fewer are evaluated as often as makes so many."""
 MOST_LINKAGES = 100_000
 MOST_LOOPED = 1000
-"""Linkages that are solved one after the other: beyond them the cost of one no longer changes."""
+"""Linkages that are solved one after the other. Beyond them the cost of one no longer
+changes.
+"""
 STUDY, POSITIONS, LOOPED = (
     "study, NumPy",
     "one linkage, as many positions",
@@ -66,7 +73,11 @@ class Peers(NamedTuple):
 
 
 def make_example(linkage: FourBar = LINKAGE, theta_2: float | None = 0.0) -> Scene:
-    """Build the scene that is timed: crank at 10 rad/s, gravity, drive on the input; theta_2 None: its full range."""
+    """Build the scene that is timed.
+
+    It is a crank at 10 rad/s with gravity and the drive on the input; theta_2 None: its
+    full range.
+    """
     return Scene(linkage, Motion(theta_2, 10.0), 2, (), (Gravity(),))
 
 
@@ -78,7 +89,10 @@ def make_command(n: int, start: float = 0.0, stop: float = 2.0 * np.pi) -> Comma
 
 
 def allocate(names: Iterable[str], command: Command) -> dict[str, Array]:
-    """Allocate arrays as `solve` lays them out, touched so that no page is faulted in while the clock runs."""
+    """Allocate arrays as `solve` lays them out.
+
+    They are touched, so that no page is faulted in while the clock runs.
+    """
     first = solve(make_example(), at=command)
     return {name: getattr(first, name) for name in names}
 
@@ -86,7 +100,10 @@ def allocate(names: Iterable[str], command: Command) -> dict[str, Array]:
 def time_interleaved(
     actions: Mapping[str, Callable[[], object]], rounds: int, calls: int = 1
 ) -> dict[str, float]:
-    """Time a call of each action in turn, in CPU seconds: the median, the first round apart."""
+    """Time a call of each action in turn, in CPU seconds.
+
+    It is the median; the first round does not count.
+    """
     clocks = {
         name: partial(time_call, action, calls) for name, action in actions.items()
     }
@@ -97,7 +114,10 @@ def time_interleaved(
 
 
 def collect_loops() -> Peers:
-    """Collect the closed formulas by several hands: each writes into arrays that are there."""
+    """Collect the closed formulas by several hands.
+
+    Each writes into arrays that exist.
+    """
     loops: dict[str, Loop | str] = {"NumPy": _make_solve_loop(), "C": compile_loop()}
     reasons = {name: loop for name, loop in loops.items() if isinstance(loop, str)}
     return Peers(
@@ -158,7 +178,10 @@ def compile_loop() -> Loop | str:
 
 
 def time_positions(peers: dict[str, Loop], largest: int, rounds: int) -> Times:
-    """Time a position, in ns, for 1000, 10 000, ... of them, into arrays that are there."""
+    """Time a position, in ns, for 1000, 10 000, ... of them.
+
+    They are written into arrays that exist.
+    """
     times: Times = {name: {} for name in peers}
     for n in [10**k for k in range(3, 9) if 10**k <= largest]:
         at_once, calls = min(n, AT_ONCE), max(1, SHORTEST // n, n // AT_ONCE)
@@ -172,7 +195,10 @@ def time_positions(peers: dict[str, Loop], largest: int, rounds: int) -> Times:
 
 
 def time_linkages(largest: int, rounds: int) -> Times:
-    """Time a linkage at one position, in ns, for 1, 10, ... of them: solved as a study, and one after the other."""
+    """Time a linkage at one position, in ns, for 1, 10, ... of them.
+
+    They are solved as a study, and one after the other.
+    """
     scene = make_example(theta_2=1.0)
     times: Times = {STUDY: {}, POSITIONS: {}, LOOPED: {}}
 

@@ -1,4 +1,7 @@
-"""`python -m fourbar_lab effects`: what each effect, and each flag of MuJoCo, costs in each engine, in time."""
+"""`python -m fourbar_lab effects`: what each effect and flag costs in time.
+
+The flags are those of MuJoCo; each engine is timed.
+"""
 
 import math
 import re
@@ -64,7 +67,9 @@ EFFECTS |= {
     for key, kind in kinds.list_kinds().items()
     if key not in EFFECTS
 }
-"""Effects by name, each alone on the same linkage; one that is not listed acts as in its example of a scene file."""
+"""Effects by name, each alone on the same linkage. One that is not listed acts as in
+its example of a scene file.
+"""
 SIMULATION = "mujoco-simulated"
 NO_COUNTERPART = {
     (SIMULATION, name)
@@ -84,7 +89,9 @@ AMOUNTS = {
     "mujoco-inverse": 100,
     "pinocchio-inverse": 100,
 }
-"""Units of work of one run: 10 to 20 ms, long against the clock's resolution and short against what disturbs it."""
+"""Units of work of one run. It takes 10 to 20 ms, long against the clock's resolution
+and short against disturbances.
+"""
 ABOUT = (
     "Processor time of a position, of a step of the simulation (RK4), in us without"
     " effects; with an effect relative to that: the median of the ratios of"
@@ -126,7 +133,10 @@ def prepare_simulation(effect: str) -> Callable[[int], Any]:
 
 @cache
 def list_flags() -> dict[str, str]:
-    """List the flags that the MJCF of a bare scene switches off, by the name of the workload that leaves one on."""
+    """List the flags that the MJCF of a bare scene switches off.
+
+    The key is the name of the workload that leaves one on.
+    """
     flags = re.findall(r'(\w+)="disable"', write_mjcf(make_scene("none", 91)))
     return {LEFT_ON.format(flag): flag for flag in flags}
 
@@ -153,7 +163,10 @@ WORKLOADS: dict[str, Callable[[str], Callable[[int], Any]]] = {
 
 
 class EffectCost(NamedTuple):
-    """Time of one effect, or one flag, in one engine by that of the bare scene, of pairs of neighbouring runs."""
+    """Time of one effect, or one flag, in one engine by that of the bare scene.
+
+    It is that of pairs of neighbouring runs.
+    """
 
     engine: str
     effect: str
@@ -166,7 +179,10 @@ class EffectCost(NamedTuple):
 
 
 def measure(engine: str, effect: str, rounds: int = ROUNDS) -> EffectCost:
-    """Time neighbouring runs with and without an effect: both meet the same disturbances."""
+    """Time neighbouring runs with and without an effect.
+
+    Both meet the same disturbances.
+    """
     amount = AMOUNTS[engine]
     works = {
         which: partial(WORKLOADS[engine](name), amount)
@@ -210,7 +226,10 @@ def list_rows(costs: Iterable[EffectCost]) -> tuple[list[str], list[list[str]]]:
 def list_pairs(
     engines: tuple[str, ...], effects: tuple[str, ...]
 ) -> list[tuple[str, str]]:
-    """Pair each engine with each effect that it has, the simulation with each flag that the bare scene switches off."""
+    """Pair each engine with each effect that it has.
+
+    The simulation is paired with each flag that the bare scene switches off.
+    """
     chosen = [
         (engine, effect)
         for engine in engines

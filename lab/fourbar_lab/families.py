@@ -1,4 +1,7 @@
-"""Families of hard positions: one position of a random scene, drawn from a random generator alone."""
+"""Families of hard positions.
+
+Each is one position of a random scene, drawn from a random generator alone.
+"""
 
 import cmath
 import math
@@ -38,7 +41,10 @@ from fourbar_validation.scenes.random import (
 
 
 def spread_masses(spread: float) -> Ranges:
-    """Spread masses over decades to either side, one bar of ten without any; centres anywhere about the bar."""
+    """Spread masses over decades, one bar of ten without any.
+
+    Centres lie anywhere about the bar.
+    """
     return Ranges(
         mass=draw_chance(
             0.9, draw_product(draw_decades(-spread, spread), draw_uniform(0.2, 5.0))
@@ -80,11 +86,16 @@ def _draw_near_limit(rng: np.random.Generator) -> DrawnLinkage:
 
 
 BESIDE_ROUNDING = 1e-13
-"""Part of a length by which a linkage misses a change point at least: by less it has one, within the rounding."""
+"""Least miss of a change point, as a part of a length. By less a linkage has one,
+within the rounding.
+"""
 
 
 def _draw_near_change_point(rng: np.random.Generator) -> DrawnLinkage:
-    """Draw within 1e-8..1 rad of a change point: parallelograms, kites, any s + l = p + q, some off by as little."""
+    """Draw within 1e-8..1 rad of a change point.
+
+    It is that of parallelograms, kites, any s + l = p + q, some off by as little.
+    """
     x, y = rng.uniform(0.1, 1.0, 2)
     kind = rng.integers(0, 4)
     straight = 0.0
@@ -119,7 +130,10 @@ def _draw_near_change_point(rng: np.random.Generator) -> DrawnLinkage:
 
 
 def _draw_with_ratios(rng: np.random.Generator) -> DrawnLinkage:
-    """Draw crank to ground, coupler to diagonal, and masses, each in ratios from 1e-6 to 1e6."""
+    """Draw lengths and masses in ratios from 1e-6 to 1e6.
+
+    The ratios are crank to ground, coupler to diagonal, and those of masses.
+    """
     lengths, angle = draw_uneven_lengths(
         rng, draw_decades(-6.0, 6.0), draw_decades(-1.0, 1.0)
     )
@@ -180,7 +194,10 @@ def draw_deviation(rng: np.random.Generator) -> float:
 
 
 def massless(rng: np.random.Generator) -> Scene:
-    """Draw a linkage of the random family without masses, loads and effects: only what is added makes forces."""
+    """Draw a linkage of the random family without masses, loads and effects.
+
+    Only what is added makes forces.
+    """
     scene = ANYWHERE.draw(rng)
     d, a, b, c = scene.linkage.lengths
     return replace(
@@ -198,7 +215,10 @@ def _draw_place(bar: int, rng: np.random.Generator, nearest: float) -> Place:
 
 
 def springs(rng: np.random.Generator) -> Scene:
-    """Draw a spring near the length at which its force is zero, with a preload in every other scene."""
+    """Draw a spring near the length at which its force is zero.
+
+    It has a preload in every other scene.
+    """
     scene = massless(rng)
     first, second = (
         int(bar) for bar in rng.choice((1, *MOVING_BARS), 2, replace=False)
@@ -227,11 +247,11 @@ def springs(rng: np.random.Generator) -> Scene:
 
 
 def torsion(rng: np.random.Generator) -> Scene:
-    """Draw a torsion spring near the angle at which its couple is zero, its rest some turns away or none.
+    """Draw a torsion spring near the angle at which its couple is zero.
 
-    Not at O2: its angle, given in doubles, comes back from the directions to the last
-    digit more often than not, and an error that is zero by chance says nothing of the
-    bar.
+    Its rest is some turns away, or none. Not at O2: its angle, given in doubles, comes
+    back from the directions to the last digit more often than not, and an error that is
+    zero by chance says nothing of the bar.
     """
     scene = massless(rng)
     solution, pin = solve(scene, "position"), str(rng.choice(["A", "B", "O4"]))
@@ -256,10 +276,10 @@ def torsion(rng: np.random.Generator) -> Scene:
 
 
 def tables(rng: np.random.Generator) -> Scene:
-    """Draw a load over a table, many turns from its angles or none, every other near where its factor is zero.
+    """Draw a load over a table, many turns from its angles or none.
 
-    The ground is level: against another theta_2 loses digits of all directions after
-    many turns.
+    Every other one is near where its factor is zero. The ground is level: against
+    another theta_2 loses digits of all directions after many turns.
     """
     scene = massless(rng)
     linkage = scene.linkage
@@ -308,7 +328,10 @@ def drives(rng: np.random.Generator) -> Scene:
 
 
 def strokes(rng: np.random.Generator) -> Scene:
-    """Command the stroke of a cylinder from the ground to bar 2 or 4, as it comes out where the input is."""
+    """Command the stroke of a cylinder from the ground to bar 2 or 4.
+
+    It is the stroke that results where the input is.
+    """
     bar = int(rng.choice([2, 4]))
     scene = _put_cylinder(ANYWHERE.draw(rng), rng, 1, bar)
     solution = solve(scene, "acceleration")
@@ -346,7 +369,10 @@ def _put_cylinder(
 
 
 def pushes(rng: np.random.Generator) -> Scene:
-    """Draw a force at a point of a moving bar that drives, along a fixed or turning line."""
+    """Draw a force at a point of a moving bar that drives.
+
+    It acts along a fixed or turning line.
+    """
     bar, frame = int(rng.choice(MOVING_BARS)), str(rng.choice(FRAMES))
     place, direction = _draw_place(bar, rng, 0.05), float(rng.uniform(-3.0, 3.0))
     drive = PointDrive(place, direction, frame)
@@ -354,10 +380,10 @@ def pushes(rng: np.random.Generator) -> Scene:
 
 
 def near_pins(rng: np.random.Generator) -> Scene:
-    """Draw a spring or a cylinder with an end at 1e-1 to 1e-11 m from the pin that joins its two bars, or a load there.
+    """Draw a spring or a cylinder with an end near a pin, or a load there.
 
-    The line of the force then passes the pin at that distance, though its other end
-    lies far off.
+    The end is at 1e-1 to 1e-11 m from the pin that joins its two bars. The line of the
+    force then passes the pin at that distance, though its other end lies far off.
     """
     scene, pin = massless(rng), str(rng.choice(list(PINS)))
     near = {"O2": 1, "A": 3, "B": 3, "O4": 4}[pin]

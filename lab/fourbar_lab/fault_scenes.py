@@ -1,4 +1,7 @@
-"""Scenes on which injected faults are tried: each effect, drive, branch and kind of motion in one of them."""
+"""Scenes on which injected faults are tried.
+
+Each effect, drive, branch and kind of motion is in one of them.
+"""
 
 import math
 from dataclasses import replace

@@ -1,4 +1,7 @@
-"""Injected faults against the harness, each in a process of its own; none may survive without a reason."""
+"""Injected faults against the harness, each in a process of its own.
+
+None may survive without a reason.
+"""
 
 import json
 import os
@@ -23,13 +26,18 @@ TEST_SECONDS = 10.0
 CHUNK = 8
 """Faults of one process, which loads the engines once."""
 SECONDS = 300
-"""Faults with which the harness takes longer than this end the run as a failure would; one takes some three."""
+"""Factor on the harness's time with which a fault ends the run. A failure would end it
+too; a run takes some three.
+"""
 Failing = dict[str, list[str]]
 """Rows that fail, by test scene."""
 
 
 def try_faults(numbers: Sequence[int]) -> list[Failing] | str:
-    """Try the fault of each number in turn, or none: the rows that fail, or why there is no result."""
+    """Try the fault of each number in turn, or none.
+
+    Return the rows that fail, or why there is no result.
+    """
     done = _inject(*map(str, numbers))
     return done.why or [
         json.loads(each) for each in done.out.splitlines()[-max(1, len(numbers)) :]
@@ -48,7 +56,10 @@ def _inject(*arguments: str) -> Ended:
 
 
 def try_judging_fault(number: int) -> str | None:
-    """Try a fault of what judges on the tests of its folder: why it survives them, or None."""
+    """Try a fault of what judges on the tests of its folder.
+
+    Return why it survives them, or None.
+    """
     done = _inject("--tests", str(number))
     if done.why:
         return f"it raises: {done.why}"
@@ -61,7 +72,10 @@ def try_judging_fault(number: int) -> str | None:
 
 
 def explain_survival(entry: dict[str, Any], failing: Failing | str) -> str | None:
-    """Say why an entry does not count as caught on each of its test scenes; None where it does."""
+    """Say why an entry does not count as caught on each of its test scenes.
+
+    None if it does.
+    """
     if isinstance(failing, str):
         return f"it raises, which is no physical fault: {failing}"
     for scene, rows in failing.items():
@@ -77,7 +91,10 @@ def explain_survival(entry: dict[str, Any], failing: Failing | str) -> str | Non
 
 
 def try_in_turn(numbers: Sequence[int]) -> list[Failing | str]:
-    """Try faults in one process, which loads the engines once; if it ends early, each in a process of its own."""
+    """Try faults in one process, which loads the engines once.
+
+    If it ends early, each is tried in a process of its own.
+    """
     together = try_faults(numbers)
     if not isinstance(together, str):
         return [*together]
@@ -86,7 +103,10 @@ def try_in_turn(numbers: Sequence[int]) -> list[Failing | str]:
 
 
 def try_every_fault(workers: int) -> Iterator[tuple[str, str | None]]:
-    """Try every fault: the reason why it survives, or None; first the tree without a fault."""
+    """Try every fault, first the tree without one.
+
+    Return the reason why it survives, or None.
+    """
     entries, rows = read_faults(), try_faults(())
     failing = (
         rows

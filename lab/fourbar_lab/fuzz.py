@@ -1,7 +1,7 @@
-"""Random scenes through files, formulas and exact engines; what fails is made smaller and kept.
+"""Random scenes through files, formulas and exact engines.
 
-Even numbers are ordinary scenes, odd ones adversarial; scene i depends on the seed and
-i alone.
+What fails is made smaller and kept. Even numbers are ordinary scenes, odd ones
+adversarial; scene i depends on the seed and i alone.
 """
 
 import json
@@ -92,12 +92,16 @@ EXACT = tuple(
     for w in ENGINES
     if w.name in ("pinocchio-inverse", "mujoco-inverse", "free-body")
 )
-"""The exact engines, held to full accuracy or to what was predicted for the position."""
+"""The exact engines, held to full accuracy. Or they are held to what was predicted for
+the position.
+"""
 CHUNK = 200
 """Scenes per task: some seconds, which is what an interruption costs."""
 SHOWN = 20
 LOST = "worker:"
-"""Beginning of the discrepancy of a scene that killed its worker, or never came back."""
+"""Beginning of the discrepancy of a scene that killed its worker. It is that of one
+that never came back too.
+"""
 
 
 def draw_fuzz_scene(seed: int, index: int) -> Scene:
@@ -133,7 +137,10 @@ FAMILIES = {
 
 
 def _draw_lengths(rng: np.random.Generator, hard: bool) -> Any:
-    """Draw (ground, input, coupler, output), some of them equal, in extreme ratios, or near s + l = p + q."""
+    """Draw (ground, input, coupler, output), some of them special.
+
+    They are equal, in extreme ratios, or near s + l = p + q.
+    """
     choice = rng.random() if hard else 1.0
     x = rng.uniform(0.1, 1.0, 4)
     if choice < 0.1:
@@ -164,7 +171,10 @@ def _draw_lengths(rng: np.random.Generator, hard: bool) -> Any:
 def _draw_angles(
     rng: np.random.Generator, hard: bool, lengths: tuple[float, ...]
 ) -> Any:
-    """Draw theta_2 - theta_1: anywhere, or near a limit position, a change point, or many turns away."""
+    """Draw theta_2 - theta_1, anywhere or at a special place.
+
+    It may be near a limit position, a change point, or many turns away.
+    """
     psi = rng.uniform(-3.2, 3.2, POSITIONS)
     if not hard:
         return psi
@@ -208,7 +218,10 @@ def shrink_scene(scene: Scene, fails: Callable[[Scene], bool]) -> Scene:
 
 
 def _list_simpler(lines: list[str], number: int) -> Iterator[list[str]]:
-    """Leave out one line, or the table that it begins, or put a simpler entry in the line."""
+    """Leave out one line, or the table that it begins.
+
+    Or put a simpler entry in the line.
+    """
     line, until = lines[number], number + 1
     if line.startswith("["):
         until = next(
@@ -244,7 +257,10 @@ def keep(scene: Scene, name: str, folder: Path = KEPT) -> Path:
 
 
 def list_findings(scene: Scene) -> list[str]:
-    """List what is wrong with a scene, in one line each; exceptions and warnings too."""
+    """List what is wrong with a scene, in one line each.
+
+    Exceptions and warnings are listed too.
+    """
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
@@ -260,7 +276,10 @@ def list_findings(scene: Scene) -> list[str]:
 
 
 def _check_file(scene: Scene) -> list[str]:
-    """Write a scene file and read it again: it must be the same scene to the last digit."""
+    """Write a scene file and read it again.
+
+    It must be the same scene to the last digit.
+    """
     again = dump(loads(dump(scene)))
     return (
         []
@@ -270,7 +289,11 @@ def _check_file(scene: Scene) -> list[str]:
 
 
 def _check_assembly(scene: Scene, commanded: Command, solution: Solution) -> list[str]:
-    """Compare by ball arithmetic: no position where the loop does not close, none missing where it does."""
+    """Compare the assembly by ball arithmetic.
+
+    There is no position where the loop does not close, and none is missing where it
+    does.
+    """
     from fourbar_validation.engines.balls import closure, make_balls
 
     problems = []
@@ -329,7 +352,10 @@ def _find_lost(_: int, error: BaseException, __: object) -> list[str]:
 def run(
     count: int, seed: int, out: Path, workers: int
 ) -> Iterator[dict[str, list[str]]]:
-    """Examine the scenes chunk by chunk, what is wrong by number; chunks of an interrupted run are read."""
+    """Examine the scenes chunk by chunk, what is wrong by number.
+
+    Chunks of an interrupted run are read.
+    """
     with Store(out, {"seed": seed, **name_code(LAB)}).held() as store:
         chunks = {
             min(start + CHUNK, count): range(start, min(start + CHUNK, count))
@@ -374,7 +400,10 @@ def run(
     show_default=True,
 )
 def fuzz(scenes: int, seed: int, workers: int, out: Path) -> int:
-    """Put random scenes through files, formulas and exact engines; every failure is shrunk and kept."""
+    """Put random scenes through files, formulas and exact engines.
+
+    Every failure is shrunk and kept.
+    """
     from rich.console import Console
     from rich.progress import track
 

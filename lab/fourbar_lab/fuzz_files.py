@@ -1,4 +1,7 @@
-"""`python -m fourbar_lab fuzz-files`: mutated scene files must end in a scene or in one clear line."""
+"""`python -m fourbar_lab fuzz-files`: mutated scene files.
+
+Each must end in a scene or in one clear line.
+"""
 
 import time
 from collections.abc import Iterator, Sequence
@@ -15,7 +18,9 @@ from fourbar_validation.scenes.suites import list_model_files
 HANG = 5.0
 """Seconds; a scene file takes milliseconds."""
 MOST_POSITIONS = 10_000
-"""A mutated file may ask for 10^8 positions, and may have them; here only the reading of it is tried."""
+"""Positions that a mutated file may ask for here. It may have 10^8 of them, but only
+the reading of it is tried.
+"""
 PIECES = (
     *(
         '"',
@@ -71,7 +76,9 @@ PIECES = (
         "steps = 99999999999999999999",
     ),
 )
-"""Text that is put into files: the syntax itself, numbers at the edge, and text that other formats would run."""
+"""Text that is put into files. It is the syntax itself, numbers at the edge, and text
+that other formats would run.
+"""
 
 
 def mutate_files(
@@ -120,7 +127,10 @@ def _mutate(text: str, rng: np.random.Generator, originals: Sequence[str]) -> st
 
 
 def try_out(text: str) -> str:
-    """Read a mutated file and evaluate what it describes: what it ended in but a scene or one line, or nothing."""
+    """Read a mutated file and evaluate what it describes.
+
+    Return what it ended in but a scene or one line, or nothing.
+    """
     start = time.perf_counter()
     try:
         scene = loads(text, "mutant.toml")
@@ -143,7 +153,10 @@ def try_out(text: str) -> str:
 @click.option("--count", type=click.IntRange(min=1), default=100_000, show_default=True)
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
 def fuzz_files(count: int, seed: int) -> int:
-    """Read mutated scene files; any traceback or hang is printed with its text, and fails."""
+    """Read mutated scene files.
+
+    Any traceback or hang is printed with its text, and fails.
+    """
     from rich.progress import track
 
     originals = [file.read_text(encoding="utf-8") for file in list_model_files()]

@@ -1,10 +1,11 @@
-"""Inject faults, one after another: a module is loaded with another text, then the harness checks the test scenes.
+"""Inject faults, one after another.
 
-Run by its path, with the packages on PYTHONPATH: `python -P injection.py NUMBER...`
-prints what failed as JSON, a line for each fault; without a number nothing is injected
-and every test scene must hold. `injection.py --tests NUMBER` runs the tests that an
-entry of what judges names, and prints how they ended. As a module it would import the
-project before the fault stands.
+A module is loaded with another text, then the harness checks the test scenes. Run by
+its path, with the packages on PYTHONPATH: `python -P injection.py NUMBER...` prints
+what failed as JSON, a line for each fault; without a number nothing is injected and
+every test scene must hold. `injection.py --tests NUMBER` runs the tests that an entry
+of what judges names, and prints how they ended. As a module it would import the project
+before the fault stands.
 """
 
 import importlib.abc
@@ -36,7 +37,10 @@ def read_faults(table: str = "injected") -> list[dict[str, Any]]:
 
 
 def inject_fault(entry: dict[str, Any]) -> dict[str, str]:
-    """Change the text of modules, by their names; ValueError where the entry no longer fits one."""
+    """Change the text of modules, by their names.
+
+    Raises ValueError if the entry no longer fits one.
+    """
     texts = {}
     for change in (entry, *([entry["also"]] if "also" in entry else [])):
         text = _find_file(change["file"]).read_text(encoding="utf-8")
@@ -99,7 +103,10 @@ class _Text(importlib.machinery.SourceFileLoader):
 
 
 def list_failing(names: list[str]) -> dict[str, list[str]]:
-    """Check test scenes: by their names the rows that fail, as "engine quantity: reason"."""
+    """Check test scenes, and list the rows that fail by their names.
+
+    A row is "engine quantity: reason".
+    """
     from fourbar_lab.fault_scenes import FAULT_SCENES
     from fourbar_validation.engines.registry import ENGINES, HARD_ENGINES
     from fourbar_validation.run.judge import judge
@@ -119,7 +126,10 @@ def list_failing(names: list[str]) -> dict[str, list[str]]:
 
 
 def run_tests(entry: dict[str, Any]) -> dict[str, float]:
-    """Run the quick tests that an entry names, with its fault: pytest's exit status and the processor time, s."""
+    """Run the quick tests that an entry names, with its fault.
+
+    Return pytest's exit status and the processor time, s.
+    """
     import pytest
 
     finder = FaultFinder(entry)

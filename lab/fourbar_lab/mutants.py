@@ -59,7 +59,7 @@ OTHER: dict[type, type] = (
 """Replacement of each operator."""
 CHANGES = 1e-9
 SECONDS = 20
-"""A mutant that computes longer than this hangs: the run would be stopped, which is a failure too."""
+"""Time after which a mutant hangs. The run would be stopped, which is a failure too."""
 LEAST = 0.95
 """Share of the mutants that must be caught."""
 MODULES = (
@@ -163,7 +163,10 @@ class HangError(Exception):
 
 
 def choose_scenes() -> list[Scene]:
-    """Choose random linkages of every type, drive and branch, and a parallelogram near its change point."""
+    """Choose random linkages of every type, drive and branch.
+
+    A parallelogram near its change point is added.
+    """
     from fourbar_validation.scenes.hard_families import (
         approach_change_point,
         dress,
@@ -321,10 +324,10 @@ def judge_mutant(mutant: Mutant, tried: Sequence[Baseline]) -> bool | None:
     help="At most this many of each module.",
 )
 def command(module: str | None, most: int) -> int:
-    """Change operators and numbers of the formulas, one at a time; 95 % of those that matter must fail the harness.
+    """Change operators and numbers of the formulas, one at a time.
 
-    A change matters that alters a number by more than 1e-9. Those that are not caught
-    are listed.
+    95 % of those that matter must fail the harness. A change matters that alters a
+    number by more than 1e-9. Those that are not caught are listed.
     """
     from rich.console import Console
     from rich.progress import track

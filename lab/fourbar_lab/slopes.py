@@ -1,4 +1,6 @@
-"""Derivatives of every output by every number of a scene: of `sensitivity` against those of balls.
+"""Derivatives of every output by every number of a scene.
+
+Those of `sensitivity` are held against those of balls.
 
 The error allowed of a derivative s_i = dy/dx_i is
     8 eps (|s_i| + sum |x_j ds_i/dx_j| + sum |x_j s_j| / |x_i|):
@@ -43,10 +45,10 @@ def list_numbers(scene: Scene) -> dict[str, float]:
 
 
 def compute_exact_slopes(scene: Scene) -> tuple[Values, Slopes]:
-    """Return every output, and its derivatives and theirs by every number, by differences in balls.
+    """Return every output, and its derivatives and theirs by every number.
 
-    No output where the loop does not close, no derivative where the drive has no
-    torque.
+    They are differences in balls. No output where the loop does not close, no
+    derivative where the drive has no torque.
     """
     numbers, angle = list_numbers(scene), command_key(scene)
     make_balls(scene, numbers[angle])  # sets the precision
@@ -149,7 +151,10 @@ def judge_slopes(scene: Scene, tally: Tally, sample: str) -> None:
 
 
 def _is_held(scene: Scene, values: Values) -> bool:
-    """Return whether dry friction holds a pin at rest, so that torque and pin forces have no derivative."""
+    """Return whether dry friction holds a pin at rest.
+
+    Torque and pin forces then have no derivative.
+    """
     dry = [
         PINS[pin]
         for term in scene.effects

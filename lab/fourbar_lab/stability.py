@@ -1,4 +1,7 @@
-"""The command: forward error of every output of `solve` against ball arithmetic, per family of hard cases."""
+"""The command: forward error of every output of `solve`, per family.
+
+It is against ball arithmetic; the families are those of hard cases.
+"""
 
 import math
 import warnings
@@ -39,7 +42,10 @@ WIDE = 160
 
 
 def solve_position(scene: Scene, angle: float) -> dict[str, Any]:
-    """Solve one position with error bars; `solve` evaluates one in plain numbers, two in arrays."""
+    """Solve one position with error bars.
+
+    `solve` evaluates one in plain numbers, two in arrays.
+    """
     times = 1 + hash(angle) % 2  # as good as random, and the same on every run
     commanded = np.full(times, angle)
     scene = replace(scene, motion=scene.motion.replace(angle=commanded))
@@ -116,7 +122,9 @@ def run(
     *,
     derivatives: bool = False,
 ) -> Tally:
-    """Judge some samples of a family; each depends on the family, the seed and its number alone.
+    """Judge some samples of a family.
+
+    Each depends on the family, the seed and its number alone.
 
     Parameters
     ----------
@@ -138,7 +146,10 @@ def find_sign(scene: Scene) -> int:
 
 
 def feed_back(scene: Scene, bar: int) -> Scene | None:
-    """Command bar 2, 3 or 4 to move as it does under the scene's own command; None where that has no motion."""
+    """Command bar 2, 3 or 4 to move as it does under the scene's command.
+
+    None if that has no motion.
+    """
     if bar == 2:
         return scene
     solution = solve(scene, "acceleration")
@@ -153,7 +164,10 @@ def feed_back(scene: Scene, bar: int) -> Scene | None:
 
 
 def read_commanded(solution: Solution, bar: int) -> tuple[float, float, float, float]:
-    """Return angle, speed and acceleration of a bar at the first position, and the sine whose sign its branch is."""
+    """Return angle, speed and acceleration of a bar at the first position.
+
+    The sine whose sign its branch is follows.
+    """
     theta, omega, alpha = (
         float(getattr(solution, f"{name}_{bar}")[0])
         for name in ("theta", "omega", "alpha")
@@ -206,7 +220,10 @@ def stability(
     derivatives: bool,
     jobs: int,
 ) -> int:
-    """Measure the error of every output against 50-digit arithmetic, and whether the error bars hold."""
+    """Measure the error of every output against 50-digit arithmetic.
+
+    It tells too whether the error bars hold.
+    """
     from rich.console import Console
     from rich.progress import track
 

@@ -1,8 +1,9 @@
-"""Count what samples showed: the largest errors over what is allowed, and whether error bars hold.
+"""Count what samples showed.
 
-The error allowed is 8 eps (|y| + sum |x_i dy/dx_i|) with y the value (1 rad for angles)
-and x_i the stored inputs: what a change of the inputs in their last digits does to y,
-and nothing more.
+These are the largest errors over what is allowed, and whether error bars hold. The
+error allowed is 8 eps (|y| + sum |x_i dy/dx_i|) with y the value (1 rad for angles) and
+x_i the stored inputs: what a change of the inputs in their last digits does to y, and
+nothing more.
 """
 
 import math
@@ -16,16 +17,22 @@ EPS = 2.0**-52
 FACTOR = 8.0
 """Factor on eps in the allowed error, as the contract states it."""
 TOO_SMALL, TOO_LARGE = 10.0, 100.0
-"""An error bar may be this much smaller (never) and this much larger (in one of USELESS samples) than the error."""
+"""Factors by which an error bar may miss the error. It may be smaller (never) and
+larger (in one of USELESS samples).
+"""
 USELESS = 0.01
 CHANCE = 1e-6
-"""Least probability, with a share of USELESS, of so many samples or more by chance. One of 60 samples is."""
+"""Least probability of so many samples or more by chance. The share is that of USELESS.
+One of 60 samples is.
+"""
 HALF_A_DIGIT = 2.0**-53
-"""Half a digit of a result: a smaller error is chance, for no double need be nearer to the truth. A bar is called too
-large only against at least this error.
+"""Half a digit of a result: a smaller error is chance, for no double need be nearer to
+the truth. A bar is called too large only against at least this error.
 """
 UNTOLD = 0.125
-"""Part of |sin mu| that may be wrong with it if doubles do not tell whether the loop closes."""
+"""Part of |sin mu| that may be wrong. With it doubles do not tell whether the loop
+closes.
+"""
 
 
 @dataclass(slots=True)
@@ -65,7 +72,10 @@ class Tally:
         self.worst[output] = max(self.worst.get(output, (0.0, "")), (ratio, sample))
 
     def holds(self) -> bool:
-        """Return whether anything was compared, and error and error bars are as promised."""
+        """Return whether error and error bars are as promised.
+
+        Something must have been compared.
+        """
         bars = all(ratio <= TOO_SMALL for ratio in self.too_small.values())
         useful = all(
             is_by_chance(count, self.samples) for count in self.too_large.values()
@@ -77,21 +87,30 @@ class Tally:
 
 
 def is_by_chance(count: int, samples: int) -> bool:
-    """Return whether a share of USELESS explains that so many samples or more are counted (binomial)."""
+    """Return whether a share of USELESS explains the samples (binomial).
+
+    So many samples or more are counted.
+    """
     from scipy.stats import binom
 
     return bool(binom.sf(count - 1, samples, USELESS) >= CHANCE)
 
 
 def list_components(name: str) -> list[tuple[str, Any]]:
-    """List the names that an output has in the reference, and their index in its array."""
+    """List the names that an output has in the reference.
+
+    Their index in its array is listed too.
+    """
     return [(f"{name}_x", 0), (f"{name}_y", 1)] if name in VECTORS else [(name, 0)]
 
 
 def compute_ratio(
     name: str, ours: float, value: Any, sensitivity: float
 ) -> tuple[float, float]:
-    """Compute an error over what is allowed, and the error: 0 where the balls cannot tell it from the truth."""
+    """Compute an error over what is allowed, and the error.
+
+    It is 0 where the balls cannot tell it from the truth.
+    """
     error = value - float(ours) if math.isfinite(ours) else math.inf
     size = abs(float(value.mid()))
     if name.startswith("theta"):
@@ -108,7 +127,10 @@ def compute_ratio(
 
 
 def is_untold(sine: Any, sensitivity: float) -> bool:
-    """Return whether so few digits of sin mu are known that there may be no derivatives."""
+    """Return whether few digits of sin mu are known.
+
+    There may be no derivatives then.
+    """
     return compute_allowed(size := abs(float(sine.mid())), sensitivity) > UNTOLD * size
 
 

@@ -1,4 +1,7 @@
-"""`python -m fourbar_lab write`: write the MJCF of every scene in models/ next to it."""
+"""`python -m fourbar_lab write`: write the MJCF of every scene in models/.
+
+It is written next to the scene.
+"""
 
 import math
 import re
@@ -15,11 +18,16 @@ from fourbar_validation.scenes.suites import list_model_files
 
 NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 ROUND_OFF = 1e-12
-"""The assembled state is computed, and another processor's sine may end it in another digit."""
+"""Part by which the assembled state may differ. It is computed, and another
+processor's sine may end it in another digit.
+"""
 
 
 def find_stale(files: Iterable[Path]) -> list[Path]:
-    """Find the scene files whose MJCF is missing or differs from what they generate now, round-off apart."""
+    """Find the scene files whose MJCF is missing or differs.
+
+    It differs from what they generate now, round-off apart.
+    """
     stale = []
     for file in files:
         xml = file.with_suffix(".xml")

@@ -1,4 +1,7 @@
-"""Engines that join a run where they are installed: Exudyn, OpenSim and Drake, each imported by its adapter alone."""
+"""Engines that join a run where they are installed: Exudyn, OpenSim and Drake.
+
+Each is imported by its adapter alone.
+"""
 
 import hashlib
 from collections.abc import Callable

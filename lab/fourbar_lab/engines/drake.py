@@ -1,4 +1,7 @@
-"""Drake: inverse dynamics on the open tree, the loop closed by multipliers, pin forces from its reaction port."""
+"""Drake: inverse dynamics on the open tree, pin forces from its reaction port.
+
+Multipliers close the loop.
+"""
 
 from collections.abc import Iterable, Sequence
 from functools import partial
@@ -140,7 +143,10 @@ class DrakeTree(Tree):
     def needed(
         self, field: tuple[float, float], wrenches: dict[int, list[float]]
     ) -> Array:
-        """Compute the inverse dynamics with gravity as a force element and what acts on the bars as external forces."""
+        """Compute the inverse dynamics with gravity as a force element.
+
+        What acts on the bars are external forces.
+        """
         forces = MultibodyForces(self.plant)
         if any(field):
             self.plant.CalcForceElementsContribution(self.context, forces)
@@ -154,7 +160,10 @@ class DrakeTree(Tree):
         return self.balancing
 
     def carried(self) -> dict[int, Pair]:
-        """Read the reaction port, which finds the accelerations once more, from what acts and what the motion needs."""
+        """Read the reaction port, which finds the accelerations once more.
+
+        It uses what acts and what the motion needs.
+        """
         applied = []
         for bar, wrench in self.wrenches.items():
             force = ExternallyAppliedSpatialForce()

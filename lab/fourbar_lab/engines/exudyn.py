@@ -1,4 +1,6 @@
-"""Exudyn: nine absolute coordinates, the multipliers of four pins and a drive; springs and dampers are its own.
+"""Exudyn: nine absolute coordinates and the multipliers of pins and drive.
+
+There are four pins; springs and dampers are Exudyn's own.
 
 A bar is `ObjectRigidBody2D` with coordinates (x, y of its first pin, direction). The
 nine constraints g = 0 are two of each pin, and the drive: a bar's direction, or the
@@ -52,7 +54,9 @@ from fourbar_validation.engines.loop import Exact
 SIZE = 9
 """Coordinates, and constraints."""
 B_ROWS, OTHER_ROWS = [4, 5], [0, 1, 2, 3, 6, 7]
-"""The rows of pin B and of the others among the constraints, which stand in the order of `JOINTS`, the drive last."""
+"""Rows of pin B and of the others among the constraints. They are in the order of
+`JOINTS`, the drive last.
+"""
 JOINTS = {"O2": (1, 2), "A": (3, 2), "B": (4, 3), "O4": (1, 4)}
 """Bars of each pin; the pin's force is that on the second bar: F12, F32, F43, F14."""
 
@@ -69,7 +73,9 @@ class ExudynBars(Loaded):
     behind: Any = None
     """Marker of the end on the ground, where a force at a point drives."""
     reach: float
-    """Distance of that end, m: of the size of the coordinates, so that the direction keeps its digits."""
+    """Distance of that end, m. It has the size of the coordinates, so that the
+    direction keeps its digits.
+    """
 
     def __init__(self, scene: Scene) -> None:
         if reason := find_unknown(scene, has_term, forces=True):
@@ -141,7 +147,10 @@ class ExudynBars(Loaded):
         self.shifts = [i for i in range(SIZE) if i not in self.turn.values()]
 
     def place(self, q: Sequence[float]) -> None:
-        """Set the bars' angles; the pins O2, A and O4 are closed, in which Exudyn's constraints are linear."""
+        """Set the bars' angles; the pins O2, A and O4 are closed.
+
+        Exudyn's constraints are linear in these pins.
+        """
         of_3_to_2, theta_4 = q[1:]
         theta_2 = reduce_angle(q[0])
         coordinates = np.zeros(SIZE)
@@ -180,7 +189,10 @@ class ExudynBars(Loaded):
         return x, y
 
     def jacobian(self) -> Array:
-        """Return the derivative of the gap by the joint angles, pins O2, A and O4 kept closed."""
+        """Return the derivative of the gap by the joint angles.
+
+        Pins O2, A and O4 are kept closed.
+        """
         turns, pins, b = (
             list(self.turn.values()),
             self.jacobians[OTHER_ROWS],
@@ -230,7 +242,10 @@ class ExudynBars(Loaded):
         return {name: self.point(point) for name, point in POINTS.items()}
 
     def move(self, bar: int, speed: float, acceleration: float) -> Values:
-        """Return speeds, accelerations and multipliers; nothing where a toggle leaves them 0/0."""
+        """Return speeds, accelerations and multipliers.
+
+        Empty where a toggle leaves them 0/0.
+        """
         if self.behind is not None:
             self._move_behind()
         of_drive, commanded = (

@@ -32,7 +32,10 @@ from fourbar_validation.engines.description import (
 
 
 class Bodies:
-    """The ground and a body of each bar, with the coordinates of its first pin and its direction."""
+    """The ground and a body of each bar.
+
+    The coordinates are those of its first pin and its direction.
+    """
 
     def __init__(self, mbs: Any, linkage: FourBar) -> None:
         self.mbs, self.ground_angle = mbs, linkage.ground_angle
@@ -50,7 +53,10 @@ class Bodies:
             self.body[part.bar] = mbs.AddObject(body)
 
     def point(self, bar: int, x: float = 0.0, y: float = 0.0) -> Any:
-        """Mark a point of a bar, along and across its line from its first pin; of the ground in world axes."""
+        """Mark a point of a bar, along and across its line from its first pin.
+
+        Of the ground it is in world axes.
+        """
         return self.mbs.AddMarker(
             MarkerBodyPosition(bodyNumber=self.body[bar], localPosition=[x, y, 0.0])
         )
@@ -64,7 +70,10 @@ class Bodies:
         )
 
     def axes(self, bar: int, turn: float = 0.0) -> Any:
-        """Mark axes fixed in a bar at its first pin, rotated by an angle from its line."""
+        """Mark axes fixed in a bar at its first pin.
+
+        They are rotated by an angle from its line.
+        """
         cos, sin = math.cos(turn), math.sin(turn)
         frame = [
             [cos, -sin, 0.0, 0.0],
@@ -89,7 +98,10 @@ def _add_viscous(effect: Any, bodies: Bodies) -> None:
 
 
 def _add_torsion(effect: Any, bodies: Bodies) -> None:
-    """Add a `TorsionalSpringDamper`, which measures within half a turn of rest between axes that coincide there."""
+    """Add a `TorsionalSpringDamper` between axes that coincide at rest.
+
+    It measures within half a turn of rest.
+    """
     for pin, stiffness, rest, preload in effect.springs:
         first, second = PINS[pin]
         line = bodies.ground_angle if first == 1 else 0.0

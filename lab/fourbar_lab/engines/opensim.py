@@ -1,9 +1,10 @@
-"""OpenSim (Simbody): bars 2 and 4 on the ground, bar 3 on bar 4, closed at pin A by its own constraint and solve.
+"""OpenSim (Simbody): bars 2 and 4 on the ground, bar 3 on bar 4.
 
-Coordinates are the direction of bar 2, that of bar 4, and that of bar 3 against bar 4.
-The closing force, the joint reactions, the accelerations and the couple that moves bar
-2 or 4 as commanded come from Simbody's constrained dynamics. No coordinate is the
-direction of bar 3, whose command is refused.
+Its own constraint and solve close the loop at pin A. Coordinates are the direction of
+bar 2, that of bar 4, and that of bar 3 against bar 4. The closing force, the joint
+reactions, the accelerations and the couple that moves bar 2 or 4 as commanded come from
+Simbody's constrained dynamics. No coordinate is the direction of bar 3, whose command
+is refused.
 """
 
 import math
@@ -40,11 +41,17 @@ PER_COORDINATE = {
 }
 """Derivative of each bar's direction by the coordinates."""
 PASSES = 50
-"""Number of passes; each leaves a millionth to a tenth of the previous pass's multipliers, down to rounding."""
+"""Number of passes, down to rounding. Each leaves a millionth to a tenth of the
+previous pass's multipliers.
+"""
 LEAST_CONDITIONED = 1e-11
-"""Simbody 4.6 drops a constraint as dependent from 5e-12 to 7e-12 on: 1000 positions near limits of 40 linkages."""
+"""Ratio at which Simbody 4.6 drops a constraint as dependent. Measured: 5e-12 to 7e-12,
+at 1000 positions near limits of 40 linkages.
+"""
 TIME_IS_ALPHA = (1.0 / 6.0, 0.0, 0.0, 0.0)
-"""t^3/6: the motion prescribed for bar 2 or 4, whose second derivative is the time, set to its acceleration."""
+"""Motion t^3/6 prescribed for bar 2 or 4. Its second derivative is the time, set to the
+bar's acceleration.
+"""
 TURNING = {2: "O2", 4: "O4"}
 """Joint whose coordinate is the direction of a bar."""
 
@@ -132,7 +139,9 @@ class OpenSimBars(Loaded):
         self.pin_a.setIsEnforced(self.state, True)
         self.matter = model.getMatterSubsystem()
         self.least_conditioned = 1.0
-        """Least ratio of singular values of the multipliers' matrix G M^-1 G^T, over the positions moved so far."""
+        """Least ratio of singular values of the multipliers' matrix G M^-1 G^T. It is
+        that over the positions moved so far.
+        """
 
     def refusal(self) -> str:
         """Tell where constraints may have been dropped."""
@@ -160,7 +169,10 @@ class OpenSimBars(Loaded):
         return joint
 
     def _add_at_first_pin(self, bar: int) -> list[Any]:
-        """Add the components (x, y, moment) of a wrench on a bar at its first pin, to be set at each position."""
+        """Add a wrench on a bar at its first pin, to be set at each position.
+
+        Its components are x, y, moment.
+        """
         element = osim.PrescribedForce(f"wrench{bar}", self.body[bar])
         element.setForceIsInGlobalFrame(True)
         element.setPointFunctions(*_make_constants())
@@ -174,7 +186,10 @@ class OpenSimBars(Loaded):
         ]
 
     def place(self, q: Sequence[float]) -> None:
-        """Set the bars' angles, at rest: Simbody forms its matrices by differences from the present motion."""
+        """Set the bars' angles, at rest.
+
+        Simbody forms its matrices by differences from the present motion.
+        """
         of_3_to_2, theta_4 = q[1:]
         theta_2 = reduce_angle(q[0])
         self.state.setTime(0.0)
@@ -197,7 +212,10 @@ class OpenSimBars(Loaded):
         return x, y
 
     def jacobian(self) -> Array:
-        """Return the derivative of the gap by the angles of bar 2, of bar 3 against bar 2, and of bar 4."""
+        """Return the derivative of the gap by three angles.
+
+        They are those of bar 2, of bar 3 against bar 2, and of bar 4.
+        """
         by_own = self._compute_station_jacobian(
             "end2"
         ) - self._compute_station_jacobian("first_pin3")
@@ -222,7 +240,10 @@ class OpenSimBars(Loaded):
         return {name: self.point(point) for name, point in POINTS.items()}
 
     def move(self, bar: int, speed: float, acceleration: float) -> Values:
-        """Compute speeds and accelerations, pin forces and torque; nothing where a toggle leaves them 0/0."""
+        """Compute speeds and accelerations, pin forces and torque.
+
+        Empty where a toggle leaves them 0/0.
+        """
         if bar != self.commanded:
             self.commanded, q = bar, self.state.getQ().to_numpy()
             for moving, pin in TURNING.items():
@@ -258,7 +279,10 @@ class OpenSimBars(Loaded):
         return np.asarray(self.line()[1] @ rate)
 
     def _set_motion(self, speed: float, acceleration: float) -> tuple[Array, Array]:
-        """Solve the constraint equations for the coordinates' speeds per speed commanded, and their accelerations."""
+        """Solve the constraint equations for the coordinates' speeds.
+
+        They are per speed commanded; the accelerations are solved for too.
+        """
         equations = self._differentiate_constraints()
         turns = np.linalg.solve(equations, np.eye(3)[0])
         self.state.setTime(acceleration)
@@ -335,7 +359,10 @@ class OpenSimBars(Loaded):
         return {**reactions, "F32": closing, self.driving: drive}
 
     def _differentiate_constraints(self) -> Array:
-        """Differentiate the constraints by the coordinates: the commanded motion, and pin A along two axes."""
+        """Differentiate the constraints by the coordinates.
+
+        They are the commanded motion, and pin A along two axes.
+        """
         matrix = osim.Matrix()
         self.matter.calcG(self.state, matrix)
         return np.array(matrix.to_numpy())[:3]
@@ -369,7 +396,10 @@ class OpenSimBars(Loaded):
         )
 
     def _compute_closing_force(self) -> Array:
-        """Compute the force of bar 3 on bar 2 from the constraint's multipliers; on bodies it is -G^T lambda."""
+        """Compute the force of bar 3 on bar 2 from the multipliers.
+
+        They are the constraint's; on bodies the force is -G^T lambda.
+        """
         on_bodies, on_mobilities = osim.VectorOfSpatialVec(), osim.Vector()
         multipliers = self.state.getMultipliers()
         self.matter.calcConstraintForcesFromMultipliers(
@@ -399,5 +429,8 @@ def make_vector(values: Iterable[float]) -> Any:
 
 
 def _make_constants() -> list[Any]:
-    """Make three functions of time that are zero, and may be given another value later."""
+    """Make three functions of time that are zero.
+
+    They may be given another value later.
+    """
     return [osim.Constant(value) for value in ZERO]

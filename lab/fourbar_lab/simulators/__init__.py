@@ -1,1 +1,4 @@
-"""Simulators under test: each is compared with the formulas in an environment of its own."""
+"""Simulators under test.
+
+Each is compared with the formulas in an environment of its own.
+"""

@@ -33,7 +33,10 @@ class Dart(Simulator):
     settings: ClassVar[dict[str, None]] = {"its defaults": None}
 
     def through(self, scene: Scene, course: Course) -> Readings:
-        """Run through a course; torque and forces are those with which the last step began."""
+        """Run through a course.
+
+        Torque and forces are those with which the last step began.
+        """
         begin, inertia = start(scene), size_flywheel(scene, LIGHT)
         world, linkage = dartpy.simulation.World(), dartpy.dynamics.Skeleton("four_bar")
         bodies: dict[int, Any] = {}

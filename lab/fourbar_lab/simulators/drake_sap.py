@@ -1,4 +1,7 @@
-"""Drake's own simulation of the SDF file: a discrete plant, its SAP solver, the loop closed in two ways."""
+"""Drake's own simulation of the SDF file.
+
+It is a discrete plant with its SAP solver, the loop closed in two ways.
+"""
 
 from importlib.metadata import version
 from typing import Any, ClassVar
@@ -53,7 +56,10 @@ class DrakeSap(Simulator):
     """Simulator for which the SDF is written; Gazebo's SDF has the fourth joint."""
 
     def through(self, scene: Scene, course: Course) -> Readings:
-        """Run through a course, carried by a flywheel, the rotor of an actuator on O2."""
+        """Run through a course, carried by a flywheel.
+
+        The flywheel is the rotor of an actuator on O2.
+        """
         timestep, written_for = course.timestep, self.settings[self.setting]
         begin, inertia = start(scene), size_flywheel(scene, LIGHT)
         plant = MultibodyPlant(timestep)

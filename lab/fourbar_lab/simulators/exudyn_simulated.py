@@ -1,4 +1,7 @@
-"""Exudyn's own simulation: nine absolute coordinates, its implicit solvers, all four pins and the drive multipliers."""
+"""Exudyn's own simulation by its implicit solvers.
+
+It has nine absolute coordinates, and multipliers of all four pins and the drive.
+"""
 
 import time
 from importlib.metadata import version
@@ -29,7 +32,10 @@ class ExudynIntegrators(Simulator):
     }
 
     def through(self, scene: Scene, course: Course) -> Readings:
-        """Run through a course; multipliers, speeds and accelerations are all of the end of a step."""
+        """Run through a course.
+
+        Multipliers, speeds and accelerations are all of the end of a step.
+        """
         begin, bars = start(scene), ExudynBars(scene)
         if bars.terms:
             raise LimitError(

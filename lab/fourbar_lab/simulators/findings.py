@@ -1,4 +1,7 @@
-"""`findings`: each finding's script in an environment of engines.toml that has its simulator."""
+"""`findings`: each finding's script in an environment with its simulator.
+
+The environments are those of engines.toml.
+"""
 
 import ast
 import re
@@ -17,14 +20,18 @@ from fourbar_validation.places import CHECKOUT
 
 FOLDER = None if CHECKOUT is None else CHECKOUT / "docs" / "findings"
 FIELDS = ("Engine", "With", "Expected", "Found", "Since", "Until", "Reported")
-"""Fields of a script's docstring, after its first sentence; Engine: the name for pip, in brackets what is imported."""
+"""Fields of a script's docstring, after its first sentence. Engine: the name for pip,
+in brackets what is imported.
+"""
 LOOK = (
     "import importlib.metadata, importlib.util as u, sys; u.find_spec({0!r}) or"
     " sys.exit(1)"
 )
 """Program for a Python interpreter that fails if a module is not installed."""
 FIXED = "fixed"
-"""Word that a script prints at its end, with exit status 1, if the finding no longer holds."""
+"""Word that a script prints at its end if the finding no longer holds. Its exit status
+is then 1.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +94,10 @@ def find_interpreter(finding: Reproduction) -> tuple[str, str] | None:
 
 
 def _list_interpreters(name: str) -> Iterator[str]:
-    """List this interpreter, and those of the engines that require a package, which pip installs for the first."""
+    """List this interpreter, and those of the engines that require a package.
+
+    pip installs it for the first of these.
+    """
     yield sys.executable
     for entry in read_engines([]).values():
         if any(
@@ -132,7 +142,10 @@ def run_findings(
     "--time-limit", default=600.0, show_default=True, help="Seconds for each script."
 )
 def command(scripts: tuple[Path, ...], time_limit: float) -> None:
-    """Run the scripts of docs/findings where their simulators are: here, or in environments of engines.toml."""
+    """Run the scripts of docs/findings where their simulators are.
+
+    They run here, or in environments of engines.toml.
+    """
     chosen = [read(script) for script in scripts] or read_findings()
     for finding in chosen:
         if "Engine" not in finding.fields:

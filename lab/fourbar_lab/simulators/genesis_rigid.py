@@ -21,8 +21,8 @@ from fourbar_lab.simulators.motion import (
 from fourbar_lab.simulators.mujoco_c import text
 
 FLYWHEEL = 1e5
-"""Inertia of the flywheel relative to the linkage's; beside 1e8 its solver leaves gravity to itself unless it is set to
-MuJoCo's tolerance.
+"""Inertia of the flywheel relative to the linkage's; beside 1e8 its solver leaves
+gravity to itself unless it is set to MuJoCo's tolerance.
 """
 genesis.init(
     backend=genesis.gpu if torch.cuda.is_available() else genesis.cpu,
@@ -49,7 +49,10 @@ class GenesisRigid(Simulator):
     """Arguments of the MJCF morph and of the rigid solver's options."""
 
     def through(self, scene: Scene, course: Course) -> Readings:
-        """Run through a course; torque and force are those with which the step began."""
+        """Run through a course.
+
+        Torque and force are those with which the step began.
+        """
         of_morph, of_solver = self.settings[self.setting]
         common: dict[str, Any] = {"dt": course.timestep, "gravity": find_gravity(scene)}
         world = genesis.Scene(

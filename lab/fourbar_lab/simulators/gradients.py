@@ -1,8 +1,9 @@
-"""Differentiate the driving torque at a state by three numbers, with a simulator that can be differentiated.
+"""Differentiate the driving torque at a state by three numbers.
 
-Assembling the loop and compiling a model are no part of what it differentiates: how its
-state and the numbers of its model change with a number of the scene is taken from two
-scenes to either side, each assembled by MuJoCo.
+The simulator is one that can be differentiated. Assembling the loop and compiling a
+model are no part of what it differentiates: how its state and the numbers of its model
+change with a number of the scene is taken from two scenes to either side, each
+assembled by MuJoCo.
 """
 
 from typing import Any, NamedTuple
@@ -33,7 +34,10 @@ class ClosedState(NamedTuple):
 
 
 def assemble(scene: Scene, theta_2: float, reader: str) -> ClosedState:
-    """Compile a scene as it is written for a simulator, and assemble it at theta_2 (rad) and its speed."""
+    """Compile a scene for a simulator, and assemble it at theta_2 (rad).
+
+    It has the speed there.
+    """
     written = text(scene, STEPS, reader)
     loop, (model, data) = ClosedLoop(written), open_model(written)
     q = Assembler(loop).find(theta_2, scene.motion.branch)
@@ -79,7 +83,10 @@ def choose_quarter(scene: Scene) -> tuple[float, float]:
 def collect_answer(
     scene: Scene, how: str, state: tuple[Any, Any, Any, Any], by: dict[str, Any]
 ) -> dict[str, Any]:
-    """Put together theta_2, omega_2, alpha_2 and torque of a state, and the torque's derivatives, as plain numbers."""
+    """Collect theta_2, omega_2, alpha_2 and torque of a state, and derivatives.
+
+    They are plain numbers; the derivatives are those of the torque.
+    """
     names = (*scene.motion.names, "torque")
     return {"how": how, "by": {key: float(x) for key, x in by.items()}} | {
         name: float(x) for name, x in zip(names, state, strict=True)

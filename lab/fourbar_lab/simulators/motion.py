@@ -1,4 +1,7 @@
-"""Simulators as engines of the protocol: a command is run through in time, or each of its positions set as a state."""
+"""Simulators as engines of the protocol.
+
+A command is run through in time, or each of its positions is set as a state.
+"""
 
 import copy
 import math
@@ -27,11 +30,14 @@ from fourbar_validation.engines.free_body_closure import close
 STEPS = 628
 """Steps in a turn where no setting states them."""
 LIGHT = replace(RECIPE, flywheel=30.0)
-"""Recipe for accelerations that are differences of speeds: of a heavier flywheel's they keep no digits, and solvers
-that end at a part of all momentum leave the loop to itself beside it.
+"""Recipe for accelerations that are differences of speeds: of a heavier flywheel's they
+keep no digits, and solvers that end at a part of all momentum leave the loop to itself
+beside it.
 """
 LEADS = tuple(np.pi / 2.0**power for power in range(1, 6))
-"""rad; a run begins so far before its first position, where the linkage closes there, so that its closure settles."""
+"""Angle by which a run begins before its first position, rad. Where the linkage closes
+there, its closure settles.
+"""
 FROM_TOGGLE = 0.1
 """Least |sin(theta_4 - theta_3)| on the way to the first position."""
 
@@ -87,7 +93,11 @@ class Readings:
 
 
 class Simulator:
-    """Base of the simulators: chooses a setting, asks for a run or for single states, and states the motion made."""
+    """Base of the simulators.
+
+    It chooses a setting, asks for a run or for single states, and states the motion
+    made.
+    """
 
     name: str
     version = ""
@@ -196,7 +206,10 @@ def refuse_what_no_simulator_holds(scene: Scene, command: Command) -> None:
 
 
 def lay_out(scene: Scene, command: Command, steps: int) -> tuple[Scene, Course]:
-    """Lay out a run through the positions of a command; the scene's motion begins before them, so that it settles."""
+    """Lay out a run through the positions of a command.
+
+    The scene's motion begins before them, so that it settles.
+    """
     refuse_what_no_simulator_holds(scene, command)
     sense = math.copysign(1.0, scene.motion.omega_2 or 0.0)
     first = float((sense * command.theta_2).min()) * sense
@@ -264,9 +277,10 @@ def run_through(
 
 
 def start(scene: Scene) -> Start:
-    """Assemble the first position that closes, in the direction of motion, and its speeds, as the free body does.
+    """Assemble the first position that closes, in the direction of motion.
 
-    No simulator starts from what the formulas computed.
+    Its speeds are those of the free body. No simulator starts from what the formulas
+    computed.
     """
     commanded, omega_2 = command(scene), scene.motion.omega_2 or 0.0
     closed = close(scene.linkage, commanded.theta_2, commanded.branch)
@@ -300,7 +314,10 @@ def find_gravity(scene: Scene) -> tuple[float, float, float]:
 
 @contextmanager
 def write_temp(text: str, name: str) -> Iterator[str]:
-    """Write a file that lasts as long as the context: for simulators that read no text."""
+    """Write a file that lasts as long as the context.
+
+    It is for simulators that read no text.
+    """
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / name
         file.write_text(text, encoding="utf-8")

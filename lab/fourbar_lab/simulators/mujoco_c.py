@@ -1,4 +1,7 @@
-"""MuJoCo itself (the C library), with the settings of the generated file and with its own defaults."""
+"""MuJoCo itself (the C library), by the generated file.
+
+It runs with the file's settings and with its own defaults.
+"""
 
 from dataclasses import replace
 from functools import partial
@@ -31,10 +34,10 @@ BY_DEFAULT = {
 
 
 def text(scene: Scene, steps: int, simulator: str | None, **settings: Any) -> str:
-    """Write the MJCF, opening in the simulators' common start, with so many steps a turn.
+    """Write the MJCF, opening in the simulators' common start.
 
-    Without a simulator's name all that the solver is set to goes; `settings`: others
-    than those of the simulator.
+    It has so many steps a turn. Without a simulator's name all that the solver is set
+    to goes; `settings`: others than those of the simulator.
     """
     reader = simulator or "warp"  # without pads
     changed = replace(
@@ -69,7 +72,10 @@ def find_bars(model: Any) -> list[int]:
 
 
 def states_of(written: str, scene: Scene) -> list[tuple[Array, Array]]:
-    """Assemble the scene's positions by MuJoCo's own kinematics: Newton on the gap, speeds by its Jacobian."""
+    """Assemble the scene's positions by MuJoCo's own kinematics.
+
+    It is Newton on the gap, and speeds by its Jacobian.
+    """
     loop, states = ClosedLoop(written), []
     position = Assembler(loop)
     for theta_2 in command(scene).theta_2.tolist():

@@ -49,7 +49,9 @@ class MujocoMjx(Simulator):
         "written for MJX": "mjx",
         "as for MuJoCo": "mujoco",
     }
-    """The file written for MJX yields within two timesteps, which makes up for the term that MJX leaves out."""
+    """The file written for MJX yields within two timesteps. That makes up for the term
+    that MJX leaves out.
+    """
     single_states = True
 
     def through(self, scene: Scene, course: Course) -> Readings:
@@ -84,7 +86,10 @@ class MujocoMjx(Simulator):
         return readings
 
     def slopes(self, scene: Scene) -> list[dict[str, Any]]:
-        """Differentiate the driving torque forwards, at a set state and through a quarter turn, and backwards."""
+        """Differentiate the driving torque forwards and backwards.
+
+        It is at a set state and through a quarter turn.
+        """
         begin, end = gradients.choose_quarter(scene)
         ways = [
             ("jax.jvp at a set state", end, 0),
@@ -131,7 +136,10 @@ def _evaluated(model: Any, state: Any) -> Instant:
 def _slopes(
     scene: Scene, how: str, theta_2: float, differentiate: Callable[..., Any]
 ) -> dict[str, Any]:
-    """Differentiate along the changes of model and state, which as trees differ in what is no number of theirs."""
+    """Differentiate along the changes of model and state.
+
+    As trees these differ in what is no number of theirs.
+    """
     model, data, q, v = gradients.assemble(scene, theta_2, "mjx")
     inputs, by, state = (mjx.put_model(model), q, v), {}, (0.0,) * 4
     for key in gradients.list_keys(scene):
@@ -147,7 +155,10 @@ def _slopes(
 def _torque(
     part: Any, inputs: Any, moves: Any, data: Any, steps: Any
 ) -> tuple[Any, Any]:
-    """Evaluate the torque where so much of the moves is added to what is given, and the state it is of."""
+    """Evaluate the torque where so much of the moves is added.
+
+    The state it is of is returned too.
+    """
     leaves, tree = jax.tree.flatten(inputs)
     moved = [
         x + part * y if jax.numpy.issubdtype(x.dtype, float) else x

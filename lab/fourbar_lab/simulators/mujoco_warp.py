@@ -1,4 +1,8 @@
-"""MuJoCo Warp, in single precision; `forward` once as a user of MuJoCo would, and twice as the file's comment says."""
+"""MuJoCo Warp, in single precision.
+
+`forward` is called once as a user of MuJoCo would, and twice as the file's comment
+says.
+"""
 
 import time
 from typing import Any, ClassVar
@@ -44,7 +48,8 @@ class MujocoWarp(Simulator):
             else {}
         ),
     }
-    """Number of evaluations of a state and of simulated worlds; the last world is read."""
+    """Number of evaluations of a state and of simulated worlds. The last world is read.
+    """
     single_states = True
 
     def through(self, scene: Scene, course: Course) -> Readings:
@@ -90,7 +95,10 @@ class MujocoWarp(Simulator):
         return readings
 
     def slopes(self, scene: Scene) -> list[dict[str, Any]]:
-        """Differentiate the driving torque at a set state backwards, by the tape, then along each change."""
+        """Differentiate the driving torque at a set state.
+
+        It is backwards, by the tape, then along each change.
+        """
         _, theta_2 = gradients.choose_quarter(scene)
         model, data, q, v = gradients.assemble(scene, theta_2, "warp")
         theirs, state = mjw.put_model(model), mjw.put_data(model, data)

@@ -1,4 +1,7 @@
-"""Newton's Kamino solver (beta, single precision, maximal coordinates), from the USD file."""
+"""Newton's Kamino solver, from the USD file.
+
+It is a beta in single precision, with maximal coordinates.
+"""
 
 from dataclasses import replace
 from importlib.metadata import version
@@ -27,7 +30,9 @@ from fourbar_validation.engines.description import rotate
 
 TOLERANCES = ("primal_tolerance", "dual_tolerance", "compl_tolerance")
 PARENTS = {"O2": None, "A": 0, "O4": None, "B": 2}
-"""The body on which each joint's axes are fixed, in the order of the joints; None: the ground."""
+"""Body on which each joint's axes are fixed, in the order of the joints. None: the
+ground.
+"""
 
 
 class NewtonKamino(Simulator):
@@ -51,7 +56,10 @@ class NewtonKamino(Simulator):
     tolerance = (0.2, "single precision and first order in the timestep")
 
     def through(self, scene: Scene, course: Course) -> Readings:
-        """Run through a course; forces are those of a step, with the state in which it began."""
+        """Run through a course.
+
+        Forces are those of a step, with the state in which it began.
+        """
         begin, inertia = start(scene), size_flywheel(scene, LIGHT)
         carried = replace(scene, effects=(*scene.effects, Flywheel(inertia, 2)))
         builder = newton.ModelBuilder()

@@ -1,4 +1,7 @@
-"""Pinocchio's forward dynamics of the closed loop: its acceleration solvers under RK4, its impulse solvers of 4.1."""
+"""Pinocchio's forward dynamics of the closed loop.
+
+Its acceleration solvers are under RK4; it has the impulse solvers of 4.1 too.
+"""
 
 from typing import Any, ClassVar
 
@@ -30,11 +33,16 @@ PROXIMAL = 1e-10
 its three rows depends on the rest.
 """
 ACCURATE = 1e-10
-"""Accuracy asked of the impulse solvers in place of the example's 1e-6, absolute and relative."""
+"""Accuracy asked of the impulse solvers, absolute and relative. It replaces the
+example's 1e-6.
+"""
 
 
 class LoopConstrained(ClosedTree):
-    """The same closure solved by the loop-constrained articulated body algorithm (lcaba)."""
+    """The same closure solved by lcaba.
+
+    It is the loop-constrained articulated body algorithm.
+    """
 
     def __init__(self, tree: PinocchioTree, time_constant: float) -> None:
         super().__init__(tree, time_constant)
@@ -54,7 +62,10 @@ class LoopConstrained(ClosedTree):
         ).copy()
 
     def loop_force(self) -> Array:
-        """Return F43: lcaba leaves the force on bar 4, in the axes of bar 3, whatever frame the closure was given."""
+        """Return F43, in whatever frame the closure was given.
+
+        lcaba leaves the force on bar 4 in the axes of bar 3.
+        """
         return np.array(
             -self.tree.rotation(3) @ self.closure_data[0].contact_force.linear[:2]
         )
@@ -167,7 +178,10 @@ class PinocchioSolvers(Simulator):
         )
 
     def states(self, scene: Scene) -> Readings:
-        """Evaluate single states; the impulse solvers have none: a step sees (dJ/dt) v in the step before."""
+        """Evaluate single states.
+
+        The impulse solvers have none: a step sees (dJ/dt) v in the step before.
+        """
         solver = self.settings[self.setting]
         if isinstance(solver, str):
             raise LimitError("an impulse solver has no single states")
@@ -214,7 +228,10 @@ def _evaluated(
 def _read(
     tree: PinocchioTree, inertia: float, q: Array, v: Array, a: Array, loop_force: Array
 ) -> Instant:
-    """Read what Pinocchio's recursive Newton-Euler says the joints carry under its own closing force."""
+    """Read what Pinocchio's recursive Newton-Euler says the joints carry.
+
+    It is under Pinocchio's own closing force.
+    """
     tree.model.armature = np.zeros(3)
     tree.place(q.tolist())
     tree.moving(v, a)

@@ -36,13 +36,18 @@ CONVENTIONS = (
 )
 ARCHIVE = "fourbar-problems-1.0"
 PROMISED = 1e-9
-"""rad in 5 s of a released motion, held by test_free_motion_reference.py; beyond them in proportion."""
+"""Error of a released motion in 5 s, rad. test_free_motion_reference.py holds it;
+beyond them it is in proportion.
+"""
 PROMISED_FOR = 5.0
 """s."""
 
 
 def collect_problem(name: str) -> dict[str, Any]:
-    """Collect what is stated and what is to be answered, each value with an error bar."""
+    """Collect what is stated and what is to be answered.
+
+    Each value has an error bar.
+    """
     if name in slider_crank.SLIDER_CRANKS:
         return {"schema": SCHEMA, **slider_crank.make_problem(name)}
     scene = fourbar.load(PROBLEMS / f"{name}.toml")
@@ -88,7 +93,10 @@ def list_problems() -> list[str]:
 
 
 def _answer_released(solution: Solution) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Answer a released motion: it errs as a time that is off; angle, speed and forces with it."""
+    """Answer a released motion.
+
+    It errs as a time that is off; angle, speed and forces err with it.
+    """
     time, omega, alpha = solution.time, solution.omega_2, solution.alpha_2
     assert (
         time is not None
@@ -116,7 +124,10 @@ def _answer_released(solution: Solution) -> tuple[dict[str, Any], dict[str, Any]
 def _measure_period(
     time: Array, theta: Array, omega: Array, alpha: Array
 ) -> float | None:
-    """Measure the time between upward passages through mid-swing, s; None where it does not swing."""
+    """Measure the time between upward passages through mid-swing, s.
+
+    None if it does not swing.
+    """
     from scipy.interpolate import BPoly
 
     level = 0.5 * (theta.max() + theta.min())
@@ -156,7 +167,10 @@ def command(archive: Path | None) -> None:
 
 
 def write_archive(checkout: Path, archive: Path) -> None:
-    """Pack the problems with their page, figures, schema, licence and citation, the same bytes each time."""
+    """Pack the problems with their page, figures, schema, licence and citation.
+
+    The bytes are the same each time.
+    """
     files = sorted(PROBLEMS.iterdir())
     files += [
         checkout / name

@@ -1,4 +1,7 @@
-"""PyBullet: an articulated body, a point constraint at B, and a velocity motor on O2."""
+"""PyBullet: an articulated body, a point constraint at B, and a motor on O2.
+
+The motor is one of velocity.
+"""
 
 from importlib.metadata import version
 from typing import Any, ClassVar
@@ -24,7 +27,10 @@ STRONG = 1e9
 
 
 def write_urdf(scene: Scene) -> str:
-    """Build the tree: bars 2 and 3 in series, bar 4 on the ground; each link's frame lies in its mass centre."""
+    """Build the tree: bars 2 and 3 in series, bar 4 on the ground.
+
+    Each link's frame lies in its mass centre.
+    """
     links = ['<robot name="four_bar"><link name="ground"/>']
     for part in list_parts(scene.linkage):
         turned = " ".join(
@@ -58,7 +64,10 @@ class PyBullet(Simulator):
     }
 
     def through(self, scene: Scene, course: Course) -> Readings:
-        """Run through a course; torque and forces are those with which the step began."""
+        """Run through a course.
+
+        Torque and forces are those with which the step began.
+        """
         begin = start(scene)
         client = bullet.connect(bullet.DIRECT)
         try:

@@ -1,4 +1,6 @@
-"""Two slider-cranks of the set of problems, as data, and their answers by free bodies in fifty digits.
+"""Two slider-cranks of the set of problems, as data, and their answers.
+
+Free bodies in fifty digits give the answers.
 
 Crank O2-A of length a, rod A-B of length b, slider with its pin and mass centre at B on
 the line y = offset. The product knows four-bars alone: these answers share nothing with
@@ -139,7 +141,10 @@ def solve(
 
 
 def _direct(size: float, direction: float) -> Any:
-    """Resolve a force into components; one that the direction as a double cannot tell from zero is zero."""
+    """Resolve a force into components.
+
+    One that the direction as a double cannot tell from zero is zero.
+    """
     from mpmath import mp, mpc, mpf
 
     x, y = mp.cos(direction), mp.sin(direction)

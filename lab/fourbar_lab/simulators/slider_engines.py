@@ -1,5 +1,6 @@
-"""`python -m fourbar_lab.simulators.slider_engines mujoco | pinocchio`: serve slider-cranks by the protocol.
+"""Slider-cranks served by the protocol.
 
+`python -m fourbar_lab.simulators.slider_engines mujoco | pinocchio` starts the program.
 The loop is cut at B: crank and rod in series, the slider on its guide. Each engine
 finds its own position, speeds and accelerations, and the closing force and the torque
 by its inverse dynamics; what each bar bears it reads itself.
@@ -27,7 +28,10 @@ ANSWERS = ("theta_3", "stroke", "torque", "F12", "F32", "F43", "guide_force")
 
 
 class SliderBar(NamedTuple):
-    """One bar: mass, kg; inertia about its mass centre, kg m^2; mass centre from its first pin, along and across, m."""
+    """One bar: mass, kg; inertia about its mass centre, kg m^2; and the centre.
+
+    The mass centre is from its first pin, along and across, m.
+    """
 
     mass: float
     inertia: float
@@ -35,25 +39,38 @@ class SliderBar(NamedTuple):
 
 
 class CutLoop(Protocol):
-    """Interface of an engine to the tree, whose joints turn the crank and the rod and move the slider."""
+    """Interface of an engine to the tree.
+
+    Its joints turn the crank and the rod and move the slider.
+    """
 
     def set(self, q: Array, v: Array) -> None:
         """Set joint positions and speeds."""
 
     def gap(self) -> tuple[Array, Array, Array]:
-        """Return the rod's end less the slider (2,), its Jacobian (2, 3), and its acceleration at none of q (2,)."""
+        """Return the rod's end less the slider (2,), and its derivatives.
+
+        These are its Jacobian (2, 3), and its acceleration at none of q (2,).
+        """
 
     def inverse(self, a: Array) -> Array:
         """Return the joint forces of accelerations a, without the closing force."""
 
     def borne(self, a: Array, closing: Array) -> tuple[Array, Array, Array]:
-        """Return what ground bears on the crank, the crank on the rod and the guide on the slider (2,) each."""
+        """Return what each body bears on the next, (2,) each.
+
+        It is that of ground on the crank, the crank on the rod, and the guide on the
+        slider.
+        """
 
 
 def describe(
     scene: dict[str, Any],
 ) -> tuple[list[SliderBar], tuple[float, float, float], Array, Array]:
-    """Return the bodies, (crank, rod, offset), the field of gravity and the force on the slider."""
+    """Return the bodies, (crank, rod, offset), and what acts.
+
+    That is the field of gravity and the force on the slider.
+    """
     lengths, bodies = scene["lengths"], []
     for name in ("crank", "rod", "slider"):
         bar, length = scene.get("bars", {}).get(name, {}), lengths.get(name, 0.0)

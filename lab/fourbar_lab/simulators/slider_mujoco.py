@@ -1,4 +1,7 @@
-"""A slider-crank in MuJoCo: the tree that is open at B, by mj_inverse without constraints."""
+"""A slider-crank in MuJoCo, by mj_inverse without constraints.
+
+The tree is open at B.
+"""
 
 import mujoco
 import numpy as np
@@ -8,7 +11,8 @@ from fourbar_validation.compare.answer import Array
 
 VERSION = mujoco.__version__
 NO_INERTIA = 1e-12
-"""kg m^2; inertia of the slider, which does not turn: MuJoCo holds no body without any."""
+"""Inertia of the slider, which does not turn, kg m^2. MuJoCo holds no body without any.
+"""
 
 
 class MujocoSlider:
@@ -55,7 +59,10 @@ class MujocoSlider:
         mujoco.mj_fwdVelocity(self.model, self.data)
 
     def gap(self) -> tuple[Array, Array, Array]:
-        """Return the rod's end less the slider, its Jacobian, and its acceleration at none of q."""
+        """Return the rod's end less the slider, and its derivatives.
+
+        These are its Jacobian, and its acceleration at none of q.
+        """
         slopes, rates = np.zeros((2, 3, 3)), np.zeros((2, 3, 3))
         for slope, rate, site in zip(slopes, rates, self.sites, strict=True):
             mujoco.mj_jacSite(self.model, self.data, slope, None, site)
@@ -79,7 +86,11 @@ class MujocoSlider:
         return np.array(self.data.qfrc_inverse) - slope[:2].T @ self.push
 
     def borne(self, a: Array, closing: Array) -> tuple[Array, Array, Array]:
-        """Return what ground bears on the crank, the crank on the rod and the guide on the slider."""
+        """Return what each body bears on the next.
+
+        It is that of ground on the crank, the crank on the rod, and the guide on the
+        slider.
+        """
         for body, force, site in zip(
             self.bodies[1:], (closing, self.push - closing), self.sites, strict=True
         ):

@@ -50,7 +50,10 @@ class PinocchioSlider:
         pin.updateFramePlacements(self.model, self.data)
 
     def gap(self) -> tuple[Array, Array, Array]:
-        """Return the rod's end less the slider, its Jacobian, and its acceleration at none of q."""
+        """Return the rod's end less the slider, and its derivatives.
+
+        These are its Jacobian, and its acceleration at none of q.
+        """
         axes = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
         places = [self.data.oMf[frame].translation[:2] for frame in self.frames]
         slopes = [
@@ -70,7 +73,11 @@ class PinocchioSlider:
         return np.asarray(self._solve(a, np.zeros(2)))
 
     def borne(self, a: Array, closing: Array) -> tuple[Array, Array, Array]:
-        """Return what ground bears on the crank, the crank on the rod and the guide on the slider."""
+        """Return what each body bears on the next.
+
+        It is that of ground on the crank, the crank on the rod, and the guide on the
+        slider.
+        """
         self._solve(a, closing)
         forces = [
             (self.data.oMi[joint].rotation @ self.data.f[joint].linear)[:2]
@@ -79,7 +86,10 @@ class PinocchioSlider:
         return forces[0], forces[1], forces[2]
 
     def _solve(self, a: Array, closing: Array) -> Array:
-        """Solve the inverse dynamics with the force on the rod's end, its opposite and the load on the slider."""
+        """Solve the inverse dynamics with the force on the rod's end.
+
+        Its opposite and the load act on the slider.
+        """
         outside = [pin.Force.Zero() for _ in range(4)]
         for joint, force, frame in (
             (2, closing, self.frames[0]),

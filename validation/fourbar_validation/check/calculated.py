@@ -295,7 +295,10 @@ class Calculation:
     def _accelerate(
         self, wrenches: BarWrenches, bar: int, a: Array, alpha: Array | float = 0.0
     ) -> tuple[BarWrenches, Values]:
-        """Return the wrenches and a_G of a bar with a and alpha added to its acceleration."""
+        """Return the wrenches and a_G of a bar under an added acceleration.
+
+        `a` and `alpha` are added to its acceleration.
+        """
         body = self.judge.scene.linkage.bar(bar)
         needed = wrenches.changed(bar, body.mass * a, body.moment_of_inertia * alpha)
         return needed, {f"a_G{bar}": getattr(self.right, f"a_G{bar}") + a}

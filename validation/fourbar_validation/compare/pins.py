@@ -1,4 +1,7 @@
-"""Places and mass centres from the first pins of their bars, by the harness's own arithmetic."""
+"""Places and mass centres from the first pins of their bars.
+
+The arithmetic is the harness's own.
+"""
 
 import math
 
@@ -13,7 +16,10 @@ def resolve(size: float, angle: float) -> tuple[float, float]:
 
 
 def find_centre(bar: Bar) -> tuple[float, float]:
-    """Return distance (m) and angle (rad) of G from pin and line: as stated, or mid-bar."""
+    """Return distance (m) and angle (rad) of G from pin and line.
+
+    They are as stated, or mid-bar.
+    """
     return bar.centre if bar.centre is not None else (bar.length / 2.0, 0.0)
 
 
