@@ -35,6 +35,28 @@ class LoopSettings:
     """Factor on body_invweight0 after compilation."""
     wheel: float = 1e5
     """Armature of the crank's joint, kg m^2: a flywheel that keeps the speed."""
+    carrier: "Servo | TurningWheel | None" = None
+    """What keeps the speed in place of that flywheel."""
+
+
+@dataclass(frozen=True)
+class Servo:
+    """An actuator on the crank: position_gain (target - theta_2) + velocity_gain (omega - omega_2)."""
+
+    position_gain: float
+    """N m/rad; 0: no target, the speed alone is kept."""
+    velocity_gain: float
+    """N m s/rad."""
+
+
+@dataclass(frozen=True)
+class TurningWheel:
+    """A second body that turns at omega, to which a joint equality holds the crank."""
+
+    armature: float
+    """kg m^2."""
+    weight_factor: float = 1.0
+    """Factor on dof_invweight0 after compilation."""
 
 
 class Loop:
@@ -214,7 +236,14 @@ class Loop:
             "torque": found[8:9],
         }
 
-    def write(self, settings: LoopSettings, timestep: float, wheel: float) -> str:
+    def write(
+        self,
+        settings: LoopSettings,
+        timestep: float,
+        wheel: float,
+        carrier: Servo | TurningWheel | None = None,
+        omega: float = 0.0,
+    ) -> str:
         """Write the MJCF: crank and coupler in series, the rocker by itself, `connect` between two sites."""
         lengths = (self.a, self.b, self.c)
 
@@ -266,6 +295,21 @@ class Loop:
                 f'biastype="affine" biasprm="1 0 0" gear="{push.real!r} {push.imag!r} '
                 f'0 0 0 {couple!r}"/>'
             )
+        body = equality = ""
+        if isinstance(carrier, TurningWheel):
+            body = (
+                '<body><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'
+                f'<joint name="wheel" axis="0 0 1" armature="{carrier.armature!r}"/>'
+                "</body>"
+            )
+            equality = f'<joint joint1="pin0" joint2="wheel" {softness}/>'
+        if isinstance(carrier, Servo):
+            kp, kv = carrier.position_gain, carrier.velocity_gain
+            integrates = 'dyntype="integrator"' if kp else ""
+            motors.append(
+                f'<general joint="pin0" {integrates} gaintype="fixed" gainprm="{kp!r}" '
+                f'biastype="affine" biasprm="{kv * omega!r} {-kp!r} {-kv!r}"/>'
+            )
         return f"""
         <mujoco>
           <option timestep="{timestep!r}" integrator="{settings.integrator}"
@@ -280,8 +324,9 @@ class Loop:
             <body name="bar2" pos="{ground.real!r} {ground.imag!r} 0">
               {bar(2)}{"".join(sites[2])}{closing_site(2)}
             </body>
+            {body}
           </worldbody>
-          <equality><connect site1="B2" site2="B1" {softness}/></equality>
+          <equality><connect site1="B2" site2="B1" {softness}/>{equality}</equality>
           <actuator>{"".join(motors)}</actuator>
         </mujoco>"""
 
@@ -306,22 +351,40 @@ class Simulation:
         self.omega = float(scene.motion.omega_2)  # type: ignore[arg-type]
         assert float(scene.motion.alpha_2) == 0.0, "the flywheel keeps its speed"
         self.timestep = 2.0 * math.pi / settings.steps_per_revolution / abs(self.omega)
-        self.model = self.compile(settings.wheel)
+        carried = settings.carrier is not None
+        self.model = self.compile(0.0 if carried else settings.wheel, settings.carrier)
         self.data = mujoco.MjData(self.model)
         # a linkage that is driven elsewhere has no flywheel on its crank; pads stiffen
         # the closure next to one alone
         self.wheel_read = settings.wheel
-        if self.loop.drive != 2 and settings.pad is None:
+        if self.loop.drive != 2 and (settings.pad is None or carried):
             self.wheel_read = 0.0
         self.probed = self.compile(self.wheel_read)
         self.probe = mujoco.MjData(self.probed)
 
-    def compile(self, wheel: float) -> mujoco.MjModel:
-        """Compile the loop with a flywheel on the crank."""
-        text = self.loop.write(self.settings, self.timestep, wheel)
+    def compile(
+        self, wheel: float, carrier: Servo | TurningWheel | None = None
+    ) -> mujoco.MjModel:
+        """Compile the loop with a flywheel on the crank, or with what else keeps its speed."""
+        text = self.loop.write(self.settings, self.timestep, wheel, carrier, self.omega)
         model = mujoco.MjModel.from_xml_string(text)
         model.body_invweight0[:] *= self.settings.weight_factor
+        if isinstance(carrier, TurningWheel):
+            model.dof_invweight0[:] *= carrier.weight_factor
         return model
+
+    def start(self, theta_2: float) -> None:
+        """Close the loop at an angle of the crank, with what keeps its speed in step."""
+        angles = np.array([theta_2, *self.loop.assemble(theta_2)])
+        speeds, _ = self.loop.rates(angles, self.omega, 0.0)
+        self.data.qpos[:3] = angles[0], angles[1] - angles[0], angles[2]
+        self.data.qvel[:3] = speeds[0], speeds[1] - speeds[0], speeds[2]
+        carrier = self.settings.carrier
+        if isinstance(carrier, TurningWheel):
+            self.data.qpos[3], self.data.qvel[3] = theta_2, self.omega
+        if isinstance(carrier, Servo) and carrier.position_gain:
+            self.data.act[:] = theta_2
+            self.data.ctrl[-1] = self.omega
 
     def run(self, settle: bool = False) -> list[Sample]:
         """Step through the sweep, one turn ahead of it to settle, and read states on the way."""
@@ -329,10 +392,7 @@ class Simulation:
         span = float(np.ptp(self.sweep))
         sign = math.copysign(1.0, self.omega)
         start = float(first) - (2.0 * math.pi * sign if settle else 0.0)
-        angles = np.array([start, *self.loop.assemble(start)])
-        speeds, _ = self.loop.rates(angles, self.omega, 0.0)
-        self.data.qpos[:] = angles[0], angles[1] - angles[0], angles[2]
-        self.data.qvel[:] = speeds[0], speeds[1] - speeds[0], speeds[2]
+        self.start(start)
         n = self.settings.steps_per_revolution
         steps = math.floor((span / (2.0 * math.pi) + (1.0 if settle else 0.0)) * n)
         stride = max(1, round(n / SAMPLES))
@@ -362,6 +422,30 @@ class Simulation:
                 self.data.qvel[2],
             ]
         )
+        if self.settings.carrier is not None and self.loop.drive == 2:
+            # the drive is what carries the crank
+            acceleration, closing = self.data.qacc[:3], self.data.efc_force[:2]
+            drive = self.exerted()
+        else:
+            acceleration, closing, drive = self.probe_drive(angles, alpha_2)
+        turned = np.array(
+            [acceleration[0], acceleration[0] + acceleration[1], acceleration[2]]
+        )
+        return Sample(
+            float(self.data.qpos[0]),
+            float(self.data.qvel[0]),
+            alpha_2,
+            self.balance(angles, speeds, turned, closing, drive),
+        )
+
+    def exerted(self) -> float:
+        """Return what a servo gives the crank, or the multiplier of the equality with the wheel."""
+        if isinstance(self.settings.carrier, Servo):
+            return float(self.data.actuator_force[-1])
+        return float(self.data.efc_force[3])  # after the three rows of `connect`
+
+    def probe_drive(self, angles: Array, alpha_2: float) -> tuple[Array, Array, float]:
+        """Find the drive that gives the crank its acceleration, with joints and closure."""
         unit = self.generalized_drive(angles)
         answers = []
         wheel_torque = np.array([self.wheel_read * alpha_2, 0.0, 0.0])
@@ -369,7 +453,7 @@ class Simulation:
         scale = max(self.wheel_read, 1.0) / float(np.abs(unit).max())
         probe = self.probe
         for amount in (0.0, scale):
-            probe.qpos[:], probe.qvel[:] = self.data.qpos, self.data.qvel
+            probe.qpos[:], probe.qvel[:] = self.data.qpos[:3], self.data.qvel[:3]
             probe.qfrc_applied[:] = wheel_torque + amount * unit
             mujoco.mj_forward(self.probed, probe)
             answers.append((probe.qacc.copy(), probe.efc_force[:2].copy()))
@@ -377,16 +461,7 @@ class Simulation:
         part = (alpha_2 - rest[0]) / (pushed[0] - rest[0])
         acceleration = rest + part * (pushed - rest)
         closing = rest_closing + part * (pushed_closing - rest_closing)
-        turned = np.array(
-            [acceleration[0], acceleration[0] + acceleration[1], acceleration[2]]
-        )
-        drive = part * scale
-        return Sample(
-            float(self.data.qpos[0]),
-            float(self.data.qvel[0]),
-            alpha_2,
-            self.balance(angles, speeds, turned, closing, drive),
-        )
+        return acceleration, closing, float(part * scale)
 
     def generalized_drive(self, angles: Array) -> Array:
         """Return the forces on the three joints by which the drive of size one acts, by virtual work."""

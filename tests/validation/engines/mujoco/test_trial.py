@@ -13,7 +13,7 @@ from fourbar_validation.cost.series import BEST, PLAIN
 from fourbar_validation.engines.mujoco import drives
 from fourbar_validation.engines.mujoco.trial import Build, TrialSetup
 from fourbar_validation.scenes.suites import MODELS
-from tests.support.second_loop import LoopSettings, measure
+from tests.support.second_loop import LoopSettings, Servo, TurningWheel, measure
 
 AGREES = 0.05
 """Part by which two loops may differ that read the same run at positions of their own."""
@@ -27,6 +27,12 @@ class Case:
     again: LoopSettings
     closure: Build | None = None
     steps: int = 160
+    drive: Build | None = None
+    """Builds the loop that is stepped, if no flywheel carries it."""
+    gains: tuple[float, float] | None = None
+    """Gains of position and speed of a servo, per (inertia omega^2) and (inertia omega)."""
+    softness: float | None = None
+    """Factor on dof_invweight0 where a joint equality holds the crank to a wheel."""
 
 
 def soften(text: str, _: float) -> drives.ClosedLoop:
@@ -64,6 +70,27 @@ CASES = {
         LoopSettings(160, "Euler", 20.0, pad=1e-3),
     ),
 }
+LIGHT = replace(BEST, flywheel=1.0, pad=1e-3)
+FAST = replace(LIGHT, integrator="implicitfast", time_constant_steps=3.0)
+RK4 = LoopSettings(160, "RK4", 20.0, pad=1e-3)
+IMPLICIT = LoopSettings(160, "implicitfast", 3.0, pad=1e-3)
+CARRIED = {
+    "servo": Case(FAST, IMPLICIT, None, 320, drives.Servo, (1e6, 1e4)),
+    "gentle servo": Case(LIGHT, RK4, drive=drives.GentleServo, gains=(1.0, 1.0)),
+    "velocity actuator": Case(
+        FAST, IMPLICIT, drive=drives.VelocityActuator, gains=(0.0, 1e4)
+    ),
+    "gentle velocity actuator": Case(
+        LIGHT, RK4, drive=drives.GentleVelocityActuator, gains=(0.0, 1.0)
+    ),
+    "joint equality": Case(LIGHT, RK4, drive=drives.WheelEquality, softness=1.0),
+    "joint equality, softness edited": Case(
+        LIGHT, RK4, drive=drives.StiffWheelEquality, softness=1e-8
+    ),
+}
+"""What else carries the crank, with the integrator that the study gives it."""
+WHEEL = 1e8
+"""Armature of the wheel that a joint equality follows, per inertia of the crank."""
 QUICK = ("defaults, Euler", "no pads", "pads")
 
 
@@ -74,10 +101,22 @@ def make_scene(drive: str) -> fourbar.Scene:
         window = fourbar.Sweep(math.radians(80.0), math.radians(150.0), 60)
         return replace(
             scene,
-            motion=scene.motion.replace(angle=window, speed=20.0, acceleration=0.0),
+            motion=scene.motion.replace(angle=window, speed=30.0, acceleration=0.0),
         )
     name, bar = drive.split()
     return replace(fourbar.load(MODELS / f"{name}.toml"), drive_bar=int(bar))
+
+
+def make_carrier(
+    case: Case, inertia: float, omega: float
+) -> Servo | TurningWheel | None:
+    """Return what keeps the crank's speed in place of a flywheel."""
+    if case.gains is not None:
+        position, velocity = case.gains
+        return Servo(position * inertia * omega**2, velocity * inertia * abs(omega))
+    if case.softness is not None:
+        return TurningWheel(WHEEL * inertia, case.softness)
+    return None
 
 
 def compare(drive: str, case: Case) -> None:
@@ -85,13 +124,15 @@ def compare(drive: str, case: Case) -> None:
     scene = make_scene(drive)
     setup = TrialSetup(scene, command(scene))
     settings = replace(case.settings, steps_per_revolution=float(case.steps))
-    trial = setup.try_out(settings, case.closure)
+    trial = setup.try_out(settings, case.closure, case.drive)
     assert not trial.broken
     plotted = compute_errors(scene, trial.at, trial.quantities)
     # a window is read at as many steps as it has positions
     steps = max(trial.steps_per_revolution, case.steps)
+    wheel = size_flywheel(scene, settings)
+    carrier = make_carrier(case, wheel, float(scene.motion.omega_2))  # type: ignore[arg-type]
     again = replace(
-        case.again, steps_per_revolution=steps, wheel=size_flywheel(scene, settings)
+        case.again, steps_per_revolution=steps, wheel=wheel, carrier=carrier
     )
     right = measure(scene, again)
     for quantity in QUANTITIES:
@@ -112,6 +153,13 @@ def test_the_plotted_error_is_that_of_a_second_loop(drive: str, case: str) -> No
 @pytest.mark.parametrize("drive", DRIVES)
 def test_so_is_that_of_every_integrator_and_softness(drive: str, case: str) -> None:
     compare(drive, CASES[case])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", CARRIED)
+@pytest.mark.parametrize("drive", DRIVES)
+def test_so_is_that_of_every_other_drive_of_the_crank(drive: str, case: str) -> None:
+    compare(drive, CARRIED[case])
 
 
 def test_finer_steps_do_not_make_the_defaults_worse_where_bar_4_is_driven() -> None:

@@ -350,7 +350,8 @@ def solve_couple_elsewhere(
     # the light flywheel's motor gives it alpha_2 as commanded; this gives it what the
     # crank really had
     correction = light.model.dof_armature[O2] * (happened - alpha_2)
-    speed = float(loop.drive_column(drive_bar) @ d.qvel)
+    column = loop.drive_column(drive_bar)[: d.qvel.size]
+    speed = float(column @ d.qvel)
     guess = crank_torque * d.qvel[O2] / speed if speed else crank_torque
     trials = (0.5 * guess, 1.5 * guess) if guess else (-1.0, 1.0)
     return light.solve_drive(drive_bar, happened, trials, correction)
