@@ -60,6 +60,7 @@ def test_it_imports_the_description_and_nothing_of_the_formulas() -> None:
     allowed += (
         "fourbar_validation.engines.description",
         "fourbar_validation.compare.line",
+        "fourbar_validation.compare.pins",
     )  # which import these alone
     allowed += ("fourbar.quantities",)  # names
     standard = {"collections", "dataclasses", "math", "typing"}
