@@ -156,6 +156,7 @@ def test_positions_alone_start_no_force_engine() -> None:
         "pinocchio-inverse",
         "mujoco-inverse",
         "mujoco-simulated",
+        "scenes stated otherwise",
     }
     assert all("the scene states positions only" in line for line in left_out)
 
