@@ -78,7 +78,10 @@ def signature(thing: Any) -> str:
     if hasattr(thing, "__dataclass_fields__") and constructors:
         names, defaults = constructors[0].args.args[1:], constructors[0].args.defaults
         pairs = zip(names, defaults, strict=True)
-        return f"({', '.join(f'{ast.unparse(name)} = {ast.unparse(default)}' for name, default in pairs)})"
+        fields = [
+            f"{ast.unparse(name)} = {ast.unparse(value)}" for name, value in pairs
+        ]
+        return f"({', '.join(fields)})"
     if isinstance(node, ast.ClassDef):
         arguments = [
             ast.unparse(statement).replace("field(default_factory=", "(")

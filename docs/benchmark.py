@@ -1,5 +1,6 @@
-"""Writes the blocks of docs/benchmark.md and docs/findings.md between comments, and figures. `python docs/benchmark.py`
+"""Writes the blocks of docs/benchmark.md and docs/findings.md, and figures.
 
+`python docs/benchmark.py` runs it. The blocks lie between comments.
 Data and figures of problems come from models/problems, letters and errors from
 docs/examples/benchmark.csv, findings from the docstrings of docs/findings/*.py. The
 sentences around them are written by hand.
@@ -122,8 +123,10 @@ def write_question(problem: dict[str, Any]) -> str:
         parts.append(f"Ground at {write_number(math.degrees(turned))}°.")
     if (offset := scene["lengths"].get("offset")) is not None:
         parts.append(f"Guide at y = {write_number(offset)} m.")
-    parts += [f"{key.replace('_', ' ').capitalize()}: {write_effect(value)}." for key, value in
-              (*scene.get("effects", {}).items(), *(("loads", load) for load in scene.get("loads", ())))]  # fmt: skip
+    acting = list(scene.get("effects", {}).items())
+    acting += [("loads", load) for load in scene.get("loads", ())]
+    for key, value in acting:
+        parts.append(f"{key.replace('_', ' ').capitalize()}: {write_effect(value)}.")
     if "from" in scene.get("drive", {}):
         parts.append(f"Drive: {write_effect(scene['drive'])}.")
     angles = np.atleast_1d(command["theta_2"])
@@ -355,8 +358,12 @@ def draw_slider_crank(axes: Any, problem: dict[str, Any], labels: Labels) -> Non
             )
         )
     if problem["scene"].get("loads"):
-        axes.annotate("", (stroke + 1.1 * size, level), (stroke + 3.0 * size, level),
-                      arrowprops={"arrowstyle": "-|>", "color": INK, "lw": 1.4})  # fmt: skip
+        axes.annotate(
+            "",
+            (stroke + 1.1 * size, level),
+            (stroke + 3.0 * size, level),
+            arrowprops={"arrowstyle": "-|>", "color": INK, "lw": 1.4},
+        )
 
 
 def text(page: str) -> str:

@@ -89,10 +89,10 @@ def text() -> str:
         ),
     ]
     style = (
-        "text{font:15px"
-        " serif;font-style:italic;text-anchor:middle;fill:#1b2733}.said{text-anchor:start;"
-        "font-style:normal}path{fill:none;stroke:#1b2733}.bar{stroke-width:4;stroke:#33658a}"
-        ".ground{stroke-width:4;stroke:#99a3ad}.diagonal{stroke-width:2;stroke:#c1440e;stroke-dasharray:7 4}"
+        "text{font:15px serif;font-style:italic;text-anchor:middle;fill:#1b2733}"
+        ".said{text-anchor:start;font-style:normal}path{fill:none;stroke:#1b2733}.bar{stroke-width:4;stroke:#33658a}"
+        ".ground{stroke-width:4;stroke:#99a3ad}"
+        ".diagonal{stroke-width:2;stroke:#c1440e;stroke-dasharray:7 4}"
         ".ray{stroke-width:.8;stroke-dasharray:3 3}.arc{stroke-width:1.2}"
         "circle{fill:#fff;stroke:#1b2733;stroke-width:2}"
         "@media(prefers-color-scheme:dark){text{fill:#dfe7ee}path{stroke:#dfe7ee}circle{fill:#24323f;stroke:#dfe7ee}}"

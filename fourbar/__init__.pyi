@@ -1,4 +1,7 @@
-"""The public names of fourbar: each module is imported when one of its names is first used."""
+"""The public names of fourbar.
+
+Each module is imported when one of its names is first used.
+"""
 
 from .effects import Flywheel as Flywheel
 from .effects import Friction as Friction

@@ -17,7 +17,7 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 
 LINK = '<link name="{}"><pose>{} {} 0 0 0 0</pose></link>'
-JOINT = '<joint name="{0}{1}" type="revolute"><parent>{0}</parent><child>{1}</child><axis><xyz>0 0 1</xyz></axis></joint>'  # noqa: E501
+JOINT = '<joint name="{0}{1}" type="revolute"><parent>{0}</parent><child>{1}</child><axis><xyz>0 0 1</xyz></axis></joint>'
 links = "".join(LINK.format(*link) for link in (("a", 0, 0), ("b", 0, 1), ("c", 1, 1)))
 joints = "".join(
     JOINT.format(*pair)

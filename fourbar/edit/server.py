@@ -296,7 +296,7 @@ class Entrance:
         except (BlockingIOError, ConnectionAbortedError):
             return
         except OSError:
-            # no more files (EMFILE, ENFILE): the socket would offer the connection again
+            # no more files (EMFILE, ENFILE): the socket would offer it again and again
             IOLoop.current().remove_handler(self.listening)
             IOLoop.current().call_later(PAUSE, self._open)
             self._close_oldest(MOST_CONNECTIONS // 4)

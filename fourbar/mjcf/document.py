@@ -301,9 +301,8 @@ def size_flywheel(scene: Scene, settings: Settings = RECIPE) -> float:
     longest lever arm, and q the greater of omega_2^2 and |alpha_2|. The work of weights
     and loads in a revolution is then a small part of the flywheel's energy.
     """
-    return float(
-        f"{settings.flywheel * (_sum_inertia(scene.linkage) + _sum_load_inertia(scene)):.3g}"
-    )
+    inertia = _sum_inertia(scene.linkage) + _sum_load_inertia(scene)
+    return float(f"{settings.flywheel * inertia:.3g}")
 
 
 def compute_load_ratio(scene: Scene) -> float:
@@ -356,8 +355,10 @@ def compute_mass_ratio(linkage: FourBar) -> float:
 
     It is 1 if one of them has no mass.
     """
-    masses = [(bar.moment_of_inertia + bar.mass * bar.mass_centre[0] ** 2) / bar.length**2
-              for bar in (linkage.coupler, linkage.output)]  # fmt: skip
+    masses = [
+        (bar.moment_of_inertia + bar.mass * bar.mass_centre[0] ** 2) / bar.length**2
+        for bar in (linkage.coupler, linkage.output)
+    ]
     return max(masses) / min(masses) if min(masses) > 0.0 else 1.0
 
 

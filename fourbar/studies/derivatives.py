@@ -144,8 +144,11 @@ class Sensitivity:
         columns = {
             part: np.ravel([self.of(part, key) for key in self.keys]) for part in parts
         }
-        first = {"key": np.repeat(list(self.keys), n), "theta_2": np.tile(self.solution.theta_2, len(self.keys)),
-                 "status": self.status * len(self.keys)}  # fmt: skip
+        first = {
+            "key": np.repeat(list(self.keys), n),
+            "theta_2": np.tile(self.solution.theta_2, len(self.keys)),
+            "status": self.status * len(self.keys),
+        }
         return make_data_frame(first | columns)
 
     def _find_whole(self, quantity: str) -> str:
@@ -223,8 +226,15 @@ class Sensitivity:
         return "\n".join([self._title(), *rows, list_names("quantities", self.by)])
 
     def _repr_html_(self) -> str:
-        return make_html(self._title(), ("", "value", "changes most by 1 % of a number, of an angle by 1 deg, with"),
-                          self._list_rows())  # fmt: skip
+        return make_html(
+            self._title(),
+            (
+                "",
+                "value",
+                "changes most by 1 % of a number, of an angle by 1 deg, with",
+            ),
+            self._list_rows(),
+        )
 
 
 def sensitivity(scene: Scene) -> Sensitivity:

@@ -116,15 +116,21 @@ class Tolerances:
 
         Raises DependencyError where pandas is not installed.
         """
-        first = {"quantity": np.repeat(list(self.spreads), len(self.theta_2)),
-                 "theta_2": np.tile(self.theta_2, len(self.spreads))}  # fmt: skip
+        first = {
+            "quantity": np.repeat(list(self.spreads), len(self.theta_2)),
+            "theta_2": np.tile(self.theta_2, len(self.spreads)),
+        }
         names = [name for name in Spread._fields if name != "shares"]
         columns = {
             name: np.ravel([getattr(spread, name) for spread in self.spreads.values()])
             for name in names
         }
-        shares = {f"share of {tolerance.key}": np.ravel([spread.shares[k] for spread in self.spreads.values()])
-                  for k, tolerance in enumerate(self.scene.tolerances)}  # fmt: skip
+        shares = {
+            f"share of {tolerance.key}": np.ravel(
+                [spread.shares[k] for spread in self.spreads.values()]
+            )
+            for k, tolerance in enumerate(self.scene.tolerances)
+        }
         return make_data_frame(first | columns | shares)
 
     def describe_seed(self) -> str:
@@ -143,8 +149,16 @@ class Tolerances:
 
         The deviation is the standard one.
         """
-        shown = [name for name in ("torque", "theta_3", "theta_4", *(f"|{name}|" for name in PIN_FORCES))
-                 if name in self.spreads]  # fmt: skip
+        shown = [
+            name
+            for name in (
+                "torque",
+                "theta_3",
+                "theta_4",
+                *(f"|{name}|" for name in PIN_FORCES),
+            )
+            if name in self.spreads
+        ]
         rows = []
         for name in shown:
             spread = self.spreads[name]

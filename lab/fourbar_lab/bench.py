@@ -223,7 +223,8 @@ def import_cost() -> float:
         for name, value in os.environ.items()
         if name != "PYTHONDONTWRITEBYTECODE"
     }
-    runs = [  # the first one compiles what is not compiled yet, which is no cost of importing
+    # the first one compiles what is not compiled yet, which is no cost of importing
+    runs = [
         subprocess.run(
             [sys.executable, "-c", code],
             capture_output=True,

@@ -348,11 +348,37 @@ class Benchmark:
                             cell.reason if finest and level not in ("A", "") else ""
                         )
                         reason = "not read" if level == MISSING else reason
-                        table.append([problem, label, version, run.setting, quantity, error, level if finest else "",
-                                      cell.letters if finest else "", f"{run.seconds:.3g}", reason])  # fmt: skip
+                        table.append(
+                            [
+                                problem,
+                                label,
+                                version,
+                                run.setting,
+                                quantity,
+                                error,
+                                level if finest else "",
+                                cell.letters if finest else "",
+                                f"{run.seconds:.3g}",
+                                reason,
+                            ]
+                        )
                 if problem == DIFFERENTIATED:
-                    table += [[problem, label, version, how, f"d torque / d {key}", error, "", "", "", ""]
-                              for how, errors in row.slopes for key, error in errors.items()]  # fmt: skip
+                    table += [
+                        [
+                            problem,
+                            label,
+                            version,
+                            how,
+                            f"d torque / d {key}",
+                            error,
+                            "",
+                            "",
+                            "",
+                            "",
+                        ]
+                        for how, errors in row.slopes
+                        for key, error in errors.items()
+                    ]
         return table
 
     def write(self) -> None:

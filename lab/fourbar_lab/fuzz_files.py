@@ -142,7 +142,8 @@ def try_out(text: str) -> str:
         if "\n" in str(error):
             return f"more than one line: {error}"
     except MemoryError:
-        pass  # more positions than there is memory for: stated as such by the command line
+        # more positions than there is memory for: the command line says so
+        pass
     except Exception as error:
         return f"{type(error).__name__}: {error}"
     took = time.perf_counter() - start

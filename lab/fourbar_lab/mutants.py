@@ -116,7 +116,9 @@ def compile_mutants(module: ModuleType) -> Iterator[Mutant]:
                     code = _find_code(
                         compile(tree, inspect.getfile(module), "exec"), qualified
                     )
-                    name = f"{module.__name__}.{qualified}, line {node.lineno}: {before} -> {ast.unparse(node)}"  # type: ignore[attr-defined]
+                    line = node.lineno  # type: ignore[attr-defined]
+                    name = f"{module.__name__}.{qualified}, line {line}"
+                    name += f": {before} -> {ast.unparse(node)}"
                     setattr(node, field, original)
                     assert code is not None
                     yield Mutant(name, _find_function(module, qualified), code)

@@ -72,9 +72,17 @@ class Labels:
             away = max(math.hypot(dx, dy), 1e-300)
             side = "center" if abs(dx) < 0.5 * away else "left" if dx > 0.0 else "right"
             text = label.axes.annotate(
-                label.text, label.at, (8.0 * dx / away, 11.0 * dy / away), textcoords="offset points", ha=side,
-                va="center", size=label.size, color=label.colour, zorder=9, annotation_clip=False,
-            )  # fmt: skip
+                label.text,
+                label.at,
+                (8.0 * dx / away, 11.0 * dy / away),
+                textcoords="offset points",
+                ha=side,
+                va="center",
+                size=label.size,
+                color=label.colour,
+                zorder=9,
+                annotation_clip=False,
+            )
             written.append(text)
         return written
 
@@ -212,8 +220,11 @@ def _choose_spot(
             hit = (np.abs(dots[:, 0] - x) < half[0] + edge) & (
                 np.abs(dots[:, 1] - y) < half[1] + edge
             )
-            clashes = sum(abs(x - 0.5 * (b[0] + b[2])) < half[0] + 0.5 * (b[2] - b[0]) and
-                          abs(y - 0.5 * (b[1] + b[3])) < half[1] + 0.5 * (b[3] - b[1]) for b in boxes)  # fmt: skip
+            clashes = sum(
+                abs(x - 0.5 * (b[0] + b[2])) < half[0] + 0.5 * (b[2] - b[0])
+                and abs(y - 0.5 * (b[1] + b[3])) < half[1] + 0.5 * (b[3] - b[1])
+                for b in boxes
+            )
             outside = x - half[0] < inside[0] or x + half[0] > inside[2]
             outside = outside or y - half[1] < inside[1] or y + half[1] > inside[3]
             cost = (

@@ -62,8 +62,14 @@ class ExudynIntegrators(Simulator):
             nonlocal done
             done += 1
             if done in course.stops:
-                q, v, a = (np.array(get()) for get in (state.GetODE2Coordinates, state.GetODE2Coordinates_t,
-                                                       state.GetODE2Coordinates_tt))  # fmt: skip
+                q, v, a = (
+                    np.array(get())
+                    for get in (
+                        state.GetODE2Coordinates,
+                        state.GetODE2Coordinates_t,
+                        state.GetODE2Coordinates_tt,
+                    )
+                )
                 exerted = -np.array(
                     state.GetAECoordinates()
                 )  # its multipliers stand on the other side of M a = f

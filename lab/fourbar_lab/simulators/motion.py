@@ -186,8 +186,16 @@ class Simulator:
         )
         made = Command(command.theta_2 + turned, command.branch, moved[0], moved[1])
         gap = readings.gap / max(scene.linkage.lengths)
-        return Answer(self.name, setting, made, np.ones(n, bool), values, evidence={"gap": gap},
-                      shared=self.changed, seconds=readings.seconds)  # fmt: skip
+        return Answer(
+            self.name,
+            setting,
+            made,
+            np.ones(n, bool),
+            values,
+            evidence={"gap": gap},
+            shared=self.changed,
+            seconds=readings.seconds,
+        )
 
 
 def refuse_what_no_simulator_holds(scene: Scene, command: Command) -> None:

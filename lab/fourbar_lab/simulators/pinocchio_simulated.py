@@ -95,8 +95,12 @@ class Impulses:
             getattr(pin, f"{solver}SolverResult")(),
         )
         self.settings.max_iterations = 10000
-        for kind in ("absolute_feasibility", "relative_feasibility", "absolute_complementarity",
-                     "relative_complementarity"):  # fmt: skip
+        for kind in (
+            "absolute_feasibility",
+            "relative_feasibility",
+            "absolute_complementarity",
+            "relative_complementarity",
+        ):
             setattr(self.settings, f"{kind}_tol", ACCURATE)
 
     def step(self, q: Array, v: Array) -> tuple[Array, Array]:
@@ -117,8 +121,14 @@ class Impulses:
             jacobian @ free
             + self.closure_data[0].extract().constraint_position_error / h
         )
-        self.solver.solve(self.cholesky.getDelassusOperatorCholeskyExpression(), g, self.models, self.closure_data,
-                          self.settings, self.result)  # fmt: skip
+        self.solver.solve(
+            self.cholesky.getDelassusOperatorCholeskyExpression(),
+            g,
+            self.models,
+            self.closure_data,
+            self.settings,
+            self.result,
+        )
         force = np.array(self.result.retrieveConstraintImpulses()) / h
         self.tree.place(q.tolist())
         return (

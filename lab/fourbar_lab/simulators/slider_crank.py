@@ -65,8 +65,14 @@ SLIDER_CRANKS: dict[str, dict[str, Any]] = {
     },
 }
 UNITS = {
-    "theta_3": "rad", "stroke": "m", "torque": "N m", "F12": "N", "F32": "N", "F43": "N", "guide_force": "N",
-}  # fmt: skip
+    "theta_3": "rad",
+    "stroke": "m",
+    "torque": "N m",
+    "F12": "N",
+    "F32": "N",
+    "F43": "N",
+    "guide_force": "N",
+}
 
 
 def make_problem(name: str) -> dict[str, Any]:
@@ -76,10 +82,19 @@ def make_problem(name: str) -> dict[str, Any]:
     rates = command["omega_2"], command["alpha_2"], command["branch"]
     rows = [solve(stated["scene"], theta, *rates) for theta in command["theta_2"]]
     answers = {quantity: [row[quantity] for row in rows] for quantity in UNITS}
-    errors = {quantity: [math.ulp(max(map(abs, np.atleast_1d(value)))) for value in values]
-              for quantity, values in answers.items()}  # fmt: skip
-    return {"conventions": CONVENTIONS, "mechanism": "slider-crank", "ask": "answer", **stated, "answers": answers,
-            "errors": errors, "units": UNITS}  # fmt: skip
+    errors = {
+        quantity: [math.ulp(max(map(abs, np.atleast_1d(value)))) for value in values]
+        for quantity, values in answers.items()
+    }
+    return {
+        "conventions": CONVENTIONS,
+        "mechanism": "slider-crank",
+        "ask": "answer",
+        **stated,
+        "answers": answers,
+        "errors": errors,
+        "units": UNITS,
+    }
 
 
 def solve(
@@ -105,8 +120,10 @@ def solve(
         at_B = at_A + (1j * alpha_3 - omega_3**2) * rod
         forces, moments, arms = [], [], []
         for name, line, rate, growth, start in (
-            ("crank", crank, omega, alpha, 0), ("rod", rod, omega_3, alpha_3, at_A), ("slider", 0, 0, 0, at_B),
-        ):  # fmt: skip
+            ("crank", crank, omega, alpha, 0),
+            ("rod", rod, omega_3, alpha_3, at_A),
+            ("slider", 0, 0, 0, at_B),
+        ):
             bar = scene["bars"].get(name, {})
             mass, length = mpf(bar.get("mass", 0.0)), abs(line)
             r, phi = bar.get("centre", (0.5 * length, 0.0))
@@ -120,9 +137,16 @@ def solve(
             mp.zeros(8, 8),
             mp.zeros(8, 1),
         )  # F12 x y, F32 x y, F43 x y, guide, torque
-        for row, terms in enumerate((
-            {0: 1, 2: 1}, {1: 1, 3: 1}, {2: -1, 4: 1}, {3: -1, 5: 1}, {4: -1}, {5: -1, 6: 1},
-        )):  # fmt: skip
+        for row, terms in enumerate(
+            (
+                {0: 1, 2: 1},
+                {1: 1, 3: 1},
+                {2: -1, 4: 1},
+                {3: -1, 5: 1},
+                {4: -1},
+                {5: -1, 6: 1},
+            )
+        ):
             y[row] = forces[row // 2].imag if row % 2 else forces[row // 2].real
             for column, factor in terms.items():
                 A[row, column] = factor
@@ -136,8 +160,15 @@ def solve(
         y[7] = moments[1]
         x = [float(value) for value in mp.lu_solve(A, y)]
         angle, stroke = float(mp.atan2(sine, cosine)), float((crank + rod).real)
-    return {"theta_3": angle, "stroke": stroke, "torque": x[7], "F12": x[0:2], "F32": x[2:4], "F43": x[4:6],
-            "guide_force": x[6]}  # fmt: skip
+    return {
+        "theta_3": angle,
+        "stroke": stroke,
+        "torque": x[7],
+        "F12": x[0:2],
+        "F32": x[2:4],
+        "F43": x[4:6],
+        "guide_force": x[6],
+    }
 
 
 def _direct(size: float, direction: float) -> Any:

@@ -107,8 +107,10 @@ def answer(make: Callable[..., CutLoop], question: dict[str, Any]) -> dict[str, 
     _, (crank, rod, _), *_ = describe(scene)
     rows: dict[str, list[Any]] = {name: [] for name in ANSWERS}
     n = len(command["theta_2"])
-    rates = [np.broadcast_to(command.get(name, default), n) for name, default in
-             (("omega_2", 0.0), ("alpha_2", 0.0), ("branch", 1))]  # fmt: skip
+    rates = [
+        np.broadcast_to(command.get(name, default), n)
+        for name, default in (("omega_2", 0.0), ("alpha_2", 0.0), ("branch", 1))
+    ]
     for theta, omega, alpha, branch in zip(command["theta_2"], *rates, strict=True):
         q = np.array(
             [
@@ -180,6 +182,11 @@ if __name__ == "__main__":
         os.dup2(2, 1)  # an engine's prints are no answer
         module = import_module(f"fourbar_lab.simulators.slider_{sys.argv[1]}")
         loop = getattr(module, f"{sys.argv[1].capitalize()}Slider")
-        hello = {"engine": sys.argv[1], "version": module.VERSION, "answers": list(ANSWERS),
-                 "mechanisms": ["slider-crank"], "effects": ["gravity", "loads"]}  # fmt: skip
+        hello = {
+            "engine": sys.argv[1],
+            "version": module.VERSION,
+            "answers": list(ANSWERS),
+            "mechanisms": ["slider-crank"],
+            "effects": ["gravity", "loads"],
+        }
         serve(hello, partial(answer, loop), sys.stdin.buffer, stdout)

@@ -22,8 +22,11 @@ class PinocchioSlider:
         crank, rod, offset = lengths
         self.model, self.push = pin.Model(), push
         self.model.gravity = pin.Motion(np.array([*field, 0.0, 0.0, 0.0, 0.0]))
-        joints = (pin.JointModelRZ(), 0, (0.0, 0.0)), (pin.JointModelRZ(), 1, (crank, 0.0)), (
-            pin.JointModelPX(), 0, (0.0, offset))  # fmt: skip
+        joints = (
+            (pin.JointModelRZ(), 0, (0.0, 0.0)),
+            (pin.JointModelRZ(), 1, (crank, 0.0)),
+            (pin.JointModelPX(), 0, (0.0, offset)),
+        )
         for number, ((joint, parent, place), body) in enumerate(
             zip(joints, bodies, strict=True), 1
         ):

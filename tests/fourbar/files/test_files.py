@@ -214,7 +214,7 @@ frame = "bar"
 viscous = { O2 = "0.01 N m s/rad", B = "1 N m s/rad" }
 friction = { A = "5 N cm" }
 springs = [{ from = { bar = 1 }, to = { bar = 4, from_pin = ["20 cm", "0 deg"] }, gas = { extended = "50 cm", stroke = "20 cm", extended_force = "400 N", compressed_force = "520 N" } }]
-"""  # noqa: E501
+"""
     )
     scene = loads(text)
     assert scene.motion.free == fourbar.Free(5.0, 500)

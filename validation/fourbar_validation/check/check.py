@@ -214,8 +214,10 @@ def write_junit(judgement: Judgement, name: str) -> str:
 
 
 def _list_cases(judgement: Judgement, name: str) -> Iterator[JunitCase]:
-    by_quantity = {quantity: [f for f in judgement.findings if f.quantity == quantity] for quantity in
-                   dict.fromkeys(f.quantity for f in judgement.findings)}  # fmt: skip
+    by_quantity = {
+        quantity: [f for f in judgement.findings if f.quantity == quantity]
+        for quantity in dict.fromkeys(f.quantity for f in judgement.findings)
+    }
     for quantity, findings in by_quantity.items():
         judged = [finding for finding in findings if finding.judged]
         differing = [finding for finding in judged if not finding.agrees]
@@ -379,8 +381,16 @@ def show(judgement: Judgement, table: TheirTable, name: str) -> None:
             "error",
             "allowed",
         )
-        rows = [(str(each.line), f"{math.degrees(each.theta_2):.7g}", *write_in_their_unit(each, table),
-                 f"{each.error:.1e}", f"{each.allowed:.1e}") for each in choose_worst(differing)]  # fmt: skip
+        rows = [
+            (
+                str(each.line),
+                f"{math.degrees(each.theta_2):.7g}",
+                *write_in_their_unit(each, table),
+                f"{each.error:.1e}",
+                f"{each.allowed:.1e}",
+            )
+            for each in choose_worst(differing)
+        ]
         console.print(
             make_table(head, rows, title=title, show_edge=False, padding=(0, 1, 0, 0))
         )

@@ -1,4 +1,7 @@
-"""Tolerances of what is derived from `solve`: each is a rule of a run, as those of its engines are."""
+"""Tolerances of what is derived from `solve`.
+
+Each is a rule of a run, as those of its engines are.
+"""
 
 from fourbar_validation.compare.tolerance import EPS, ErrorBound, K
 

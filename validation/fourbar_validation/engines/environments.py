@@ -148,10 +148,8 @@ def make_environment(entry: Entry, cache: Path = CACHE) -> str:
     key = hashlib.sha256(
         repr((python, sys.version_info[:2], sys.prefix, wanted)).encode()
     ).hexdigest()[:12]
-    folder = (
-        cache
-        / f"{re.sub(r'[^a-zA-Z0-9.]+', '-', ' '.join(entry.requires) or entry.python)[:40]}-{key}"
-    )
+    named = re.sub(r"[^a-zA-Z0-9.]+", "-", " ".join(entry.requires) or entry.python)
+    folder = cache / f"{named[:40]}-{key}"
     inside = folder / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
     cache.mkdir(parents=True, exist_ok=True)
     with FileLock(f"{folder}.lock"):

@@ -300,8 +300,12 @@ def load_further() -> tuple[Engine, ...]:
     return tuple(entry.load() for entry in sorted(registered))
 
 
-FOLDERS = tuple(Path(folder) for spec in [find_spec(LAB.replace("-", "_"))] if spec is not None
-                for folder in spec.submodule_search_locations or ())  # fmt: skip
+FOLDERS = tuple(
+    Path(folder)
+    for spec in [find_spec(LAB.replace("-", "_"))]
+    if spec is not None
+    for folder in spec.submodule_search_locations or ()
+)
 """Folder of the lab, whose engines.toml a run reads too. None if the lab is not
 installed.
 """

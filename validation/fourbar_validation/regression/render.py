@@ -19,8 +19,15 @@ are named together.
 AT_MOST = 50
 """Engines and causes listed in text and Markdown."""
 HEADINGS = (
-    "scene", "engine", "quantity", "old error", "new error", "round-off", "old verdict", "new verdict",
-)  # fmt: skip
+    "scene",
+    "engine",
+    "quantity",
+    "old error",
+    "new error",
+    "round-off",
+    "old verdict",
+    "new verdict",
+)
 LISTED = 1000
 """Rows of one kind on the page."""
 ROWS = 5

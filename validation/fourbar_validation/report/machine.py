@@ -150,10 +150,8 @@ def hash_modules(*packages: Path) -> str:
                 and package / "models" not in path.parents
             ):
                 data = path.read_bytes()
-                digest.update(
-                    f"{path.relative_to(package.parent).as_posix()} {len(data)}\n".encode()
-                    + data
-                )
+                place = path.relative_to(package.parent).as_posix()
+                digest.update(f"{place} {len(data)}\n".encode() + data)
     return digest.hexdigest()[:16]
 
 

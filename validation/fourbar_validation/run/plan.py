@@ -199,7 +199,9 @@ class Plan:
         return summary
 
     def conclude(self, counts: Counts, *, worse: bool = False) -> int:
-        """Return the exit status of a run; DependencyError if only an engine is missing.
+        """Return the exit status of a run.
+
+        Raises DependencyError if only an engine is missing.
 
         `worse`: whether the run is worse than the one that it is compared with.
         """

@@ -385,7 +385,7 @@ def _make_rows(
     def numbers(answer: ReleasedAnswer) -> dict[str, Array]:
         series = {"theta_2": answer.theta_2[:n], "omega_2": answer.omega_2[:n]}
         if coarse is not None:
-            # the formulas integrate the energy equation; its drift is part of their test
+            # the formulas integrate the energy equation: their drift is tested too
             series["energy"] = answer.energy[:n] - answer.energy[0]
         return series
 

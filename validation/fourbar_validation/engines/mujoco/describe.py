@@ -642,9 +642,17 @@ def _set_load(
         gear = sign * np.array((fx, fy, 0.0, 0.0, 0.0, parts["couple"][0]))
         frame = {"refsite": "O2"} if axes == "world axes" else {}
         ET.SubElement(
-            actuators, "general", frame, site=f"changed_{number}", name=f"changed_{number}", gaintype="fixed",
-            gainprm="0", biastype="affine", biasprm="1 0 0", gear=_write_value(tuple(gear.tolist())),
-        )  # fmt: skip
+            actuators,
+            "general",
+            frame,
+            site=f"changed_{number}",
+            name=f"changed_{number}",
+            gaintype="fixed",
+            gainprm="0",
+            biastype="affine",
+            biasprm="1 0 0",
+            gear=_write_value(tuple(gear.tolist())),
+        )
 
 
 def mend_entry(topology: Topology, key: str, value: Value | None) -> bool:

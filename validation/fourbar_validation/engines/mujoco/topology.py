@@ -527,9 +527,16 @@ def _list_sites(
         or _find_site(model, roles["B3"])
     ):
         return [{}]
-    on = {role: [model.site(i).name for i in range(model.nsite) if model.site(i).name
-                 and int(model.body_weldid[model.site_bodyid[i]]) == find_body(model, roles[role])]
-          for role in ("coupler", "output")}  # fmt: skip
+    on = {
+        role: [
+            model.site(i).name
+            for i in range(model.nsite)
+            if model.site(i).name
+            and int(model.body_weldid[model.site_bodyid[i]])
+            == find_body(model, roles[role])
+        ]
+        for role in ("coupler", "output")
+    }
     return [
         {"B3": three, "B4": four} for three in on["coupler"] for four in on["output"]
     ]

@@ -124,7 +124,10 @@ class _SummaryJudge:
 
     @property
     def counted(self) -> slice:
-        """Select the positions of a mean: the last one of a closed motion is its first."""
+        """Select the positions of a mean.
+
+        The last position of a closed motion is its first.
+        """
         return slice(None, -1) if self.closed else slice(None)
 
     def ask(self, places: Any) -> Answer:
