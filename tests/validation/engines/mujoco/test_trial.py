@@ -1,6 +1,7 @@
 """The errors that `cost` plots are those of a second loop, for every drive, integrator and softness."""
 
 import math
+import statistics
 from dataclasses import dataclass, replace
 
 import pytest
@@ -25,7 +26,7 @@ AGREES = 0.05
 """Part by which two loops may differ that read the same run at positions of their own."""
 
 NOISE = 1.6
-"""Factor between the times of a step of two models of one loop: 0.7 to 1.05 on two cores with ten processes."""
+"""Factor between the times of a step of two models of one loop: 0.7 to 1.05 were measured on two busy cores."""
 ROUNDS, STEPS = 15, 100
 """Timings of each loop, and the steps of one."""
 
@@ -177,18 +178,15 @@ def test_so_is_that_of_every_other_drive_of_the_crank(drive: str, case: str) -> 
 @pytest.mark.parametrize("case", ["defaults, Euler", "no pads", "pads"])
 @pytest.mark.parametrize("drive", DRIVES)
 def test_a_step_takes_as_long_as_in_a_second_loop(drive: str, case: str) -> None:
-    """In turns, so that both meet the same machine; the least of each counts."""
+    """In turns, so that both meet the same machine; the middle one of the ratios counts."""
     scene, settings = make_scene(drive), CASES[case].settings
     setup = TrialSetup(scene, command(scene))
     settings = replace(settings, steps_per_revolution=float(CASES[case].steps))
     time_steps, _ = setup.make_clocks(settings, CASES[case].closure)
     again = replace(CASES[case].again, wheel=size_flywheel(scene, settings))
     second = Simulation(scene, again)
-    ours, theirs = [], []
-    for _ in range(ROUNDS):
-        ours.append(time_steps(STEPS))
-        theirs.append(second.time_steps(STEPS))
-    assert 1.0 / NOISE < min(ours) / min(theirs) < NOISE
+    ratios = [time_steps(STEPS) / second.time_steps(STEPS) for _ in range(ROUNDS)]
+    assert 1.0 / NOISE < statistics.median(ratios) < NOISE
 
 
 def test_finer_steps_do_not_make_the_defaults_worse_where_bar_4_is_driven() -> None:
