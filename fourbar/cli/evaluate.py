@@ -365,7 +365,7 @@ def _read_pressure(scene: Scene, pressure: str | None) -> float | None:
     """Read the pressure of a cylinder, Pa; InputError where no cylinder drives."""
     if pressure is None:
         return None
-    if scene.drive is None:
+    if scene.drive is None or not scene.drive.has_stroke:
         raise InputError(
             "--pressure",
             pressure,

@@ -416,7 +416,7 @@ class _Block:
         if facts.stroke_range is not None:
             lines += self._write_stroke()
         lines += self._write_power()
-        if pressure is not None and facts.linear:
+        if pressure is not None and facts.stroke_range is not None:
             lines += self._write_bore(pressure)
         return lines
 

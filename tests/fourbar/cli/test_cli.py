@@ -317,6 +317,15 @@ def test_every_thins_the_table_and_keeps_its_last_position(run: Fourbar) -> None
         (
             (
                 "analyze",
+                MODELS / "capabilities" / "push_output.toml",
+                "--pressure",
+                "10 MPa",
+            ),
+            "needs a cylinder",
+        ),
+        (
+            (
+                "analyze",
                 MODELS / "gallery" / "excavator_bucket.toml",
                 "--pressure",
                 210,

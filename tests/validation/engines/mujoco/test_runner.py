@@ -65,6 +65,7 @@ def failing(posed: Scene) -> set[str]:
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(300)
 @pytest.mark.parametrize("drive", [2, 4])
 @pytest.mark.parametrize("name", LAWS)
 def test_a_motion_law_is_run_through(name: str, drive: int) -> None:
