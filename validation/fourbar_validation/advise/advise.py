@@ -445,12 +445,13 @@ def command(
     output: Path | None,
     **robot: Any,
 ) -> int:
-    """Find the cheapest MuJoCo settings that keep SCENES within an error.
+    """Find the cheapest MuJoCo settings.
 
-    Exit with status 1 if none is found for one of them. Of each scene it says which of
-    the settings matters, and why; of several scenes a table is printed at the end. Of a
-    robot's FILE.xml, and SCENE before it or not, it tries settings in the file itself
-    and prints what to type.
+    They keep torque and pin forces of each SCENE within an error. The command says
+    which of the settings matters, and why; for several scenes it prints a table at the
+    end. It exits with status 1 if it finds no settings for one of them. For a robot's
+    FILE.xml, with or without SCENE before it, it tries settings in the file itself and
+    prints what to type.
     """
     if scenes[-1].suffix.lower() in ROBOTS:
         if output is not None or len(scenes) > 2:

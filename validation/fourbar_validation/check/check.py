@@ -307,18 +307,19 @@ def check(
     json: Path | None,
     junit: Path | None,
 ) -> int:
-    """Judge a table of torques and forces (THEIRS.csv) against the formulas.
+    """Judge your own torques and forces.
 
+    THEIRS.csv is a table, whose rows are judged against the formulas.
     `check PROBLEM.json RESULT.json` judges the answers to a problem of models/problems,
     by its levels of accuracy.
 
     Columns are named as by `fourbar analyze --csv`, whose file is read as it is; a unit
     may follow in brackets: theta_2 [deg], torque [lbf ft], F12_x, F12_y, F43 [kN] (a
     magnitude). A spreadsheet's semicolons, blank cells, thousands separators and lines
-    of comments are understood. Half a unit of the last printed digit is allowed, and to
-    how many digits is printed; with --rtol or --atol these decide, and how many agree
-    exactly is printed too. Where the scene states no omega_2 each row is judged at its
-    own omega_2 and alpha_2.
+    of comments are understood. Half a unit of the last printed digit is allowed; the
+    command prints to how many digits the numbers were compared. If --rtol or --atol is
+    given, these decide, and the number of exact agreements is printed too. If the scene
+    states no omega_2, each row is judged at its own omega_2 and alpha_2.
     """
     if scene.suffix == ".json":
         for option, value in (

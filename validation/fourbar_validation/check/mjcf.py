@@ -411,7 +411,9 @@ def command(
     out: Path,
     **robot: Any,
 ) -> int:
-    """Compare your own MJCF with a scene: the errors of torque and pin forces, and why.
+    """Compare your own MJCF with a scene.
+
+    It prints the errors of torque and pin forces, and their causes.
 
     A four-bar alone is compared with the generated MJCF of SCENE, entry by entry. With
     --loop, without SCENE, or where FILE.xml has more joints, loops are measured inside

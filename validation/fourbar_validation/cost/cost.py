@@ -50,10 +50,11 @@ HEAD = ("setting", "error", "ms per simulated second", "ms a revolution")
     help="Print the cheapest settings of every error, the laws and the warnings too.",
 )
 def cost(scenes: tuple[Path, ...], out: Path, verbose: bool) -> int:
-    """Measure what accuracy costs in time, by every method, on SCENES.
+    """Measure what accuracy costs in time.
 
-    The default is the crank-rocker. An interrupted study is resumed where it stopped.
-    Exit status 1 where the law of any quantity does not hold, or none is decided.
+    Every method is measured on SCENES (default: the crank-rocker). An interrupted study
+    is resumed where it stopped. Exit status 1 where the law of any quantity does not
+    hold, or none is decided.
     """
     from rich.console import Console
     from rich.progress import track

@@ -129,6 +129,8 @@ FORMS: dict[str, Callable[[Differences], str]] = {
     "junit": render.write_junit,
 }
 """Forms in which the differences can be written, besides the text that is printed."""
+FORM_NAMES = {"markdown": "Markdown", "html": "HTML", "junit": "JUnit"}
+"""Names of these forms in help texts."""
 NAMED = 50
 """Names of a column that a message lists."""
 CHOICES = {"only": "scene", "engines": "engine", "quantity": "quantity"}
@@ -145,7 +147,7 @@ def add_output_options(junit: str = "") -> Callable[[Command], Command]:
         for form in reversed(FORMS):
             path = click.Path(path_type=Path, dir_okay=False)
             end = junit if form == "junit" else ""
-            text = f"Write the differences as {form} too{end}."
+            text = f"Write the differences as {FORM_NAMES[form]} too{end}."
             command = click.option(f"--{form}", type=path, help=text)(command)
         return command
 
@@ -313,10 +315,10 @@ def _require_as_strict(run: Recorded, target: Path) -> None:
 def accept_command(
     results: Path, to: Path | None, even_failing: bool, allow_weaker: bool
 ) -> None:
-    """Record RESULTS (a run's folder) as the accepted state.
+    """Record a run as the accepted state.
 
-    Later runs are compared with it. It is kept in DIR, and its rows are appended to
-    DIR/history.parquet, a table for pandas or DuckDB.
+    RESULTS is the run's folder. Later runs are compared with it. It is kept in DIR, and
+    its rows are appended to DIR/history.parquet, a table for pandas or DuckDB.
     """
     folder = results if results.is_dir() else results.parent
     target = folder.absolute().parent / ACCEPTED if to is None else to

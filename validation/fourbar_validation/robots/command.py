@@ -107,7 +107,10 @@ def command(
     speed: str | None,
     out: Path | None,
 ) -> None:
-    """List the closed loops of a robot's MJCF, and say which are planar four-bars."""
+    """List the closed loops of a robot's MJCF.
+
+    The command says which loops are planar four-bars.
+    """
     options = read_pose(pose, key, hold, drive)
     omega = read_speed(speed)
     if out is None and speed is not None:

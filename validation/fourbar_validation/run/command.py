@@ -124,9 +124,10 @@ from fourbar_validation.run.run import run
 )
 @add_output_options("; without --against the comparisons of the run")
 def command(**stated: Any) -> int:
-    """Judge scenes (default: models/ and capabilities/) and write a report.
+    """Judge scenes and write a report.
 
-    The files are results.csv, timings.csv, report.md and report.html.
+    Without SCENES the run judges those of models/ and models/capabilities/. It writes
+    results.csv, timings.csv, report.md and report.html.
     """
     from fourbar_validation.report.terminal import print_table
 

@@ -121,10 +121,10 @@ def collect(
 )
 @click.option("--verbose", is_flag=True, help="Print the worst row of each scene too.")
 def command(folders: tuple[Path, ...], out: Path, verbose: bool) -> int:
-    """Write tables and report of a run from the folders of its parts.
+    """Put together the parts of a run.
 
-    `run --part` judged the parts. Parts of different runs are refused. If parts are
-    missing, the command names them.
+    It writes tables and report from the folders in which `run --part` judged the parts.
+    Parts of different runs are refused. If parts are missing, the command names them.
     """
     from fourbar_validation.report.terminal import print_table
 
