@@ -157,7 +157,7 @@ class _Few:
 
         Some entries of the command are changed.
         """
-        return _solve(scene, self.command._replace(**changed))
+        return _solve(scene, self.command._replace(**changed), self._allocate())
 
     def solve_alike(self, scene: Scene, sense: int, **changed: Any) -> Solution:
         """Solve another scene whose loop lies on the same side, or on the other.
@@ -169,7 +169,12 @@ class _Few:
         the same in both scenes, the name of the assembly need not be.
         """
         signed = self.command._replace(branch=sense * self._signs, **changed)
-        return _solve(scene, with_signs(scene.linkage, signed))
+        return _solve(scene, with_signs(scene.linkage, signed), self._allocate())
+
+    def _allocate(self) -> dict[str, Array]:
+        """Allocate the quantities that are compared: no others are evaluated."""
+        arrays = zip(self.quantities, self.numbers, strict=True)
+        return {name: np.empty_like(one) for name, one in arrays if name != "theta_2"}
 
     def compare(self, convert: Callable[[str], Array]) -> Array:
         """Compare all quantities with those of another scene, converted; (q, n)."""
@@ -258,14 +263,16 @@ def _take_few(question: Question) -> _Few:
     return _Few(few, command, _solve(few, command), question, fit[positions])
 
 
-def _solve(scene: Scene, command: Command) -> Solution:
+def _solve(
+    scene: Scene, command: Command, out: dict[str, Array] | None = None
+) -> Solution:
     """Solve a scene whose motion begins at the first position.
 
     Springs count their turns from there.
     """
     bar, branch = command.bar, int(command.branch[0])
     begin: Any = {f"theta_{bar}": float(command.angle[0]), "branch": branch}
-    return solve(replace(scene, motion=Motion(**begin)), "force", at=command)
+    return solve(replace(scene, motion=Motion(**begin)), "force", at=command, out=out)
 
 
 def _make_plain(bar: Bar) -> Bar:
