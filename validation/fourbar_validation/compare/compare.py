@@ -43,7 +43,7 @@ from fourbar_validation.compare.rows import (
 from fourbar_validation.compare.scales import (
     Sizes,
     make_reference,
-    take_smallest_scale,
+    take_smallest_scales,
     take_strictest_condition,
 )
 from fourbar_validation.compare.tolerance import (
@@ -432,7 +432,7 @@ class Comparison:
         it: its error is in its own unit, and none is allowed.
         """
         names, ours, theirs, masks, *_ = zip(*due, strict=True)
-        scale, condition = map(np.stack, zip(*map(self._scale, names), strict=True))
+        scale, condition = self._scale(names)
         vanishes = scale == 0.0
         unit = replace_zero_size(scale)
         tolerance = self.demands.tolerance
@@ -481,21 +481,25 @@ class Comparison:
             share = np.where(was_asked, np.fmin(share, errors.allowed), share)
         return np.nan_to_num(share, nan=0.0, posinf=np.inf)
 
-    def _scale(self, quantity: str) -> tuple[Array, Array]:
-        """Return size and condition of a quantity at each position.
+    def _scale(self, quantities: Sequence[str]) -> tuple[Array, Array]:
+        """Return size and condition of quantities at each position, (q, n).
 
         Each is the stricter of formulas and reference.
         """
-        if quantity not in self.scales:
+        missing = [name for name in quantities if name not in self.scales]
+        if missing:
             ours, theirs = self._sizes
             reference = None if theirs is None else theirs.formulas
-            self.scales[quantity] = (
-                take_smallest_scale(quantity, ours, theirs),
-                take_strictest_condition(
-                    quantity, self.scene.linkage, self.formulas, reference
-                ),
-            )
-        return self.scales[quantity]
+            sizes = take_smallest_scales(missing, ours, theirs)
+            for name, size in zip(missing, sizes, strict=True):
+                condition = take_strictest_condition(
+                    name, self.scene.linkage, self.formulas, reference
+                )
+                self.scales[name] = size, condition
+        scales, conditions = zip(
+            *(self.scales[name] for name in quantities), strict=True
+        )
+        return np.stack(scales), np.stack(conditions)
 
     @cached_property
     def _sizes(self) -> tuple[Sizes, Sizes | None]:

@@ -11,7 +11,7 @@ too small, an acceleration that is too large. So another derivation, the referen
 asked too, and the stricter of the two decides.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -52,23 +52,33 @@ class Sizes:
 
     def scale(self, quantity: str, values: Array) -> Array:
         """Compute what the error of a quantity is divided by at each position, (n,)."""
-        formulas, unit = self.formulas, UNITS[quantity]
-        if unit in ("rad", "1"):
-            return np.ones(len(formulas))
-        size = magnitude(values)
-        terms = self.sum_terms(quantity)
+        return np.asarray(self.scales([quantity], [values])[0])
+
+    def scales(self, quantities: Sequence[str], values: Sequence[Array]) -> Array:
+        """Compute what the errors of several quantities are divided by, (q, n)."""
+        formulas, units = self.formulas, [UNITS[quantity] for quantity in quantities]
+        scales = np.ones((len(units), len(formulas)))
+        sized = [i for i, unit in enumerate(units) if unit not in ("rad", "1")]
+        if not sized:
+            return scales
+        size = np.stack([magnitude(values[i]) for i in sized])
+        terms = np.stack([self.sum_terms(quantities[i]) for i in sized])
         well = (formulas.condition >= WELL_CONDITIONED) & np.isfinite(size)
-        if (
-            unit in ("N m", "W") or quantity == LINE.value
-        ):  # its poles are not where sin_mu vanishes
+        # the poles of what the drive does are not where sin_mu vanishes
+        driven = [
+            row
+            for row, i in enumerate(sized)
+            if units[i] in ("N m", "W") or quantities[i] == LINE.value
+        ]
+        if driven:
             assert formulas.drive_condition is not None
-            well &= formulas.drive_condition >= WELL_CONDITIONED
+            well[driven] &= formulas.drive_condition >= WELL_CONDITIONED
         nonzero = np.where(size < VANISHING * terms, terms, size)
-        if not well.any():
-            return nonzero
-        scale = float(size[well].max())
-        most = float(terms[well].max())
-        return np.where(well, most if scale < VANISHING * most else scale, nonzero)
+        largest = np.where(well, size, 0.0).max(axis=1, keepdims=True)
+        most = np.where(well, terms, 0.0).max(axis=1, keepdims=True)
+        largest = np.where(largest < VANISHING * most, most, largest)
+        scales[sized] = np.where(well, largest, nonzero)
+        return scales
 
     def sum_terms(self, quantity: str) -> Array:
         """Sum the absolute terms of the equation of a quantity, (n,), in its unit.
@@ -366,14 +376,26 @@ def take_strictest_condition(
     )
 
 
-def take_smallest_scale(quantity: str, ours: Sizes, theirs: Sizes | None) -> Array:
-    """Take the smaller of two sizes of a quantity at each position, (n,)."""
-    scale = ours.scale(quantity, getattr(ours.formulas, quantity))
-    if theirs is None or getattr(theirs.formulas, quantity) is None:
-        return scale
+def take_smallest_scales(
+    quantities: Sequence[str], ours: Sizes, theirs: Sizes | None
+) -> Array:
+    """Take the smaller of two sizes of each quantity at each position, (q, n)."""
+    values = [getattr(ours.formulas, quantity) for quantity in quantities]
+    scales = ours.scales(quantities, values)
+    if theirs is None:
+        return scales
     reference = theirs.formulas
     if reference.omega_2 is not None and any(
         getattr(reference, name) is None for name in SIZED_BY
     ):
-        return scale
-    return np.fmin(scale, theirs.scale(quantity, getattr(reference, quantity)))
+        return scales
+    answered = {
+        i: numbers
+        for i, quantity in enumerate(quantities)
+        if (numbers := getattr(reference, quantity)) is not None
+    }
+    if answered:
+        rows = list(answered)
+        names, numbers = [quantities[i] for i in rows], list(answered.values())
+        scales[rows] = np.fmin(scales[rows], theirs.scales(names, numbers))
+    return scales

@@ -22,7 +22,7 @@ from fourbar_validation.compare.rows import FAILS, FORMULAS, UNDECIDED, Row
 from fourbar_validation.compare.scales import (
     Sizes,
     make_reference,
-    take_smallest_scale,
+    take_smallest_scales,
     take_strictest_condition,
 )
 from fourbar_validation.compare.tolerance import (
@@ -253,9 +253,7 @@ def check_error_bars(question: Question) -> Iterator[Row]:
             [magnitude(getattr(ours, q) - exact.quantities[q]) for q in quantities],
             axis=0,
         )
-        size = np.max(
-            [take_smallest_scale(q, sizes, of_balls) for q in quantities], axis=0
-        )
+        size = np.max(take_smallest_scales(quantities, sizes, of_balls), axis=0)
         condition = take_strictest_condition(
             quantities[0], scene.linkage, ours, reference
         )

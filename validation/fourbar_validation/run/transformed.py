@@ -139,13 +139,14 @@ class _Few:
     def sizes(self) -> _QuantitySizes:
         """Return the sizes of all quantities."""
         sizes, linkage = Sizes(self.scene, self.solution), self.scene.linkage
-        scales, conditions, terms = [], [], []
-        for name, numbers in zip(self.quantities, self.numbers, strict=True):
-            scales.append(sizes.scale(name, numbers))
-            conditions.append(find_condition(name, linkage, self.solution))
-            terms.append(sizes.sum_terms(name))
-        condition = np.minimum(np.stack(conditions), 1.0)
-        return _QuantitySizes(np.stack(scales), condition, np.stack(terms))
+        conditions = [
+            find_condition(name, linkage, self.solution) for name in self.quantities
+        ]
+        return _QuantitySizes(
+            sizes.scales(self.quantities, self.numbers),
+            np.minimum(np.stack(conditions), 1.0),
+            np.stack([sizes.sum_terms(name) for name in self.quantities]),
+        )
 
     @cached_property
     def _signs(self) -> NDArray[np.int8]:
