@@ -77,13 +77,19 @@ def _list_range(view: View, steps: int) -> Command:
     return command_at(view.scene, np.linspace(places[0], places[-1], steps + 1))
 
 
+def _measure(points: Array) -> tuple[Array, float]:
+    """Return the chord of each step of a path, NaN beside a gap, and the path's extent, m."""
+    chords = np.hypot(*np.diff(points, axis=0).T)
+    extent = np.nanmax(np.nanmax(points, axis=0) - np.nanmin(points, axis=0))
+    return chords, float(extent)
+
+
 def _longest_chord(points: Array) -> float:
     """Return the longest chord between positions that assemble.
 
     It is a part of the path's extent.
     """
-    chords = np.hypot(*np.diff(points, axis=0).T)
-    extent = float(np.nanmax(np.nanmax(points, axis=0) - np.nanmin(points, axis=0)))
+    chords, extent = _measure(points)
     return float(np.nanmax(chords, initial=0.0)) / extent if extent else 0.0
 
 
@@ -92,13 +98,13 @@ def _thin(path: Array) -> Array:
 
     Gaps and ends stay.
     """
-    extent = float(np.nanmax(np.nanmax(path, axis=0) - np.nanmin(path, axis=0)))
+    chords, extent = _measure(path)
     step = 0.5 * CHORD * extent
     gap = np.isnan(path).any(axis=1)
     if step == 0.0:
         return path[[0, -1]]
-    chords = np.nan_to_num(np.hypot(*np.diff(path, axis=0).T))
-    passed = np.floor(np.concatenate([[0.0], np.cumsum(chords)]) / step)
+    along = np.cumsum(np.nan_to_num(chords))
+    passed = np.floor(np.concatenate([[0.0], along]) / step)
     beside = np.flatnonzero(np.diff(gap.astype(int)))
     on = np.flatnonzero(np.diff(passed, prepend=-1.0) > 0.0)
     kept = np.unique([0, len(path) - 1, *beside, *(beside + 1), *on])
