@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -229,28 +229,15 @@ class Solution(Quantities):  # noqa: PLW1641 - arrays have no hash
 
         Raises DependencyError where pandas is not installed.
         """
-        columns = {
-            name: values
-            for name, values in list_scalars(self, require_units(units)).items()
-            if values is not None
-        }
+        evaluated = [
+            column
+            for column in list_scalars(self, require_units(units))
+            if column.values is not None
+        ]
+        columns = {column.heading: column.values for column in evaluated}
         table = make_data_frame({**list_leading(self), **columns})
-        table.attrs["units"] = {heading: _read_unit(heading) for heading in columns}
+        table.attrs["units"] = {column.heading: column.unit for column in evaluated}
         return table
-
-
-def _read_unit(heading: str) -> str:
-    """Return the unit of a column of numbers.
-
-    It is that of the heading, otherwise the SI unit.
-    """
-    name, _, unit = heading.partition(" [")
-    if unit:
-        return unit.removesuffix("]")
-    stem = name.strip("|")
-    if stem not in UNITS and stem not in DERIVED_NAMES:
-        stem = stem.removesuffix("_x").removesuffix("_y")
-    return find_unit(stem)
 
 
 def _is_equal(one: Any, another: Any) -> bool:
@@ -334,10 +321,14 @@ def write_csv(
     """
     size = solution.theta_2.size
     first = list_leading(solution) if chosen is None else {}
-    scalars = list_scalars(solution, units) if chosen is None else chosen
+    scalars: Mapping[str, Array | None] = (
+        {column.heading: column.values for column in list_scalars(solution, units)}
+        if chosen is None
+        else chosen
+    )
     columns = {
-        name: [math.nan] * size if values is None else values.tolist()
-        for name, values in scalars.items()
+        heading: [math.nan] * size if values is None else values.tolist()
+        for heading, values in scalars.items()
     }
     text = io.StringIO()
     writer = csv.writer(
@@ -377,43 +368,56 @@ def list_leading(solution: Solution) -> dict[str, list[Any]]:
     }
 
 
-def list_scalars(solution: Solution, units: Conversion = SI) -> dict[str, Array | None]:
-    """List every quantity as columns of numbers.
+class ScalarColumn(NamedTuple):
+    """One column of numbers: a quantity, or a component or the size of one."""
 
-    Vectors are `A_x`, `A_y`; None stands for what was not evaluated. Of a pin force the
-    magnitude too, and where it is known the time. In other units than SI every heading
-    names its own: `F12_x [lbf]`.
+    name: str
+    unit: str
+    """Unit of the values."""
+    values: Array | None
+    """One for each position; None for what was not evaluated."""
+    names_unit: bool
+    """The heading names the unit."""
+
+    @property
+    def heading(self) -> str:
+        """What stands above the column: `F12_x`, or `F12_x [lbf]`."""
+        if not self.names_unit or self.unit == "1":
+            return self.name
+        return f"{self.name} [{self.unit}]"
+
+
+def list_scalars(solution: Solution, units: Conversion = SI) -> list[ScalarColumn]:
+    """List every quantity as columns of numbers, vectors as `A_x`, `A_y`.
+
+    Of a pin force the magnitude too, and where it is known the time. In other units
+    than SI every heading names its own.
     """
-    columns: dict[str, Array | None] = {}
-    for name in _list_quantities(solution):
-        _add_columns(columns, name, find_values(solution, name, units), units)
-    for name, values in load_show("derived").list_derived(solution, units).items():
-        _add_columns(columns, name, values, units)
+    quantities = {
+        name: find_values(solution, name, units) for name in _list_quantities(solution)
+    }
+    quantities |= load_show("derived").list_derived(solution, units)
+    columns = [
+        ScalarColumn(part, find_unit_in(find_unit(name), units)[0], column, bool(units))
+        for name, values in quantities.items()
+        for part, column in _split_columns(name, values).items()
+    ]
     if solution.time is None and (time := compute_times(solution)) is not None:
-        columns["time [s]" if units else "time"] = time
+        columns.append(ScalarColumn("time", "s", time, bool(units)))
     return columns
 
 
-def _add_columns(
-    columns: dict[str, Array | None],
-    name: str,
-    values: Array | None,
-    units: Conversion,
-) -> None:
-    """Add the columns of a quantity, headed with its unit where units are given."""
-    unit = find_unit(name)
-    heading = f" [{find_unit_in(unit, units)[0]}]" if units and unit != "1" else ""
+def _split_columns(name: str, values: Array | None) -> dict[str, Array | None]:
+    """Split a quantity into columns of numbers, one for each position of each member."""
     if is_scalar(name):
-        columns[name + heading] = None if values is None else values.ravel()
-        return
-    for axis, letter in enumerate("xy"):
-        columns[f"{name}_{letter}{heading}"] = (
-            None if values is None else values[..., axis].ravel()
-        )
+        return {name: None if values is None else values.ravel()}
+    parts: dict[str, Array | None] = {f"{name}_x": None, f"{name}_y": None}
     if has_size(name):
-        columns[f"|{name}|{heading}"] = (
-            None if values is None else np.hypot(*values.T).T.ravel()
-        )
+        parts[f"|{name}|"] = None
+    if values is None:
+        return parts
+    x, y = values[..., 0].ravel(), values[..., 1].ravel()
+    return dict(zip(parts, (x, y, np.hypot(x, y)), strict=False))
 
 
 def is_scalar(name: str) -> bool:
