@@ -18,6 +18,7 @@ from fourbar.formulas.mobility import limit_positions
 from fourbar.linkage import BAR_NAMES, MOVING_BARS
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import with_signs
+from fourbar.show.derived import derive
 from fourbar.show.duty import compute_energies, read_drive
 from fourbar.show.plot.style import (
     BAR_COLOURS,
@@ -128,6 +129,13 @@ def break_at_poles(values: Array, poles: Indices) -> Array:
     out = np.array(values, dtype=float)
     out[~np.isfinite(out)] = np.nan
     return np.insert(out, poles + 1, np.nan)
+
+
+def plot_between_poles(
+    axes: "Axes", over: Array, values: Array, poles: Indices, **look: Any
+) -> None:
+    """Plot a curve that no line takes across a pole."""
+    axes.plot(break_at_poles(over, poles), break_at_poles(values, poles), **look)
 
 
 def choose_limit(values: list[Array]) -> float | None:
@@ -340,12 +348,7 @@ def _draw_drive(
         limit or find_greatest(*everywhere), unit, view.units
     )
     symbol = f"${letter}_{bar}$" if bar else f"${letter}$"
-    axes.plot(
-        break_at_poles(over, poles),
-        factor * break_at_poles(values, poles),
-        color=INK,
-        label=symbol,
-    )
+    plot_between_poles(axes, over, factor * values, poles, color=INK, label=symbol)
     for index in poles:
         axes.axvline(
             0.5 * float(over[index] + over[index + 1]),
@@ -411,11 +414,8 @@ def draw_forces(axes: "Axes", view: View) -> None:
     factor, unit = choose_unit(limit or find_greatest(*everywhere), "N", view.units)
     poles = find_poles(view)
     for name, values in sizes.items():
-        axes.plot(
-            break_at_poles(over, poles),
-            factor * break_at_poles(values, poles),
-            **choose_force_line(name),
-        )
+        look = choose_force_line(name)
+        plot_between_poles(axes, over, factor * values, poles, **look)
     axes.set_ylim(bottom=0.0)
     axes.set(ylabel=f"$|F|$ ({unit})", title="Pin forces")
     clip(axes, view, sizes, limit, "Pin forces", "N")
@@ -471,9 +471,9 @@ def draw_transmission(axes: "Axes", view: View) -> None:
     """
     over = draw_axes(axes, view)
     sweep = view.sweep
-    mu = np.degrees(
-        np.arctan2(np.abs(sweep.sin_mu), np.abs(np.cos(sweep.theta_4 - sweep.theta_3)))
-    )
+    angle = derive(sweep, "transmission")
+    assert angle is not None
+    mu = np.degrees(angle)
     axes.plot(over, mu, color=INK)
     axes.axhline(RECOMMENDED, color=MUTED, lw=0.9, ls=(0, (4, 2)))
     place = find_free_place(mu)
@@ -611,9 +611,7 @@ def draw_hodograph(axes: "PolarAxes", view: View, name: str) -> None:
     free = _find_free_direction(direction[finite])
     direction[finite] = np.unwrap(direction[finite])
     size = np.where(size_here <= top, size_here, np.nan) if limit else size_here
-    axes.plot(
-        break_at_poles(direction, poles), factor * break_at_poles(size, poles), **look
-    )
+    plot_between_poles(axes, direction, factor * size, poles, **look)
     axes.plot(
         direction[dots],
         factor * size[dots],

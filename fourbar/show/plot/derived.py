@@ -3,18 +3,19 @@
 These are shaking force and moment, ratios, and paths of instant centres.
 """
 
+from itertools import chain
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from fourbar.show.derived import derive
 from fourbar.show.plot.curves import (
-    break_at_poles,
     choose_limit,
     clip,
     draw_axes,
     find_poles,
     note,
+    plot_between_poles,
 )
 from fourbar.show.plot.labels import Labels
 from fourbar.show.plot.linkage import draw_mechanism, locate_pins, scale_of
@@ -61,13 +62,8 @@ def draw_shaking_force(axes: "Axes", view: View) -> None:
     factor, unit = choose_unit(limit or find_greatest(*sizes), "N", view.units)
     looks = ((INK, "-"), (BAR_COLOURS[2], (0, (4, 1.5))), (BAR_COLOURS[4], (0, (1, 1))))
     for (name, values), (colour, dashes) in zip(curves.items(), looks, strict=True):
-        axes.plot(
-            break_at_poles(over, poles),
-            factor * break_at_poles(values, poles),
-            color=colour,
-            ls=dashes,
-            label=f"${name}$",
-        )
+        look = {"color": colour, "ls": dashes, "label": f"${name}$"}
+        plot_between_poles(axes, over, factor * values, poles, **look)
     axes.axhline(0.0, color=INK, lw=0.6, zorder=1)
     axes.set(ylabel=f"$F$ ({unit})", title="Shaking force on the frame")
     clip(axes, view, curves, limit, "Shaking force", "N")
@@ -80,11 +76,7 @@ def draw_shaking_moment(axes: "Axes", view: View) -> None:
     moments = _list_values(view, "shaking_moment")
     limit = choose_limit(moments)
     factor, unit = choose_unit(limit or find_greatest(*moments), "N m", view.units)
-    axes.plot(
-        break_at_poles(over, poles),
-        factor * break_at_poles(moments[0], poles),
-        color=INK,
-    )
+    plot_between_poles(axes, over, factor * moments[0], poles, color=INK)
     axes.axhline(0.0, color=INK, lw=0.6, zorder=1)
     axes.set(ylabel=f"$M$ ({unit})", title="Shaking moment about $O_2$")
     clip(axes, view, {"M": moments[0]}, limit, "Shaking moment", "N m")
@@ -109,24 +101,17 @@ def _draw_ratios(axes: "Axes", view: View, names: dict[int, str]) -> None:
     No line goes on beyond a pole.
     """
     over = draw_axes(axes, view)
-    everywhere = [
-        values for name in names.values() for values in _list_values(view, name)
-    ]
-    limit = choose_limit(everywhere)
+    everywhere = {name: _list_values(view, name) for name in names.values()}
+    limit = choose_limit([*chain(*everywhere.values())])
     curves = dict[str, Array]()
     for bar, name in names.items():
-        values = _list_values(view, name)[0]
+        values = everywhere[name][0]
         jumps = np.flatnonzero(values[:-1] * values[1:] < 0.0)
         far = np.minimum(np.abs(values[:-1]), np.abs(values[1:]))[jumps] > 1.0
         poles = jumps[far]
         curves[SYMBOLS[name]] = values
-        axes.plot(
-            break_at_poles(over, poles),
-            break_at_poles(values, poles),
-            color=BAR_COLOURS[bar],
-            ls=BAR_DASHES[bar],
-            label=SYMBOLS[name],
-        )
+        look = {"color": BAR_COLOURS[bar], "ls": BAR_DASHES[bar]}
+        plot_between_poles(axes, over, values, poles, label=SYMBOLS[name], **look)
     axes.axhline(0.0, color=INK, lw=0.6, zorder=1)
     clip(axes, view, curves, limit, "Ratio", "1")
 
@@ -138,7 +123,9 @@ def draw_centres(axes: "Axes", view: View, labels: Labels) -> None:
     middle = pins.mean(axis=0)
     reach = WINDOW * max(view.scene.linkage.lengths)
     for name, colour, dashes in (("I13", POINT, "-"), ("I24", INK, (0, (4, 1.5)))):
-        (path,) = _list_values(view, name)[:1]
+        path, here = derive(view.sweep, name), derive(view.here, name)
+        assert path is not None
+        assert here is not None
         away = np.hypot(*(path - middle).T)
         shown = np.where((away <= reach)[:, None], path, np.nan)
         subscript = name[1:]
@@ -149,8 +136,6 @@ def draw_centres(axes: "Axes", view: View, labels: Labels) -> None:
             lw=1.2,
             label=f"$I_{{{subscript}}}$",
         )
-        (here,) = [derive(view.here, name)]
-        assert here is not None
         if np.hypot(*(here[0] - middle)) <= reach:
             axes.plot(*(factor * here).T, "o", ms=4.5, color=colour, zorder=6)
     draw_mechanism(axes, view, view.here, 0, labels)
