@@ -65,10 +65,11 @@ def _find_places(scene: Scene, name: str, value: float) -> list[float]:
         )
     places: list[float] = []
     for place in _list_candidates(scene, name, value):
+        if any(_is_same(motion.commanded, place, other) for other in places):
+            continue
         here = solve(scene, "position", at=command_at(scene, np.array([place])))
         reached = getattr(here, name)[0]
-        is_new = not any(_is_same(motion.commanded, place, other) for other in places)
-        if is_new and math.isfinite(reached) and _is_same(name, reached, value):
+        if math.isfinite(reached) and _is_same(name, reached, value):
             places.append(place)
     if not places:
         raise NotAssembledError(
@@ -145,10 +146,10 @@ def _find_times(scene: Scene, name: str, value: float) -> list[float]:
         return _require_values(getattr(solution, name), name)
 
     grid = np.unique([*np.linspace(start, stop, FINE + 1), *law.time])
-    gaps = _gap(name, read(grid), value)
+    gaps = _measure_gaps(name, read(grid), value)
 
     def gap(time: float) -> float:
-        return float(_gap(name, read(np.array([time])), value)[0])
+        return float(_measure_gaps(name, read(np.array([time])), value)[0])
 
     times = [float(start)] if gaps[0] == 0.0 else []
     times += [_bisect(gap, *grid[row : row + 2]) for row in _find_crossings(name, gaps)]
@@ -157,7 +158,7 @@ def _find_times(scene: Scene, name: str, value: float) -> list[float]:
     return times
 
 
-def _gap(name: str, values: Array, value: float) -> Array:
+def _measure_gaps(name: str, values: Array, value: float) -> Array:
     """Return how far values lie from one, of angles within half a turn."""
     if name in ANGLES:
         return np.asarray(np.angle(np.exp(1j * (values - value))))
@@ -236,7 +237,7 @@ def _find_released(scene: Scene, name: str, value: float) -> Command:
     times = whole.time
     assert times is not None
     values = read(whole)
-    gaps = _gap(name, values, value)
+    gaps = _measure_gaps(name, values, value)
     if gaps[0] == 0.0:
         return whole.part(slice(0, 1))
     rows = _find_crossings(name, gaps)
@@ -249,7 +250,7 @@ def _find_released(scene: Scene, name: str, value: float) -> Command:
     def gap(time: float) -> float:
         if time == times[0]:
             return float(gaps[0])
-        return float(_gap(name, read(run(time, 1))[-1:], value)[0])
+        return float(_measure_gaps(name, read(run(time, 1))[-1:], value)[0])
 
     from scipy.optimize import brentq
 
