@@ -24,10 +24,10 @@ MOVING_BARS = (2, 3, 4)
 PINS = {"O2": (1, 2), "A": (2, 3), "B": (3, 4), "O4": (1, 4)}
 PIN_FORCE = dict(zip(PINS, PIN_FORCES, strict=True))
 """The independent force of each pin."""
-ENDS = {2: ("O2", "A"), 3: ("A", "B"), 4: ("O4", "B")}
-"""The pins at both ends of each moving bar, that which it is measured from first."""
+ENDS = {1: ("O2", "O4"), 2: ("O2", "A"), 3: ("A", "B"), 4: ("O4", "B")}
+"""The pins at both ends of each bar; its angle is measured at the first."""
 FIRST_PIN = {bar: first for bar, (first, _) in ENDS.items()}
-SECOND_PIN = {1: "O4", **{bar: second for bar, (_, second) in ENDS.items()}}
+SECOND_PIN = {bar: second for bar, (_, second) in ENDS.items()}
 NO_NUMBERS = (bool, str, bytes, complex)
 """Types that `require` rejects although `float` may read them."""
 A_BRANCH = "must be +1 (open) or -1 (crossed)"

@@ -15,7 +15,7 @@ from fourbar.edit.document import Path, SceneDocument
 from fourbar.effects import ForceDrive, Place, Springs
 from fourbar.errors import InputError
 from fourbar.files.drawing import DRAWN
-from fourbar.linkage import BAR_NAMES, MOVING_BARS
+from fourbar.linkage import BAR_NAMES, FIRST_PIN, MOVING_BARS
 from fourbar.quantities.units import find_unit, to_si
 from fourbar.scene import Command, Scene
 from fourbar.scene.drawing import DrawnPins
@@ -187,7 +187,7 @@ def drag(
         )
     for handle in list_handles(scene):
         frame = cmath.rect(1.0, turned[handle.bar])
-        foot = pins[{1: "O2", 2: "O2", 3: "A", 4: "O4"}[handle.bar]] + frame * handle.at
+        foot = pins[FIRST_PIN[handle.bar]] + frame * handle.at
         own_frame = frame if handle.turns else 1.0 + 0.0j
         force_frame = frame if handle.force_turns else 1.0 + 0.0j
         if list(handle.path) == dragged.what:

@@ -115,7 +115,7 @@ def _list_bars(linkage: FourBar, point: Place) -> set[int]:
     These are its bar and, at a pin of it, the other bar.
     """
     length = linkage.lengths[point.bar - 1]
-    places = zip({1: ("O2", "O4"), **ENDS}[point.bar], (0.0, length), strict=True)
+    places = zip(ENDS[point.bar], (0.0, length), strict=True)
     pins = [
         pin for pin, along in places if abs(point.in_bar - along) <= COINCIDE * length
     ]

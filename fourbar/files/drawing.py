@@ -104,13 +104,12 @@ def meet_lengths(drawing: DrawnPins, pins: dict[str, Any]) -> tuple[float, ...]:
 
     `pins`: x and y of each pin as they are written.
     """
-    ends = {1: ("O2", "O4"), **ENDS}
     last = {pin: [find_rounding(text, "m") for text in pins[pin]] for pin in PINS}
     moved = {pin: math.hypot(*roundings) for pin, roundings in last.items()}
-    lengths = tuple(drawing.length(bar) for bar in ends)
-    roundings = tuple(moved[first] + moved[second] for first, second in ends.values())
+    lengths = tuple(drawing.length(bar) for bar in ENDS)
+    roundings = tuple(moved[first] + moved[second] for first, second in ENDS.values())
     decimals = tuple(
-        max(*last[first], *last[second]) for first, second in ends.values()
+        max(*last[first], *last[second]) for first, second in ENDS.values()
     )
     met = meet_change_points(lengths, roundings, decimals)  # type: ignore[arg-type]
     # one equality alone is met by chance: nobody draws it

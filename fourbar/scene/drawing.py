@@ -33,7 +33,7 @@ class DrawnPins:
                 raise InputError(key, place, "must be a pair (x, y)")
             x, y = (require(f"{key}.{axis}", place[axis], "m") for axis in (0, 1))
             object.__setattr__(self, field.name, (x, y))
-        for bar, (first, second) in {1: ("O2", "O4"), **ENDS}.items():
+        for bar, (first, second) in ENDS.items():
             if self.vector(bar) == 0.0:
                 name = f"both ends of the {BAR_NAMES[bar]}"
                 raise InputError(
@@ -61,7 +61,7 @@ class DrawnPins:
 
     def vector(self, bar: int) -> complex:
         """Return the vector of a bar, from its first pin to its second, m."""
-        first, second = ("O2", "O4") if bar == 1 else ENDS[bar]
+        first, second = ENDS[bar]
         (x, y), (to_x, to_y) = self.place(first), self.place(second)
         return complex(to_x - x, to_y - y)
 
@@ -90,12 +90,12 @@ class DrawnPins:
 
         It is from the first pin, along + i across.
         """
-        x, y = self.place("O2" if bar == 1 else FIRST_PIN[bar])
+        x, y = self.place(FIRST_PIN[bar])
         vector = self.vector(bar)
         return complex(place[0] - x, place[1] - y) * vector.conjugate() / abs(vector)
 
     def from_bar(self, bar: int, z: complex) -> complex:
         """Return the place in the drawing of a point of a bar, x + i y, m."""
-        x, y = self.place("O2" if bar == 1 else FIRST_PIN[bar])
+        x, y = self.place(FIRST_PIN[bar])
         vector = self.vector(bar)
         return complex(x, y) + z * vector / abs(vector)

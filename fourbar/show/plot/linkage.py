@@ -96,7 +96,8 @@ def draw_mechanism(
     pins = {name: split_components(pin) for name, pin in place.pins.items()}
     centre = sum(place.pins.values()) / 4.0
     middle, drawn = split_components(centre), []
-    for number, (start, stop) in ENDS.items():
+    for number in MOVING_BARS:
+        start, stop = ENDS[number]
         (x, y), colour = zip(pins[start], pins[stop], strict=True), BAR_COLOURS[number]
         drawn += axes.plot(x, y, color=colour, lw=4.5, solid_capstyle="round", zorder=4)
         labels.keep_off(axes, pins[start], pins[stop], width=4.5)
@@ -129,7 +130,7 @@ def draw_mechanism(
         labels.keep_off(axes, here, here)
         labels.add(Label(axes, name, here, middle, POINT, 8.5, 2.5))
     for carrier, corner in _list_carried(view, place):
-        first, last = (place.pins[pin] for pin in ENDS.get(carrier, ("O2", "O4")))
+        first, last = (place.pins[pin] for pin in ENDS[carrier])
         drawn += draw_plate(axes, carrier, (first, corner, last), labels)
     for number in MOVING_BARS:
         bar, colour = view.scene.linkage.bar(number), BAR_COLOURS[number]
@@ -437,8 +438,9 @@ def draw_coupler_curves(axes: "Axes", view: View, labels: Labels) -> None:
         "solid_capstyle": "round",
         "zorder": 2,
     }
-    for ends in ENDS.values():
-        axes.plot(*zip(*(pins[end] for end in ends), strict=True), lw=2.5, **faint)
+    for number in MOVING_BARS:
+        start, stop = ENDS[number]
+        axes.plot(*zip(pins[start], pins[stop], strict=True), lw=2.5, **faint)
     for name in names:
         x, y = (float(x) for x in factor * view.here.points[name][0])
         axes.plot(

@@ -14,14 +14,11 @@ import mujoco
 import numpy as np
 
 from fourbar.errors import InputError
-from fourbar.linkage import BAR_NAMES, MOVING_BARS, PINS
-from fourbar.linkage import ENDS as MOVING_ENDS
+from fourbar.linkage import BAR_NAMES, ENDS, MOVING_BARS, PINS
 from fourbar.mjcf import Plane
 from fourbar_validation.compare.answer import Array
 
 PIN_OF = {frozenset(bars): pin for pin, bars in PINS.items()}
-ENDS = {1: ("O2", "O4"), **MOVING_ENDS}
-"""The pins between which a bar's line runs."""
 PLANES = {2: ("x-y", (0, 1)), 1: ("x-z", (0, 2)), 0: ("y-z", (1, 2))}
 """World axis of the hinges: the plane, and the world axes for x and y there."""
 STRAIGHT = 1e-9

@@ -14,6 +14,7 @@ import mujoco
 import numpy as np
 
 from fourbar.errors import InputError
+from fourbar.linkage import ENDS
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.engines.mujoco.robots.ancestry import (
     climb,
@@ -53,8 +54,6 @@ COINCIDE = 1e-6
 """Two pins are one where they are nearer than this part of the longest bar."""
 LEVEL = 1e-6
 """Part of gravity below which a plane is level."""
-PINS_OF_BAR = {1: ("O2", "O4"), 2: ("O2", "A"), 3: ("A", "B"), 4: ("O4", "B")}
-"""Pins at both ends of each bar, that which its angle is counted at first."""
 KINDS = {
     int(getattr(mujoco.mjtEq, f"mjEQ_{name.upper()}")): name
     for name in ("connect", "weld", "joint", "tendon")
@@ -718,12 +717,10 @@ class _Layout:
             self.points[bar, pin] = turn.T @ (place - self.data.xpos[body])
         self.along = self._to_ground(self._choose_along())
         self.across = np.cross(self.normal, self._choose_along())
-        lines = [self._line(bar) for bar in PINS_OF_BAR]
+        lines = [self._line(bar) for bar in ENDS]
         self.lengths = tuple(math.hypot(x, y) for x, y in lines)
         self.angles = tuple(math.atan2(y, x) for x, y in lines)
-        for length, (one, other) in zip(
-            self.lengths, PINS_OF_BAR.values(), strict=True
-        ):
+        for length, (one, other) in zip(self.lengths, ENDS.values(), strict=True):
             if length <= COINCIDE * max(self.lengths):
                 return f"pins {one} and {other} are in one place: a bar has no length"
         return ""
@@ -750,7 +747,7 @@ class _Layout:
         return np.asarray(np.linalg.svd(self.normal[None])[2][1])
 
     def _line(self, bar: int) -> tuple[float, float]:
-        first, second = PINS_OF_BAR[bar]
+        first, second = ENDS[bar]
         vector = self.places[bar, second] - self.places[bar, first]
         along = self.data.xmat[self.bodies[1][0]].reshape(3, 3) @ self.along
         return float(vector @ along), float(vector @ self.across)

@@ -21,7 +21,7 @@ from fourbar.formulas.mobility import (
     find_intervals,
     turns_fully,
 )
-from fourbar.linkage import BAR_NAMES, MOVING_BARS, Bar, FourBar
+from fourbar.linkage import BAR_NAMES, ENDS, MOVING_BARS, Bar, FourBar
 from fourbar.scene import Command, Scene, with_signs
 from fourbar.scene.motion import CROSSED, OPEN, Motion, Sweep
 from fourbar.solving import solve
@@ -33,7 +33,6 @@ from fourbar_validation.engines.mujoco.robots.ancestry import (
     name_joint,
 )
 from fourbar_validation.engines.mujoco.robots.closures import (
-    PINS_OF_BAR,
     choose_loop,
     describe_equality,
     find_closures,
@@ -305,7 +304,7 @@ class _SceneOfLoop:
 
         The angle is from the bar's line.
         """
-        first, second = PINS_OF_BAR[bar]
+        first, second = ENDS[bar]
         pin = self._locate(bar, first)
         line = self._in_plane(self._locate(bar, second) - pin)
         arm = self._in_plane(place - pin)
