@@ -21,9 +21,7 @@ if TYPE_CHECKING:
     from fourbar.effects.load import Load as Load
     from fourbar.effects.load import Table as Table
     from fourbar.effects.pin_friction import PinFriction as PinFriction
-    from fourbar.effects.place import STATED_PLACES as STATED_PLACES
     from fourbar.effects.place import Place as Place
-    from fourbar.effects.place import require_place as require_place
     from fourbar.effects.point_drive import PointDrive as PointDrive
     from fourbar.effects.spring import Spring as Spring
     from fourbar.effects.spring import Springs as Springs
@@ -43,10 +41,11 @@ FILE_OF = {
 """
 OTHER_FILES = {
     "Effect": "effect",
-    **dict.fromkeys(("Load", "Table"), "load"),
-    **dict.fromkeys(("Place", "STATED_PLACES", "require_place"), "place"),
-    "Spring": "spring",
     "Actions": "effect",
+    "Place": "place",
+    "Load": "load",
+    "Table": "load",
+    "Spring": "spring",
     "ForceDrive": "force_drive",
     "LinearDrive": "linear_drive",
     "PointDrive": "point_drive",

@@ -229,33 +229,10 @@ def _write_comments(
     scene: Scene, drive: Drive, reader: str, *, exerts: bool
 ) -> list[str]:
     """Say how the file starts and where its numbers stand, a line each."""
-    linear = isinstance(scene.drive, LinearDrive)
     notes, numbers, bar = NOTES["mjcf"], NOTES["numbers"][reader], scene.drive_bar
-    kinds: list[str] = [f"cylinder_{drive}" if linear else drive]
-    if scene.motion.free is not None:
-        kinds = ["released"]
-    elif drive == "flywheel":
-        kinds = ["accelerated" if scene.motion.alpha_2 else "driven"]
-        kinds += (
-            []
-            if _compute_span(scene.linkage) >= FULL_TURN
-            and not change_points(scene.linkage)
-            else ["limits"]
-        )
-        kinds += (
-            ["cylinder_flywheel"]
-            if linear
-            else (
-                ["pushed"]
-                if scene.drive is not None
-                else ["elsewhere"]
-                if bar != 2
-                else []
-            )
-        )
     lines: list[str] = [
         notes.get(f"{reader}_{kind}", notes[kind]).format(bar=bar)
-        for kind in ("opens", *kinds)
+        for kind in ("opens", *_list_kinds(scene, drive))
     ]
     if reader == "genesis" and (names := _list_left_out_by_genesis(scene)):
         lines.append(notes["genesis_without"].format(names=", ".join(names)))
@@ -274,6 +251,26 @@ def _write_comments(
     return [*lines, *numbers["after"]]
 
 
+def _list_kinds(scene: Scene, drive: Drive) -> list[str]:
+    """List the notes that hold for the motion and the drive of a file, by their keys."""
+    linear = isinstance(scene.drive, LinearDrive)
+    if scene.motion.free is not None:
+        return ["released"]
+    if drive != "flywheel":
+        return [f"cylinder_{drive}" if linear else drive]
+    kinds = ["accelerated" if scene.motion.alpha_2 else "driven"]
+    turns = _compute_span(scene.linkage) >= FULL_TURN
+    if not turns or change_points(scene.linkage):
+        kinds.append("limits")
+    if linear:
+        kinds.append("cylinder_flywheel")
+    elif scene.drive is not None:
+        kinds.append("pushed")
+    elif scene.drive_bar != 2:
+        kinds.append("elsewhere")
+    return kinds
+
+
 def _list_left_out_by_genesis(scene: Scene) -> list[str]:
     """List what Genesis leaves out.
 
@@ -281,16 +278,15 @@ def _list_left_out_by_genesis(scene: Scene) -> list[str]:
     """
     names = ["loads"] if scene.loads else []
     for effect in scene.effects:
-        pins = (
-            {pin for pin, *_ in effect.rows} if isinstance(effect, PinRows) else set()
-        )
-        names += ["springs"] if effect.key == "springs" else []
-        names += [f"{effect.key} at B"] if "B" in pins else []
-        names += (
-            ["rest angles of torsion (it rests as assembled)"]
-            if effect.key == "torsion" and pins - {"B"}
-            else []
-        )
+        if effect.key == "springs":
+            names.append("springs")
+        if not isinstance(effect, PinRows):
+            continue
+        pins = {pin for pin, *_ in effect.rows}
+        if "B" in pins:
+            names.append(f"{effect.key} at B")
+        if effect.key == "torsion" and pins - {"B"}:
+            names.append("rest angles of torsion (it rests as assembled)")
     return names
 
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from fourbar import effects
+from fourbar.effects.place import STATED_PLACES, Place, require_place
 from fourbar.errors import InputError, expect
 from fourbar.linkage import (
     BAR_NAMES,
@@ -47,7 +48,7 @@ class Point:
     bar: int
     from_pin: tuple[float, float] | None = None
     from_centre: tuple[float, float] | None = None
-    numbers: ClassVar[dict[str, Declared]] = effects.STATED_PLACES
+    numbers: ClassVar[dict[str, Declared]] = STATED_PLACES
 
     def __post_init__(self) -> None:
         plain = (
@@ -74,14 +75,14 @@ class Point:
         )
         object.__setattr__(self, "bar", bar)
         check_numbers(self, self.key)
-        effects.require_place(self.key, self.place)
+        require_place(self.key, self.place)
 
     @property
-    def place(self) -> effects.Place:
+    def place(self) -> Place:
         """Place of the point on its bar."""
-        return effects.Place(self.bar, self.from_pin, self.from_centre)
+        return Place(self.bar, self.from_pin, self.from_centre)
 
-    def with_places(self, change: Callable[[effects.Place], effects.Place]) -> "Point":
+    def with_places(self, change: Callable[[Place], Place]) -> "Point":
         """Return the same point with its place changed."""
         stated = self.place
         if (place := change(stated)) is stated:
@@ -137,7 +138,7 @@ def find_unit(key: str) -> str | None:
     if table == "loads":
         numbers = effects.Load.numbers
     elif table == "drive":
-        numbers = {**effects.STATED_PLACES, "direction": Declared("rad")}
+        numbers = {**STATED_PLACES, "direction": Declared("rad")}
     elif table == "effects" and names and (kind := effects.list_kinds().get(names[0])):
         numbers = {**kind.numbers, "gravity": effects.Gravity.numbers["magnitude"]}
     part = names.pop() if names and names[-1] in ("0", "1") else ""
