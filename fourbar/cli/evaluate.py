@@ -11,7 +11,7 @@ from fourbar.cli import given
 from fourbar.errors import InputError, NotAssembledError
 from fourbar.linkage import POSITIVE
 from fourbar.scene import Scene
-from fourbar.solution import DEGREES, Array, Conversion, Solution
+from fourbar.solution import DEGREES, SI, Array, Conversion, Solution
 
 if TYPE_CHECKING:
     from fourbar.show.columns import Column
@@ -277,11 +277,11 @@ def _choose_units(
 
     They are those asked for, otherwise those of the file; JSON and CSV are in SI.
     """
-    shown = dict(units or {})
-    if form in ("summary", "table"):
-        shown = {**DEGREES, **shown}
-        if units is None:
-            shown = dict(given.suit_units())
+    for_reading = form in ("summary", "table")
+    if units is None:
+        shown = dict(given.suit_units() if for_reading else SI)
+    else:
+        shown = {**(DEGREES if for_reading else SI), **units}
     if degrees:
         shown |= DEGREES
     elif degrees is False:
