@@ -153,14 +153,15 @@ def _remove_jumps(state: State, branch: Number) -> dict[int, Number]:
 
     The loop is read from the commanded bar. The diagonal from A to O4 swings about the
     ground's line where a < d, and otherwise about the input's, never by more than a
-    quarter turn; bars 3 and 4 make angles with it that stay between 0 and half a turn.
+    quarter turn. Where it vanishes at a change point (a = d, b = c) it has the direction
+    of (theta_1 + theta_2)/2 less a quarter turn, and a signed length.
     """
     bar, theta_1, theta_2 = (
         state.bar,
         state.theta_1,
         state.theta_2 if state.q is None else state.q,
     )
-    d, a, *_ = reorder_lengths(bar, state.lengths[:4])
+    d, a, b, c = reorder_lengths(bar, state.lengths[:4])
     turned = (
         math.pi if bar == 4 else 0.0
     )  # turn of the ground, and of the coupler with it
@@ -172,17 +173,47 @@ def _remove_jumps(state: State, branch: Number) -> dict[int, Number]:
     )
     line = np.where(a < d, theta_1, theta_2 + math.pi)
     phi = line + wrap_angle(phi - line)
-
-    def beyond(angle: Number) -> Number:
-        """Wrap the angle into half a turn, or as far outside as rounding puts it."""
-        return wrap_angle(angle - 0.5 * math.pi) + 0.5 * math.pi
-
+    outer, inner = state.passing
+    vanishes = inner & (a == d)
+    phi = np.where(vanishes, 0.5 * (theta_1 + theta_2) - 0.5 * math.pi, phi)
+    half = 0.5 * (theta_2 - theta_1)
+    of_3 = _find_middle(b, c, half, outer, inner)
+    of_4 = _find_middle(c, b, half, outer, inner)
+    at_3, at_4 = branch * (theta_3 - phi), branch * (phi + math.pi - theta_4)
     angles = (
         theta_2,
-        phi + branch * beyond(branch * (theta_3 - phi)) - turned,
-        phi + math.pi - branch * beyond(branch * (phi + math.pi - theta_4)),
+        phi + branch * (of_3 + wrap_angle(at_3 - of_3)) - turned,
+        phi + math.pi - branch * (of_4 + wrap_angle(at_4 - of_4)),
     )
     return {
         1: np.full_like(theta_2, theta_1 - turned),
         **dict(zip(ROLES[bar], angles, strict=True)),
     }
+
+
+def _find_middle(
+    beside: Number, opposite: Number, half: Number, outer: Number, inner: Number
+) -> Number:
+    """Find what the angle of a bar from the diagonal never leaves by half a turn, rad.
+
+    In the triangle of bars 3 and 4 and the diagonal f the angle of a bar p, opposite to
+    the bar q, is 2 arg(x + i y) with
+        x^2 = (p + q + f)(f + p - q),   y^2 = (p + q - f)(f - p + q).
+    Both are positive but where a root passes through zero: the outer one turns the sign
+    of y at h = 90 deg, the inner one at h = 0 that of y if p > q, of x if p < q. Where
+    both change their signs, the angle winds by as much as the bar commanded turns, and
+    by half of that where the diagonal vanishes, p = q.
+
+    Parameters
+    ----------
+    beside, opposite : lengths p and q.
+    half : h, rad, not reduced.
+    outer, inner : roots that pass through zero.
+    """
+    of_x = inner & (beside < opposite)
+    of_y = outer | (inner & (beside > opposite))
+    winds = math.pi - 2.0 * half
+    of_both = np.where(beside == opposite, 0.5 * winds, winds)
+    middle = np.where(of_x, math.pi, np.where(of_y, 0.0, 0.5 * math.pi))
+    wound = outer & inner & (beside <= opposite)
+    return np.where(wound, of_both, middle)

@@ -243,6 +243,7 @@ class Case(NamedTuple):
             path.bar,
             q,
             sine,
+            path.passing,
         )
 
     def at(

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fourbar.formulas.arithmetic import Number, is_any, select, vector
-from fourbar.formulas.position import Loop, Position
+from fourbar.formulas.position import Loop, Passing, Position
 
 FAST = 4.0
 """Value of |d^2 - a^2|/e^2, twice |1/2 - t|, from which the triangle turns fast.
@@ -235,6 +235,8 @@ class State(NamedTuple):
     """Sine between the two other moving bars, zero at the limits of the bar. None: it
     is sin(theta_4 - theta_3).
     """
+    passing: Passing = Passing(False, False)
+    """Roots of the path that pass through zero at a change point."""
 
     def direction(self, bar: int) -> Number:
         """Return e^{i theta} of bar 1 (from O2 to O4), 2, 3 or 4."""

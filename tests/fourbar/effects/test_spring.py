@@ -11,6 +11,7 @@ from fourbar.effects import Gravity, PinFriction, Place, Spring, Springs, Torsio
 from fourbar.errors import LimitError
 from fourbar.formulas.mobility import choose_range
 from fourbar.linkage import PINS
+from fourbar.quantities import CHANGE_POINT, WOUND
 from fourbar.scene import Command, Scene
 from fourbar.scene.motion import Free, Motion, Sweep
 from fourbar.solving import solve
@@ -108,13 +109,9 @@ def test_a_torsion_spring_is_wound_where_the_continuous_angle_says_so(
     """Followed position by position, and evaluated at each fiftieth by itself and in another order."""
     link = replace(linkage(name), ground_angle=0.4)
     least, most = choose_range(link)
-    if (
-        name == "kite"
-    ):  # from its change point to the same again: there bars 3 and 4 are free to turn
-        least, most = 0.4, 0.4 + 2.0 * math.pi
     margin = 1e-3 * (most - least)
     # a whole turn and a half where the input turns, else its one range
-    turns = most - least > 2.0 * math.pi - 1e-6 and name != "kite"
+    turns = most - least > 2.0 * math.pi - 1e-6
     sweep = (
         (least + margin, least + 3.0 * math.pi)
         if turns
@@ -210,6 +207,48 @@ def test_a_free_motion_that_winds_a_spring_is_an_error() -> None:
         solve(Scene(linkage("crank-rocker"), free, effects=(weak,)))
     held = Torsion.at(O2=(2.0, 0.0, 0.0))
     assert len(solve(Scene(linkage("crank-rocker"), free, effects=(held, Gravity()))))
+
+
+CHANGE_POINTS = {
+    "parallelogram": (0.3, 0.1, 0.3, 0.1),
+    "parallelogram with a short ground": (0.1, 0.3, 0.1, 0.3),
+    "kite, a = d": (0.2, 0.2, 0.3, 0.3),
+    "kite, a = b": (0.2, 0.1, 0.1, 0.2),
+    "kite with a short ground": (0.1, 0.2, 0.2, 0.1),
+    "rhombus": (0.1, 0.1, 0.1, 0.1),
+    "b + c = a + d": (0.1, 0.2, 0.25, 0.05),
+    "d + b = a + c": (0.1, 0.2, 0.25, 0.15),
+    "d + c = a + b": (0.1, 0.2, 0.15, 0.25),
+    "a rocker that passes a change point": (0.3, 0.1, 0.25, 0.05),
+}
+"""Ground, input, coupler, output, m."""
+
+
+@pytest.mark.parametrize("bar", (2, 3, 4))
+@pytest.mark.parametrize("branch", (1, -1))
+@pytest.mark.parametrize("name", CHANGE_POINTS)
+def test_turns_are_counted_through_change_points(
+    name: str, branch: int, bar: int
+) -> None:
+    """An assembly goes on smoothly there: a spring winds as the pin turns from one position to the next."""
+    link = replace(fourbar.uniform(*CHANGE_POINTS[name]), ground_angle=0.4)
+    least, most = choose_range(link, bar)
+    if most - least > 2.0 * math.pi - 1e-6:
+        most = least + 4.0 * math.pi
+    command = {f"theta_{bar}": Sweep(least + 0.03, most - 0.03, 2000)}
+    motion = Motion(**command, **{f"omega_{bar}": 5.0}, branch=branch)
+    scene = Scene(link, motion)
+    if not (solve(scene, "velocity").status_code == 0).any():
+        pytest.skip("the bar stands still in this assembly")
+    for pin in PINS:
+        between = continuous(scene, pin)
+        rest = between[0] - 1.0
+        spring = Torsion.at(**{pin: (2.0, rest, 0.1)})
+        solution = solve(replace(scene, effects=(spring,)), "force")
+        away = np.abs(between - rest)
+        sure = (np.abs(away - math.pi) > EDGE) & (solution.status_code != CHANGE_POINT)
+        wound = solution.status_code[sure] == WOUND
+        assert np.array_equal(wound, away[sure] > math.pi), pin
 
 
 @pytest.mark.parametrize("pin", ("O2", "A", "B", "O4"))
