@@ -408,7 +408,7 @@ def list_scalars(solution: Solution, units: Conversion = SI) -> list[ScalarColum
 
 
 def _split_columns(name: str, values: Array | None) -> dict[str, Array | None]:
-    """Split a quantity into columns of numbers, one for each position of each member."""
+    """Split a quantity into columns of one number a position, members in turn."""
     if is_scalar(name):
         return {name: None if values is None else values.ravel()}
     parts: dict[str, Array | None] = {f"{name}_x": None, f"{name}_y": None}

@@ -153,8 +153,8 @@ def _remove_jumps(state: State, branch: Number) -> dict[int, Number]:
 
     The loop is read from the commanded bar. The diagonal from A to O4 swings about the
     ground's line where a < d, and otherwise about the input's, never by more than a
-    quarter turn. Where it vanishes at a change point (a = d, b = c) it has the direction
-    of (theta_1 + theta_2)/2 less a quarter turn, and a signed length.
+    quarter turn. Where it vanishes at a change point (a = d, b = c) it has the
+    direction of (theta_1 + theta_2)/2 less a quarter turn, and a signed length.
     """
     bar, theta_1, theta_2 = (
         state.bar,

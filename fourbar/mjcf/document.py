@@ -252,7 +252,7 @@ def _write_comments(
 
 
 def _list_kinds(scene: Scene, drive: Drive) -> list[str]:
-    """List the notes that hold for the motion and the drive of a file, by their keys."""
+    """List the keys of the notes that hold for the motion and the drive of a file."""
     linear = isinstance(scene.drive, LinearDrive)
     if scene.motion.free is not None:
         return ["released"]

@@ -78,7 +78,7 @@ def _list_range(view: View, steps: int) -> Command:
 
 
 def _measure(points: Array) -> tuple[Array, float]:
-    """Return the chord of each step of a path, NaN beside a gap, and the path's extent, m."""
+    """Return the chord of each step of a path, NaN beside a gap, and its extent, m."""
     chords = np.hypot(*np.diff(points, axis=0).T)
     extent = np.nanmax(np.nanmax(points, axis=0) - np.nanmin(points, axis=0))
     return chords, float(extent)

@@ -230,7 +230,7 @@ CHANGE_POINTS = {
 def test_turns_are_counted_through_change_points(
     name: str, branch: int, bar: int
 ) -> None:
-    """An assembly goes on smoothly there: a spring winds as the pin turns from one position to the next."""
+    """A spring winds as its pin turns, from one position to the next, on an assembly."""
     link = replace(fourbar.uniform(*CHANGE_POINTS[name]), ground_angle=0.4)
     least, most = choose_range(link, bar)
     if most - least > 2.0 * math.pi - 1e-6:
