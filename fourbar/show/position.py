@@ -8,8 +8,9 @@ from collections.abc import Iterable
 import numpy as np
 
 from fourbar.linkage import MOVING_BARS, PIN_FORCE
-from fourbar.quantities import DERIVED_NAMES
+from fourbar.quantities import CHANGE_POINT, DERIVED_NAMES
 from fourbar.scene import Scene
+from fourbar.show.change_point import find_limits
 from fourbar.show.columns import read_column
 from fourbar.show.derived import derive
 from fourbar.show.units import POSITION_DIGITS, choose_unit, drop_rounding, write_cell
@@ -32,7 +33,8 @@ class PositionSheet:
     """
 
     def __init__(self, scene: Scene, solution: Solution, units: Conversion) -> None:
-        self.scene, self.solution, self.units = scene, solution, units
+        self.scene, self.units = scene, units
+        self.solution = find_limits(scene, solution)
 
     def write_bars(self) -> list[str]:
         """Write angle, speed and acceleration of the moving bars."""
@@ -102,15 +104,20 @@ class PositionSheet:
         shaking = derive(self.solution, "shaking_force")
         if shaking is not None:
             forces["shaking force"] = shaking
-        largest = max(float(np.hypot(*vector[0])) for vector in forces.values())
+        sizes = [float(np.hypot(*vector[0])) for vector in forces.values()]
+        largest = max(filter(np.isfinite, sizes), default=0.0)
         rows = [_write_row("", ("x", "y", "size"))]
         for label, vector in forces.items():
             rows.append(self._write_vector(label, vector[0], "N", largest))
         moment = derive(self.solution, "shaking_moment")
         if moment is not None:
+            arm = max(self.scene.linkage.lengths)
+            moment = drop_rounding(moment, largest * arm)
             factor, name = choose_unit(abs(float(moment[0])), "N m", self.units)
             cells = [*_write_numbers(factor * moment), "", "", f"{name} about O2"]
             rows.append(_write_row("shaking moment", cells))
+        if self.solution.status_code[0] == CHANGE_POINT:
+            rows.append(_say_limits([*forces.values()]))
         return rows
 
     def write_ratios(self) -> list[str]:
@@ -201,6 +208,16 @@ class PositionSheet:
             name = f" {name}"
         (text,) = _write_numbers(factor * values)
         return f"{label:<{NUMBER_LABEL}}{text}{name}{after}"
+
+
+def _say_limits(forces: list[Array]) -> str:
+    """Say what the pin forces of a change point are."""
+    bounded = [np.isfinite(force).all() for force in forces]
+    if all(bounded):
+        return "on the change point: the limits from both sides"
+    if not any(bounded):
+        return "on the change point no pin force has a limit"
+    return "on the change point: the limits from both sides; - has none"
 
 
 def _write_numbers(numbers: Array, form: str = f".{POSITION_DIGITS}g") -> list[str]:
