@@ -7,6 +7,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from fourbar.evaluation.case import Case, compute_state
 from fourbar.linkage import MOVING_BARS, PIN_FORCE
 from fourbar.quantities import CHANGE_POINT, DERIVED_NAMES
 from fourbar.scene import Scene
@@ -132,7 +133,7 @@ class PositionSheet:
             label = "transmission angle" if name == "transmission" else name
             rows.append(self._write_number(label, values, DERIVED_NAMES[name].unit))
         rows.append(self._write_advantage())
-        rows += self._write_force_ratios()
+        rows += [*self._write_force_ratios(), *self._write_drive_ratios()]
         for name in ("I13", "I24"):
             centre = derive(self.solution, name)
             assert centre is not None
@@ -170,6 +171,30 @@ class PositionSheet:
                 rows.append(
                     self._write_number(f"F_{end}/F_{start}", ratio.values, "1", text)
                 )
+        return rows
+
+    def _write_drive_ratios(self) -> list[str]:
+        """Write the forces along the paths of points to that of a drive that exerts one.
+
+        The points are those of bars 2 and 4 on which the drive does not act. By virtual
+        work the ratio is (ds/dq)/|dP/dq|, s what the force does its work along.
+        """
+        at = self.solution.at
+        case = Case.of(self.scene, at.bar)
+        if case.drive is None:
+            return []
+        state = compute_state(self.scene, at)
+        work = np.abs(case.drive.gain(state))
+        driven = {place.bar for _, place in case.drive.ends}
+        rows = []
+        for point in self.scene.settled().points:
+            if point.bar in {2, 4} - driven:
+                path = state.point_coefficient(point.bar, point.place.vector())
+                with np.errstate(divide="ignore"):
+                    ratio = work / np.abs(path)
+                label = f"F_{point.name}/drive_force"
+                text = f"  (force along the path of {point.name} to the drive's)"
+                rows.append(self._write_number(label, ratio, "1", text))
         return rows
 
     def _find_largest(self, start: str, names: Iterable[str]) -> float:

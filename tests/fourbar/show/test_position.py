@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import fourbar
+from fourbar.files import loads
 from fourbar.show.position import PositionSheet
 from fourbar.show.units import COMMON, units
 from tests.support.scenes import crank_rocker
@@ -123,3 +124,38 @@ def test_pin_forces_that_have_no_bound_on_a_change_point_have_no_value() -> None
     rows = PositionSheet(scene, fourbar.solve(scene), units("N m")).write_pin_forces()
     assert [row.split()[-4:-1] for row in rows[1:6]] == [["-", "-", "-"]] * 5
     assert rows[-1] == "on the change point no pin force has a limit"
+
+
+PLIERS = """
+[lengths]
+ground = "2.4 in"
+input = "0.8 in"
+coupler = "1.23 in"
+output = "1.55 in"
+[points]
+hand = { bar = 2, from_pin = ["4.26 in", "0 deg"] }
+jaw = { bar = 4, from_centre = ["0.225 in", "0 deg"] }
+[motion]
+theta_2 = "49 deg"
+omega_2 = "0 rad/s"
+[drive]
+point = "hand"
+direction = "60 deg"
+frame = "bar"
+"""
+
+
+def test_the_force_of_a_drive_is_related_to_that_of_a_point() -> None:
+    """Pliers with 31.969 across the handle: at 60 deg from it sin 60 deg of that.
+
+    The work of a pull of 1 lbf against the jaw's path says the same.
+    """
+    scene = loads(PLIERS, "pliers.toml")
+    rows = PositionSheet(scene, fourbar.solve(scene), COMMON).write_ratios()
+    (row,) = [row for row in rows if row.startswith("F_jaw/drive_force")]
+    ratio = numbers(row)[0]
+    assert ratio == pytest.approx(31.969 * np.sin(np.pi / 3.0), rel=2e-5)
+    assert not any(row.startswith("F_hand/drive_force") for row in rows)
+    held = fourbar.Load(4, (1.0, -0.5 * np.pi), point="jaw", frame="bar")
+    loaded = fourbar.solve(replace(scene, loads=(held,)))
+    assert 1.0 / loaded.drive_force[0] == pytest.approx(ratio, rel=SIX_DIGITS)
