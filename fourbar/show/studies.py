@@ -22,6 +22,7 @@ from fourbar.formulas.mobility import (
 from fourbar.formulas.transmission import transmission_extremes
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, FourBar
 from fourbar.quantities import COUPLE, LINE, NOT_ASSEMBLED, PIN_FORCES, SINGULAR
+from fourbar.scene import Command, with_signs
 from fourbar.scene.motion import BRANCH_NAMES
 from fourbar.show.duty import read_drive
 from fourbar.show.tables import (
@@ -36,6 +37,9 @@ from fourbar.studies.circuit_curve import RestPosition
 from fourbar.studies.derivatives import Sensitivity
 from fourbar.studies.equilibrium import Equilibria, Equilibrium
 from fourbar.writing import write_object
+
+Ends = tuple[RestPosition, RestPosition]
+"""Positions between which a range lies."""
 
 
 def write_type(
@@ -296,7 +300,11 @@ MOVES = {0: "stays", 1: "theta_2 grows", -1: "theta_2 falls"}
 
 
 def write_equilibria(title: str, rest: Equilibria) -> str:
-    """Write both tables as text."""
+    """Write both tables as text.
+
+    The branch that they name is the assembly, as a scene states it with the position.
+    """
+    rest = _name_assemblies(rest)
     friction = bool(rest.held)
     heads = [
         "theta_2 (deg)",
@@ -320,6 +328,31 @@ def write_equilibria(title: str, rest: Equilibria) -> str:
         else "\n".join([*([title] if title else []), *_count_equilibria(rest)])
     )
     return text.rstrip("\n") + "\n\n" + write_table("", *_write_holding(rest))
+
+
+def _name_assemblies(rest: Equilibria) -> Equilibria:
+    """Return equilibria and ranges with the assembly in place of the sign."""
+    scene = rest.positions.scene
+    assert scene is not None
+    linkage = scene.linkage
+
+    def name(place: RestPosition) -> RestPosition:
+        theta_2, sign = np.array([place.theta_2]), np.array([place.branch], np.int8)
+        assembly = with_signs(linkage, Command(theta_2, sign, None, 0.0)).branch[0]
+        return place._replace(branch=int(assembly))
+
+    def name_both(ends: Ends) -> Ends:
+        return name(ends[0]), name(ends[1])
+
+    found = (
+        one._replace(place=name(one.place), held=one.held and name_both(one.held))
+        for one in rest.found
+    )
+    return rest._replace(
+        found=tuple(found),
+        indifferent=tuple(map(name_both, rest.indifferent)),
+        held=tuple(map(name_both, rest.held)),
+    )
 
 
 def _count_equilibria(rest: Equilibria) -> list[str]:

@@ -2,6 +2,7 @@
 
 import math
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ import fourbar
 from fourbar.cli import group
 from fourbar.formulas.mobility import classify, find_miss, meet_change_points
 from fourbar.show.block import write_block
+from fourbar.show.studies import write_equilibria
 
 HANGING = """
 [lengths]
@@ -47,6 +49,8 @@ moment = "5 kN m"
 [effects]
 gravity = ["9.81 m/s^2", "-90 deg"]
 """
+PRINTED = math.radians(1e-4)
+"""Angles of equilibria are printed with four decimals of a degree."""
 
 
 def read(tmp_path: Path, text: str) -> fourbar.Scene:
@@ -253,6 +257,26 @@ def test_equilibria_are_those_of_the_assembly() -> None:
     found = fourbar.equilibrium(scene).found
     angles = sorted(math.degrees(rest.place.theta_2) % 360.0 for rest in found)
     assert angles == pytest.approx([90.0, 270.0], abs=1e-6)
+
+
+@pytest.mark.parametrize("name", ("open", "crossed"))
+def test_equilibria_are_named_as_a_scene_states_their_assembly(name: str) -> None:
+    """Each, put into a scene with its branch, needs no torque."""
+    branch = {"open": 1, "crossed": -1}[name]
+    scene = fourbar.Scene(
+        fourbar.uniform(0.3, 0.1, 0.3, 0.1),
+        fourbar.Motion(branch=branch),
+        effects=(fourbar.Gravity(),),
+    )
+    rows = write_equilibria("", fourbar.equilibrium(scene)).splitlines()
+    found = [row.split() for row in rows if {"stable", "unstable"} & {*row.split()}]
+    assert len(found) > 1
+    for theta_2, _, named, _, _, slope, *_ in found:
+        assert named == name
+        at = fourbar.Motion(math.radians(float(theta_2)), 0.0, branch=branch)
+        torque = fourbar.solve(replace(scene, motion=at)).torque
+        assert torque is not None
+        assert abs(torque[0]) <= PRINTED * abs(float(slope))
 
 
 def test_rounding_is_written_as_zero() -> None:
