@@ -11,14 +11,14 @@ from fourbar.solution import Array, Solution
 from fourbar.solving import solve
 
 STEP = 2e-4
-"""rad, of the commanded bar. Forces are read at multiples of it on both sides. A parabola
-through three of them meets a limit within the third power, and rounding, which grows
-beside a change point as 1/STEP, is 1e-11 of them.
+"""rad, of the commanded bar. Forces are read at multiples of it on both sides. A
+parabola through three of them meets a limit within the third power, and rounding, which
+grows beside a change point as 1/STEP, is 1e-11 of them.
 """
 NEAR, FAR = (1.0, 2.0, 3.0), (2.0, 4.0, 6.0)
 """Multiples of the step at which each of two parabolas meets the forces of a side."""
 SAME = 1e-6
-"""Part of the forces within which four extrapolations are one limit: the digits shown."""
+"""Part of the forces within which four extrapolations are one limit: as is shown."""
 ZERO = 1e-9
 """Part of the forces below which a limit is zero."""
 

@@ -174,7 +174,7 @@ class PositionSheet:
         return rows
 
     def _write_drive_ratios(self) -> list[str]:
-        """Write the forces along the paths of points to that of a drive that exerts one.
+        """Write the forces along the paths of points to the force of the drive.
 
         The points are those of bars 2 and 4 on which the drive does not act. By virtual
         work the ratio is (ds/dq)/|dP/dq|, s what the force does its work along.
