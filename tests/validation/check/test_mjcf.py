@@ -765,6 +765,14 @@ def test_a_name_beside_an_option_of_a_robot_is_refused(
         run(tmp_path, GENERATED, "--name", "input=input", *options)
 
 
+def test_a_file_without_a_scene_is_read_as_a_robot(tmp_path: Path) -> None:
+    path = tmp_path / "robot.xml"
+    hinge = '<body><joint/><geom size="0.1"/></body>'
+    path.write_text(f"<mujoco><worldbody>{hinge}</worldbody></mujoco>")
+    process = CliRunner().invoke(mjcf.command, [str(path)], standalone_mode=False)
+    assert "no equality that closes a loop" in str(process.exception)
+
+
 def run(tmp_path: Path, text: str, *options: str) -> tuple[int | None, list[float]]:
     """Exit status of the command on a file of the crank-rocker, and what its comparisons are allowed."""
     scene, path = tmp_path / "scene.toml", tmp_path / "theirs.xml"

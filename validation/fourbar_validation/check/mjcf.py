@@ -422,8 +422,10 @@ def command(
     if len(files) > 2:
         raise click.UsageError("give one FILE.xml, and SCENE before it or not")
     theirs = files[-1]
-    suite = read_scene_files(files[:-1])
-    scene = suite.scene(0) if len(suite) else None
+    name, scene = "", None
+    if len(files) == 2:
+        suite = read_scene_files(files[:1])
+        name, scene = suite.name(0), suite.scene(0)
     if mimic is not None:
         if scene is None:
             raise click.UsageError("--mimic needs the SCENE of the loop")
@@ -438,9 +440,7 @@ def command(
         report_measurement(measurement, theirs, out)
         worst = max(map(find_worst, measurement.loops))
         return int(wanted is not None and not worst <= wanted)
-    examined = examine_model(
-        suite.name(0), scene, theirs, read_names(names), wanted, assets
-    )
+    examined = examine_model(name, scene, theirs, read_names(names), wanted, assets)
     show(examined, theirs, out)
     return examined.counts.status
 
