@@ -31,8 +31,8 @@ MARGIN = math.radians(1.0)
 limit itself.
 """
 NARROW = 4.0
-"""Part of its width that a short interval gives up at each end instead. An interval is
-short below NARROW * MARGIN.
+"""Divisor of an interval's width that bounds what `choose_range` leaves out at each
+end.
 """
 
 

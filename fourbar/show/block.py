@@ -47,8 +47,8 @@ LABEL = 11
 HALF_OF_LAST = 0.5
 """Part of the last digit shown from which on an error bar changes it."""
 FEW_DIGITS = 1e-8
-"""Error bar over the value from which on the block says where digits are lost. It is
-half the digits of a double.
+"""Error bar over the value from which on the block says where digits are lost. Half of
+the digits of a double are lost then.
 """
 ALIKE = 1e-3
 """Ratio of the smallest to the largest of several quantities that share a prefix. Below

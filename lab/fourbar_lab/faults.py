@@ -26,8 +26,8 @@ TEST_SECONDS = 10.0
 CHUNK = 8
 """Faults of one process, which loads the engines once."""
 SECONDS = 300
-"""Factor on the harness's time with which a fault ends the run. A failure would end it
-too; a run takes some three.
+"""Time after which a run with a fault is ended, s. That counts as a failure; a run
+takes some three seconds.
 """
 Failing = dict[str, list[str]]
 """Rows that fail, by test scene."""

@@ -69,8 +69,8 @@ meet.
 RING_OF_OTHERS, NAME_OF_OTHERS = 2.1, 1.4
 """Ring and name of what acts at pins and is not listed."""
 SMALLEST, SHARE = 0.5, 0.12
-"""Share of the shortest bar at a pin that a symbol there may take. It is no smaller
-than half its size.
+"""Least part of its size that a symbol at a pin keeps, and the part of the shortest bar
+there that it may take.
 """
 ARROWS = {"v": ("#0B6E99", "velocity"), "a": ("#B3261E", "acceleration")}
 LONGEST = 7.0

@@ -24,8 +24,8 @@ CLEAR = 0.3
 dwarf all others.
 """
 LEAD = math.radians(60.0)
-"""Place of the drawn position in the longest stretch that assembles. In a shorter one
-it is the half.
+"""Angle of the drawn position from the start of the longest stretch that assembles,
+rad. In a shorter stretch it is half of the stretch.
 """
 
 

@@ -41,8 +41,8 @@ FACTORS = {
 }
 """Factors of a moment of inertia, and the mistake behind each."""
 VANISHING = 1e-9
-"""Least factor. What stands behind a smaller one was left out, which is a mistake of
-its own.
+"""Least factor. What a smaller one multiplies was left out, which is a mistake of its
+own.
 """
 PLAIN = 1e-2
 """Relative; a fitted number this near a plain one is tried as that."""

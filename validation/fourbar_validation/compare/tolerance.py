@@ -34,8 +34,8 @@ differ by sqrt(2 * 50) = 10 of them as a random walk; 50 covers the tails of som
 comparisons.
 """
 ROUNDINGS = 8.0
-"""Digits that a chain of some fifty roundings loses, as a random walk. It moves a
-result by sqrt(50) = 7 last digits.
+"""Last digits by which a chain of some fifty roundings moves a result, as a random
+walk. It is sqrt(50) = 7.
 """
 NOTHING_TO_TELL = 1e-3
 """Greatest eps/condition with a verdict. Beyond it two correct programs may differ in

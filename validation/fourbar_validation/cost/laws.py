@@ -15,7 +15,9 @@ from fourbar_validation.cost.study import STEPPED, CostPoint
 TOO_LARGE = 0.1
 """A larger error is not small enough for its law: the motion itself is another."""
 FLOORED = 0.8
-"""Part of an error above which twice the steps leave a floor."""
+"""Part of an error from which on it has met its floor. Twice the steps leave that part
+or more.
+"""
 ABOVE_FLOOR = 3.0
 """Points within this factor of the floor carry part of it and are not fitted."""
 WITHIN = 0.35
@@ -31,7 +33,9 @@ of a law, where it has met no floor: between neighbours of a ladder the laws her
 it by 10 or less, and downwards.
 """
 MIXES = 1.0 / 30.0
-"""Part of the least error that flattens a slope. It does not depend on the setting."""
+"""Part of the least error from which on a rest flattens a slope. The rest does not
+depend on the setting.
+"""
 FIRST_ORDER, FOURTH_ORDER = 1.0, 4.0
 EXPECTED_ORDER = dict.fromkeys(
     ("Euler", "implicit", "implicitfast", "discrete"), FIRST_ORDER

@@ -35,7 +35,9 @@ SLOW = 0.1
 DEFAULT_TIMESTEP = 0.002
 """s, of MuJoCo."""
 PART_OF_TURN = 0.25
-"""Time constant, as a part of a revolution, while the timestep changes."""
+"""Time constant, as a part of a revolution, that stays the same while the timestep
+changes.
+"""
 INTEGRATORS = ("Euler", "implicit", "implicitfast", "discrete", "RK4")
 """Integrators, all that MuJoCo 4.0 has."""
 

@@ -35,7 +35,8 @@ the ends of bars 2 and 4.
 ON_BARS = {"A": "end2", "B": "end4", "G2": "G2", "G3": "G3", "G4": "G4"}
 """Points whose accelerations are answered, each as a point of a bar."""
 TELLS = 2.0**-53
-"""Component of a direction that the angle's rounding leaves of zero."""
+"""Least component of a direction that is not what the angle's rounding leaves of zero.
+"""
 SHARED = "the description, what is commanded and the branch"
 """Words of a report for what an exact engine takes from the formulas' side."""
 

@@ -202,8 +202,8 @@ def _take_written(file: IO[bytes]) -> bytes:
 
 
 SECONDS, SECONDS_PER_POSITION = 60.0, 0.03
-"""Time for a question if no limit is stated. It is ten times what a position takes with
-all engines.
+"""Time for a question and for each of its positions if no limit is stated, s. It is ten
+times what a position takes with all engines.
 """
 LONGEST_LINE, BYTES_PER_POSITION = 10**6, 10**4
 """Bytes of an answer: ten times as many as all quantities take."""

@@ -28,8 +28,8 @@ OPEN = 1e4 * K * EPS
 a limit position, where |sin mu| is 1e-4 and less MuJoCo is not run.
 """
 STEPS = 200
-"""Time after which the servo has brought the input to its speed, to e^-100. Its time
-constant is two steps.
+"""Timesteps after which the servo has brought the input to its speed, to e^-100. Its
+time constant is two steps.
 """
 SPEED = 100.0 * SIMULATED.factor
 """Allowed error of the speed, from loads and the closure in as many steps. It is ten

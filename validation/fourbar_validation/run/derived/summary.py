@@ -53,12 +53,12 @@ acts there makes a jump.
 FINE = 1440
 """Intervals of the motion at whose ends nothing may exceed a peak or a range."""
 BETWEEN = 1e-3
-"""Part by which a largest value without a place may exceed many positions'. It lies
-between these.
+"""Part by which a largest value without a place may exceed that of many positions. Its
+own position lies between two of them.
 """
 LEAST_CONDITION = 1e-2
-"""Least condition of a motion without poles. Beside a pole peaks are those of the
-positions.
+"""Condition below which a motion counts as one with poles. Beside a pole peaks are
+those of the positions.
 """
 REPEATS = 1e-9
 """Greatest difference, rad, of angles of which one repeats the other, and of rates in

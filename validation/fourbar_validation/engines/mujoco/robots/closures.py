@@ -47,8 +47,8 @@ from fourbar_validation.engines.mujoco.robots.pose import (
 )
 
 PARALLEL = math.radians(0.5)
-"""Angle between axes from which they make no planar linkage. Forces across the plane
-then reach a hundredth.
+"""Largest angle between the axes of a planar linkage, rad. Beyond it forces across the
+plane reach a hundredth.
 """
 COINCIDE = 1e-6
 """Two pins are one where they are nearer than this part of the longest bar."""
