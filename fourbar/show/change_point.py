@@ -23,22 +23,23 @@ ZERO = 1e-9
 """Part of the forces below which a limit is zero."""
 
 
-def find_limits(scene: Scene, solution: Solution) -> Solution:
-    """Return the solution of one position with the pin forces that are bounded.
+def find_limits(scene: Scene, solution: Solution) -> Solution | None:
+    """Return the solution of one position with the limits of its pin forces.
 
-    On a change point they are the limits from both sides; a force without one keeps
-    NaN. Elsewhere, and where a stroke is commanded or nothing is, it is as it was.
+    They are those from both sides of a change point; a force without one keeps NaN.
+    None elsewhere, and where a side cannot be asked: of a released motion, a commanded
+    stroke, and the ends and standstills of a law.
     """
     if solution.F12 is None or solution.status_code[0] != CHANGE_POINT:
-        return solution
+        return None
     at, law = solution.at, scene.motion.law
     if at.stroke is not None or at.independent is not None:
-        return solution
+        return None
     step = STEP
     if law is not None:
         speed = np.abs(np.ravel(np.asarray(at.speed, dtype=float)))[0]
         if speed == 0.0:
-            return solution
+            return None
         step = STEP / float(speed)
     multiples = np.array([[sign * m for m in (*NEAR, *FAR)] for sign in (-1.0, 1.0)])
     places = float(at.places[0]) + step * multiples
@@ -46,7 +47,7 @@ def find_limits(scene: Scene, solution: Solution) -> Solution:
         law is not None
         and not law.time[0] <= places.min() < places.max() <= law.time[-1]
     ):
-        return solution
+        return None
     beside = solve(scene, "force", at=command_at(scene, places.ravel()))
     forces = {
         name: np.reshape(getattr(beside, name), (2, 2, 3, 2)) for name in PIN_FORCES

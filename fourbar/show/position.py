@@ -9,7 +9,7 @@ import numpy as np
 
 from fourbar.evaluation.case import Case, compute_state
 from fourbar.linkage import MOVING_BARS, PIN_FORCE
-from fourbar.quantities import CHANGE_POINT, DERIVED_NAMES
+from fourbar.quantities import DERIVED_NAMES
 from fourbar.scene import Scene
 from fourbar.show.change_point import find_limits
 from fourbar.show.columns import read_column
@@ -35,7 +35,9 @@ class PositionSheet:
 
     def __init__(self, scene: Scene, solution: Solution, units: Conversion) -> None:
         self.scene, self.units = scene, units
-        self.solution = find_limits(scene, solution)
+        limits = find_limits(scene, solution)
+        self.has_limits = limits is not None
+        self.solution = solution if limits is None else limits
 
     def write_bars(self) -> list[str]:
         """Write angle, speed and acceleration of the moving bars."""
@@ -117,7 +119,7 @@ class PositionSheet:
             factor, name = choose_unit(abs(float(moment[0])), "N m", self.units)
             cells = [*_write_numbers(factor * moment), "", "", f"{name} about O2"]
             rows.append(_write_row("shaking moment", cells))
-        if self.solution.status_code[0] == CHANGE_POINT:
+        if self.has_limits:
             rows.append(_say_limits([*forces.values()]))
         return rows
 

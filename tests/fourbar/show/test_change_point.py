@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import fourbar
+from fourbar.scene import command_at
 from fourbar.show.position import PositionSheet
 from fourbar.show.units import units
 from tests.fourbar.show.test_position import SIX_DIGITS, numbers
@@ -55,3 +56,17 @@ def test_pin_forces_that_have_no_bound_on_a_change_point_have_no_value() -> None
     rows = PositionSheet(scene, fourbar.solve(scene), units("N m")).write_pin_forces()
     assert [row.split()[-4:-1] for row in rows[1:6]] == [["-", "-", "-"]] * 5
     assert rows[-1] == "on the change point no pin force has a limit"
+
+
+def test_nothing_is_said_of_limits_where_a_law_begins() -> None:
+    law = fourbar.Rise("cycloidal", (1.0, 1.0), theta_2=0.0)
+    scene = fourbar.Scene(
+        PARALLELOGRAM,
+        fourbar.Motion(law=law),
+        effects=(fourbar.Gravity(9.81, 0.0),),
+    )
+    start = fourbar.solve(scene, at=command_at(scene, np.array([0.0])))
+    assert start.status == ["change_point"]
+    rows = PositionSheet(scene, start, units("N m")).write_pin_forces()
+    assert not any("limit" in row for row in rows)
+    assert numbers(rows[1]) == []
