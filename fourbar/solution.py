@@ -381,7 +381,7 @@ class ScalarColumn(NamedTuple):
 
     @property
     def heading(self) -> str:
-        """What stands above the column: `F12_x`, or `F12_x [lbf]`."""
+        """Heading of the column: `F12_x`, or `F12_x [lbf]`."""
         if not self.names_unit or self.unit == "1":
             return self.name
         return f"{self.name} [{self.unit}]"

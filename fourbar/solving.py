@@ -119,7 +119,7 @@ def solve(
 
 
 class Requested(NamedTuple):
-    """What is evaluated, and at how many positions."""
+    """Quantities that are evaluated, and the number of positions."""
 
     shape: tuple[int, ...]
     """Shape of the positions."""

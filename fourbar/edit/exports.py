@@ -1,4 +1,4 @@
-"""What the workbench makes of a scene: replies to a page, exports, reports.
+"""Replies to a page, exports and reports that the workbench makes of a scene.
 
 The frame of a reply: four bytes with the length of its JSON (little-endian), the JSON
 padded to a multiple of eight bytes, then columns of doubles one after the other, as the

@@ -25,7 +25,7 @@ ELSEWHERE = (
     "MotionGen, sliders and several loops in PMKS+, any mechanism in MuJoCo, Drake or "
     "Exudyn; "
 )
-"""Where to go with another mechanism."""
+"""Address for people with another mechanism."""
 DIRECTIONS = {"up": "90 deg", "down": "-90 deg", "left": "180 deg", "right": "0 deg"}
 """Words for directions, as the suggestions of an error know them."""
 MEANT = {

@@ -19,7 +19,7 @@ AT_OF_A_LOAD = {
         "point; an arm from G that keeps its direction is now written arm"
     ),
 }
-"""What replaces `at` in a load of an old file, by the load's frame."""
+"""Key that replaces `at` in a load of an old file, by the load's frame."""
 
 
 def read_table_with_place(

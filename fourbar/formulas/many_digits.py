@@ -20,7 +20,7 @@ from fourbar.linkage import FourBar
 DIGITS = 120
 """The angle of a limit position near a change point keeps half of them."""
 RESIDUE = 1e-55
-"""What so many digits leave of a factor that is zero at the limit position, relative.
+"""Relative part that so many digits leave of a factor which is zero at the limit.
 """
 
 

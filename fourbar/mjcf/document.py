@@ -533,7 +533,7 @@ SIMULATORS = {
     "genesis": RECIPE,
     "newton": SINGLE,
 }
-"""Who reads the file, and the settings that carry the loop best there."""
+"""Simulators that read the file, and the settings that carry the loop best there."""
 OWN_MOTORS = ("genesis", "newton")
 """Simulators that put couples on joints themselves. They take none from the controls of
 a file; Genesis takes no actuator at all.

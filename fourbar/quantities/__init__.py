@@ -213,7 +213,7 @@ LINE_QUANTITIES = (
 )
 """Every quantity that exists only where the drive is a force."""
 STROKE = "stroke"
-"""What a force at a point lacks of them."""
+"""Quantity of a linear drive that a force at a point does not have."""
 FORCES = (*PIN_FORCES, COUPLE.value, LINE.value, "power")
 DRY_FRICTION_QUANTITIES = tuple(q.name for q in QUANTITIES if q.group == "dry friction")
 PIN_LOAD_QUANTITIES = tuple(q.name for q in QUANTITIES if q.group == "pin loads")

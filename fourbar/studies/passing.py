@@ -21,7 +21,7 @@ from fourbar.solving import solve
 
 ANGLES = tuple(names[0] for names in COMMANDS.values())
 PLACES = (*ANGLES, STROKE_COMMAND[0], "time")
-"""What a position may be named by."""
+"""Names by which a position may be stated."""
 SAME = 1e-6
 """rad, or part of a length: two places that the formulas give in two ways are one."""
 FINE = 2000

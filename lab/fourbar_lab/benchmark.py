@@ -82,7 +82,7 @@ class Run(NamedTuple):
 
 @dataclass(slots=True)
 class MatrixCell:
-    """What one engine answered to one problem."""
+    """Answer of one engine to one problem."""
 
     letters: str = MISSING
     """Reactions and torque, in the finest of its timesteps. Of a released motion they

@@ -114,7 +114,7 @@ KINDS: dict[str, Kind] = {
     "no pads": partial(_leave_out_pads, partial(_lighten, 1e2)),
     **{name: partial(_integrate, name) for name in FIRST_ORDER},
 }
-"""What is tried beside RK4 with tolerance 0, ten iterations and pads."""
+"""Kinds of step that are tried beside RK4 with tolerance 0, ten iterations and pads."""
 
 
 @dataclass(frozen=True, slots=True)

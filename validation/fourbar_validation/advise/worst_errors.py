@@ -25,7 +25,7 @@ class WorstErrors(NamedTuple):
     """Worst relative errors over the positions; inf where there is no answer."""
 
     torque: float
-    """Of the drive: its torque, or the force of a cylinder."""
+    """Worst error of the drive: of its torque, or of the force of a cylinder."""
     F12: float
     F32: float
     F43: float

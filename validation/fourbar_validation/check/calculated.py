@@ -55,9 +55,9 @@ class BarWrenches(NamedTuple):
     """Bars at n positions, and what their pins and the drive must give them."""
 
     arms: dict[int, Array]
-    """From the bar's first pin (O2, A, O4) to G, (n, 2)."""
+    """Vector from the bar's first pin (O2, A, O4) to G, (n, 2)."""
     bars: dict[int, Array]
-    """From the bar's first pin to its second one, (n, 2)."""
+    """Vector from the bar's first pin to its second one, (n, 2)."""
     p: dict[int, Array]
     q: dict[int, Array]
     drive_bar: int

@@ -16,7 +16,7 @@ from fourbar_validation.compare.rows import Row
 from fourbar_validation.engines.description import ModelEntry, Value
 
 SAME = 1e-12
-"""Relative; a number written with its digits in another order of operations."""
+"""Relative difference of a number that is computed in another order of operations."""
 SAME_SOFTNESS = 1e-9
 """Relative difference that is round-off. It follows from the places of both bodies in
 the world, which cost digits.
@@ -26,7 +26,7 @@ TENFOLD = 1e-9
 ONE_SIDED = ("loads.", "tendons.", "actuators.")
 """Entries that a file may lack: what is missing on one side is a difference."""
 NOTHING: dict[str, Value] = {".force": (0.0, 0.0), ".couple": 0.0}
-"""What a load exerts that is not there."""
+"""Value of a load that is missing."""
 REMARKS = tomllib.loads(
     Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
 )["remarks"]

@@ -45,7 +45,7 @@ VANISHING = 1e-9
 own.
 """
 PLAIN = 1e-2
-"""Relative; a fitted number this near a plain one is tried as that."""
+"""Relative distance within which a fitted number is tried as a plain one."""
 GRID = 72
 """Offsets of the crank angle that are tried before one is fitted, 5 deg apart."""
 TRIED = 37

@@ -35,7 +35,7 @@ Mask = NDArray[np.bool_]
 
 OWN_MOTION = ("omega_2", "alpha_2")
 AS_PRINTED = 4.0 * EPS
-"""Relative; a position of the scene that went to degrees and back."""
+"""Relative difference of a position that went to degrees and back."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -151,7 +151,7 @@ class TheirTable:
     left_out: dict[str, str]
     """Headings of columns that are not judged, and why."""
     notes: tuple[str, ...] = ()
-    """How the table was read where it does not say so itself."""
+    """Sentences on how the table was read where it does not say so itself."""
 
     def label(self, key: str) -> str:
         """Name the quantity, or the one component of it that the table has."""

@@ -1,4 +1,4 @@
-"""What somebody's MJCF states and the check does not look at."""
+"""Entries of somebody's MJCF that the check does not look at."""
 
 from collections.abc import Iterator
 from xml.etree import ElementTree as ET

@@ -525,7 +525,7 @@ class Errors(NamedTuple):
     decidable: Mask
     """Positions of the mask at which digits are left to decide by."""
     tolerance: ErrorBound
-    """What they are held to."""
+    """Tolerance that the errors are held to."""
     again: Array | None = None
     """Errors of a second answer within the rounding of theta_2; NaN where not asked."""
     settled: int = 0

@@ -64,7 +64,7 @@ class ErrorBound:
     rest.
     """
     cause: str = ""
-    """What makes the error, in a few words."""
+    """Cause of the error, in a few words."""
 
     def explain(self, condition: float) -> str:
         """Say in a sentence what is allowed at a condition, and the error's cause."""

@@ -69,15 +69,17 @@ class CostPoint:
     """Steps of one run through the scene; positions if nothing is stepped."""
     steps_per_revolution: float
     errors: WorstErrors
-    """At the steps and between them."""
+    """Worst errors at the steps and between them."""
     at_steps: WorstErrors
-    """At the steps alone, where the laws of the steps are those of the engine."""
+    """Worst errors at the steps alone. The laws of the steps are those of the engine
+    there.
+    """
     seconds_per_second: float
     """CPU seconds of torque and pin forces in a simulated second. They are read at the
     scene's positions.
     """
     seconds_per_revolution: float
-    """The same in a revolution of the input."""
+    """CPU seconds of torque and pin forces in a revolution of the input."""
     scatter: float
     """Middle timing less the least one, over the least one. The least one is the one
     that counts.

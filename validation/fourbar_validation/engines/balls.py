@@ -292,11 +292,11 @@ class BallBars(NamedTuple):
     omega: dict[int, Ball]
     alpha: dict[int, Ball]
     tip: dict[int, Complex]
-    """From the first pin to the second."""
+    """Vectors from the first pin to the second."""
     first_pin: dict[int, Complex]
     """Places of the first pins, the ground's too."""
     centre: dict[int, Complex]
-    """From the first pin to the mass centre."""
+    """Vectors from the first pin to the mass centre."""
     v_pin: dict[int, Complex]
     a_pin: dict[int, Complex]
     """Velocities and accelerations of the first pins."""

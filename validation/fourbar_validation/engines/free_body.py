@@ -67,7 +67,7 @@ of its terms.
 FRICTION_STARTS = 100
 """Starts from which other solutions are sought, over six decades of couples."""
 APART = 1e-6
-"""Relative; two solutions that differ by less are one."""
+"""Relative difference below which two solutions are one."""
 
 
 class FreeBody:

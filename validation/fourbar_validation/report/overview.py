@@ -95,7 +95,7 @@ class OverviewCell:
 
 @dataclass(slots=True)
 class OverviewLine:
-    """What an engine answered, in the columns of the table."""
+    """Answers of an engine, in the columns of the table."""
 
     engine: str
     name: str
@@ -114,7 +114,7 @@ class OverviewLine:
 
 @dataclass(slots=True)
 class Cause:
-    """What is wrong with an engine, by a known mistake or in words."""
+    """Mistake of an engine, by a known name or in words."""
 
     engine: str
     text: str
@@ -168,7 +168,7 @@ class Overview:
         self.released = False
         self.not_compared: Counter[str] = Counter()
         self.since = ""
-        """How the named failure stood in the run that this one is held against."""
+        """State of the named failure in the run that this one is held against."""
         self.weaker: list[str] = []
         """Rules that are weaker than in that run."""
         self.baseline = ""

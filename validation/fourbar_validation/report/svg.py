@@ -24,7 +24,7 @@ DARK: dict[str, str] = dict(
         r"(--[\w-]+): light-dark\(#\w+, (#\w+)\)", PAGE.read_text(encoding="utf-8")
     )
 )
-"""Those of a dark page."""
+"""Colours of a dark page."""
 INK, SOFT, GRID, BAND, ALLOWED, PAPER = (
     LIGHT[f"--{name}"] for name in ("ink", "soft", "grid", "under", "allowed", "paper")
 )

@@ -47,12 +47,12 @@ class MimicError:
     angle: float
     """rad."""
     ratio: float
-    """Of omega_4/omega_2."""
+    """Largest error of omega_4/omega_2."""
 
 
 @dataclass(frozen=True, slots=True)
 class MimicReport:
-    """What the polynomial of a file loses, and what others would."""
+    """Losses of the polynomial of a file, and of others."""
 
     equality: JointEquality
     swing: tuple[float, float]

@@ -1,4 +1,4 @@
-"""What was measured of a robot's loops, as sentences and tables.
+"""Measurements of a robot's loops, as sentences and tables.
 
 They are for the terminal, in Markdown, and as CSV.
 """

@@ -1,4 +1,4 @@
-"""How a run is cut into tasks.
+"""Tasks into which a run is cut.
 
 Every machine cuts a run alike.
 """

@@ -283,7 +283,7 @@ def _make_plain(bar: Bar) -> Bar:
 
 @dataclass(frozen=True)
 class _Conversion:
-    """What happens to each number of a scene."""
+    """Conversion of each number of a scene."""
 
     length: float = 1.0
     """Factor of lengths, accelerations and forces. Of couples and inertias it is its
@@ -292,7 +292,7 @@ class _Conversion:
     sense: float = 1.0
     """-1: angles and couples change their signs."""
     turn: float = 0.0
-    """What is added to directions in the world, rad."""
+    """Angle that is added to directions in the world, rad."""
     exchanged: bool = False
     """Read from the other end."""
 

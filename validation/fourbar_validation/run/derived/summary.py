@@ -1,4 +1,4 @@
-"""What `analyze` prints and its JSON holds.
+"""Checks of what `analyze` prints and its JSON holds.
 
 Free bodies at many positions and plain sums judge it. Each peak and each end of a range
 is taken at the place that is printed with it, and none of many positions between the

@@ -1,4 +1,4 @@
-"""What MuJoCo says of the loops of a robot, as plain data: read without MuJoCo."""
+"""Results of MuJoCo on the loops of a robot, as plain data."""
 
 import math
 from dataclasses import dataclass, field
@@ -59,7 +59,7 @@ class InsideRow:
     joint: float
     """Position of the driven joint as the file counts it, rad."""
     soft: PinsAndTorque
-    """As MuJoCo has them."""
+    """Torque and pin forces as MuJoCo has them."""
     rigid: PinsAndTorque
     """Values with rigid pins. They are at the closed state of the same theta_2,
     omega_2, alpha_2.
@@ -72,7 +72,7 @@ class InsideRow:
 
 @dataclass(slots=True)
 class InsideAnswer:
-    """What MuJoCo says of a loop at some states of the whole robot."""
+    """Results of MuJoCo on a loop at some states of the whole robot."""
 
     rows: list[InsideRow] = field(default_factory=list)
     lost: str = ""
@@ -154,7 +154,9 @@ class TriedSettings:
     each; infinite without an answer.
     """
     through_time: float
-    """The same at the states of a simulation."""
+    """Worst error at the states of a simulation. It is over the largest of each;
+    infinite without an answer.
+    """
     gap: float
     """Largest gap of the simulation, m."""
     seconds_per_step: float
@@ -173,7 +175,7 @@ class TriedSettings:
 
 @dataclass(frozen=True, slots=True)
 class SettingsAdvice:
-    """What was found for one loop and one wanted error."""
+    """Settings and errors of one loop, for one wanted error."""
 
     wanted: float
     before: TriedSettings
@@ -189,7 +191,7 @@ class SettingsAdvice:
 
 @dataclass(frozen=True, slots=True)
 class MeasureOptions:
-    """What is asked of the loops of a robot."""
+    """Request for measurements of the loops of a robot."""
 
     pose: PoseOptions
     loop: str | None = None
@@ -206,7 +208,7 @@ class MeasureOptions:
 
 @dataclass(frozen=True, slots=True)
 class LoopMeasurement:
-    """What MuJoCo says of one loop in its whole robot."""
+    """Results of MuJoCo on one loop in its whole robot."""
 
     name: str
     joint: str
@@ -235,7 +237,7 @@ class LoopMeasurement:
 
 @dataclass(frozen=True, slots=True)
 class RobotMeasurement:
-    """What MuJoCo says of the loops of a robot's file."""
+    """Results of MuJoCo on the loops of a robot's file."""
 
     loops: tuple[LoopMeasurement, ...]
     notes: tuple[str, ...]

@@ -157,7 +157,7 @@ class ClosureEnd:
 
     body: int
     place: Array
-    """In world axes in the pose, (3,), m."""
+    """Place in world axes in the pose, (3,), m."""
 
 
 def find_ends(posed: PosedRobot, number: int) -> tuple[ClosureEnd, ClosureEnd]:

@@ -118,7 +118,7 @@ class RobotClosure:
 
     name: str
     kind: str
-    """As MJCF calls it: connect, weld, joint, ..."""
+    """Kind as MJCF calls it: connect, weld, joint, ..."""
     loop: RobotLoop | None
     reason: str
     """Why it is no planar four-bar; empty where it is one."""
@@ -154,9 +154,9 @@ class LoopScene:
     too what is held.
     """
     remarks: tuple[str, ...]
-    """What was chosen, and what the scene leaves out, with its size."""
+    """Sentences on what was chosen, and on what the scene leaves out, with its size."""
     notes: tuple[str, ...] = ()
-    """What was done to the file and its pose."""
+    """Sentences on what was done to the file and its pose."""
 
 
 def write_length(metres: float) -> str:

@@ -209,7 +209,7 @@ def is_seen_from_behind(
 
 @dataclass(frozen=True, slots=True)
 class _Lump:
-    """What a bar carries, as one rigid body in the plane."""
+    """Bodies that a bar carries, as one rigid body in the plane."""
 
     mass: float
     centre: tuple[float, float]
