@@ -39,9 +39,9 @@ from fourbar_validation.report.html import write_markdown
 from fourbar_validation.run import released as free
 from fourbar_validation.run.judge import judge, judge_for_report
 from tests.support.here import judge_here, summary_of
-from tests.support.runs import compare_rows
+from tests.support.runs import HERE, compare_rows, save_run
 from tests.support.scenes import crank_rocker
-from tests.validation.regression.test_regression import HERE, ROW, save
+from tests.validation.regression.test_regression import ROW
 from tests.validation.run.test_judge import Echo, Refuses
 
 NAN = math.nan
@@ -446,7 +446,8 @@ def test_two_runs_without_a_comparison_in_common_are_no_success(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     folders = [
-        str(save(tmp_path / name, rows)) for name, rows in (("old", old), ("new", new))
+        str(save_run(tmp_path / name, rows))
+        for name, rows in (("old", old), ("new", new))
     ]
     assert status(["compare", *folders]) == code
     printed = re.sub(r" against .* in (\d)", r" in \1", capsys.readouterr().out)
