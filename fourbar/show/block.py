@@ -194,21 +194,30 @@ class _Block:
 
     def _write_head(self) -> list[str]:
         """Write what the linkage is."""
-        scene = self.facts.scene
-        factor, unit = choose_unit(self.longest, "m", self.units)
-        bars = zip(BAR_NAMES.values(), scene.linkage.lengths, strict=True)
-        lengths = ", ".join(
-            f"{name} {write_digits(factor * length)}" for name, length in bars
-        )
-        motion = scene.motion
+        name, lengths = f"{self._name_linkage()}:", self._write_lengths()
+        line = f"{name} {lengths}"
+        lines = [line] if len(line) <= WIDTH else [name, f"    {lengths}"]
+        return [*lines, *self._write_change_points()]
+
+    def _name_linkage(self) -> str:
+        """Name the linkage by its type, its title and its branch."""
+        scene, motion = self.facts.scene, self.facts.scene.motion
         name = name_assembly(scene.linkage, motion.bar, motion.branch)
         title = f' "{clean_line(scene.title)}"' if scene.title else ""
         of_bar = "" if motion.bar == 2 else f" of the command {motion.commanded}"
         branch = f"{BRANCH_NAMES[motion.branch]} branch{of_bar}"
-        head = f"{name[0].upper()}{name[1:]}{title}, {branch}:"
-        line = f"{head} {lengths} {unit}"
-        lines = [line] if len(line) <= WIDTH else [head, f"    {lengths} {unit}"]
-        return [*lines, *self._write_change_points()]
+        return f"{name[0].upper()}{name[1:]}{title}, {branch}"
+
+    def _write_lengths(self) -> str:
+        """Write the lengths of the bars and their unit."""
+        factor, unit = choose_unit(self.longest, "m", self.units)
+        lengths = ", ".join(
+            f"{name} {write_digits(factor * length)}"
+            for name, length in zip(
+                BAR_NAMES.values(), self.facts.scene.linkage.lengths, strict=True
+            )
+        )
+        return f"{lengths} {unit}"
 
     def _write_motion(self) -> list[str]:
         """Write how far the linkage moves, and how well it transmits."""
