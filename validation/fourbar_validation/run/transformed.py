@@ -158,7 +158,7 @@ class _Few:
 
         Some entries of the command are changed.
         """
-        return _solve(scene, self.command._replace(**changed), self._allocate())
+        return _solve(scene, self.command._replace(**changed))
 
     def solve_alike(self, scene: Scene, sense: int, **changed: Any) -> Solution:
         """Solve another scene whose loop lies on the same side, or on the other.
@@ -170,12 +170,7 @@ class _Few:
         the same in both scenes, the name of the assembly need not be.
         """
         signed = self.command._replace(branch=sense * self._signs, **changed)
-        return _solve(scene, with_signs(scene.linkage, signed), self._allocate())
-
-    def _allocate(self) -> dict[str, Array]:
-        """Allocate the quantities that are compared: no others are evaluated."""
-        arrays = zip(self.quantities, self.numbers, strict=True)
-        return {name: np.empty_like(one) for name, one in arrays if name != "theta_2"}
+        return _solve(scene, with_signs(scene.linkage, signed))
 
     def compare(self, convert: Callable[[str], Array]) -> Array:
         """Compare all quantities with those of another scene, converted; (q, n)."""
@@ -264,16 +259,14 @@ def _take_few(question: Question) -> _Few:
     return _Few(few, command, _solve(few, command), question, fit[positions])
 
 
-def _solve(
-    scene: Scene, command: Command, out: dict[str, Array] | None = None
-) -> Solution:
+def _solve(scene: Scene, command: Command) -> Solution:
     """Solve a scene whose motion begins at the first position.
 
     Springs count their turns from there.
     """
     bar, branch = command.bar, int(command.branch[0])
     begin: Any = {f"theta_{bar}": float(command.angle[0]), "branch": branch}
-    return solve(replace(scene, motion=Motion(**begin)), "force", at=command, out=out)
+    return solve(replace(scene, motion=Motion(**begin)), "force", at=command)
 
 
 def _make_plain(bar: Bar) -> Bar:
