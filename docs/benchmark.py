@@ -28,15 +28,22 @@ from fourbar.show.plot.linkage import (
     locate_pins,
     scale_of,
 )
-from fourbar.show.plot.style import BAR_COLOURS, INK, MUTED, OPEN, apply_style
+from fourbar.show.plot.style import (
+    BAR_COLOURS,
+    INK,
+    MUTED,
+    OPEN,
+    add_dark_form,
+    apply_style,
+)
 from fourbar.show.plot.view import make_view
 from fourbar.writing import write_text
 from fourbar_lab.benchmark import DIFFERENTIATED as LOOP
-from fourbar_lab.benchmark import name_row
+from fourbar_lab.benchmark import draw_work_precision, name_row, read_work
 from fourbar_lab.simulators.findings import read_findings
 from fourbar_validation.check.problem import MISSING, WORSE
 from fourbar_validation.compare.rows import read_cell_text
-from fourbar_validation.report.svg import COORDINATES, LONG_NUMBER
+from fourbar_validation.report.svg import COORDINATES, LONG_NUMBER, write_alone
 
 DOCS = Path(__file__).parent
 PAGES = ("benchmark.md", "findings.md")
@@ -156,13 +163,18 @@ def write_question(problem: dict[str, Any]) -> str:
     return f"{' '.join(parts)} **Asked:** {', '.join(asked)}."
 
 
+def read_table() -> list[dict[str, str]]:
+    """Read the table of the benchmark."""
+    with TABLE.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
 def read_rows() -> list[dict[str, str]]:
     """Read the table of the benchmark, each engine with its version."""
-    with TABLE.open(encoding="utf-8", newline="") as file:
-        return [
-            {**row, "engine": name_row(row["engine"], row["version"])}
-            for row in csv.DictReader(file)
-        ]
+    return [
+        {**row, "engine": name_row(row["engine"], row["version"])}
+        for row in read_table()
+    ]
 
 
 def write_matrix(names: list[str]) -> list[str]:
@@ -306,9 +318,8 @@ def draw_problem(name: str) -> str:
             figure.savefig(
                 drawn, format="svg", metadata={"Date": None, "Creator": None}
             )
-    return COORDINATES.sub(
-        lambda part: LONG_NUMBER.sub(r"\1", part.group()), drawn.getvalue()
-    )
+    svg = add_dark_form(drawn.getvalue().encode()).decode()
+    return COORDINATES.sub(lambda part: LONG_NUMBER.sub(r"\1", part.group()), svg)
 
 
 def draw_slider_crank(axes: Any, problem: dict[str, Any], labels: Labels) -> None:
@@ -400,3 +411,5 @@ if __name__ == "__main__":
         write_text(DOCS / page_name, text(page_name))
     for file in PROBLEMS.glob("*.json"):
         write_text(FIGURES / f"{file.stem}.svg", draw_problem(file.stem))
+    work = draw_work_precision(read_work(read_table()))
+    write_text(TABLE.with_suffix(".svg"), write_alone(work, "benchmark"))

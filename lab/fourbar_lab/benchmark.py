@@ -42,7 +42,14 @@ from fourbar_validation.engines.guests import HELLO
 from fourbar_validation.engines.processes import Running
 from fourbar_validation.places import find_checkout
 from fourbar_validation.report.machine import name_machine
-from fourbar_validation.report.svg import draw_svg, shrink_svg
+from fourbar_validation.report.svg import (
+    BAND,
+    LIGHT,
+    PAPER,
+    set_frame,
+    write_alone,
+    write_svg,
+)
 from fourbar_validation.report.templating import render
 
 ENGINES = Path(__file__).parent / FILE
@@ -78,6 +85,15 @@ class Run(NamedTuple):
     """Processor time as the engine states it, else the time to its answer, s."""
     numbers: list[tuple[str, str, str]]
     """Quantity, error, level."""
+
+
+class Work(NamedTuple):
+    """What a run through time cost, and how exact it was."""
+
+    seconds: float
+    """Processor time, s."""
+    error: float
+    """Largest error of torque and pin forces, each divided by its largest value."""
 
 
 @dataclass(slots=True)
@@ -383,67 +399,96 @@ class Benchmark:
 
     def write(self) -> None:
         """Write the table and the page."""
-        write_text(self.out / "benchmark.csv", write_csv(COLUMNS, self.list_rows()))
+        table = self.list_rows()
+        write_text(self.out / "benchmark.csv", write_csv(COLUMNS, table))
         rows = {
             name_row(label, row.text("version")): row
             for label, row in self.rows.items()
         }
-        chart = draw_work_precision(rows) if DIFFERENTIATED in self.problems else ""
+        lines = read_work(dict(zip(COLUMNS, row, strict=True)) for row in table)
         page = {
             "machine": name_machine(),
             "problems": self.problems,
             "rows": rows,
-            "chart": shrink_svg(chart),
+            "chart": (
+                write_svg(draw_work_precision(lines), "benchmark") if lines else ""
+            ),
         }
-        if chart:
-            write_text(self.out / "benchmark.svg", chart)
+        if lines:
+            picture = write_alone(draw_work_precision(lines), "benchmark")
+            write_text(self.out / "benchmark.svg", picture)
         write_text(
             self.out / "benchmark.html",
             render("fourbar_lab", "benchmark.html.j2", **page),
         )
 
 
-def draw_work_precision(rows: Mapping[str, MatrixRow]) -> str:
-    """Draw the worst error of torque and pin forces over processor time, as SVG.
+FAMILIES = {
+    "Pinocchio": ("Pinocchio",),
+    "MuJoCo": ("MuJoCo",),
+    "Descendants of MuJoCo": ("MJX-JAX", "MuJoCo Warp", "Newton: MuJoCo", "Genesis"),
+    "Exudyn": ("Exudyn",),
+    "Drake": ("Drake",),
+    "Others": ("",),
+}
+"""Panels of the picture, and what the names of their engines begin with."""
+VERSION = re.compile(r" \d[\d.]*")
+"""Version within the name of a row."""
+FAMILY_COLOURS = ("--e1", "--e3", "--e4", "--e2", "--e8", "--e9")
+MARKERS = "os^DvP"
+"""Markers of the settings of a family, one after the other."""
 
-    Each engine has a line; "" if none ran.
-    """
-    from matplotlib import colormaps
+
+def read_work(table: Iterable[Mapping[str, Any]]) -> dict[str, list[Work]]:
+    """Read the runs through time: processor time, and the worst error of torque and pin forces."""
+    errors: dict[str, dict[float, list[float]]] = {}
+    for row in table:
+        timed = row["setting"].endswith("/rev") and float(row["seconds"] or 0.0) > 0.0
+        wanted = row["quantity"] in ("torque", *PIN_FORCES)
+        if row["problem"] == DIFFERENTIATED and timed and wanted:
+            name = name_row(row["engine"], row["version"])
+            runs = errors.setdefault(name, {})
+            runs.setdefault(float(row["seconds"]), []).append(float(row["error"]))
+    return {
+        name: [Work(seconds, float(np.nanmax(of))) for seconds, of in runs.items()]
+        for name, runs in errors.items()
+    }
+
+
+def find_family(name: str) -> str:
+    """Find the panel of an engine: that of the longest beginning of its name."""
+    beginnings = {
+        beginning: family for family, names in FAMILIES.items() for beginning in names
+    }
+    plain = VERSION.sub("", name)
+    return beginnings[max(filter(plain.startswith, beginnings), key=len)]
+
+
+def draw_work_precision(lines: Mapping[str, list[Work]]) -> Any:
+    """Draw error over processor time, a panel a family, before the other families in grey."""
     from matplotlib.figure import Figure
 
-    lines: dict[str, list[tuple[float, float]]] = {}
-    for name, row in rows.items():
-        for run in row.cells[DIFFERENTIATED].runs:
-            errors = [
-                float(error)
-                for quantity, error, _ in run.numbers
-                if quantity in ("torque", *PIN_FORCES)
-            ]
-            if run.setting.endswith("/rev") and run.seconds > 0.0:
-                lines.setdefault(name, []).append(
-                    (run.seconds, float(np.nanmax(errors)))
-                )
-    if not lines:
-        return ""
-    figure = Figure(figsize=(4.8, 8.2), layout="constrained")
-    axes = figure.add_subplot()
-    for number, (name, points) in enumerate(lines.items()):
-        colour = [
-            0.8 * part for part in colormaps["turbo"]((number + 0.5) / len(lines))[:3]
-        ]
-        look = {
-            "marker": "osD^vP*Xh<>"[number % 11],
-            "linestyle": ("-", "--", ":", "-.")[number % 4],
-            "color": colour,
-        }
-        axes.loglog(
-            *zip(*points, strict=True), label=name, markersize=4, linewidth=1, **look
-        )
-    axes.set_xlabel("processor time of the run, s")
-    axes.set_ylabel("greatest error of torque and pin forces")
-    axes.grid(alpha=0.3)
-    figure.legend(loc="outside lower center", fontsize=7, frameon=False)
-    return draw_svg(figure, "benchmark")
+    figure = Figure(figsize=(7.7, 9.4), layout="constrained", facecolor=PAPER)
+    panels = figure.subplots(3, 2, sharex=True, sharey=True).ravel()
+    for axes, family, variable in zip(panels, FAMILIES, FAMILY_COLOURS, strict=True):
+        axes.set_facecolor("none")
+        set_frame(axes)
+        markers = iter(MARKERS)
+        for name, points in lines.items():
+            own = find_family(name) == family
+            look: dict[str, Any] = {"color": BAND, "linewidth": 0.8, "zorder": 1.5}
+            if own:
+                look = {"color": LIGHT[variable], "linewidth": 1.5, "zorder": 3.0}
+                look |= {"marker": next(markers), "markersize": 5.0, "label": name}
+            axes.loglog(*zip(*points, strict=True), **look)
+        below = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0)}
+        legend = axes.legend(fontsize=8, frameon=False, borderaxespad=0.2, **below)
+        rows = len(legend.get_texts())
+        title = {"loc": "left", "fontsize": 9.5, "fontweight": "bold"}
+        axes.set_title(family, pad=5.0 + 12.5 * rows, **title)
+    figure.supxlabel("processor time of the run, s", fontsize=9)
+    figure.supylabel("largest error of torque and pin forces", fontsize=9)
+    return figure
 
 
 def _list_needs(problem: dict[str, Any]) -> set[str]:

@@ -7,7 +7,15 @@ from pathlib import Path
 
 import pytest
 
-from fourbar_lab.benchmark import ENGINES, REFUSED, name_row, read_reasons
+from fourbar_lab.benchmark import (
+    ENGINES,
+    FAMILIES,
+    REFUSED,
+    find_family,
+    name_row,
+    read_reasons,
+    read_work,
+)
 from fourbar_lab.cli import status
 from fourbar_lab.simulators.problems import PROBLEMS
 from fourbar_validation.check.problem import judge, read_problem, read_result
@@ -272,3 +280,24 @@ def test_an_entry_of_one_kind_of_problem_answers_in_the_row_of_another(
         letters["it", "gz_physics_987"][:1] == "-"
         and letters["it", "gz_physics_987"][1:] in "AB"
     )
+
+
+def test_the_picture_has_every_run_through_time_in_the_panel_of_its_family() -> None:
+    table = ROOT / "docs" / "examples" / "benchmark.csv"
+    with table.open(encoding="utf-8", newline="") as file:
+        lines = read_work(csv.DictReader(file))
+    picture = table.with_suffix(".svg").read_text(encoding="utf-8")
+    assert len(lines) > 15
+    assert {find_family(name) for name in lines} == set(FAMILIES)
+    assert all(f">{text}<" in picture for text in (*lines, *FAMILIES))
+    for name, family in (
+        ("MuJoCo 4.0.0: simulated", "MuJoCo"),
+        ("MuJoCo Warp 4.0.0: simulated", "Descendants of MuJoCo"),
+        ("Newton 1.8.0: MuJoCo solver", "Descendants of MuJoCo"),
+        ("Newton 1.8.0: Kamino", "Others"),
+    ):
+        assert find_family(name) == family
+    # the worst of torque and pin forces, of each number of steps
+    exact = lines["Pinocchio 4.1.0: constraintDynamics"]
+    assert [len(lines["Newton 1.8.0: Kamino"]), len(exact)] == [2, 3]
+    assert all(0.0 < run.error < 1e-6 for run in exact)

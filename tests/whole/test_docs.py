@@ -460,6 +460,13 @@ def test_the_pictures_are_those_that_are_drawn(
     assert re.findall("<!-- (.*) -->", drawn) == re.findall("<!-- (.*) -->", kept)
 
 
+@pytest.mark.parametrize(
+    "path", sorted(DOCS.rglob("*.svg")), ids=lambda path: path.name
+)
+def test_every_figure_has_a_form_for_dark_pages(path: Path) -> None:
+    assert "prefers-color-scheme" in path.read_text(encoding="utf-8")
+
+
 @pytest.mark.slow
 def test_the_gallery_is_a_suite_with_pictures_and_sources() -> None:
     suite = read_suite(GALLERY / "suite.txt")

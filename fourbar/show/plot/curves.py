@@ -88,6 +88,7 @@ def draw_axes(axes: "Axes", view: View) -> Array:
         note(view, "Hatched: the linkage does not assemble.")
     if low < here < high:
         axes.axvline(here, color=MUTED, lw=0.8, ls=(0, (2, 2)), zorder=1)
+        note(view, f"Dashed upright line: {view.at}.")
     return over
 
 
@@ -368,6 +369,8 @@ def _draw_drive(
         ylabel=f"{symbol} ({shown_unit})",
         title=f"{what} of the drive{f' on bar {bar}' if bar else ''}",
     )
+    if limit is None:  # a clipped axis says its largest value in the caption
+        mark_peak(axes, over, factor * values, shown_unit)
     clip(
         axes,
         view,
@@ -375,6 +378,28 @@ def _draw_drive(
         limit,
         what,
         unit,
+    )
+
+
+def mark_peak(axes: "Axes", over: Array, values: Array, unit: str) -> None:
+    """Mark the largest magnitude of a curve by a ring with its value."""
+    if not np.isfinite(values).any():
+        return
+    index = int(np.nanargmax(np.where(np.isfinite(values), np.abs(values), np.nan)))
+    place, peak = float(over[index]), float(values[index])
+    axes.plot(place, peak, "o", ms=5.0, mew=1.1, ls="none", zorder=5, **OPEN)
+    low, high = axes.get_xlim()
+    share = (place - low) / (high - low)
+    side = "left" if share < 0.25 else "right" if share > 0.75 else "center"
+    axes.margins(y=0.18)  # room for the words
+    axes.annotate(
+        f"{write_number(peak)} {unit}",
+        (place, peak),
+        xytext=(0.0, 5.0 if peak >= 0.0 else -5.0),
+        textcoords="offset points",
+        ha=side,
+        va="bottom" if peak >= 0.0 else "top",
+        size=7.5,
     )
 
 
@@ -457,8 +482,9 @@ def draw_energy(axes: "Axes", view: View) -> None:
 
 
 RECOMMENDED = 40.0
-"""Smallest transmission angle that is usually recommended, deg. R. L. Norton, Design of
-Machinery.
+"""Smallest transmission angle that is usually recommended, deg.
+
+Source: R. L. Norton, Design of Machinery; H. Alt introduced the angle (1932).
 """
 REMARK = 0.34
 """Part that a remark takes along an axis, as a part of its length."""
@@ -501,7 +527,7 @@ def draw_transmission(axes: "Axes", view: View) -> None:
         )
     axes.set(ylabel=r"transmission angle $\mu$ (°)", title="Transmission angle")
     if view.time is None:
-        place_legend(axes, 2)
+        place_legend(axes, 1)
 
 
 def find_free_place(mu: Array) -> float:

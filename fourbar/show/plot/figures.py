@@ -53,11 +53,11 @@ def _draw_overview(figure: "SubFigure", shown: View, labels: Labels) -> None:
     free = shown.scene.motion.free is not None
     panels = figure.subplot_mosaic(
         [
-            ["linkage", "angles", "torque"],
-            ["linkage", "omega", "forces"],
-            ["linkage" if free else "power", "alpha", "mu"],
+            ["linkage", "linkage", "torque"],
+            ["linkage", "linkage", "forces" if free else "power"],
+            ["angles", "omega", "alpha"],
+            ["mu", "mu", "mu"] if free else ["forces", "forces", "mu"],
         ],
-        width_ratios=[1.15, 1.0, 1.0],
     )
     linkage.draw_linkage(panels["linkage"], shown, labels)
     curves.draw_angles(panels["angles"], shown)
@@ -116,7 +116,7 @@ def _draw_hodographs(figure: "SubFigure", shown: View, labels: Labels) -> None:
 
 
 FIGURES: dict[str, tuple[Painter, tuple[float, float], bool]] = {
-    "overview": (_draw_overview, (11.7, 8.3), False),
+    "overview": (_draw_overview, (7.7, 9.2), False),
     "linkage": (
         lambda figure, *of: linkage.draw_linkage(figure.subplots(), *of),
         (5.6, 5.2),

@@ -384,7 +384,7 @@ def list_paths(view: View) -> list[tuple[Array, str, Any, str]]:
     middle = sweep.G3 if massive else 0.5 * (sweep.A + sweep.B)
     paths: list[tuple[Array, str, Any, str]] = [
         (sweep.A, BAR_COLOURS[2], (0, (1, 2)), "path of $A$"),
-        (sweep.B, BAR_COLOURS[4], (0, (1, 2)), "path of $B$"),
+        (sweep.B, BAR_COLOURS[4], (0, (3, 2)), "path of $B$"),
         (
             middle,
             BAR_COLOURS[3],

@@ -136,6 +136,25 @@ METADATA: dict[str, dict[str, Any]] = {
 """Without a date: the same scene gives the same bytes."""
 
 
+DARK_FORM = b"""<style>
+@media (prefers-color-scheme: dark) {
+  svg:root { filter: invert(0.92) hue-rotate(180deg) }
+}
+</style>
+"""
+"""Style of an SVG file of its own: lightness turned over, hues kept, where pages are dark.
+
+White becomes the grey of dark pages. `:root` leaves an SVG within a page as it is, and
+what draws SVG but is no browser does not read it.
+"""
+
+
+def add_dark_form(svg: bytes) -> bytes:
+    """Give an SVG file the form that readers of dark pages see."""
+    head, tag, rest = svg.partition(b"<defs>")
+    return head + DARK_FORM + tag + rest
+
+
 class Drawing:
     """A figure that a notebook shows, and that `save` writes."""
 
@@ -151,7 +170,8 @@ class Drawing:
         The file is written atomically.
         """
         file_format = format_of(path)
-        write_bytes(Path(path), self._render(file_format))
+        drawn = self._render(file_format)
+        write_bytes(Path(path), add_dark_form(drawn) if file_format == "svg" else drawn)
 
     def _render(self, file_format: str) -> bytes:
         buffer = io.BytesIO()

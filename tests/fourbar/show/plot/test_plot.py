@@ -368,6 +368,34 @@ def test_a_linear_drive_is_drawn_with_its_force_and_the_poles_of_that(
 
 
 @pytest.mark.slow
+def test_a_file_has_a_dark_form_and_a_figure_within_a_page_leaves_the_page(
+    tmp_path: Path,
+) -> None:
+    drawing = draw_figure(crank_rocker(), "torque")
+    drawing.save(tmp_path / "a.svg")
+    written = (tmp_path / "a.svg").read_text(encoding="utf-8")
+    assert "@media (prefers-color-scheme: dark)" in written and "svg:root" in written
+    assert "prefers-color-scheme" not in drawing._repr_svg_()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("turned", (False, True), ids=("up", "down"))
+def test_the_peak_of_the_torque_is_marked_with_its_value(turned: bool) -> None:
+    scene = crank_rocker()
+    if turned:  # speed changes sign, and so does the angle at which friction acts
+        scene = replace(scene, motion=scene.motion.replace(speed=-10.0))
+    torque = 1e3 * solved(scene).torque
+    peak = torque[np.abs(torque).argmax()]
+    figure = composed(scene, "torque")
+    (ring,) = (line for line in figure.axes[0].lines if line.get_marker() == "o")
+    assert ring.get_ydata()[0] == pytest.approx(peak)
+    words = [text.get_text() for text in figure.findobj(Text)]
+    assert f"{write_number(peak)} mN m" in words
+    place = f"{math.degrees(make_view(scene).here.theta_2[0]):.4g}°"
+    assert any(f"Dashed upright line: θ₂\u00a0=\u00a0{place}" in word for word in words)
+
+
+@pytest.mark.slow
 def test_a_scene_without_velocity_draws_positions_only(tmp_path: Path) -> None:
     scene = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.0, 6.0, 30)))
     plot.draw(scene, tmp_path / "a.svg")
