@@ -54,7 +54,7 @@ def text() -> str:
         float(solution.theta_4[0]),
         cmath.phase(O4 - A),
     )
-    ray = 26.0
+    ray = 32.0
     parts = [
         line("ground", O2, O4),
         line("bar", O2, A, B, O4),
@@ -63,7 +63,7 @@ def text() -> str:
         arc(O2, 18, 0, THETA_2),
         arc(A, 18, 0, theta_3),
         arc(O4, 18, 0, theta_4),
-        arc(A, 34, 0, delta),
+        arc(A, 27, 0, delta),
         arc(B, 14, theta_3 + math.pi, theta_4 + math.pi),
         *(
             f'<circle cx="{screen(z).split()[0]}" cy="{screen(z).split()[1]}" r="5"/>'
@@ -81,7 +81,7 @@ def text() -> str:
         label(cmath.rect(24, THETA_2 / 2), "ψ"),
         label(A + cmath.rect(24, theta_3 / 2), "θ₃"),
         label(O4 + cmath.rect(25, theta_4 / 2), "θ₄"),
-        label(A + cmath.rect(41, delta / 2), "δ"),
+        label(A + cmath.rect(31, delta / 2) - 1.5j, "δ"),
         label(B + cmath.rect(20, (theta_3 + theta_4) / 2 + math.pi), "μ"),
         (
             f'<text class="said" x="{LEFT:.0f}" y="{BASE + 55:.0f}">while θ₂ grows by'

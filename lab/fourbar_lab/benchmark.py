@@ -440,7 +440,7 @@ MARKERS = "os^DvP"
 
 
 def read_work(table: Iterable[Mapping[str, Any]]) -> dict[str, list[Work]]:
-    """Read the runs through time: processor time, and the worst error of torque and pin forces."""
+    """Read processor time and worst error of torque and pin forces of every run."""
     errors: dict[str, dict[float, list[float]]] = {}
     for row in table:
         timed = row["setting"].endswith("/rev") and float(row["seconds"] or 0.0) > 0.0
@@ -465,7 +465,7 @@ def find_family(name: str) -> str:
 
 
 def draw_work_precision(lines: Mapping[str, list[Work]]) -> Any:
-    """Draw error over processor time, a panel a family, before the other families in grey."""
+    """Draw error over processor time: a panel a family, the others in grey."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(7.7, 9.4), layout="constrained", facecolor=PAPER)

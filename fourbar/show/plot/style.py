@@ -142,7 +142,7 @@ DARK_FORM = b"""<style>
 }
 </style>
 """
-"""Style of an SVG file of its own: lightness turned over, hues kept, where pages are dark.
+"""Style of an SVG file: lightness turned over, hues kept, where pages are dark.
 
 White becomes the grey of dark pages. `:root` leaves an SVG within a page as it is, and
 what draws SVG but is no browser does not read it.
