@@ -11,6 +11,7 @@ import time
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from itertools import cycle
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -468,24 +469,35 @@ def draw_work_precision(lines: Mapping[str, list[Work]]) -> Any:
     """Draw error over processor time: a panel a family, the others in grey."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(7.7, 9.4), layout="constrained", facecolor=PAPER)
-    panels = figure.subplots(3, 2, sharex=True, sharey=True).ravel()
-    for axes, family, variable in zip(panels, FAMILIES, FAMILY_COLOURS, strict=True):
+    present = {find_family(name) for name in lines}
+    colours = dict(zip(FAMILIES, FAMILY_COLOURS, strict=True))
+    shown = [family for family in FAMILIES if family in present]
+    rows = math.ceil(len(shown) / 2)
+    size = (7.7, 3.1 * rows)
+    figure = Figure(figsize=size, layout="constrained", facecolor=PAPER)
+    panels = figure.subplots(rows, 2, sharex=True, sharey=True).ravel()
+    for axes in panels[len(shown) :]:
+        axes.set_axis_off()
+    for axes, family in zip(panels, shown, strict=False):
         axes.set_facecolor("none")
         set_frame(axes)
-        markers = iter(MARKERS)
+        markers = cycle(MARKERS)
         for name, points in lines.items():
             own = find_family(name) == family
             look: dict[str, Any] = {"color": BAND, "linewidth": 0.8, "zorder": 1.5}
             if own:
-                look = {"color": LIGHT[variable], "linewidth": 1.5, "zorder": 3.0}
+                look = {
+                    "color": LIGHT[colours[family]],
+                    "linewidth": 1.5,
+                    "zorder": 3.0,
+                }
                 look |= {"marker": next(markers), "markersize": 5.0, "label": name}
             axes.loglog(*zip(*points, strict=True), **look)
         below = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0)}
         legend = axes.legend(fontsize=8, frameon=False, borderaxespad=0.2, **below)
-        rows = len(legend.get_texts())
+        height = 12.5 * len(legend.get_texts())
         title = {"loc": "left", "fontsize": 9.5, "fontweight": "bold"}
-        axes.set_title(family, pad=5.0 + 12.5 * rows, **title)
+        axes.set_title(family, pad=5.0 + height, **title)
     figure.supxlabel("processor time of the run, s", fontsize=9)
     figure.supylabel("largest error of torque and pin forces", fontsize=9)
     return figure

@@ -64,8 +64,12 @@ class Labels:
     def beside(self) -> "list[Annotation]":
         """Write every label at once, each outwards from its point.
 
-        No free spot is searched for a film.
+        No free spot is searched for a film: a bright edge keeps the text clear of a bar
+        of its own colour.
         """
+        from matplotlib.patheffects import withStroke
+
+        edge = [withStroke(linewidth=2.5, foreground="white")]
         written = []
         for label in self.wanted:
             dx, dy = (p - q for p, q in zip(label.at, label.shun, strict=True))
@@ -83,6 +87,7 @@ class Labels:
                 zorder=9,
                 annotation_clip=False,
             )
+            text.set_path_effects(edge)
             written.append(text)
         return written
 
