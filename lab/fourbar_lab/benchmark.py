@@ -45,6 +45,7 @@ from fourbar_validation.places import find_checkout
 from fourbar_validation.report.machine import name_machine
 from fourbar_validation.report.svg import (
     BAND,
+    INK,
     LIGHT,
     PAPER,
     set_frame,
@@ -481,6 +482,7 @@ def draw_work_precision(lines: Mapping[str, list[Work]]) -> Any:
     for axes, family in zip(panels, shown, strict=False):
         axes.set_facecolor("none")
         set_frame(axes)
+        axes.tick_params(which="both", labelcolor=INK)
         markers = cycle(MARKERS)
         for name, points in lines.items():
             own = find_family(name) == family
@@ -493,13 +495,14 @@ def draw_work_precision(lines: Mapping[str, list[Work]]) -> Any:
                 }
                 look |= {"marker": next(markers), "markersize": 5.0, "label": name}
             axes.loglog(*zip(*points, strict=True), **look)
-        below = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0)}
+        below = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "labelcolor": INK}
         legend = axes.legend(fontsize=8, frameon=False, borderaxespad=0.2, **below)
         height = 12.5 * len(legend.get_texts())
-        title = {"loc": "left", "fontsize": 9.5, "fontweight": "bold"}
+        title = {"loc": "left", "fontsize": 9.5, "weight": "bold", "color": INK}
         axes.set_title(family, pad=5.0 + height, **title)
-    figure.supxlabel("processor time of the run, s", fontsize=9)
-    figure.supylabel("largest error of torque and pin forces", fontsize=9)
+    figure.supxlabel("processor time of the run, s", fontsize=9, color=INK)
+    errors = "largest error of torque and pin forces"
+    figure.supylabel(errors, fontsize=9, color=INK)
     return figure
 
 

@@ -67,9 +67,9 @@ class Labels:
         No free spot is searched for a film: a bright edge keeps the text clear of a bar
         of its own colour.
         """
-        from matplotlib.patheffects import withStroke
+        from matplotlib.patheffects import AbstractPathEffect, withStroke
 
-        edge = [withStroke(linewidth=2.5, foreground="white")]
+        edge: list[AbstractPathEffect] = [withStroke(linewidth=2.5, foreground="white")]
         written = []
         for label in self.wanted:
             dx, dy = (p - q for p, q in zip(label.at, label.shun, strict=True))
