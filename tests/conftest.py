@@ -1,4 +1,7 @@
-"""What tests of several folders need: a headless Chromium, where the machine has one; programs that Ctrl-C stops."""
+"""What tests of several folders need: a headless Chromium, where the machine has one.
+
+Programs that Ctrl-C stops.
+"""
 
 import os
 import shutil
@@ -43,7 +46,10 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.fixture
 def interruptible() -> Iterator[None]:
-    """Programs started here heed SIGINT: a job in the background ignores it, and what is ignored would be inherited."""
+    """Programs started here heed SIGINT.
+
+    A job in the background ignores it, and what is ignored would be inherited.
+    """
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
     signal.signal(signal.SIGINT, before)
@@ -71,7 +77,10 @@ def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator:
 
 @pytest.fixture
 def browse(chromium, tmp_path: Path):
-    """Opens page text at a width, light or dark; after the test the console must be empty."""
+    """Opens page text at a width, light or dark.
+
+    After the test the console must be empty.
+    """
 
     def open_page(
         text: str, width: int = 1100, *, dark: bool = False, still: bool = False

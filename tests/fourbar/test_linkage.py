@@ -31,7 +31,10 @@ def test_density_and_cross_section_give_the_mass_of_a_uniform_bar() -> None:
 
 
 def test_the_section_modulus_is_that_of_the_second_moment_of_area() -> None:
-    """I over the distance of the outermost fibre, both integrated over strips of the area."""
+    """I over the distance of the outermost fibre.
+
+    Both are integrated over strips of the area.
+    """
     y = np.linspace(-0.01, 0.01, 200_001)
     chord = 2.0 * np.sqrt(np.maximum(0.01**2 - y * y, 0.0))
     sections = {

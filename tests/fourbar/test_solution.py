@@ -1,4 +1,7 @@
-"""A solution as its users hold it: by name, frozen, comparable, as a data frame with units."""
+"""A solution as its users hold it.
+
+By name, frozen, comparable, as a data frame with units.
+"""
 
 from dataclasses import FrozenInstanceError, replace
 

@@ -1,4 +1,7 @@
-"""No value, and a status that names it: where the status is ok every requested quantity is a number."""
+"""No value, and a status that names it.
+
+Where the status is ok every requested quantity is a number.
+"""
 
 import json
 import math
@@ -53,7 +56,10 @@ def solved(scene: Scene, stage: str | None = "error") -> Solution:
 
 
 def without_value(solution: Solution) -> dict[str, list[str]]:
-    """Quantities that are no number at positions whose status is ok, with what stands there instead."""
+    """Quantities that are no number at positions whose status is ok.
+
+    What stands there instead is returned.
+    """
     ok = solution.status_code == OK
     missing = {}
     for name in STAGE_OF:
@@ -77,7 +83,10 @@ per_pin = st.dictionaries(st.sampled_from(list(PINS)), sizes, min_size=1)
 
 @st.composite
 def linkages(draw: st.DrawFn) -> fourbar.FourBar:
-    """Lengths that close somewhere: of a few round numbers, so that bars are equal, or of any size."""
+    """Lengths that close somewhere.
+
+    Of a few round numbers, so that bars are equal, or of any size.
+    """
     lengths = [
         draw(st.sampled_from([1.0, 2.0, 3.0]) | st.floats(0.5, 3.0)) for _ in range(4)
     ]
@@ -109,7 +118,10 @@ def linkages(draw: st.DrawFn) -> fourbar.FourBar:
 
 @st.composite
 def scenes(draw: st.DrawFn) -> Scene:
-    """Every drive bar, every effect, magnitudes from the least double to the greatest."""
+    """Every drive bar and every effect.
+
+    Magnitudes go from the least double to the greatest.
+    """
     linkage = draw(linkages())
     loads = draw(
         st.lists(
@@ -187,7 +199,10 @@ CRANK_ROCKER = fourbar.uniform(0.3, 0.1, 0.25, 0.22)
 def test_a_bar_that_does_not_turn_takes_no_torque(
     linkage: fourbar.FourBar, branch: int, drive_bar: int
 ) -> None:
-    """T3 of a parallelogram and T4 of a folded kite would have a pole at every position."""
+    """T3 of a parallelogram and T4 of a folded kite are tested.
+
+    They would have a pole at every position.
+    """
     motion = Motion(np.linspace(0.3, 2.0, 5), 1.0, 2.0, branch)
     for effects in (
         (),
@@ -255,7 +270,10 @@ def test_beyond_the_range_of_doubles_the_status_says_so_from_that_stage_on() -> 
 
 
 def test_where_it_depends_on_the_position_only_those_positions_are_lost() -> None:
-    """The force of a spring of 1e308 N/m, 0.8 m long, at a distance that grows with theta_2."""
+    """The force of a spring of 1e308 N/m, 0.8 m long.
+
+    Its distance grows with theta_2.
+    """
     spring = Spring(Place(1, (3.0, 0.0)), Place(2, (1.0, 0.0)), 1e308, 0.0)
     solution = solved(
         Scene(
@@ -315,7 +333,10 @@ def test_what_is_beyond_the_range_of_doubles_is_nan_where_the_loop_does_not_clos
 
 
 def test_where_friction_jams_the_motion_that_would_begin_the_status_says_so() -> None:
-    """At rest with a large pin: one of the two torques does not exist, torque and forces at rest do."""
+    """At rest with a large pin.
+
+    One of the two torques does not exist, torque and forces at rest do.
+    """
     scene = Scene(
         CRANK_ROCKER,
         Motion(np.linspace(0.1, 6.2, 60), 0.0),

@@ -1,4 +1,7 @@
-"""Invariants of the mechanics over random linkages: a symmetry or a second derivation, never the formula again."""
+"""Invariants of the mechanics over random linkages.
+
+A symmetry or a second derivation, never the formula again.
+"""
 
 import math
 from dataclasses import replace
@@ -20,7 +23,9 @@ from tests.support.scenes import change_place, mirrored
 WORST_CONDITION = 0.2
 """Sines below this are drawn elsewhere: here every relation must hold to round-off."""
 ROUND_OFF = 100.0 * 2.0**-52 / WORST_CONDITION**3
-"""Two methods of fifty roundings each, divided by the motion condition squared and the drive condition: 2.8e-12."""
+"""Two methods of fifty roundings each, divided by the motion condition squared and the
+drive condition: 2.8e-12.
+"""
 EXAMPLES = settings(
     max_examples=60,
     deadline=None,
@@ -37,7 +42,10 @@ def between(low: float, high: float) -> st.SearchStrategy[float]:
 
 @st.composite
 def scenes(draw: st.DrawFn, effects: bool = True) -> Scene:
-    """Lengths from the angles of the triangle A, B, O4, so every scene assembles with a known condition."""
+    """Lengths from the angles of the triangle A, B, O4.
+
+    Every scene then assembles with a known condition.
+    """
     d, a, psi = (
         draw(between(0.1, 1.0)),
         draw(between(0.1, 1.0)),
@@ -98,7 +106,10 @@ def scenes(draw: st.DrawFn, effects: bool = True) -> Scene:
 
 
 def draw_load(draw: Any) -> Load:
-    """A force at a place of any form, in a direction that is fixed or turns, and a couple."""
+    """A force at a place of any form, and a couple.
+
+    The direction of the force is fixed or turns.
+    """
     frame = draw(st.sampled_from(["world", "bar"]))
     forms = ["from_pin", "from_centre", *(["arm"] if frame == "world" else [])]
     at = {draw(st.sampled_from(forms)): (draw(between(0, 0.5)), draw(between(-3, 3)))}
@@ -129,7 +140,10 @@ def arm_from_G(scene: Scene, s: fourbar.Solution, load: Load) -> Any:
 
 
 def force_size(scene: Scene, solution: Solution) -> float:
-    """Sum of the magnitudes of everything that acts, N: what the forces are rounded by."""
+    """Sum of the magnitudes of everything that acts, N.
+
+    What the forces are rounded by.
+    """
     size = sum(float(np.hypot(*getattr(solution, name)[0])) for name in FORCES)
     for bar in MOVING_BARS:
         part = scene.linkage.bar(bar)
@@ -168,7 +182,10 @@ def same_forces(
     torque: float,
     factor: float = 1.0,
 ) -> None:
-    """Forces and torque of `ours` equal those given, in units of everything that acts."""
+    """Forces and torque of `ours` equal those given.
+
+    They are in units of everything that acts.
+    """
     size = force_size(scene, ours)
     for name, expected in theirs.items():
         assert (
@@ -202,7 +219,10 @@ def test_the_loop_closes(scene: Scene) -> None:
 @EXAMPLES
 @given(scenes())
 def test_power_balance(scene: Scene) -> None:
-    """T omega_k + power of loads and effects = d/dt of the kinetic energy, from points and speeds alone."""
+    """T omega_k + power of loads and effects = d/dt of the kinetic energy.
+
+    It follows from points and speeds alone.
+    """
     s = fourbar.solve(scene)
     w = {1: 0.0} | {bar: float(getattr(s, f"omega_{bar}")[0]) for bar in MOVING_BARS}
     power = float(s.torque[0]) * w[scene.drive_bar]
@@ -285,7 +305,10 @@ def test_ground_carries_what_acts_and_what_accelerates(scene: Scene) -> None:
 @EXAMPLES
 @given(scenes())
 def test_mirror_symmetry(scene: Scene) -> None:
-    """Mirrored in the x-axis: angles, couples and speeds change sign, so do y-components and the branch."""
+    """Mirrored in the x-axis.
+
+    Angles, couples and speeds change sign, so do y-components and the branch.
+    """
     ours, of_mirrored = fourbar.solve(scene), fourbar.solve(mirrored(scene))
     flipped = {name: value * (1.0, -1.0) for name, value in forces(of_mirrored).items()}
     same_forces(scene, ours, flipped, -float(of_mirrored.torque[0]))
@@ -300,7 +323,10 @@ def test_mirror_symmetry(scene: Scene) -> None:
 def test_length_mass_and_time_scale(
     scene: Scene, length: int, mass: int, time: int
 ) -> None:
-    """By powers of two, which round nothing: forces scale as m L/t^2, torques as m L^2/t^2."""
+    """By powers of two, which round nothing.
+
+    Forces scale as m L/t^2, torques as m L^2/t^2.
+    """
     L, M, T = 2.0**length, 2.0**mass, 2.0**time
     force, torque = M * L / T**2, M * L * L / T**2
     link, m = scene.linkage, scene.motion
@@ -362,7 +388,10 @@ def test_forces_go_as_the_speed_squared(scene: Scene, times: float) -> None:
 @EXAMPLES
 @given(scenes())
 def test_time_reversal(scene: Scene) -> None:
-    """Backwards through the same position: the same forces, without what depends on the sense of motion."""
+    """Backwards through the same position.
+
+    The same forces, without what depends on the sense of motion.
+    """
     still = replace(
         scene, effects=tuple(e for e in scene.effects if isinstance(e, Gravity))
     )
@@ -414,7 +443,10 @@ def test_frame_rotation(scene: Scene, turn: float) -> None:
 @EXAMPLES
 @given(scenes())
 def test_relabelled_from_the_other_end(scene: Scene) -> None:
-    """Bars 2 and 4 exchanged, the ground turned end for end: the same forces under their other names."""
+    """Bars 2 and 4 exchanged, the ground turned end for end.
+
+    The same forces under their other names.
+    """
     s, link = fourbar.solve(scene), scene.linkage
     theta_1 = link.ground_angle + math.pi
     b = link.coupler
@@ -483,13 +515,19 @@ def test_relabelled_from_the_other_end(scene: Scene) -> None:
 
 
 def _branch_from_the_other_end(s: Solution) -> int:
-    """B' = A seen from B and O2: the side of the diagonal from B to O2 on which A lies."""
+    """B' = A seen from B and O2.
+
+    The side of the diagonal from B to O2 on which A lies.
+    """
     diagonal, coupler = -s.B[0], s.A[0] - s.B[0]
     return 1 if diagonal[0] * coupler[1] - diagonal[1] * coupler[0] > 0.0 else -1
 
 
 def shape(scene: Scene) -> float:
-    """Longest over shortest bar, squared: how much a rounding of one bar's place turns another."""
+    """Longest over shortest bar, squared.
+
+    How much a rounding of one bar's place turns another.
+    """
     return (max(scene.linkage.lengths) / min(scene.linkage.lengths)) ** 2
 
 

@@ -1,4 +1,7 @@
-"""What becomes of the file that was there: its mode, the links that lead to it, and its bytes where writing fails."""
+"""What becomes of the file that was there.
+
+Its mode, the links that lead to it, and its bytes where writing fails.
+"""
 
 import os
 import stat

@@ -1,4 +1,7 @@
-"""How good the advice is: on linkages that it has never seen, against an exhaustive search."""
+"""How good the advice is.
+
+On linkages that it has never seen, against an exhaustive search.
+"""
 
 from dataclasses import replace
 from pathlib import Path
@@ -17,7 +20,10 @@ from tests.validation.cost.test_cost import turning
 
 @pytest.mark.slow
 def test_unseen_linkages_are_served_and_not_at_three_times_the_cheapest() -> None:
-    """A few of those of the study `advice`, of every type, judged between the positions that the advice saw."""
+    """A few of those of the study `advice`, of every type.
+
+    They are judged between the positions that the advice saw.
+    """
     costs = {("RK4", True): 1.0}
     for index in range(2):
         case = advice.measure_case(99, index, costs)

@@ -1,4 +1,7 @@
-"""The limits of speed: each is of a row that is measured, is reported with its reason, and costs the run."""
+"""The limits of speed.
+
+Each is of a row that is measured, is reported with its reason, and costs the run.
+"""
 
 import math
 from pathlib import Path

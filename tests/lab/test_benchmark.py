@@ -1,4 +1,8 @@
-"""The benchmark: engines are asked by the protocol, a letter is what the numbers earn, and nothing is asked twice."""
+"""The benchmark.
+
+Engines are asked by the protocol, a letter is what the numbers earn, and nothing is
+asked twice.
+"""
 
 import csv
 import json
@@ -29,7 +33,10 @@ WRONG = ('"torque": moments[0]', '"torque": 1.1 * moments[0]')
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """A stranger's folder: the engine of the page, one that is wrong, and the entries of both."""
+    """A stranger's folder.
+
+    The engine of the page, one that is wrong, and the entries of both.
+    """
     (code,) = re.findall(
         r"```python\n(.*?)```", (ROOT / "docs" / "protocol.md").read_text(), re.DOTALL
     )[:1]

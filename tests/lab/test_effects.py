@@ -1,4 +1,7 @@
-"""Switching off what a bare loop never needs pays; what every effect costs is measured by `effects`."""
+"""Switching off what a bare loop never needs pays.
+
+What every effect costs is measured by `effects`.
+"""
 
 import time
 from pathlib import Path
@@ -12,7 +15,9 @@ from fourbar_lab.effects import DEFAULT_FLAGS
 from fourbar_validation.engines import registry
 
 SAVED = 0.08
-"""Part of the time of a step that the flags of the bare scene must save; they save some 0.2."""
+"""Part of the time of a step that the flags of the bare scene must save; they save some
+0.2.
+"""
 
 
 def test_the_bare_scene_steps_faster_than_with_default_flags() -> None:

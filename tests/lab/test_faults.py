@@ -1,4 +1,7 @@
-"""A harness that cannot catch an injected fault is none: the list fits the tree, and some of its faults are tried."""
+"""A harness that cannot catch an injected fault is none.
+
+The list fits the tree, and some of its faults are tried.
+"""
 
 import math
 
@@ -95,7 +98,10 @@ FIRST_OF_FOLDERS = {
 def test_a_fault_of_what_judges_falls_in_the_tests_of_its_folder(
     number: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """How soon they fail is for `python -m fourbar_lab faults`: a slow machine is no fault."""
+    """How soon they fail is for `python -m fourbar_lab faults`.
+
+    A slow machine is no fault.
+    """
     monkeypatch.setattr(faults, "TEST_SECONDS", math.inf)
     assert faults.try_judging_fault(number) is None
 

@@ -1,4 +1,7 @@
-"""Fuzzing: counter-examples stay fixed, the fuzzer itself notices what it must, a stretch of scenes holds."""
+"""Fuzzing: counter-examples stay fixed, and a stretch of scenes holds.
+
+The fuzzer itself notices what it must.
+"""
 
 import os
 import signal
@@ -43,7 +46,10 @@ def test_a_scene_depends_on_its_number_alone() -> None:
 
 
 def test_half_are_adversarial() -> None:
-    """Odd scenes reach where even ones never go: bars in a ratio beyond 100, or positions that barely close."""
+    """Odd scenes reach where even ones never go.
+
+    Bars in a ratio beyond 100, or positions that barely close.
+    """
     spread = [
         max(s.linkage.lengths) / min(s.linkage.lengths)
         for s in (draw_fuzz_scene(SEED, i) for i in range(200))
@@ -101,7 +107,10 @@ def test_a_limit_off_by_a_billionth_is_found(monkeypatch: pytest.MonkeyPatch) ->
 def test_a_force_that_vanishes_is_held_to_its_prediction(
     monkeypatch: pytest.MonkeyPatch, times: float, found: bool
 ) -> None:
-    """Relative to 0 no error has a size: it is judged in newtons, and not left unjudged."""
+    """Relative to 0 no error has a size.
+
+    It is judged in newtons, and not left unjudged.
+    """
     scene = loads(
         (KEPT / "bar_with_all_mass_stands_for_an_instant.toml").read_text(
             encoding="utf-8"

@@ -1,4 +1,7 @@
-"""Mutants of the formulas: how they are made, what counts as a changed number, and what the harness catches."""
+"""Mutants of the formulas.
+
+How they are made, what counts as a changed number, and what the harness catches.
+"""
 
 import importlib.util
 from dataclasses import replace
@@ -34,7 +37,10 @@ def test_a_number_counts_as_changed_from_a_billionth_on() -> None:
 
 @pytest.mark.slow
 def test_without_a_mutant_the_harness_holds() -> None:
-    """Near change points too, where the engines lose as many digits as they are expected to."""
+    """Near change points too it holds.
+
+    The engines lose as many digits there as they are expected to.
+    """
     for scene in harness.choose_scenes()[-3:]:
         command = command_of(scene)
         answers = [

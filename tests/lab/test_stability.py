@@ -1,4 +1,7 @@
-"""Forward errors and error bars on a small seeded set; the full one is `python -m fourbar_lab stability`."""
+"""Forward errors and error bars on a small seeded set.
+
+The full one is `python -m fourbar_lab stability`.
+"""
 
 import math
 from dataclasses import replace
@@ -15,7 +18,9 @@ from fourbar_lab.tally import CHANCE, TOO_SMALL, USELESS, Tally, is_by_chance
 
 pytestmark = pytest.mark.slow  # random campaigns
 SAMPLES = 40
-"""Per family: about 1 s each; the ten thousand of each are `python -m fourbar_lab stability`."""
+"""Per family: about 1 s each; the ten thousand of each are `python -m fourbar_lab
+stability`.
+"""
 FED_BACK = 8
 """Per family and bar."""
 ONCE_BAD = {
@@ -79,7 +84,9 @@ ONCE_BAD = {
     ],
 }
 ONCE_TOO_WIDE = [126, 1497, 2410, 6894, 7017]
-"""Of `change_point`: a bar of the forces was 2e7 to 9e7 times the error, though theta_2 - theta_1 had lost nothing."""
+"""Of `change_point`: a bar of the forces was 2e7 to 9e7 times the error, though
+theta_2 - theta_1 had lost nothing.
+"""
 
 
 @pytest.fixture(scope="module")
@@ -121,7 +128,10 @@ def test_derivatives_are_within_what_the_inputs_last_digits_do_to_them() -> None
 
 
 def test_the_power_of_a_bar_that_hardly_turns_has_its_digits() -> None:
-    """Its torque has a pole: of torque times speed the derivative by theta_2 was 1.05 of what is allowed."""
+    """Its torque has a pole.
+
+    Of torque times speed the derivative by theta_2 was 1.05 of what is allowed.
+    """
     assert run("ratios", range(2, 3), derivatives=True).holds()
 
 
@@ -129,7 +139,10 @@ def test_the_power_of_a_bar_that_hardly_turns_has_its_digits() -> None:
 def test_a_derivative_that_is_left_out_is_a_failure(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The reference says where there is none: where the loop does not close, or dry friction holds a pin at rest."""
+    """The reference says where there is none.
+
+    Where the loop does not close, or dry friction holds a pin at rest.
+    """
 
     def lost(scene: fourbar.Scene) -> fourbar.Sensitivity:
         sensitivity = fourbar.sensitivity(scene)
@@ -165,12 +178,18 @@ def test_a_derivative_that_is_left_out_is_a_failure(
 
 
 def test_the_numbers_of_a_table_are_inputs() -> None:
-    """The load's factor is what two of them leave of each other: 3.9 of what the other inputs allow."""
+    """The load's factor is what two of them leave of each other.
+
+    3.9 of what the other inputs allow.
+    """
     assert run("tables", range(8523, 8524)).holds()
 
 
 def test_a_pull_between_two_bars_stays_out_of_the_force_at_a_third() -> None:
-    """F12_y is 1.8 mN, the spring between input and coupler pulls with 5.4 N; in their sums 1.45 of what is allowed."""
+    """F12_y is 1.8 mN, the spring between input and coupler pulls with 5.4 N.
+
+    In their sums 1.45 of what is allowed.
+    """
     assert run("springs", range(2515, 2516)).holds()
 
 

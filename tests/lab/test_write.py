@@ -1,4 +1,7 @@
-"""The named mechanisms: each says where it comes from, and its generated MJCF is not stale."""
+"""The named mechanisms.
+
+Each says where it comes from, and its generated MJCF is not stale.
+"""
 
 from pathlib import Path
 

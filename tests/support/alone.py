@@ -1,7 +1,7 @@
-"""A command in a process that has loaded the libraries and nothing of the project: it is forked from one like that.
+"""A command in a process that has loaded the libraries and nothing of the project.
 
-What a command must import by itself shows as in a process of its own, without the
-second that numpy and pint take.
+It is forked from one like that. What a command must import by itself shows as in a
+process of its own, without the second that numpy and pint take.
 """
 
 import os

@@ -1,4 +1,7 @@
-"""Other machines that this one can pass for; `test_machines.py` starts the tests there, the one below first."""
+"""Other machines that this one can pass for.
+
+`test_machines.py` starts the tests there, the one below first.
+"""
 
 import os
 import subprocess
@@ -17,7 +20,10 @@ BEFORE = "MACHINE_BEFORE"
 
 
 class Core(NamedTuple):
-    """A kernel of OpenBLAS, by the name that OPENBLAS_CORETYPE takes, and the CPU it is made for."""
+    """A kernel of OpenBLAS, by the name that OPENBLAS_CORETYPE takes.
+
+    The CPU it is made for belongs to it.
+    """
 
     needs: str
     """The feature without which its instructions are illegal."""
@@ -40,7 +46,10 @@ CORES = {
 
 
 def here() -> str:
-    """What this process calculates with: the BLAS kernel of NumPy and the vectorised functions of NumPy."""
+    """What this process calculates with.
+
+    The BLAS kernel of NumPy and the vectorised functions of NumPy.
+    """
     return " ".join(
         [
             find_blas() or "unknown BLAS",
@@ -50,7 +59,10 @@ def here() -> str:
 
 
 def environment(core: str) -> dict[str, str]:
-    """The variables under which OpenBLAS, NumPy and the C library take this CPU for another."""
+    """The variables under which OpenBLAS takes this CPU for another.
+
+    NumPy and the C library follow them too.
+    """
     off = [
         name
         for name in __cpu_dispatch__
@@ -65,7 +77,10 @@ def environment(core: str) -> dict[str, str]:
 
 @cache
 def machine(core: str | None = None) -> str:
-    """What a fresh process calculates with, as it is started or under the variables of a core."""
+    """Return what a fresh process calculates with.
+
+    It is as it is started, or under the variables of a core.
+    """
     line = [sys.executable, "-c", f"from {__name__} import here; print(here())"]
     changed = os.environ | ({} if core is None else environment(core))
     return subprocess.run(

@@ -1,4 +1,7 @@
-"""Every output of the thirteen equations in 320-bit balls, which share nothing with the formulas."""
+"""Every output of the thirteen equations in 320-bit balls.
+
+They share nothing with the formulas.
+"""
 
 import numpy as np
 from flint import arb, ctx
@@ -9,7 +12,10 @@ from fourbar_validation.engines.balls import compute_outputs, make_balls
 
 
 def answer_in_balls(scene: Scene, at: Command | None = None) -> dict[str, np.ndarray]:
-    """Compute each output at each position, rounded once: (n,), vectors (n, 2), NaN where it has no value."""
+    """Compute each output at each position, rounded once.
+
+    (n,), vectors (n, 2), NaN where it has no value.
+    """
     at = with_signs(scene.linkage, fourbar.command(scene) if at is None else at)
     rows, precision = [], ctx.prec
     try:

@@ -7,7 +7,10 @@ from fourbar_validation.cost.study import STEPPED, CostPoint
 def point(
     steps: float, worst: float, curve: str = "c", kind: str = STEPPED
 ) -> CostPoint:
-    """Return a point with one error of all quantities; it takes a microsecond a step."""
+    """Return a point with one error of all quantities.
+
+    It takes a microsecond a step.
+    """
     errors = WorstErrors(*[worst] * len(QUANTITIES))
     return CostPoint(
         curve,

@@ -1,6 +1,7 @@
-"""Where the declared limits of the engines lie, measured: each holds at one value of what it limits, not at another.
+"""Where the declared limits of the engines lie, measured.
 
-An engine upgrade that lifts a limit, or makes it worse, is then noticed.
+Each holds at one value of what it limits, not at another. An engine upgrade that lifts
+a limit, or makes it worse, is then noticed.
 """
 
 import math
@@ -56,7 +57,10 @@ def _simulated(scene: Scene) -> Answer:
 
 
 def _near_toggle(sine: float) -> bool:
-    """Whether a sweep that ends where |sin mu| has this value is followed without an alarm."""
+    """Tell whether a sweep that ends near a toggle is followed without an alarm.
+
+    |sin mu| has this value at its end.
+    """
     d, a, b, c = draw_linkage(DrawnType.TRIPLE_ROCKER, 1)
     cosine = -math.sqrt(1.0 - sine * sine)
     squared = b * b + c * c - 2.0 * b * c * cosine
@@ -113,7 +117,10 @@ def _compiles(inertia: float) -> bool:
 
 
 def _centre_kept(r: float) -> bool:
-    """Whether the compiled MJCF places a mass centre at this distance from its pin where it was put."""
+    """Tell whether the compiled MJCF keeps a mass centre where it was put.
+
+    It is at this distance from its pin.
+    """
     base = _base()
     scene = replace_bars(base, output=replace(base.linkage.output, centre=(r, 0.5)))
     loop = ClosedLoop(write_mjcf(scene, replace(RECIPE, timestep=1e-3), keyframe=False))
@@ -124,7 +131,10 @@ def _centre_kept(r: float) -> bool:
 
 
 def _proximal(mu: float) -> bool:
-    """Whether Pinocchio's constrained acceleration is a number with this proximal parameter."""
+    """Tell whether Pinocchio's constrained acceleration is a number.
+
+    It has this proximal parameter.
+    """
     scene = replace(_base(), loads=(), motion=Motion(1.0, 3.0))
     kept = pinocchio.PROXIMAL
     try:

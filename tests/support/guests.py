@@ -1,4 +1,7 @@
-"""Programs that answer as guests, made of the engine of docs/protocol.md, and the processes of a test."""
+"""Programs that answer as guests, and the processes of a test.
+
+They are made of the engine of docs/protocol.md.
+"""
 
 import os
 import re

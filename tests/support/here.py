@@ -36,7 +36,10 @@ def summary_of(records: Iterable[Record]) -> Summary:
 
 
 def judge_here(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Do in this process, one item after another, what workers would do that are not under test; shipped neither."""
+    """Do in this process, one item after another, what workers would do.
+
+    It is not under test here; shipped neither.
+    """
 
     def over_none(
         function: Callable[[Any], Any],
@@ -52,7 +55,10 @@ def judge_here(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def judge_solve_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Leave out what is shipped besides `solve`, a second of work for each scene that is drawn."""
+    """Leave out what is shipped besides `solve`.
+
+    It takes a second for each scene that is drawn.
+    """
     monkeypatch.setattr(
         judge, "CHECKS", tuple(check for check in judge.CHECKS if not check.derived)
     )

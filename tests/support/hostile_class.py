@@ -1,4 +1,7 @@
-"""Classes that our host serves: free bodies under other names, and what the hostile ones do besides."""
+"""Classes that our host serves.
+
+Free bodies under other names, and what the hostile ones do besides.
+"""
 
 import os
 import sys

@@ -1,7 +1,7 @@
-"""Types of the public names, as pyright sees them: `python -m tests.support.public_types`.
+"""Types of the public names, as pyright sees them.
 
-What is public is `fourbar.__all__`. The status is 1 if a type of it, of its parameters
-or of its fields is unknown.
+`python -m tests.support.public_types`. What is public is `fourbar.__all__`. The status
+is 1 if a type of it, of its parameters or of its fields is unknown.
 """
 
 import importlib.util

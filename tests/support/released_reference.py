@@ -22,12 +22,16 @@ from fourbar.linkage import MOVING_BARS, PINS
 from fourbar_validation.engines.balls import closure
 
 BITS = 256
-"""Near a change point the terms of 1/(t . M t) grow as SINGULAR^-ORDER = 1e-34, and cancel."""
+"""Near a change point the terms of 1/(t . M t) grow as SINGULAR^-ORDER = 1e-34, and
+cancel.
+"""
 ORDER = 20
 TRUNCATION = 1e-16
 """Last terms of a step, rad; some hundred steps err by less than 1e-13."""
 SINGULAR = 0.02
-"""A step should not end where |t| is below this part of the product of the two longest moving bars ..."""
+"""A step should not end where |t| is below this part of the product of the two longest
+moving bars ...
+"""
 SHORTER = tuple(0.85**k for k in range(9))
 """... and is made as much shorter there as suits best."""
 
@@ -44,7 +48,9 @@ class Reference(NamedTuple):
     sine: np.ndarray
     """sin(theta_4 - theta_3)."""
     limits: int
-    """How often bars 3, 4 came into one line and bar 2 did not: limit positions reached."""
+    """How often bars 3, 4 came into one line and bar 2 did not: limit positions
+    reached.
+    """
     change_points: int
     """How often all came into one line."""
 
@@ -134,7 +140,10 @@ class Equations:
             raise NotImplementedError(type(term).__name__)
 
     def _add_load(self, load: Load) -> None:
-        """Move the force to G, in the axes that it is stated in, and add its couple about G."""
+        """Move the force to G, in the axes that it is stated in.
+
+        Its couple about G is added.
+        """
         if load.table is not None or load.point is not None:
             raise NotImplementedError("a load of a table, or at a named point")
         k = load.bar - 2
@@ -188,7 +197,10 @@ class Equations:
         )
 
     def closed(self, theta: Three, omega: Three) -> tuple[list[Ball], list[Ball]]:
-        """The nearest angles and speeds that close the loop: an open one has no change point to pass."""
+        """The nearest angles and speeds that close the loop.
+
+        An open one has no change point to pass.
+        """
         for _ in range(4):  # 16, 32, 64, 128 digits
             S, y_C = self.loop([q.cos() for q in theta], [q.sin() for q in theta])
             gap = sum(y_C, start=-self.O4[0]), -sum(S, start=self.O4[1])

@@ -63,7 +63,9 @@ ADAPTIVE = """
 <actuator><general tendon="split" forcerange="-5 5" gainprm="0.3 0 0" biasprm="0 -100 -10" biastype="affine"/>
 </actuator></mujoco>
 """
-"""Five hinges, one of them with a spring, and a joint that follows that of the other finger."""
+"""Five hinges, one of them with a spring, and a joint that follows that of the other
+finger.
+"""
 EXCAVATOR = """
 <mujoco model="excavator"><compiler angle="degree" autolimits="true"/><default><joint axis="0 -1 0" damping="500"/>
 <geom type="capsule" contype="0" conaffinity="0"/></default>
@@ -106,7 +108,10 @@ LIFTED = """
 
 
 def examine_text(scene: Scene, text: str | None, names: Mapping[str, str]) -> Examined:
-    """Examine a text as a file that names no other; None: the file generated from the scene."""
+    """Examine a text as a file that names no other.
+
+    None: the file generated from the scene.
+    """
     file = None if text is None else RobotFile(Path("theirs.xml"), text)
     return examine(scene, file, names)
 
@@ -149,7 +154,10 @@ class Planar:
     """Further elements of the file."""
 
     def body(self, name: str, pin: str, at: Point, inside: str = "") -> str:
-        """Return a body on a hinge at a pin, its frame there, in a parent whose frame is at `at`."""
+        """Return a body on a hinge at a pin, its frame there.
+
+        The frame of its parent is at `at`.
+        """
         x, y = np.subtract(self.pins[pin], at).tolist()
         axis = self.axes.get(pin, "0 0 1")
         return (

@@ -25,7 +25,10 @@ HEAD = "scene,engine,setting,positions,seconds,times_formulas\n"
 def save_run(
     folder: Path, rows: list[Row], times: str = "", about: About = HERE
 ) -> Path:
-    """Write the folder of a run with these rows, and lines of times where there are any."""
+    """Write the folder of a run with these rows.
+
+    Lines of times are written if there are any.
+    """
     folder.mkdir()
     write_results(rows, folder / "results.csv")
     if times:

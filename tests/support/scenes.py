@@ -44,7 +44,10 @@ TURN = crank_rocker(
 
 
 def thesis(theta_2: object = None) -> fourbar.Scene:
-    """The thesis's model mechanism, uniform bars 2.54 cm wide (Linares Mendoza, sections 4.12 and 5.7)."""
+    """The thesis's model mechanism, uniform bars 2.54 cm wide.
+
+    The source is Linares Mendoza, sections 4.12 and 5.7.
+    """
 
     def inertia(mass: float, length: float) -> float:
         return mass * (length**2 + 0.0254**2) / 12.0
@@ -77,9 +80,10 @@ def change_place(
 
 
 def mirrored(scene: fourbar.Scene) -> fourbar.Scene:
-    """Return the scene with y to -y: angles, couples, speeds and the branch change sign.
+    """Return the scene with y to -y.
 
-    Effects other than gravity stay: they must have no side.
+    Angles, couples, speeds and the branch change sign. Effects other than gravity stay:
+    they must have no side.
     """
     linkage, motion = scene.linkage, scene.motion
     bars = {}

@@ -1,4 +1,7 @@
-"""Scenes and engines that cost a worker its life; a worker that imports them imports no more than it needs to judge."""
+"""Scenes and engines that cost a worker its life.
+
+A worker that imports them imports no more than it needs to judge.
+"""
 
 import os
 import signal
@@ -57,7 +60,10 @@ class Moody:
 
 
 def dies_at_first(*_: object) -> None:
-    """Starts no worker of a process as long as some of its lives are left in the folder that the run was given."""
+    """Starts no worker of a process as long as some of its lives are left.
+
+    They are in the folder that the run was given.
+    """
     lives = sorted(Path(os.environ["LIVES"]).iterdir())
     if lives:
         lives[0].unlink(missing_ok=True)

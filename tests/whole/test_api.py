@@ -1,4 +1,7 @@
-"""What `fourbar` offers in Python: every public name documented, the list of them, and what a slip is answered."""
+"""What `fourbar` offers in Python.
+
+Every public name documented, the list of them, and what a slip is answered.
+"""
 
 import itertools
 import json
@@ -80,7 +83,8 @@ WRONG = (
     {"m": 1},
     {5: 1},
 )
-"""Not for every argument: some are allowed somewhere, and then the call goes through."""
+"""Not for every argument: some are allowed somewhere, and then the call goes through.
+"""
 OF_OTHERS = {"Solution", "Sensitivity", "Study", "Released"}
 """What functions return; nobody constructs them."""
 
@@ -296,7 +300,10 @@ def calls() -> dict[str, tuple[Callable[..., object], tuple[Any, ...]]]:
 
 
 def calls_by_name() -> dict[str, tuple[Callable[..., object], tuple[Any, ...]]]:
-    """Arguments that are given by their names, each for itself: what is called, and a good value."""
+    """Arguments that are given by their names, each for itself.
+
+    What is called, and a good value.
+    """
     link, base = fourbar.uniform(0.3, 0.1, 0.25, 0.22), fourbar.Motion(1.0, 10.0)
     ends = (fourbar.Place(2, (0.1, 0.2)), fourbar.Place(4, (0.1, 0.2)))
     pair, points = (0.1, 0.2), (fourbar.Point("P", 2, (0.1, 0.2)),)
@@ -429,7 +436,10 @@ def test_a_figure_is_refused_arguments_of_another_type(tmp_path: Path) -> None:
 
 
 def test_the_public_formulas_agree_with_a_solution() -> None:
-    """A point's velocity is its coefficient times omega_2; the coupler curve passes through the point at each angle."""
+    """A point's velocity is its coefficient times omega_2.
+
+    The coupler curve passes through the point at each angle.
+    """
     scene = crank_rocker()
     solution, linkage = fourbar.solve(scene), scene.linkage
     z = linkage.coupler.to_centre

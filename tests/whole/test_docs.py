@@ -1,6 +1,7 @@
-"""README and docs are run: commands, program, scene file; every link leads somewhere, every page is listed.
+"""README and docs are run: commands, program, scene file.
 
-The tutorial has a test of its own, which runs it from top to bottom.
+Every link leads somewhere, every page is listed. The tutorial has a test of its own,
+which runs it from top to bottom.
 """
 
 import contextlib
@@ -80,7 +81,10 @@ def test_the_examples_of_continuous_integration_use_commands_and_options_that_ex
 def test_the_run_of_a_pull_request_is_held_against_what_comes_along(
     checkout: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The accepted state of the project is cut down to the scene and the engine of this run."""
+    """The accepted state of the project is cut down.
+
+    It keeps the scene and the engine of this run.
+    """
     about, rows = read_run(find_baseline(ACCEPTED))
     assert about.engines is not None
     others = about.engines - {"free-body"}
@@ -234,7 +238,10 @@ def test_the_scene_file_is_one(checkout: Path) -> None:
 
 @pytest.mark.parametrize("page", [*PAGES, *FORMS], ids=lambda page: page.name)
 def test_every_other_command_line_is_one_that_its_program_takes(page: Path) -> None:
-    """Parse the command lines in running text and shell blocks, which run for minutes or name a SCENE."""
+    """Parse the command lines in running text and shell blocks.
+
+    They run for minutes or name a SCENE.
+    """
     text = page.read_text(encoding="utf-8")
     lines = re.findall(
         r"`((?:fourbar|python -m validation|python -m fourbar_lab|fourbar-validation)"
@@ -445,7 +452,10 @@ def test_the_figure_of_the_theory_is_the_one_that_is_drawn() -> None:
 def test_the_pictures_are_those_that_are_drawn(
     name: str, options: tuple[str, ...], tmp_path: Path
 ) -> None:
-    """Compare what is written in the pictures, because another matplotlib draws other paths."""
+    """Compare what is written in the pictures.
+
+    Another matplotlib draws other paths.
+    """
     command = [
         "plot",
         str(ROOT / "models" / "crank_rocker.toml"),
@@ -529,7 +539,10 @@ def test_the_gallery_is_a_suite_with_pictures_and_sources() -> None:
 def test_the_wiper_of_the_page_needs_less_torque_by_other_means(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Check the optimum by `solve`, `swing` and `transmission_extremes`, which the optimiser does not use."""
+    """Check the optimum by `solve`, `swing` and `transmission_extremes`.
+
+    The optimiser does not use them.
+    """
     pytest.importorskip("scipy")
     monkeypatch.chdir(ROOT)
     names: dict[str, Any] = {}

@@ -1,4 +1,7 @@
-"""The guide's example is a working effect: read from the page, registered, and judged by the engines."""
+"""The guide's example is a working effect.
+
+Read from the page, registered, and judged by the engines.
+"""
 
 import math
 import re
@@ -158,7 +161,10 @@ def test_without_its_file_a_scene_neither_reads_nor_writes_the_example(
 
 
 def test_the_drive_makes_up_for_what_the_example_takes(latch: Any) -> None:
-    """Power of the couple, angle and speed those of the free bodies; it acts at few positions, and in both senses."""
+    """Power of the couple, angle and speed those of the free bodies.
+
+    It acts at few positions, and in both senses.
+    """
     scene = guide_scene()
     with_it, without = solve(scene).torque, solve(replace(scene, effects=())).torque
     assert with_it is not None and without is not None

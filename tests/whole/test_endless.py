@@ -1,4 +1,7 @@
-"""Input that never ends, and work that would not: refused in one line with exit status 2, or bounded and stopped."""
+"""Input that never ends, and work that would not.
+
+Refused in one line with exit status 2, or bounded and stopped.
+"""
 
 import os
 import signal

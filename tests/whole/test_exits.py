@@ -1,4 +1,8 @@
-"""How a command ends: one table of commands and their statuses, and every command once in a process of its own."""
+"""How a command ends.
+
+One table of commands and their statuses, and every command once in a process of its
+own.
+"""
 
 import os
 import subprocess

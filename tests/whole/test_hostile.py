@@ -1,4 +1,7 @@
-"""Files are data: hostile names and titles end escaped wherever they are shown, and no path escapes."""
+"""Files are data.
+
+Hostile names and titles end escaped wherever they are shown, and no path escapes.
+"""
 
 import csv
 import json
@@ -55,7 +58,10 @@ def scene_text(title: str) -> str:
 
 @dataclass(frozen=True)
 class Named:
-    """Scenes whose name, title and source are hostile: where the beginning or the whole matters each by itself."""
+    """Scenes whose name, title and source are hostile.
+
+    Where the beginning or the whole matters each by itself.
+    """
 
     texts: tuple[str, ...] = (
         *(HOSTILE[kind] for kind in ("path", "markdown", "rich")),

@@ -59,7 +59,9 @@ LAYERS = {
         "cli",
     ),
 }
-"""From the ground up: no layer imports one above it or on its own floor, not even inside a function."""
+"""From the ground up: no layer imports one above it or on its own floor, not even
+inside a function.
+"""
 ON_ONE_FLOOR = {
     ("files", "studies"),
     ("scenes", "compare"),
@@ -67,11 +69,16 @@ ON_ONE_FLOOR = {
 }
 """Of two layers on one floor the first may use the second."""
 MOST = {"fourbar": 16, "fourbar_validation": 15}
-"""Entries at a package's own level, dunder files not counted: what a stranger can take in at a glance."""
+"""Entries at a package's own level, dunder files not counted: what a stranger can take
+in at a glance.
+"""
 
 
 def imported(path: Path, *, types: bool = False) -> set[str]:
-    """Full names of all modules that a file imports when it runs, at any depth; with those of its types if wanted."""
+    """Full names of all modules that a file imports when it runs, at any depth.
+
+    With those of its types if wanted.
+    """
     names = set()
     tree = ast.parse(path.read_text())
     typing = (
@@ -96,7 +103,10 @@ def imported(path: Path, *, types: bool = False) -> set[str]:
 
 
 def test_import_fourbar_loads_numpy_alone() -> None:
-    """With the names that a first program uses; the others are imported on their first use."""
+    """With the names that a first program uses.
+
+    The others are imported on their first use.
+    """
     code = (
         "import sys; from fourbar import FourBar, Motion, Scene, solve, uniform;"
         " print(*sorted({name.partition('.')[0] for name in sys.modules}))"

@@ -1,4 +1,7 @@
-"""Nothing is lost: whatever dies, finished scenes stay, and a rerun ends with the same bytes."""
+"""Nothing is lost.
+
+Whatever dies, finished scenes stay, and a rerun ends with the same bytes.
+"""
 
 import math
 import os
@@ -53,12 +56,17 @@ from tests.support.unlucky import (
 
 SEED = 7
 KILLS = int(os.environ.get("KILLS", "1"))
-"""Kills in each of the tests that kill; `make long-test` takes 50, and runs of full size."""
+"""Kills in each of the tests that kill; `make long-test` takes 50, and runs of full
+size.
+"""
 FULL = "KILLS" in os.environ
 KILLS_OF_BLAME = 4
-"""Kills of one scene that an engine is blamed for: twice with the others, twice alone."""
+"""Kills of one scene that an engine is blamed for: twice with the others, twice alone.
+"""
 COUNT, IN_A_CHUNK = (220, 20) if FULL else (30, 3)
-"""Scenes of a run, none of them drawn, so that the work is the judging alone; and as many chunks in a small run."""
+"""Scenes of a run, none of them drawn, so that the work is the judging alone; and as
+many chunks in a small run.
+"""
 SMALL = (
     "import fourbar_validation.run.plan as plan; plan.CHUNK = {False:"
     f" {IN_A_CHUNK}}}; "
@@ -152,7 +160,10 @@ def test_workers_that_die_with_nothing_to_do_end_the_run_which_can_be_resumed(
 def test_a_worker_killed_with_the_lock_of_the_pipe_ends_the_run_within_seconds() -> (
     None
 ):
-    """Nobody gives the lock back: the others must not wait for it as long as Pebble does, two minutes."""
+    """Nobody gives the lock back.
+
+    The others must not wait for it as long as Pebble does, two minutes.
+    """
     begin = time.monotonic()
     results = workers.apply_over_processes(
         die_with_the_pipe, [(0, [None])], 1, seconds=None, instead=workers.fail
@@ -289,7 +300,9 @@ LIMIT = (
     " resource.RLIM_INFINITY)); "
 )
 LIMITED = LIMIT + ("" if FULL else SMALL) + HARNESS
-"""The harness on a disk that takes no file of more than 60 kB: the parts fit, the results do not."""
+"""The harness on a disk that takes no file of more than 60 kB: the parts fit, the
+results do not.
+"""
 
 
 def start(
@@ -360,7 +373,10 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_whatever_ended_it_a_rerun_goes_on_and_ends_with_the_same_bytes(
     tmp_path: Path, undisturbed: Path
 ) -> None:
-    """Interrupted, killed at random moments and met with a full disk, one after the other in one folder."""
+    """Interrupted, killed at random moments and met with a full disk.
+
+    These happen one after the other in one folder.
+    """
     process = start(tmp_path, COUNT)
     wait_for_parts(tmp_path, process, at_least=1)
     os.kill(process.pid, signal.SIGINT)
@@ -396,7 +412,10 @@ def test_whatever_ended_it_a_rerun_goes_on_and_ends_with_the_same_bytes(
 
 
 def workers_of(process: subprocess.Popen[bytes]) -> list[int]:
-    """The processes that judge: no zombie of one that was killed, nor Python's tracker of resources."""
+    """The processes that judge.
+
+    No zombie of one that was killed, nor Python's tracker of resources.
+    """
     try:
         children = (
             Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
@@ -443,7 +462,10 @@ def test_a_worker_killed_at_random_moments_changes_no_byte(
 
 
 def guests_of(mark: str, program: str) -> list[int]:
-    """The programs of guests among the processes with a mark; the run names them too."""
+    """The programs of guests among the processes with a mark.
+
+    The run names them too.
+    """
     guests = []
     for pid in list_processes(mark):
         with suppress(OSError):  # it has just gone
@@ -480,7 +502,10 @@ def test_any_process_of_a_run_with_a_guest_killed_changes_no_byte(
     undisturbed_with_guest: bytes,
     kind: str,
 ) -> None:
-    """Killed in the middle, with questions left to ask; a run that ended early is resumed."""
+    """Killed in the middle, with questions left to ask.
+
+    A run that ended early is resumed.
+    """
     mark = f"MARK_OF_TEST={tmp_path}"
     monkeypatch.setenv("MARK_OF_TEST", str(tmp_path))
     rng = np.random.default_rng(SEED + 2)
@@ -579,7 +604,10 @@ class Blunders:
 def test_of_a_long_suite_what_fails_has_pictures_and_what_is_nearest_to_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Drawn at the end, without the engine that broke down; with --no-pictures not at all."""
+    """Drawn at the end, without the engine that broke down.
+
+    With --no-pictures not at all.
+    """
     judge_here(monkeypatch)
     drawn: list[str] = []
     judge = pool.judge_job

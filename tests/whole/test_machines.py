@@ -1,4 +1,6 @@
-"""The numbers hold on another machine: another BLAS kernel, other vectorised functions of NumPy, in a child process.
+"""The numbers hold on another machine.
+
+Another BLAS kernel, other vectorised functions of NumPy, in a child process.
 
 `MACHINES=all` (part of `make long-test`) tries every kernel that the CPU can run, on
 every numerical test file, and the whole `validation run`.

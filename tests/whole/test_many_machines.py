@@ -1,6 +1,7 @@
-"""The page on many machines is run: a Slurm array, a workflow's matrix and Dask judge parts, and no byte changes.
+"""The page on many machines is run.
 
-A worker is a machine here: it shares with the others what the page says that it shares.
+A Slurm array, a workflow's matrix and Dask judge parts, and no byte changes. A worker
+is a machine here: it shares with the others what the page says that it shares.
 """
 
 import importlib.util

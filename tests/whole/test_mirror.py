@@ -1,5 +1,6 @@
-"""Whoever opens a module knows its test: tests/ mirrors the tree, and what has no test of its name stands below.
+"""Whoever opens a module knows its test.
 
+Tests/ mirrors the tree, and what has no test of its name stands below.
 `tests/fourbar/formulas/test_position.py` is of `fourbar/formulas/position.py`, as is
 `test_position_more.py`; a test may have the name of its folder. `whole/` is of no
 module alone, `support/` holds what tests share.
@@ -125,7 +126,9 @@ JUDGED_BY = {
         " pinocchio_simulated pybullet"
     ),
 }
-"""Modules without a test of their name, folder by folder, and the test that says when one of them is wrong."""
+"""Modules without a test of their name, folder by folder, and the test that says when
+one of them is wrong.
+"""
 
 
 def listed() -> dict[str, str]:

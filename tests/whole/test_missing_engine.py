@@ -1,4 +1,7 @@
-"""An environment without one of the engines: what is left is judged, and what is missing is named."""
+"""An environment without one of the engines.
+
+What is left is judged, and what is missing is named.
+"""
 
 import csv
 import os
@@ -24,7 +27,9 @@ class Blocker:
 
 sys.meta_path.insert(0, Blocker())
 """
-"""As `sitecustomize` it is imported by every Python started with it on its path, the workers too."""
+"""As `sitecustomize` it is imported by every Python started with it on its path, the
+workers too.
+"""
 ENGINES = {
     "mujoco": {"mujoco-inverse", "mujoco-simulated"},
     "pinocchio": {"pinocchio-inverse"},

@@ -1,7 +1,8 @@
-"""Other systems: no `fork`, an ASCII locale, names with blanks and accents, line ends of Windows.
+"""Other systems.
 
-Workers are started by `spawn` everywhere; here nothing else can be had. What opens a
-text without saying its encoding makes Python warn.
+No `fork`, an ASCII locale, names with blanks and accents, line ends of Windows. Workers
+are started by `spawn` everywhere; here nothing else can be had. What opens a text
+without saying its encoding makes Python warn.
 """
 
 import os

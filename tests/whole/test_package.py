@@ -1,4 +1,6 @@
-"""What is installed: every file goes along, every library is declared, and one that is missing is one line.
+"""What is installed.
+
+Every file goes along, every library is declared, and one that is missing is one line.
 
 `PACKAGE=all` (of `make long-test`) builds the wheel and the source archive and installs
 them afresh on each Python that the machine has, and once more with the lowest versions
@@ -70,7 +72,10 @@ def test_every_file_of_the_package_is_shipped(package: str, folder: str) -> None
 
 
 def test_the_source_archive_has_the_package_that_lies_elsewhere() -> None:
-    """The wheel is built from the archive, which has no module of a package that is mapped to another folder."""
+    """The wheel is built from the archive.
+
+    The archive has no module of a package that is mapped to another folder.
+    """
     for package in PROJECT["tool"]["setuptools"]["package-dir"]:
         module = f"validation/{package.replace('.', '/')}/__init__.py"
         assert (ROOT / module).is_file() and f"include {module}\n" in (
@@ -230,7 +235,10 @@ def lowest(requirements: list[str]) -> list[str]:
 def installed_works(
     python: str, package: Path, folder: Path, constraints: list[str]
 ) -> None:
-    """Install afresh, outside the tree; then version, numbers, a page, and the one line of a missing extra."""
+    """Install afresh, outside the tree.
+
+    Then version, numbers, a page, and the one line of a missing extra.
+    """
     subprocess.run([python, "-m", "venv", folder], check=True)
     its_python = folder / "bin" / "python"
     (folder / "constraints.txt").write_text("\n".join(constraints))

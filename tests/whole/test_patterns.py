@@ -1,4 +1,7 @@
-"""Regular expressions against hostile repeats: no text that somebody hands in may hang the program."""
+"""Regular expressions against hostile repeats.
+
+No text that somebody hands in may hang the program.
+"""
 
 import ast
 import re
@@ -24,12 +27,18 @@ REPEATED = (
     *("a", "0", " ", ".", "-", "^", "_", "/", "(", "[", "<", '"', "'", "=", ",", ":"),
     *("a0", "a.", "1.", "a ", "m^2 ", "m_", "N m", "1 ", "a-", '="', "[a", "{ a", "²"),
 )
-"""Pieces of the texts; a pattern that can read one of them in two ways takes 2^n steps to refuse n of them."""
+"""Pieces of the texts; a pattern that can read one of them in two ways takes 2^n steps
+to refuse n of them.
+"""
 ENDS = ("", "!", "^", "\n", "0^", ")")
 LENGTHS = (8, 12, 16, 20, 24, 60, 600)
-"""Characters. The short texts come first, so that a bad pattern is named within the time of the test."""
+"""Characters. The short texts come first, so that a bad pattern is named within the
+time of the test.
+"""
 SECONDS = 0.25
-"""Processor time of one search. The slowest takes 0.02 s; a quadratic one passes, an exponential one cannot."""
+"""Processor time of one search. The slowest takes 0.02 s; a quadratic one passes, an
+exponential one cannot.
+"""
 
 
 def list_patterns() -> Iterator[tuple[str, re.Pattern[str]]]:
@@ -56,7 +65,10 @@ PATTERNS = dict(list_patterns())
 
 
 def measure_slowest(pattern: re.Pattern[str]) -> float:
-    """Return the longest processor time of a search in hostile texts, s; it ends at the first one that is too long."""
+    """Return the longest processor time of a search in hostile texts, s.
+
+    It ends at the first one that is too long.
+    """
     slowest = 0.0
     for length in LENGTHS:
         for piece in REPEATED:

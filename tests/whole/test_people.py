@@ -27,7 +27,10 @@ Steps = Callable[..., str]
 def ask(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> Steps:
-    """Run one command line of `fourbar` in an empty folder, and return what it prints."""
+    """Run one command line of `fourbar` in an empty folder.
+
+    Return what it prints.
+    """
     monkeypatch.chdir(tmp_path)
 
     def run(*words: str) -> str:
@@ -41,7 +44,10 @@ def ask(
 
 
 def row_of(text: str, label: str, after: str = "") -> list[float]:
-    """Return the numbers of the first row with a label, below one that begins with `after`."""
+    """Return the numbers of the first row with a label.
+
+    The row is below one that begins with `after`.
+    """
     start = text.index(f"\n{after}") if after else 0
     row = re.search(rf"^ *{re.escape(label)}  +(.*)$", text[start:], re.MULTILINE)
     assert row is not None, (label, text)
@@ -174,7 +180,10 @@ def test_four_pins_and_the_speed_of_the_output_as_they_are_drawn(
 
 
 def test_a_linkage_by_the_coordinates_of_its_joints(ask: Steps, tmp_path: Path) -> None:
-    """E stands where it is drawn, in the coordinates of the drawing, and its path goes through it."""
+    """E stands where it is drawn, in the coordinates of the drawing.
+
+    Its path goes through it.
+    """
     (tmp_path / "joints.toml").write_text(COORDINATES)
     text = ask("analyze", "joints.toml", "--at", "drawn")
     for name, place in {
@@ -320,7 +329,10 @@ omega_2 = "20 rpm"
 
 
 def test_steel_rods_by_their_density(ask: Steps, tmp_path: Path) -> None:
-    """A file, two commands: torque, pins and stress; the shaking force position by position."""
+    """A file, two commands: torque, pins and stress.
+
+    The shaking force position by position.
+    """
     (tmp_path / "rods.toml").write_text(RODS)
     text = ask("analyze", "rods.toml")
     peak, place, rms = row_of(text, "torque")

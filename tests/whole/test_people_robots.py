@@ -105,7 +105,10 @@ MIMIC = """\
 def ask(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> Steps:
-    """Run one command line in an empty folder, and return what it prints in one line."""
+    """Run one command line in an empty folder.
+
+    Return what it prints in one line.
+    """
     monkeypatch.chdir(tmp_path)
 
     def run(line: str, code: int = 0) -> str:
@@ -130,7 +133,10 @@ def spoil(name: str, old: str, new: str) -> None:
 
 @pytest.mark.slow
 def test_a_file_with_dry_friction_is_right(ask: Steps) -> None:
-    """MuJoCo's default friction; 1.2243167 N m at 30 deg by bisection where 1.2243155 is exact."""
+    """MuJoCo's default friction.
+
+    1.2243167 N m at 30 deg by bisection where 1.2243155 is exact.
+    """
     write("friction.toml", FRICTION)
     ask("fourbar mjcf friction.toml --drive none -o friction.xml")
     text = Path("friction.xml").read_text()

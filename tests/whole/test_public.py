@@ -1,4 +1,7 @@
-"""What is public is kept in public.txt; `python -m tests.whole.test_public` writes it anew."""
+"""What is public is kept in public.txt.
+
+`python -m tests.whole.test_public` writes it anew.
+"""
 
 import inspect
 import runpy
@@ -66,7 +69,11 @@ def of_python() -> Iterator[str]:
 
 
 def public() -> str:
-    """One line a name: of Python, of commands and their options, exit statuses, quantities, columns of results."""
+    """One line a name.
+
+    Of Python, of commands and their options, exit statuses, quantities, columns of
+    results.
+    """
     lines = [*of_python(), *of_commands()]
     lines += [
         f"exit status {name}: {getattr(errors, name)}"

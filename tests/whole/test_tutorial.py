@@ -1,6 +1,7 @@
-"""Tutorial and thesis page are run from top to bottom: files, commands, programs, and what they print.
+"""Tutorial and thesis page are run from top to bottom.
 
-A line "..." stands for lines that the page leaves out.
+Files, commands, programs, and what they print. A line "..." stands for lines that the
+page leaves out.
 """
 
 import contextlib

@@ -1,4 +1,7 @@
-"""The command line: schema of JSON and CSV, the table, exit statuses, files that appear whole or not at all."""
+"""The command line.
+
+Schema of JSON and CSV, the table, exit statuses, files that appear whole or not at all.
+"""
 
 import csv
 import io
@@ -221,7 +224,10 @@ def test_csv_has_the_same_numbers(run: Fourbar) -> None:
 def test_a_heading_of_csv_is_a_word_and_no_formula(
     name: str, tmp_path: Path, run: Fourbar
 ) -> None:
-    """A spreadsheet calculates a cell that begins with =, and a point's name heads its columns."""
+    """A spreadsheet calculates a cell that begins with =.
+
+    A point's name heads its columns.
+    """
     save(
         crank_rocker(points=(fourbar.Point("P", 3, (0.1, 0.7)),)),
         tmp_path / "scene.toml",
@@ -483,7 +489,10 @@ def test_a_length_that_is_written_to_a_file_has_a_unit(
 
 
 def test_classify_says_what_turns_and_how_far(run: Fourbar) -> None:
-    """Numbers by the law of cosines in the triangles that the bars make where two of them are in line."""
+    """Numbers by the law of cosines in the triangles that the bars make.
+
+    There two of them are collinear.
+    """
 
     def angle(opposite: float, first: float, second: float) -> float:
         return math.degrees(

@@ -1,4 +1,7 @@
-"""`-` is standard input where a scene is read, standard output where a file is written; pipes are read to their end."""
+"""`-` is standard input where a scene is read, standard output where a file is written.
+
+Pipes are read to their end.
+"""
 
 import json
 import subprocess
@@ -16,7 +19,10 @@ SCENE = ROOT / "models" / "crank_rocker.toml"
 def call_fourbar(
     folder: Path, *arguments: str, scene: bytes = SCENE.read_bytes()
 ) -> subprocess.CompletedProcess[bytes]:
-    """Run the command line in a folder, with a scene on a pipe as its standard input."""
+    """Run the command line in a folder, with a scene on a pipe.
+
+    The pipe is its standard input.
+    """
     line = [sys.executable, "-m", "fourbar", *arguments]
     return subprocess.run(
         line, input=scene, capture_output=True, check=False, cwd=folder

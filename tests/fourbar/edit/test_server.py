@@ -1,4 +1,7 @@
-"""The server of the workbench: whom it answers, what waits, when it ends; and the check that it starts."""
+"""The server of the workbench: whom it answers, what waits, when it ends.
+
+The check that it starts.
+"""
 
 import asyncio
 import gc
@@ -68,7 +71,10 @@ def wait_until(happened: Callable[[], object]) -> None:
 
 @pytest.fixture
 def bench(path: Path, monkeypatch: pytest.MonkeyPatch, capsys):
-    """Run a coroutine against a workbench that listens; it gets the workbench and its address."""
+    """Run a coroutine against a workbench that listens.
+
+    It gets the workbench and its address.
+    """
     monkeypatch.setattr(server, "GONE", 0.3)
 
     def run(what: Callable[[Workbench, str], Awaitable[None]]) -> Session:

@@ -1,4 +1,7 @@
-"""A designer's path in a real browser: from an empty scene to a saved file, numbers equal to `analyze`'s."""
+"""A designer's path in a real browser.
+
+From an empty scene to a saved file, numbers equal to `analyze`'s.
+"""
 
 import json
 import math
@@ -46,7 +49,9 @@ boxes.forEach(([a, p], n) => boxes.slice(n + 1).forEach(([b, q]) => {
 }));
 return found;
 """
-"""Pairs of labels in the picture whose boxes overlap by more than the space around letters."""
+"""Pairs of labels in the picture whose boxes overlap by more than the space around
+letters.
+"""
 
 
 SAVED = "/^saved|is saved/.test(document.getElementById('bench').textContent)"
@@ -115,7 +120,10 @@ def drag_pin_B(driver) -> None:
 
 
 class Servers:
-    """The command for scene files: called, it starts one and returns the address that this prints."""
+    """The command for scene files.
+
+    Called, it starts one and returns the address that this prints.
+    """
 
     def __init__(self) -> None:
         self.processes: list[subprocess.Popen] = []

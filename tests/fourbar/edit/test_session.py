@@ -1,4 +1,7 @@
-"""A scene that is changed step by step: its text, its history, its answers and what is kept on the disk."""
+"""A scene that is changed step by step.
+
+Its text, its history, its answers and what is kept on the disk.
+"""
 
 import cmath
 import json
@@ -33,7 +36,9 @@ PIXEL = 1e-3
 BARE_SOLVES = 10
 """That an answer may take: the issue's demand."""
 BARE_A_READING, ANSWERS_A_READING = 150, 20
-"""Of the processor's clock, which ticks at 15.6 ms on Windows: above a tenth of a second."""
+"""Of the processor's clock, which ticks at 15.6 ms on Windows: above a tenth of a
+second.
+"""
 
 
 @pytest.fixture
@@ -109,7 +114,10 @@ def test_each_part_that_is_offered_is_one_that_the_file_takes() -> None:
 
 @pytest.mark.parametrize("in_place", ["density", "mass"])
 def test_each_field_that_is_offered_is_one_that_the_file_takes(in_place: str) -> None:
-    """A density stands in place of a mass: each field is set in one of two documents."""
+    """A density stands in place of a mass.
+
+    Each field is set in one of two documents.
+    """
     fields = dict(leaves(list_offers()["fields"]))
     document = SceneDocument(CRANK_ROCKER.read_text())
     bars = ("input", "coupler", "output")
@@ -663,7 +671,10 @@ def test_a_damaged_state_file_is_one_line(session: Session, name: str) -> None:
 def test_the_history_of_a_large_scene_stays_within_what_the_next_start_reads(
     session: Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Both limits and the scene a tenth as large, since what takes time is the reading of the text."""
+    """Both limits and the scene are a tenth as large.
+
+    Reading the text takes the time.
+    """
     largest = LARGEST_STATE // 10
     monkeypatch.setattr("fourbar.edit.session.LARGEST_STATE", largest)
     monkeypatch.setattr("fourbar.edit.session.MOST_CHARACTERS", MOST_CHARACTERS // 10)
@@ -740,7 +751,10 @@ def test_a_slip_of_the_finger_on_the_steps_does_not_fill_the_memory(
 
 
 def test_another_command_goes_over_the_position_that_is_shown(tmp_path: Path) -> None:
-    """The output of a crank-rocker turns back twice: the page shows one of the stretches."""
+    """The output of a crank-rocker turns back twice.
+
+    The page shows one of the stretches.
+    """
     path = tmp_path / "crank.toml"
     path.write_text((ROOT / "models" / "crank_rocker.toml").read_text())
     for shown in (0.2, 2.0, 5.0):

@@ -1,4 +1,7 @@
-"""The effects' formulas against other derivations: potentials, exact arithmetic, limiting cases."""
+"""The effects' formulas against other derivations.
+
+Potentials, exact arithmetic, limiting cases.
+"""
 
 import math
 from dataclasses import replace
@@ -28,7 +31,8 @@ from fourbar_validation.engines.effects import look_up
 from tests.support.scenes import crank_rocker
 
 SECOND_ORDER = 1e-8
-"""A central difference with a step of 1e-5 rad: 1e-10 from its third derivative, 1e-11 from rounding, times the
+"""A central difference with a step of 1e-5 rad: 1e-10 from its third derivative, 1e-11
+from rounding, times the
 derivatives of these springs, which are some tens of N m.
 """
 STEP = 1e-5
@@ -47,7 +51,10 @@ def alone(
 
 
 def potential_torque(scene: Scene, energy: object) -> np.ndarray:
-    """T2 = dV/dtheta_2 of a static linkage under a potential, by central differences."""
+    """T2 = dV/dtheta_2 of a static linkage, by central differences.
+
+    V is its potential.
+    """
     theta_2 = np.asarray(scene.motion.theta_2)
     ends = [
         solve(replace(scene, motion=Motion(theta_2 + step, 0.0)), "position")
@@ -76,7 +83,10 @@ def test_a_spring_is_the_slope_of_its_energy() -> None:
 
 
 def test_the_work_that_compresses_a_gas_spring_is_that_of_its_two_forces() -> None:
-    """Pushed in by s it has taken F1 s + (F2 - F1) s^2/(2 stroke), F1 and F2 its forces at no and at full stroke."""
+    """Pushed in by s it has taken F1 s + (F2 - F1) s^2/(2 stroke).
+
+    F1 and F2 are its forces at no and at full stroke.
+    """
     extended, stroke, first, last = 0.5, 0.3, 40.0, 70.0
 
     def energy(s: fourbar.Solution) -> np.ndarray:
@@ -97,7 +107,10 @@ def test_the_work_that_compresses_a_gas_spring_is_that_of_its_two_forces() -> No
 
 
 def test_a_spring_without_free_length_has_a_force_where_its_points_meet() -> None:
-    """Force k times the distance vector: zero, not NaN, where both ends lie on pin A."""
+    """Force k times the distance vector.
+
+    Zero, not NaN, where both ends lie on pin A.
+    """
     ends = Place(2, (0.1, 0.0)), Place(3, (0.0, 0.0))
     torque = solve(alone(Springs((Spring(*ends, 100.0),)))).torque
     assert torque is not None and np.array_equal(torque, np.zeros(9))
@@ -178,7 +191,10 @@ def test_one_cone_has_one_none_or_two_solutions() -> None:
 
 
 def test_several_cones_one_of_which_is_known() -> None:
-    """Two pins that do not feel each other are two single ones, in every outcome, each position with its own arms."""
+    """Two pins that do not feel each other are two single ones.
+
+    They are so in every outcome, each position with its own arms.
+    """
     for c1, c2, number in (
         (0.5, 0.3, ONE),
         (2.0, 0.3, NONE),
@@ -216,7 +232,10 @@ def test_jamming_is_a_status_and_leaves_no_force() -> None:
     [Friction.at(O2=0.02, B=0.03), PinFriction.at(O2=(0.2, 0.01), B=(0.3, 0.02))],
 )
 def test_at_rest_the_interval_is_that_of_beginning_to_move(friction: object) -> None:
-    """Its ends are the limits of the torque for slow motions in either sense; at rest itself it is their inside."""
+    """Its ends are the limits of the torque for slow motions in either sense.
+
+    At rest itself it is their inside.
+    """
     scene = alone(Gravity(), friction)
     rest = solve(scene)
     slow = [
@@ -316,7 +335,10 @@ CAM = {"rise": (1.0, 0.5), "dwell": 0.2, "fall": 0.4, "rest": 0.1}
 def test_a_standard_law_has_the_factors_of_the_books(
     kind: str, speed: float, acceleration: float
 ) -> None:
-    """C_v = 2, C_a = 2 pi of the cycloidal law; 1.875 and 5.7735 of the 3-4-5 polynomial."""
+    """C_v = 2, C_a = 2 pi of the cycloidal law.
+
+    1.875 and 5.7735 of the 3-4-5 polynomial.
+    """
     law = Rise(kind, (1.0, 0.5), theta_2=0.3)
     time = np.linspace(0.0, 0.5, 100_001)
     theta, omega, alpha = law.at(time)
@@ -432,7 +454,10 @@ def test_a_table_says_in_degrees_what_it_covers_and_what_lies_outside() -> None:
 
 
 def test_a_base_that_accelerates_is_gravity_less_its_acceleration() -> None:
-    """By virtual work in the frame of the world, where the mass centres accelerate with the base too."""
+    """By virtual work in the frame of the world.
+
+    The mass centres accelerate with the base too.
+    """
     base, g = np.array([3.0, 1.5]), np.array([0.0, -9.81])
     felt = g - base
     gravity = fourbar.Gravity(

@@ -1,4 +1,7 @@
-"""The drive along a line: against free bodies in balls, limiting cases, symmetry, power, and what is refused."""
+"""The drive along a line.
+
+Against free bodies in balls, limiting cases, symmetry, power, and what is refused.
+"""
 
 import math
 from dataclasses import replace
@@ -22,9 +25,13 @@ from tests.support.scenes import crank_rocker
 
 PAIRS = list(combinations((1, 2, 3, 4), 2))
 BARS = 10.0
-"""Of an error bar, 0.64 standard deviations wide: 2 in ten billion normal errors are beyond."""
+"""Of an error bar, 0.64 standard deviations wide: 2 in ten billion normal errors are
+beyond.
+"""
 ROUND_OFF = 2e-11
-"""Relative to the largest value of the sweep: eps over the conditions that the scenes below come down to, 1e-4."""
+"""Relative to the largest value of the sweep: eps over the conditions that the scenes
+below come down to, 1e-4.
+"""
 DIFFERENCES = 1e-7
 """Relative: truncation and rounding of central differences at a step of 1e-5."""
 STEP = 1e-5
@@ -78,7 +85,10 @@ def test_forces_are_those_of_thirteen_equations_in_balls_within_their_error_bars
 def compare_with_balls(
     scene: fourbar.Scene, s: fourbar.Solution, ok: np.ndarray
 ) -> dict[str, np.ndarray]:
-    """Compare forces with those in balls by their error bars, and return all that the balls give."""
+    """Compare forces with those in balls by their error bars.
+
+    Return all that the balls give.
+    """
     exact = answer_in_balls(scene)
     assert (np.abs(s.drive_force - exact["drive_force"]) <= BARS * s.drive_force_error)[
         ok
@@ -94,7 +104,10 @@ def compare_with_balls(
 def test_beside_a_limit_of_the_input_its_digits_are_those_of_the_line(
     start_bar: int, end_bar: int
 ) -> None:
-    """At rest nothing grows without end there but for a line that has no lever on bars 3 and 4 in line, bar 2's."""
+    """At rest nothing grows without end there but for a line without lever.
+
+    It has none on bars 3 and 4, which are collinear, but on bar 2.
+    """
     link = fourbar.uniform(0.2, 0.48, 0.55, 0.2)
     near = fourbar.Motion(fourbar.FromLimit(1, 1e-10), 0.0)
     scene = fourbar.Scene(
@@ -113,7 +126,10 @@ def test_beside_a_limit_of_the_input_its_digits_are_those_of_the_line(
 
 @pytest.mark.parametrize("bar", [2, 4])
 def test_from_the_ground_to_a_bar_it_is_the_torque_over_its_lever(bar: int) -> None:
-    """The other pin forces are those of the torque, and only the ground's pin of the bar bears the push."""
+    """The other pin forces are those of the torque.
+
+    Only the ground's pin of the bar bears the push.
+    """
     torque, s = (
         fourbar.solve(crank_rocker(drive_bar=bar)),
         fourbar.solve(driven(1, bar)),
@@ -191,7 +207,10 @@ def test_its_power_is_that_of_the_torque_and_its_line_has_no_sense(
 def test_the_condition_is_the_slope_of_the_stroke_over_what_its_ends_could_move(
     start_bar: int, end_bar: int
 ) -> None:
-    """In [0, 1] for linkages of every type; ds/dtheta_2 here from differences of the stroke."""
+    """In [0, 1] for linkages of every type.
+
+    Ds/dtheta_2 here from differences of the stroke.
+    """
     rng = np.random.default_rng(start_bar + 10 * end_bar)
     seen = 0
     for _ in range(40):
@@ -428,7 +447,10 @@ def test_the_frame_bears_what_changes_the_momentum_of_the_bars(
 def test_friction_that_depends_on_pin_forces_takes_its_power_from_the_drive(
     start_bar: int, end_bar: int
 ) -> None:
-    """P = power without friction + sum of mu r |F| |slip|, with the pin forces that the drive itself makes."""
+    """P = power without friction + sum of mu r |F| |slip|.
+
+    The pin forces are those that the drive itself makes.
+    """
     pins = {
         "O2": (0.1, 0.004),
         "A": (0.15, 0.005),

@@ -1,4 +1,7 @@
-"""Where forces act: places of bars in every form, loads at them, and the cases that people brought."""
+"""Where forces act.
+
+Places of bars in every form, loads at them, and the cases that people brought.
+"""
 
 import cmath
 import math
@@ -23,7 +26,10 @@ ROUND_OFF = 1e-13
 
 
 def test_a_weight_hung_at_the_tip_of_the_rocker() -> None:
-    """Right values by virtual work with a circle intersection, apart from this program."""
+    """Right values by virtual work with a circle intersection.
+
+    They are apart from this program.
+    """
     torque = fourbar.solve(loads(HUNG)).torque
     right = [0.441477, -0.417152, -0.621733, 0.532516]
     assert torque is not None
@@ -45,7 +51,10 @@ PLACES: dict[str, dict[str, Any]] = {
 
 
 def find_place(scene: Scene, load: Load, s: fourbar.Solution) -> np.ndarray:
-    """Where a load acts at each position, x + i y, from the solution's points and angles alone."""
+    """Compute where a load acts at each position, x + i y.
+
+    Points and angles of the solution are all that is used.
+    """
     bar = scene.linkage.bar(load.bar)
     angle = {3: s.theta_3, 4: s.theta_4}[load.bar]
     d, theta_1 = scene.linkage.ground, scene.linkage.ground_angle
@@ -66,7 +75,10 @@ def find_place(scene: Scene, load: Load, s: fourbar.Solution) -> np.ndarray:
 def test_a_force_does_the_work_of_its_place_and_its_direction(
     form: str, bar: int, frame: str
 ) -> None:
-    """T2 dtheta_2 = -F . dr of a massless linkage at rest, dr by a central difference of the place."""
+    """T2 dtheta_2 = -F . dr of a massless linkage at rest.
+
+    dr is a central difference of the place.
+    """
     force = Load(bar, (7.0, 0.9), frame=frame, **PLACES[form])
     theta_2, step = np.linspace(0.3, 6.0, 7), 1e-6
     point = fourbar.Point("P", bar, from_centre=(0.05, 1.1))
@@ -121,7 +133,10 @@ def test_one_place_in_three_forms_is_one_load() -> None:
 def test_a_member_of_a_study_moves_its_load_with_the_point_and_with_the_centre() -> (
     None
 ):
-    """A place at a named point or from G follows these, as the same scene stated anew does."""
+    """A place at a named point or from G follows these.
+
+    The same scene stated anew does so too.
+    """
     point = fourbar.Point("P", 4, (0.2, 0.1))
     acting = (
         Load(4, (5.0, 0.3), point="P"),

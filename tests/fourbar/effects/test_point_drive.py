@@ -1,4 +1,7 @@
-"""A force at a point as the drive: its size by virtual work, its pin forces, and how a file states it."""
+"""A force at a point as the drive.
+
+Its size by virtual work, its pin forces, and how a file states it.
+"""
 
 import math
 from dataclasses import replace
@@ -67,7 +70,10 @@ def driven(bar: int, frame: str, **changes: Any) -> Scene:
 def test_the_power_of_the_force_is_that_of_a_couple_on_the_input(
     bar: int, frame: str
 ) -> None:
-    """F (e . v_P) = T2 omega_2, v_P the velocity of the point as the solution has it."""
+    """F (e . v_P) = T2 omega_2.
+
+    v_P is the velocity of the point as the solution has it.
+    """
     point = fourbar.Point("P", bar, (0.15, 0.3))
     scene = driven(bar, frame, points=(point,))
     s = fourbar.solve(scene)
@@ -90,7 +96,10 @@ def test_the_power_of_the_force_is_that_of_a_couple_on_the_input(
 def test_the_pin_forces_are_those_of_a_load_of_this_size_and_no_couple(
     bar: int, frame: str
 ) -> None:
-    """With the drive's force as a load, the couple on the input is zero and the pins carry the same."""
+    """The couple on the input is zero under a load of the drive's force.
+
+    The pins carry the same.
+    """
     scene = driven(bar, frame, motion=fourbar.Motion(0.7, 10.0, 5.0))
     s = fourbar.solve(scene)
     push = fourbar.Load(

@@ -1,4 +1,7 @@
-"""Where a spring has no value: the status says so, there are no forces, and every engine says the same."""
+"""Where a spring has no value.
+
+The status says so, there are no forces, and every engine says the same.
+"""
 
 import math
 from dataclasses import replace
@@ -106,7 +109,10 @@ def continuous(scene: Scene, pin: str) -> np.ndarray:
 def test_a_torsion_spring_is_wound_where_the_continuous_angle_says_so(
     name: str, branch: int, pin: str
 ) -> None:
-    """Followed position by position, and evaluated at each fiftieth by itself and in another order."""
+    """Followed position by position, and evaluated at each fiftieth.
+
+    These are evaluated by themselves and in another order.
+    """
     link = replace(linkage(name), ground_angle=0.4)
     least, most = choose_range(link)
     margin = 1e-3 * (most - least)
@@ -142,7 +148,10 @@ def test_a_torsion_spring_is_wound_where_the_continuous_angle_says_so(
 
 
 def test_the_pins_that_turn_do_wind_their_springs() -> None:
-    """The test above has something to find: of a crank-rocker the pins of the crank turn, the others swing."""
+    """The test above has something to find.
+
+    Of a crank-rocker the pins of the crank turn, the others swing.
+    """
     scene = Scene(linkage("crank-rocker"), Motion(Sweep(0.0, 2.0 * math.pi, FINE), 5.0))
     travel = {pin: np.ptp(continuous(scene, pin)) for pin in PINS}
     assert (
@@ -254,7 +263,10 @@ def test_turns_are_counted_through_change_points(
 @pytest.mark.parametrize("pin", ("O2", "A", "B", "O4"))
 @pytest.mark.parametrize("bar", (3, 4))
 def test_turns_are_counted_alike_whichever_bar_is_commanded(pin: str, bar: int) -> None:
-    """Every bar of a drag link turns; the spring is wound up where the pin has turned by half a turn from its rest."""
+    """Every bar of a drag link turns.
+
+    The spring is wound up where the pin has turned by half a turn from its rest.
+    """
     linkage = replace(fourbar.uniform(0.1, 0.25, 0.3, 0.28), ground_angle=0.4)
     scene = fourbar.Scene(
         linkage,
@@ -284,7 +296,10 @@ def test_turns_are_counted_alike_whichever_bar_is_commanded(pin: str, bar: int) 
 def test_turns_are_counted_where_the_output_is_a_crank(
     pin: str, branch: int, theta_1: float
 ) -> None:
-    """Angles that are continuous along two turns say where a pin is half a turn from where its spring rests."""
+    """Angles that are continuous along two turns say where a pin is wound.
+
+    It is half a turn from where its spring rests.
+    """
     linkage = replace(fourbar.uniform(0.3, 0.22, 0.25, 0.1), ground_angle=theta_1)
     rest = 0.7
     scene = fourbar.Scene(

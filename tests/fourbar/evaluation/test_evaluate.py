@@ -1,4 +1,7 @@
-"""Error bars against the true error, by ball arithmetic, where they once were too small, too large, or none."""
+"""Error bars against the true error, by ball arithmetic.
+
+They once were too small, too large, or none.
+"""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -35,7 +38,10 @@ TURNS = 2000.0 * np.pi
 
 
 def sized(k: float = 1.0, turns: float = 0.0) -> Scene:
-    """A crank-rocker with lengths times k under what grows with them; mass centres at angles of so many rad more."""
+    """A crank-rocker with lengths times k under what grows with them.
+
+    Mass centres at angles of so many rad more.
+    """
     linkage = FourBar(
         0.3 * k,
         Bar(0.1 * k, 0.2, centre=(0.04 * k, 0.4 + turns)),
@@ -58,7 +64,11 @@ def sized(k: float = 1.0, turns: float = 0.0) -> Scene:
 
 
 def near_a_limit(effect: Springs | Torsion) -> Scene:
-    """Springs alone: they pull as uncertainly as the directions of bars 3 and 4, which are nearly in line."""
+    """Springs alone.
+
+    They pull as uncertainly as the directions of bars 3 and 4, which are nearly in
+    line.
+    """
     linkage = FourBar(0.3, Bar(0.25), Bar(0.1), Bar(0.22))
     limit = fourbar.limit_positions(linkage)[0].theta_2
     angles = limit + np.sign(1.0 - limit) * 10.0 ** -np.arange(2.0, 9.0)
@@ -66,7 +76,10 @@ def near_a_limit(effect: Springs | Torsion) -> Scene:
 
 
 def exactly_one() -> Scene:
-    """Force and couple of 1 at the crank's own pin: nothing is rounded but the result."""
+    """Force and couple of 1 at the crank's own pin.
+
+    Nothing is rounded but the result.
+    """
     bars = FourBar(0.3, Bar(0.1, centre=(0.0, 0.0)), Bar(0.25), Bar(0.22))
     return Scene(
         bars,
@@ -161,7 +174,10 @@ def test_a_run_judges_the_bars_where_each_spring_is_nearest_to_its_rest(
 
 
 def test_a_bar_is_of_the_motion_that_begins_to_one_side() -> None:
-    """The bar of a linkage about to move was the friction itself, of which the other evaluation knew nothing."""
+    """The bar of a linkage about to move was the friction itself.
+
+    The other evaluation did not have it.
+    """
     still = replace(
         sized(),
         motion=Motion(np.array([1.0, 2.0]), 0.0),
@@ -173,7 +189,10 @@ def test_a_bar_is_of_the_motion_that_begins_to_one_side() -> None:
 
 
 def test_a_bar_is_as_wide_as_what_a_position_loses() -> None:
-    """Where a spring's ends nearly meet the direction in which it pulls is lost, which is no power of any sine."""
+    """Where a spring's ends nearly meet its direction is lost.
+
+    That is no power of any sine.
+    """
     scene = FAULT_SCENES["ends of a spring nearly meet"]
     rows = printed.check_error_bars(Question("", scene, command(scene)))
     assert [row.verdict for row in rows] == ["agrees", "agrees"]
@@ -182,7 +201,10 @@ def test_a_bar_is_as_wide_as_what_a_position_loses() -> None:
 def test_a_long_sweep_searches_for_friction_at_its_ends_alone(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Eight thousand positions of several loaded pins, each searched from many starts, took eight minutes."""
+    """Eight thousand positions of several loaded pins took eight minutes.
+
+    Each was searched from many starts.
+    """
     searched, search = [], pin_friction._search
     monkeypatch.setattr(
         pin_friction,
@@ -203,7 +225,10 @@ def test_a_long_sweep_searches_for_friction_at_its_ends_alone(
 
 
 def test_what_gravity_drops_of_its_direction_shows_in_the_error_bar() -> None:
-    """Compare a heavy crank beside its equilibrium with balls: cos(-pi/2) as a double is 6e-17, and taken for zero."""
+    """Compare a heavy crank beside its equilibrium with balls.
+
+    Cos(-pi/2) as a double is 6e-17, and taken for zero.
+    """
     scene = Scene(
         FourBar(0.3, Bar(0.1, 1e6), Bar(0.25, 0.5), Bar(0.22, 0.4)),
         Motion(1.5 * np.pi + np.linspace(-1e-3, 1e-3, 101), 1.0),
@@ -255,7 +280,10 @@ def beside_a_free_length() -> fourbar.Scene:
 def test_an_error_bar_holds_what_long_doubles_do_not_resolve(
     make: Callable[[], fourbar.Scene], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Double and long double agree here and are both wrong; pairs of doubles have 32 digits."""
+    """Double and long double agree here and are both wrong.
+
+    Pairs of doubles have 32 digits.
+    """
     scene = make()
     bars = fourbar.solve(scene, "error")
     monkeypatch.setattr(longer, "HAS_LONG_DOUBLES", False)

@@ -1,4 +1,7 @@
-"""Free motion against exact solutions and its own equilibrium; test_free_motion_reference.py has the digits."""
+"""Free motion against exact solutions and its own equilibrium.
+
+Test_free_motion_reference.py has the digits.
+"""
 
 import math
 from dataclasses import replace
@@ -137,7 +140,9 @@ def test_a_scene_reports_its_times() -> None:
 ROCKER = fourbar.FourBar(
     0.3, fourbar.Bar(0.25, 0.7), fourbar.Bar(0.1, 1.3), fourbar.Bar(0.22, 0.9)
 )
-"""A double rocker; released at rest at 50 deg, open, it swings through limit positions of its input."""
+"""A double rocker; released at rest at 50 deg, open, it swings through limit positions
+of its input.
+"""
 SWING = fourbar.Scene(
     ROCKER,
     fourbar.Motion(math.radians(50.0), 0.0, free=fourbar.Free(1.2, 120)),
@@ -145,17 +150,22 @@ SWING = fourbar.Scene(
 )
 PINS = ("F12", "F32", "F43", "F14")
 BY_ENERGY = 1e-12
-"""Of the largest force: some hundred steps of 3e-15, and a system of 17 equations whose condition is below 1e4."""
+"""Of the largest force: some hundred steps of 3e-15, and a system of 17 equations whose
+condition is below 1e4.
+"""
 STEEPER = 2.0
-"""A slope at an instant over the steepest mean slope of a step of 10 ms: the forces bend little within one."""
+"""A slope at an instant over the steepest mean slope of a step of 10 ms: the forces
+bend little within one.
+"""
 
 
 def forces_by_energy(theta: np.ndarray, start: np.ndarray) -> np.ndarray:
-    """Pin forces F12, F32, F43, F14 of ROCKER, (4, 2), at the angles of its bars 2, 3, 4 if it is released at others.
+    """Compute pin forces of ROCKER, (4, 2), at angles of its bars.
 
-    Speeds by the conservation of energy, along the one direction that the loop allows.
-    Accelerations of the three mass centres and the four pin forces together are 17
-    linear equations, regular where any two bars are in line.
+    They are F12, F32, F43, F14 if it is released at other angles. Speeds by the
+    conservation of energy, along the one direction that the loop allows. Accelerations
+    of the three mass centres and the four pin forces together are 17 linear equations,
+    regular where any two bars are in line.
     """
     _, a, b, c = ROCKER.lengths
     half = 0.5 * np.array([a, b, c])
@@ -230,7 +240,10 @@ def test_what_is_not_released_is_refused(motion: fourbar.Motion, says: str) -> N
 
 
 def integrate_to_line(scene: fourbar.Scene) -> float:
-    """Time at which bars 3 and 4 of a released scene first come to lie in one line, s, by bisection."""
+    """Find when bars 3 and 4 of a released scene are first collinear, s.
+
+    The search is a bisection.
+    """
     free = scene.motion.free
     assert free is not None
     coarse = solve(scene, "position")
@@ -260,7 +273,10 @@ def integrate_to_line(scene: fourbar.Scene) -> float:
 def test_pin_forces_pass_a_limit_position_smoothly(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """theta_2, omega_2, alpha_2 as doubles do not hold the forces there, the angle of bar 4 does."""
+    """theta_2, omega_2, alpha_2 as doubles do not hold the forces there.
+
+    The angle of bar 4 does.
+    """
     line = integrate_to_line(SWING)
     distances = np.logspace(-14, -2, 49)
     evenly = np.linspace(0.0, 1.2, 121)
@@ -288,7 +304,10 @@ def test_pin_forces_pass_a_limit_position_smoothly(
 def test_friction_that_holds_at_the_ground_loads_the_pins_as_a_drive_there(
     pin: str, bar: int
 ) -> None:
-    """The ground's couple on a bar is that of a drive on it, which holds a linkage still just as well."""
+    """The ground's couple on a bar is that of a drive on it.
+
+    A drive holds a linkage still just as well.
+    """
     held = fourbar.Motion(0.3, 0.0, free=fourbar.Free(0.2, 4))
     s = solve(
         fourbar.Scene(
@@ -328,7 +347,10 @@ def test_what_begins_to_move_against_friction_does_so_at_once() -> None:
 def test_a_spring_between_places_that_are_one_is_refused_where_it_is_released(
     preload: float,
 ) -> None:
-    """Rounding gives its pull a direction that differs at each step: the integration would never end."""
+    """Rounding gives its pull a direction that differs at each step.
+
+    The integration would never end.
+    """
     on_B = fourbar.Spring(
         fourbar.Place(3, (0.25, 0.0)),
         fourbar.Place(4, (0.22, 0.0)),
@@ -368,7 +390,10 @@ def test_a_release_at_an_angle_of_another_bar_is_the_same_motion(bar: int) -> No
 
 
 def test_change_points_of_several_turns_are_noted_when_they_are_passed() -> None:
-    """A flywheel turns a massless parallelogram evenly: all bars are in line at each half turn of the input."""
+    """A flywheel turns a massless parallelogram evenly.
+
+    All bars are in line at each half turn of the input.
+    """
     linkage = fourbar.FourBar(
         0.3, fourbar.Bar(0.1), fourbar.Bar(0.3), fourbar.Bar(0.1), ground_angle=0.2
     )
@@ -402,7 +427,10 @@ def test_a_released_spring_is_followed_up_to_half_a_turn_and_no_further() -> Non
 
 
 def test_the_drift_is_a_part_of_the_largest_energy_or_work() -> None:
-    """From rest all kinetic energy is the weight's work; the largest of it is what a drift is measured by."""
+    """From rest all kinetic energy is the weight's work.
+
+    The largest of it is what a drift is measured by.
+    """
     scene = fourbar.Scene(
         HANGING,
         fourbar.Motion(0.9, 0.0, free=fourbar.Free(0.5, 5)),

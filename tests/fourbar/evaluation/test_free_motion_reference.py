@@ -1,4 +1,6 @@
-"""Free motions to 1e-9 rad over 5 s against Taylor series in 77 digits, linkages of every type at random.
+"""Free motions to 1e-9 rad over 5 s against Taylor series in 77 digits.
+
+The linkages are random ones of every type.
 
 `FREE_MOTIONS=n` tests n motions of each kind besides the few that `make test` takes.
 """
@@ -18,7 +20,9 @@ from fourbar.scene import Command, with_signs
 from tests.support.released_reference import released
 
 PROMISED = 1e-9
-"""rad over 5 s, where the motion amplifies errors by no more than AMPLIFIED; beyond it in proportion."""
+"""rad over 5 s, where the motion amplifies errors by no more than AMPLIFIED; beyond it
+in proportion.
+"""
 AMPLIFIED = 1000.0
 TIMES = np.linspace(0.0, 5.0, 51)
 NUDGE = 1e-6
@@ -26,7 +30,9 @@ NUDGE = 1e-6
 SURE = 1e-6
 """|sin(theta_4 - theta_3)| from which on the branch is known from its sign."""
 LOOSE = 1e-10
-"""Tolerance of the motions whose difference over NUDGE is the amplification: 1e-4 of it."""
+"""Tolerance of the motions whose difference over NUDGE is the amplification: 1e-4 of
+it.
+"""
 
 
 class Released(NamedTuple):
@@ -56,7 +62,10 @@ def four_lengths(rng: np.random.Generator, grashof: bool) -> list[float]:
 def with_extreme(
     place: int, grashof: bool
 ) -> Callable[[np.random.Generator], list[float]]:
-    """Linkages by the place among ground, input, coupler, output of the shortest bar (Grashof) or of the longest."""
+    """Linkages by the place of the shortest bar (Grashof) or of the longest.
+
+    The places are ground, input, coupler and output.
+    """
 
     def lengths(rng: np.random.Generator) -> list[float]:
         others = four_lengths(rng, grashof)
@@ -103,7 +112,8 @@ PLACES = {
     "world": ("arm", "from_pin", "from_centre"),
     "bar": ("from_pin", "from_centre"),
 }
-"""Forms in which the place of a force is stated, by the axes that its direction keeps."""
+"""Forms in which the place of a force is stated, by the axes that its direction keeps.
+"""
 
 
 def motion(kind: str, number: int) -> Released:
@@ -258,7 +268,10 @@ def test_the_motions_shown_meet_every_force() -> None:
 
 @pytest.mark.slow
 def test_the_reference_against_a_printed_answer() -> None:
-    """One window of IFToMM's A02 after ten seconds (lim.ii.udc.es/mbsbenchmark), through its change points."""
+    """One window of IFToMM's A02 after ten seconds, through its change points.
+
+    The source is lim.ii.udc.es/mbsbenchmark.
+    """
     bar = fourbar.Bar(1.0, 1.0)
     theirs = released(
         fourbar.FourBar(1.0, bar, bar, bar),

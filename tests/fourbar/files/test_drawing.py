@@ -17,7 +17,9 @@ from fourbar.scene.motion import COMMANDS
 
 EPS = 2.0**-52
 K = 8.0
-"""Roundings of four lengths, two angles and the triangle, each of a few eps of the longest bar."""
+"""Roundings of four lengths, two angles and the triangle, each of a few eps of the
+longest bar.
+"""
 DRAWN = """\
 [pins]
 O2 = ["0 mm", "0 mm"]
@@ -28,7 +30,10 @@ O4 = ["250 mm", "50 mm"]
 
 
 def random_pins(random: np.random.Generator, kind: str) -> list[complex]:
-    """Draw O2, A, B, O4 at a random place and scale: any four, a parallelogram or a kite."""
+    """Draw O2, A, B, O4 at a random place and scale.
+
+    Any four, a parallelogram or a kite.
+    """
     scale = 10.0 ** random.uniform(-3.0, 3.0)
     O2, A, B, O4 = random.normal(size=4) + 1j * random.normal(size=4)
     if kind == "parallelogram":
@@ -49,7 +54,10 @@ def write_pins(pins: Sequence[complex]) -> str:
 
 
 def find_gap(pins: list[complex]) -> float:
-    """Return how far the linkage of a drawing stands from it, in eps of its longest bar and condition."""
+    """Return how far the linkage of a drawing stands from it.
+
+    It is in eps of its longest bar and condition.
+    """
     O2, A, B, _ = pins
     scene = fourbar.from_pins(*((pin.real, pin.imag) for pin in pins))
     here = fourbar.solve(scene, "position")
@@ -69,7 +77,9 @@ def test_a_drawing_turned_into_lengths_comes_back(kind: str, count: int) -> None
 
 
 DRAWINGS = int(os.environ.get("DRAWINGS", "1000"))
-"""Drawings at random, a tenth of them with change points; `make long-fuzz` takes 10 000."""
+"""Drawings at random, a tenth of them with change points; `make long-fuzz` takes 10
+000.
+"""
 
 
 @pytest.mark.slow
@@ -101,7 +111,10 @@ def test_every_command_is_on_the_assembly_that_is_drawn(bar: int) -> None:
 
 
 def test_places_of_the_drawing_are_where_they_are_drawn() -> None:
-    """Away from the origin: points of all bars, a mass centre, and coordinates as they are printed."""
+    """Away from the origin.
+
+    Points of all bars, a mass centre, and coordinates as they are printed.
+    """
     pins = DRAWN.replace('"0 mm", "0 mm"', '"-20 mm", "7 mm"')
     places = {1: (30.0, 40.0), 2: (-5.0, 60.0), 3: (120.0, 80.0), 4: (200.0, 20.0)}
     rows = "\n".join(
@@ -172,7 +185,10 @@ def test_a_scene_that_was_changed_since_is_written_by_its_lengths() -> None:
 
 
 def test_the_default_sweep_holds_the_drawn_position() -> None:
-    """A rocker with two ranges, mirror images in the ground: the one in which it is drawn."""
+    """A rocker with two ranges, mirror images in the ground.
+
+    The one in which it is drawn.
+    """
     linkage = fourbar.uniform(3.0, 2.5, 2.0, 1.0)
     assert len(fourbar.circuits(linkage)) == 2
     for theta_4 in (0.5 * math.pi, -0.5 * math.pi):
@@ -254,7 +270,10 @@ def test_mjcf_stands_where_the_drawing_has_it(tmp_path: Path) -> None:
 
 
 def test_a_parallelogram_drawn_on_a_grid_is_one() -> None:
-    """To a tenth of a millimetre the lengths of opposite bars differ; the sum of all is above 500 mm."""
+    """To a tenth of a millimetre the lengths of opposite bars differ.
+
+    The sum of all is above 500 mm.
+    """
     random = np.random.default_rng(1)
     recognised, tried = 0, 0
     for _ in range(200):
@@ -277,7 +296,10 @@ def test_a_parallelogram_drawn_on_a_grid_is_one() -> None:
 
 
 def test_a_drawing_that_nearly_has_one_change_point_stays_as_it_is() -> None:
-    """d + a = b + c but for 0.03 mm, within the decimals: by chance, and nobody draws that."""
+    """d + a = b + c but for 0.03 mm, within the decimals.
+
+    By chance, and nobody draws that.
+    """
     text = """\
 [pins]
 O2 = ["0.0 mm", "0.0 mm"]
@@ -294,7 +316,10 @@ O4 = ["300.0 mm", "30.0 mm"]
 
 
 def test_sdf_and_usd_stand_where_the_drawing_has_them() -> None:
-    """The frame of a model file is the drawing's: O2 at its place there, moved on by --origin."""
+    """The frame of a model file is the drawing's.
+
+    O2 at its place there, moved on by --origin.
+    """
     moved = DRAWN.replace('"0 mm", "0 mm"', '"41 mm", "37.5 mm"')
     masses = (
         f"[bars.{name}]\nmass = '1 kg'" for name in ("input", "coupler", "output")
@@ -315,7 +340,10 @@ def test_a_study_of_a_drawing_names_the_lengths_that_follow() -> None:
 
 @pytest.mark.parametrize("bar", [2, 4])
 def test_a_commanded_bar_that_stands_still_as_drawn_is_refused(bar: int) -> None:
-    """A kite folded onto one pin: two bars turn together about it, and the others rest."""
+    """A kite folded onto one pin.
+
+    Two bars turn together about it, and the others rest.
+    """
     folded = {2: (0, 300, 300 + 200j, 300), 4: (0, 150 + 80j, 0, 300)}[bar]
     motion = f'[motion]\ntheta_{bar} = "drawn"\nomega_{bar} = "1 rad/s"\n'
     text = write_pins(folded) + motion

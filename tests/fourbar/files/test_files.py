@@ -1,4 +1,7 @@
-"""Scene files: read exactly, written back bit for bit; the models say what their sources say."""
+"""Scene files: read exactly, written back bit for bit.
+
+The models say what their sources say.
+"""
 
 import math
 import re
@@ -25,7 +28,10 @@ PRINTED = 0.5e-9
 
 
 def facts(scene: fourbar.Scene) -> tuple[object, ...]:
-    """Every number of a scene, in a form that compares bit for bit (repr tells -0.0 from 0.0)."""
+    """Every number of a scene, in a form that compares bit for bit.
+
+    repr tells -0.0 from 0.0.
+    """
     motion = scene.motion
     angles = (
         motion.theta_2.tolist()
@@ -379,7 +385,10 @@ def test_what_a_file_cannot_hold_is_refused() -> None:
 
 @pytest.mark.parametrize("length", [0.05, 0.4])
 def test_what_a_bar_leaves_out_follows_its_length(length: float) -> None:
-    """The inertia m L^2/12 and mid-bar, of a bar that was read and then given another length; what is stated stays."""
+    """A bar that was read gets another length: m L^2/12 and mid-bar follow.
+
+    What is stated stays.
+    """
     read = loads(
         '[lengths]\nground = "30 cm"\ninput = "10 cm"\ncoupler = "25 cm"\noutput = "22 cm"\n'
         '[bars.coupler]\nmass = "0.5 kg"\n'

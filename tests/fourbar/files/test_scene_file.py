@@ -1,4 +1,7 @@
-"""Bad input: exit status 2, one line that names file, key and value, no traceback, nothing written."""
+"""Bad input: exit status 2 and one line with file, key and value.
+
+There is no traceback, and nothing is written.
+"""
 
 import io
 import os
@@ -51,7 +54,9 @@ viscous ="""
 LONGEST_LINE = 700
 """Characters of an error: a few lines of a terminal, whatever was given."""
 PATIENCE = 5.0
-"""Seconds of processor time in which any file is answered, on a machine that does other things too."""
+"""Seconds of processor time in which any file is answered, on a machine that does other
+things too.
+"""
 
 
 def test_the_file_that_the_mistakes_are_made_in_is_good(
@@ -262,7 +267,10 @@ def test_what_is_not_text(
 
 
 def rocker(theta_2: str) -> str:
-    """A linkage whose input does not turn fully: it closes for theta_2 between 22.3 and 71.7 deg."""
+    """A linkage whose input does not turn fully.
+
+    It closes for theta_2 between 22.3 and 71.7 deg.
+    """
     text = GOOD.replace('"0.1 m"', '"0.24 m"').replace('"0.25 m"', '"0.1 m"')
     return text.replace('"60 deg"', theta_2)
 
@@ -365,7 +373,10 @@ def test_large_files_without_a_repeated_key_are_answered_soon(pattern: str) -> N
 
 @pytest.mark.slow
 def test_mutated_files_end_in_a_scene_or_in_one_line() -> None:
-    """2000 seeded mutations of a good file: any other exception than ours fails the test."""
+    """2000 seeded mutations of a good file.
+
+    Any other exception than ours fails the test.
+    """
     random.seed(20261121)
     pieces = [
         *GOOD.split(),

@@ -1,4 +1,7 @@
-"""The formulas as they stand: exact sums, the path read from either end, shapes, the half angle in many digits."""
+"""The formulas as they stand.
+
+Exact sums, the path read from either end, shapes, the half angle in many digits.
+"""
 
 import doctest
 import itertools
@@ -49,21 +52,30 @@ from tests.fourbar.formulas.test_points import Drawn, random_positions
 
 U = 2.0**-53
 THREE_SUMS = 3.0 * U
-"""Relative, of a difference of two sums of two: nothing is lost but in the last three sums."""
+"""Relative, of a difference of two sums of two: nothing is lost but in the last three
+sums.
+"""
 PRODUCTS = 8.0 * U
-"""Relative, of E1 and E2: two such differences, or one and a sum of four, and their product."""
+"""Relative, of E1 and E2: two such differences, or one and a sum of four, and their
+product.
+"""
 TANGENT = 10.0 * U
-"""Relative, of sin^2 h, cos^2 h and sin h cos h from a tangent that a library gives to 2 U: two or three of it, a
-square, a sum, a quotient and a product; of a factor of Heron's formula likewise, relative to its terms.
+"""Relative, of sin^2 h, cos^2 h and sin h cos h from a tangent that a library gives to
+2 U: two or three of it, a square, a sum, a quotient and a product; of a factor of
+Heron's formula likewise, relative to its terms.
 """
 ROUNDED_SUM = 2.0**-51
 """Of the sum of four lengths: what is missing of it where each is rounded by four U."""
 SEEN_OF_A_BAR, SEEN_OF_THE_DIAGONAL = 1e-9, 1e-11
 """Of a length and of d - a: what is more than that is stated and no rounding."""
 FROM_EITHER_END = 64.0 * 2.0**-52
-"""Roundings of two methods for one position; for the n-th derivative magnified as those of the coefficients are."""
+"""Roundings of two methods for one position; for the n-th derivative magnified as those
+of the coefficients are.
+"""
 DIGITS_LEFT = 1e-40
-"""Relative to the offset: of 120 digits an offset of 1e-40 takes 40, and a limit near a change point some 20 more."""
+"""Relative to the offset: of 120 digits an offset of 1e-40 takes 40, and a limit near a
+change point some 20 more.
+"""
 
 
 MODULES = [module.name for module in pkgutil.iter_modules(fourbar.formulas.__path__)]
@@ -83,7 +95,10 @@ class Carrying(float):
 
 
 def test_plain_numbers_stay_plain_and_arrays_broadcast() -> None:
-    """Python's own floats give Python's own results, which take a third of the time of NumPy's."""
+    """Python's own floats give Python's own results.
+
+    They take a third of the time of NumPy's.
+    """
     assert vector(1.0, 2.0) == 1.0 + 2.0j and type(vector(1.0, 2.0)) is complex
     for x, y in ((Carrying(1.0), 2.0), (1.0, Carrying(2.0))):
         assert vector(x, y) == 1.0 + 2.0j and type(vector(x, y)) is complex
@@ -107,7 +122,10 @@ def test_plain_numbers_stay_plain_and_arrays_broadcast() -> None:
 
 
 def hard_doubles(seed: int, count: int) -> list[tuple[float, float, float, float]]:
-    """p, q, r, s > 0 with p + q and r + s equal, or apart by a rounding or a few, of like or unlike sizes."""
+    """p, q, r, s > 0 with p + q and r + s equal, or nearly.
+
+    They are apart by a rounding or a few, of like or unlike sizes.
+    """
     rng = np.random.default_rng(seed)
 
     def one() -> float:
@@ -276,7 +294,10 @@ def test_read_in_theta_4_the_linkage_lies_and_moves_the_same() -> None:
 
 
 def test_read_in_theta_4_the_input_stands_at_its_limit() -> None:
-    """There theta_4 alone is an independent angle: the input has no speed and the output may have any."""
+    """There theta_4 alone is an independent angle.
+
+    The input has no speed and the output may have any.
+    """
     bars = FourBar(0.5, Bar(0.4), Bar(0.3), Bar(0.25), 0.2)
     for limit in limit_positions(bars):
         from_output = prepare_path(loop(*bars.lengths), bars.ground_angle, 4)
@@ -350,7 +371,9 @@ def test_the_sine_of_the_drive_is_that_of_the_two_bars_not_driven(
 
 
 STAY_PARALLEL = {(0.3, 0.1, 0.3, 0.1): (3, 1.0), (0.2, 0.3, 0.3, 0.2): (4, -1.0)}
-"""Drive and assembly in which the two bars not driven are parallel: 2 and 4 of a parallelogram, 2 and 3 of a kite."""
+"""Drive and assembly in which the two bars not driven are parallel: 2 and 4 of a
+parallelogram, 2 and 3 of a kite.
+"""
 
 
 LINKAGES = np.array(
@@ -374,9 +397,13 @@ ANGLES = np.array([-2.5, -1e-7, 0.0, 0.3, 1.0, 2.0, math.pi, 4.0, 7.0])
 
 
 OF_REAL_NUMBERS = {*HalfAngle._fields, *Coefficients._fields, *Rates._fields}
-"""Complex products are rounded otherwise where the processor does several at once; these are the same to the bit."""
+"""Complex products are rounded otherwise where the processor does several at once;
+these are the same to the bit.
+"""
 FUSED = 64.0 * U
-"""Relative to the largest: by what the roundings of some ten complex products differ, where all sines are above 0.1."""
+"""Relative to the largest: by what the roundings of some ten complex products differ,
+where all sines are above 0.1.
+"""
 
 
 def everything(
@@ -425,7 +452,10 @@ def everything(
 
 
 def plainly(number: type, *arguments: Any) -> dict[str, Any]:
-    """Everything in one kind of number; where Python's own refuse to divide by zero `solve` takes NumPy's too."""
+    """Everything in one kind of number.
+
+    Where Python's own refuse to divide by zero `solve` takes NumPy's too.
+    """
     try:
         return everything(*arguments)
     except ZeroDivisionError:
@@ -513,7 +543,10 @@ def test_numbers_arrays_and_many_linkages_at_once_are_the_same_formulas(
 
 
 def five(bars: FourBar, psi: mp.mpf) -> list[mp.mpf]:
-    """sin^2 h, cos^2 h, sin h cos h and the factors, from A and O4 as points of the complex plane."""
+    """sin^2 h, cos^2 h, sin h cos h and the factors.
+
+    They follow from A and O4 as points of the complex plane.
+    """
     d, a, b, c = map(mp.mpf, bars.lengths)
     e = abs(d - a * mp.expj(psi))
     return [
@@ -543,7 +576,10 @@ def test_the_half_angle_in_many_digits_is_rounded_once() -> None:
 
 
 def test_the_half_angle_in_doubles_keeps_the_digits_of_the_angle() -> None:
-    """From the ground's direction to the opposite, as near to both as doubles come, and after many turns."""
+    """From the ground's direction to the opposite, and after many turns.
+
+    Angles are as near to both as doubles come.
+    """
     near = 10.0 ** -np.arange(1.0, 17.0)
     turns = 2.0 * math.pi * np.array([3.0, 800.0, -800.0])[:, None] + [
         1e-9,
@@ -583,7 +619,10 @@ def test_the_half_angle_in_doubles_keeps_the_digits_of_the_angle() -> None:
 
 
 def exact_limit(bars: FourBar, stretched: bool) -> mp.mpf:
-    """theta_2 of a limit position from the Heron factors of the triangle of ground, input and e."""
+    """theta_2 of a limit position from the Heron factors of a triangle.
+
+    Its sides are ground, input and e.
+    """
     d, a, b, c = map(mp.mpf, bars.lengths)
     e = b + c if stretched else abs(b - c)
     squared = (e + a - d) * (e + d - a) / ((d + a - e) * (d + a + e))
@@ -648,7 +687,10 @@ def test_a_limit_position_itself_closes_in_many_digits() -> None:
 
 
 def test_bars_that_miss_by_the_rounding_of_their_lengths_touch() -> None:
-    """0.1 + 0.7 and 0.2 + 0.6 are the same sum of the lengths meant, though not of the doubles."""
+    """0.1 + 0.7 and 0.2 + 0.6 are the same sum of the lengths meant.
+
+    They are not of the doubles.
+    """
     for lengths in ((0.6, 0.7, 0.1, 0.2), (0.7, 0.6, 0.2, 0.1)):
         d, a, b, c = lengths
         assert Fraction(d) + Fraction(c) != Fraction(a) + Fraction(b)
@@ -684,7 +726,10 @@ def test_positions_decided_in_many_digits_replace_their_own_alone() -> None:
 def test_the_sine_of_the_drive_by_the_triangle_is_that_of_the_directions(
     bar: int, branch: int
 ) -> None:
-    """On linkages whose directions differ by much, and on a short ground against 60 digits of the closed loop."""
+    """On linkages whose directions differ by much, and on a short ground.
+
+    The latter is against 60 digits of the closed loop.
+    """
     from mpmath import mp, mpf
 
     theta_2 = np.linspace(0.1, 6.0, 13)
@@ -732,7 +777,10 @@ def test_a_state_holds_what_it_was_made_from() -> None:
 
 
 def test_the_factor_that_changes_less_gives_the_other_its_digits() -> None:
-    """outer + inner = 4 b c: with a short coupler or output both are small against 4 a d."""
+    """outer + inner = 4 b c.
+
+    With a short coupler or output both are small against 4 a d.
+    """
     for psi, lengths in (
         (3.141, (0.75, 0.75, 1.5, 1e-6)),
         (1e-3, (0.75, 0.75 + 1.4e-3, 2e-6, 1.4e-3)),

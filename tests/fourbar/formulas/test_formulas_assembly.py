@@ -1,4 +1,7 @@
-"""Assemblies through change points, against the intersections of two circles followed from step to step."""
+"""Assemblies through change points, against the intersections of two circles.
+
+These are followed from step to step.
+"""
 
 import itertools
 import math
@@ -30,16 +33,18 @@ STEP = math.radians(1.5)
 TURNS = 3
 GROUND_ANGLES = (0.0, -7.0)
 ALLOWED = 1e-12
-"""rad; 0.7 deg from a change point the intersection of circles in long doubles loses five digits of nineteen."""
+"""rad; 0.7 deg from a change point the intersection of circles in long doubles loses
+five digits of nineteen.
+"""
 
 
 def intersect_circles(
     linkage: fourbar.FourBar, bar: int, q: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The two places of the free pin at each angle of a bar, complex (n, 2), and the angles of the other two bars.
+    """The two places of the free pin at each angle of a bar, complex (n, 2).
 
-    The bar's far end P and the far end of the others' common chain are the centres of
-    two circles.
+    The angles of the other two bars are returned too. The bar's far end P and the far
+    end of the others' common chain are the centres of two circles.
     """
     d, a, b, c = linkage.lengths
     O4 = d * np.exp(1j * np.longdouble(linkage.ground_angle))
@@ -70,7 +75,10 @@ def intersect_circles(
 
 
 def follow(places: np.ndarray, start: int) -> np.ndarray:
-    """Follow one of two points through a table (n, 2) by linear extrapolation: the index in each row."""
+    """Follow one of two points through a table (n, 2) by linear extrapolation.
+
+    The index in each row.
+    """
     chosen = [start, start]
     for row in range(2, len(places)):
         ahead = 2 * places[row - 1, chosen[-1]] - places[row - 2, chosen[-2]]
@@ -79,7 +87,10 @@ def follow(places: np.ndarray, start: int) -> np.ndarray:
 
 
 def list_angles(linkage: fourbar.FourBar, bar: int) -> np.ndarray:
-    """Angles over three turns, both ways from the first quarter, that fall between all change points."""
+    """Angles over three turns, both ways from the first quarter.
+
+    They fall between all change points.
+    """
     first = linkage.ground_angle + (math.pi if bar == 4 else 0.0) + math.radians(45.7)
     return first + STEP * np.arange(round(TURNS * 2 * math.pi / STEP))
 

@@ -1,4 +1,7 @@
-"""Pairs of doubles against many digits: every function that the formulas call keeps some 30 of them."""
+"""Pairs of doubles against many digits.
+
+Every function that the formulas call keeps some 30 of them.
+"""
 
 from collections.abc import Callable
 from typing import Any
@@ -10,7 +13,8 @@ from mpmath import mp
 from fourbar.formulas.longer import Pair
 
 DIGITS = 2.0**-98
-"""Relative: a few roundings of pairs, 2^-104 each, and what a complex product cancels."""
+"""Relative: a few roundings of pairs, 2^-104 each, and what a complex product cancels.
+"""
 
 
 def draw(seed: int, size: float = 3.0) -> Pair:

@@ -1,4 +1,7 @@
-"""Limit positions, ranges, circuits and types against scans, 50 digits and published figures."""
+"""Limit positions, ranges, circuits and types.
+
+They are held against scans, 50 digits and published figures.
+"""
 
 import itertools
 import math
@@ -27,14 +30,18 @@ from fourbar.linkage import Bar, FourBar, uniform
 
 EPS = 2.0**-52
 ANGLE = 8.0 * EPS
-"""Rounding of a limit's angle: exact sums, then four roots, two products and an arc tangent, each 1/2 eps of
+"""Rounding of a limit's angle: exact sums, then four roots, two products and an arc
+tangent, each 1/2 eps of
 the angle, and the sum with theta_1 and pi, 2 pi: 1/2 eps of at most 4 pi.
 """
 PRINTED_8 = 0.5e-8
-"""Half a unit in the last digit of an angle printed to eight decimals of a degree, deg."""
+"""Half a unit in the last digit of an angle printed to eight decimals of a degree, deg.
+"""
 SCAN = 20_000
 SCAN_STEP = 20.0 * math.pi / SCAN
-"""What a scan of SCAN positions can miss of a range, rad: one step at each end, the output up to ten times as fast."""
+"""What a scan of SCAN positions can miss of a range, rad: one step at each end, the
+output up to ten times as fast.
+"""
 GRID = 2000
 """Positions of a scan over one turn."""
 
@@ -44,7 +51,10 @@ def linkage(d: float, a: float, b: float, c: float, theta_1: float = 0.0) -> Fou
 
 
 def random_linkages(seed: int, count: int) -> list[FourBar]:
-    """Random lengths and theta_1; a third of them integers, which makes change points common."""
+    """Random lengths and theta_1.
+
+    A third of them integers, which makes change points common.
+    """
     rng = np.random.default_rng(seed)
     linkages: list[FourBar] = []
     while len(linkages) < count:
@@ -63,7 +73,10 @@ def random_linkages(seed: int, count: int) -> list[FourBar]:
 
 
 def closes(bars: FourBar, theta_2: np.ndarray) -> np.ndarray:
-    """How far the circles about A (radius b) and about O4 (radius c) are from not meeting, m; >= 0: they meet."""
+    """How far the circles about A and O4 are from not meeting, m; >= 0: they meet.
+
+    Their radii are b and c.
+    """
     d, a, b, c = bars.lengths
     distance = np.abs(a * np.exp(1j * theta_2) - d * np.exp(1j * bars.ground_angle))
     return np.minimum(b + c - distance, distance - abs(b - c))
@@ -240,7 +253,10 @@ def exact_psi(bars: FourBar, bar: int, stretched: bool) -> mp.mpf:
 
 
 def nearly_special(seed: int, count: int) -> list[FourBar]:
-    """Linkages whose surplus or rest of the longest bar is 1e-14..1e-1 of their size."""
+    """Linkages whose surplus of the longest bar is 1e-14..1e-1 of their size.
+
+    Or the rest of that bar is.
+    """
     rng = np.random.default_rng(seed)
     linkages: list[FourBar] = []
     while len(linkages) < count:
@@ -407,7 +423,10 @@ def test_change_points_lie_along_the_ground_and_opposite() -> None:
 
 
 def test_what_touches_is_up_to_the_rounding_of_the_lengths_and_no_further() -> None:
-    """The sum of the lengths is 2: bars that miss each other by 8 U = 4 EPS touch, by one EPS more they do not."""
+    """The sum of the lengths is 2.
+
+    Bars that miss each other by 8 U = 4 EPS touch, by one EPS more they do not.
+    """
     assert change_points(linkage(0.5, 0.5 + 4 * EPS, 0.5, 0.5)) == (0.0, math.pi)
     assert turns_fully(linkage(0.5, 0.5 + 4 * EPS, 0.5, 0.5))
     assert change_points(linkage(0.5, 0.5 + 5 * EPS, 0.5, 0.5)) == ()
@@ -425,7 +444,10 @@ def test_what_touches_is_up_to_the_rounding_of_the_lengths_and_no_further() -> N
 def test_the_shortest_bar_of_a_grashof_linkage_turns(
     lengths: tuple[float, ...], turning: set[int]
 ) -> None:
-    """Grashof: the shortest bar turns against all others; where it is the ground, all turn against it."""
+    """Grashof: the shortest bar turns against all others.
+
+    Where it is the ground, all turn against it.
+    """
     assert {bar for bar in (2, 3, 4) if turns_fully(linkage(*lengths), bar)} == turning
 
 

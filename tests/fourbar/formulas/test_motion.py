@@ -1,4 +1,7 @@
-"""Positions and motion of points by differences, and what is exact or has no value near limits and change points."""
+"""Positions and motion of points by differences.
+
+What is exact or has no value near limits and change points is tested too.
+"""
 
 import cmath
 import math
@@ -75,7 +78,9 @@ def test_beyond_a_limit_nothing_assembles_however_near(
 
 
 STEP = 1e-4
-"""s; a central difference then misses STEP^2 of the third derivative of positions that turn at 3 rad/s."""
+"""s; a central difference then misses STEP^2 of the third derivative of positions that
+turn at 3 rad/s.
+"""
 BY_DIFFERENCES = 1e-5
 
 
@@ -85,7 +90,10 @@ BY_DIFFERENCES = 1e-5
 def test_points_move_as_their_positions_do(
     point: tuple[float, float], theta_1: float, alpha: float
 ) -> None:
-    """Points of all bars as complex numbers; speeds and accelerations as differences of their positions."""
+    """Points of all bars as complex numbers.
+
+    Speeds and accelerations as differences of their positions.
+    """
     link, omega = linkage(theta_1), 3.0
     angles = np.linspace(0.3, 6.0, 9)
 
@@ -128,7 +136,10 @@ def test_points_move_as_their_positions_do(
 
 
 def test_on_a_change_point_everything_is_the_limit_of_its_assembly() -> None:
-    """A parallelogram's bar 4 turns as bar 2; an antiparallelogram has h4 = -(d - a)/(d + a) and its inverse there."""
+    """A parallelogram's bar 4 turns as bar 2.
+
+    An antiparallelogram has h4 = -(d - a)/(d + a) and its inverse there.
+    """
     link = fourbar.uniform(0.3, 0.1, 0.3, 0.1)
     theta_2 = np.array([0.0, 1.0, math.pi])
     parallel = compute_state(link, theta_2, 1, 2.0, 5.0)
@@ -168,7 +179,10 @@ def test_within_the_rounding_of_a_change_point_no_direction_is_left(
 def test_pairs_that_stay_parallel_keep_the_directions_of_ground_and_input(
     lengths: tuple[float, ...], branch: int, half_turn: int, theta_1: float
 ) -> None:
-    """A parallelogram's coupler lies as its ground and bar 4 as bar 2; a folded kite has B on O2."""
+    """A parallelogram's coupler lies as its ground and bar 4 as bar 2.
+
+    A folded kite has B on O2.
+    """
     link = linkage(theta_1, lengths)
     theta_2 = theta_1 + math.pi * half_turn + np.array([1e-9, 0.5, 2.0])
     moving = compute_state(link, theta_2, branch, 2.0, 3.0)
@@ -196,7 +210,10 @@ def test_pairs_that_stay_parallel_keep_the_directions_of_ground_and_input(
 def test_a_kite_whose_A_lies_on_O4_lies_where_its_neighbours_do(
     branch: int, theta_1: float
 ) -> None:
-    """As theta_2 falls to theta_1 bars 3 and 4 come to lie on the ground's line, both in the same direction."""
+    """As theta_2 falls to theta_1 bars 3 and 4 come to lie on the ground's line.
+
+    Both have the same direction.
+    """
     link = fourbar.FourBar(
         0.3, fourbar.Bar(0.3), fourbar.Bar(0.2), fourbar.Bar(0.2), theta_1
     )
@@ -226,7 +243,10 @@ def test_a_kite_whose_A_lies_on_O4_lies_where_its_neighbours_do(
 
 
 def test_near_parallel_bars_mu_is_the_angle_of_the_input_to_the_last_bit() -> None:
-    """Bars 3 and 4 of a parallelogram lie as its ground and input do: so does the angle between them."""
+    """Bars 3 and 4 of a parallelogram lie as its ground and input do.
+
+    So does the angle between them.
+    """
     link = fourbar.uniform(0.3, 0.1, 0.3, 0.1)
     position = compute_state(link, np.linspace(0.01, 3.1, 200), 1).position
     assert np.array_equal(position.sin_mu, position.u2.imag) and np.array_equal(
@@ -242,7 +262,10 @@ def test_near_parallel_bars_mu_is_the_angle_of_the_input_to_the_last_bit() -> No
 
 
 def test_short_ground_and_input_leave_no_digit_of_mu() -> None:
-    """b = c, d and a a billiardth of them: mu = e/b, and A passes O4 so near that 8 EPS is reached."""
+    """b = c, d and a a billiardth of them.
+
+    mu = e/b, and A passes O4 so near that 8 EPS is reached.
+    """
     b, psi = 0.9, np.linspace(0.0, 2.0 * math.pi, 41)
     for least, most in ((0.7, 2.0), (0.02, 0.03), (1.1, 1.3)):
         d, a = (4.0 * EPS * b * part for part in (most + least, most - least))
@@ -267,7 +290,10 @@ def test_short_ground_and_input_leave_no_digit_of_mu() -> None:
 def test_angles_alone_are_those_of_the_whole_position(
     lengths: tuple[float, float, float, float], branch: int, theta_1: float
 ) -> None:
-    """The same angles, statuses and gaps, a limit and A on O4 among them; to the roundings of an angle."""
+    """The same angles, statuses and gaps, a limit and A on O4 among them.
+
+    To the roundings of an angle.
+    """
     link = linkage(theta_1, lengths)
     theta_2 = theta_1 + np.concatenate([np.linspace(-7.0, 7.0, 57), [0.0, np.pi, 1e-9]])
     command = fourbar.scene.Command(

@@ -1,4 +1,7 @@
-"""Pin forces and torque against the thirteen equations, power, sums over the linkage, and the thesis."""
+"""Pin forces and torque against the thirteen equations.
+
+Power, sums over the linkage, and the thesis are used too.
+"""
 
 import math
 from dataclasses import replace
@@ -15,15 +18,21 @@ from fourbar_validation.published.thirteen import FreeBodies, solve_thirteen
 
 EPS = 2.0**-52
 SOLVED = 1e-11
-"""Relative: LU of the 13x13 system, whose condition is below 1e4 on this crank-rocker."""
+"""Relative: LU of the 13x13 system, whose condition is below 1e4 on this crank-rocker.
+"""
 GROWN = 1e-13
-"""Relative, divided by the drive's condition: two evaluations of some hundred roundings each."""
+"""Relative, divided by the drive's condition: two evaluations of some hundred roundings
+each.
+"""
 PRINTED = 5e-14
 """Relative: the thesis's case recomputed in doubles elsewhere, printed to 16 digits."""
 
 
 def make_bodies(case: fourbar.Scene, command: fourbar.scene.Command) -> FreeBodies:
-    """The right-hand sides of the thirteen equations from the kinematics, under gravity alone."""
+    """The right-hand sides of the thirteen equations, under gravity alone.
+
+    They follow from the kinematics.
+    """
     s = fourbar.solve(case, "acceleration", at=command)
     gravity = np.array(
         next(
@@ -94,7 +103,9 @@ CORRECT = {
         (-15.476837016271721, 0.5519016543462177),
     ),
 }
-"""Linares Mendoza, UNAM FES Cuautitlan, section 5.7, with its errors of units corrected."""
+"""Linares Mendoza, UNAM FES Cuautitlan, section 5.7, with its errors of units
+corrected.
+"""
 
 
 @pytest.mark.parametrize("inertias", CORRECT)
@@ -134,7 +145,10 @@ def test_the_model_mechanism_of_the_thesis(inertias: tuple[float, float]) -> Non
 def test_bars_without_mass_or_inertia(
     bodies: tuple[tuple[float, float], ...], alpha: float, drive_bar: int
 ) -> None:
-    """Mass and inertia of 0 and of 1, where a term may be left out: the thirteen equations leave none out."""
+    """Mass and inertia of 0 and of 1, where a term may be left out.
+
+    The thirteen equations leave none out.
+    """
     bars = (
         fourbar.Bar(x, *body, (0.4 * x, 0.3))
         for x, body in zip((0.1, 0.25, 0.22), bodies, strict=True)
@@ -168,7 +182,10 @@ def compare_with_thirteen(bodies: FreeBodies, s: fourbar.Solution) -> None:
 def test_the_couple_of_a_loaded_pin_is_its_force_times_the_radius_of_friction(
     pins: tuple[str, ...], drive_bar: int
 ) -> None:
-    """With the couples mu r |F| of the forces found, the thirteen equations give these forces again."""
+    """With the couples mu r |F| of the forces the equations give these again.
+
+    They are the thirteen equations.
+    """
     case = fourbar.Scene(
         make_example().linkage,
         fourbar.Motion(0.0, 10.0),
@@ -216,7 +233,11 @@ def test_a_force_between_two_bars_in_line_does_not_exist() -> None:
 
 @pytest.mark.parametrize("drive_bar", [2, 3, 4])
 def test_dry_friction_at_rest_holds_as_much_as_its_work(drive_bar: int) -> None:
-    """Virtual work: the torque may move by the friction couples times the turns of their pins, in either sense."""
+    """Virtual work.
+
+    The torque may move by the friction couples times the turns of their pins, in either
+    sense.
+    """
     couples = {"O2": 0.04, "A": 0.02, "B": 0.03, "O4": 0.01}
     case = replace(
         scene(drive_bar), motion=fourbar.Motion(np.linspace(0.1, 6.0, 7), 0.0)
@@ -246,7 +267,10 @@ def test_dry_friction_at_rest_holds_as_much_as_its_work(drive_bar: int) -> None:
 
 
 def test_bars_without_mass_hold_a_load_where_the_input_turns_back() -> None:
-    """Near a limit position what they hold tends to a limit; in it the speeds are 0/0, and with them no force is."""
+    """Near a limit position what they hold tends to a limit.
+
+    In it the speeds are 0/0, and with them no force is.
+    """
     link = fourbar.FourBar(
         0.5, fourbar.Bar(0.4), fourbar.Bar(0.3), fourbar.Bar(0.25), 0.2
     )
@@ -287,7 +311,10 @@ def test_written_into_given_arrays() -> None:
 
 
 def test_the_forces_of_a_member_are_the_same_alone_and_beside_others() -> None:
-    """Where the ground is shorter than the input F32 has a form of its own, for that member alone."""
+    """Where the ground is shorter than the input F32 has a form of its own.
+
+    It has it for that member alone.
+    """
     case = replace(scene(2), motion=fourbar.Motion(1.0, -8.0, 20.0))
     ground, names = np.array([0.06, 0.3, 0.08]), ("F12", "F32", "F43", "F14", "torque")
     together = fourbar.solve(fourbar.vary(case, {"lengths.ground": ground}))
@@ -304,7 +331,10 @@ def test_the_forces_of_a_member_are_the_same_alone_and_beside_others() -> None:
 
 @pytest.mark.parametrize("beside", [1e-3, 1e-6, 1e-9])
 def test_a_force_beside_B_has_its_moment_there(beside: float) -> None:
-    """With the output driven and bars 2 and 4 free of moments, b u3 x F32 is the moment about B: force times arm."""
+    """The output is driven, and bars 2 and 4 are free of moments.
+
+    Then b u3 x F32 is the moment about B: force times arm.
+    """
     b, direction = 0.25, 0.3
     link = fourbar.FourBar(
         0.3, fourbar.Bar(0.1), fourbar.Bar(b, centre=(0.0, 0.0)), fourbar.Bar(0.22)

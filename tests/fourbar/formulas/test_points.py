@@ -1,4 +1,7 @@
-"""Kinematic coefficients by differentiation in 50 digits, instant centres by Kennedy's theorem, coupler curves."""
+"""Kinematic coefficients by differentiation in 50 digits, and curves.
+
+Instant centres follow by Kennedy's theorem; the curves are those of the coupler.
+"""
 
 import math
 from typing import NamedTuple
@@ -22,11 +25,13 @@ from fourbar.scene import Command, with_signs
 
 EPS = 2.0**-52
 FIRST, SECOND = 32.0, 128.0
-"""Roundings in a first and a second coefficient; each is magnified by 1/sin^2 mu and 1/sin^4 mu at most:
+"""Roundings in a first and a second coefficient; each is magnified by 1/sin^2 mu and
+1/sin^4 mu at most:
 one power of 1/sin^2 mu from the angles, one from the division by the root of the area.
 """
 COLLINEAR = 64.0 * EPS
-"""Rounding of the determinant of three instant centres, relative to the product of their magnitudes and
+"""Rounding of the determinant of three instant centres, relative to the product of
+their magnitudes and
 magnified by 1/|sin mu|.
 """
 

@@ -1,4 +1,7 @@
-"""Kinematic coefficients near change points, against differences of the angles in many digits."""
+"""Kinematic coefficients near change points.
+
+They are held against differences of the angles in many digits.
+"""
 
 import mpmath as mp
 import numpy as np
@@ -26,7 +29,9 @@ from fourbar.formulas.position import (
 from fourbar.linkage import uniform
 
 FEW_ROUNDINGS = 8.0 * 2.0**-52
-"""Of 1 + |h3| + |h4|, which the coefficients are sums of; their slopes are quotients of these and h."""
+"""Of 1 + |h3| + |h4|, which the coefficients are sums of; their slopes are quotients of
+these and h.
+"""
 STEP = 30
 """Digits of the step: differences of angles with 90 digits keep 30."""
 SHORT = (
@@ -45,12 +50,18 @@ SHORT = (
 
 
 def find_assembly(psi: float, sign: int) -> int:
-    """The assembly with this sign of the root at psi: with E2 = 0 it changes at psi = 0."""
+    """The assembly with this sign of the root at psi.
+
+    With E2 = 0 it changes at psi = 0.
+    """
     return sign if psi > 0.0 else -sign
 
 
 def differences(lengths: tuple[float, ...], psi: float, branch: int) -> list[mpf]:
-    """h3, h4, h3', h4' from the directions of the triangle A, B, O4 at psi and to either side of it."""
+    """h3, h4, h3', h4' from the directions of the triangle A, B, O4.
+
+    It is taken at psi and to either side of it.
+    """
     d, a, b, c = map(mpf, lengths)
 
     def angles(theta: mpf) -> tuple[mpf, mpf]:

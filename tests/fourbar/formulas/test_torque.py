@@ -1,4 +1,7 @@
-"""The torque by virtual work against the equations of the free bodies, against energy, and against outside answers."""
+"""The torque by virtual work against the equations of the free bodies.
+
+It is held against energy and outside answers too.
+"""
 
 import mpmath as mp
 import numpy as np
@@ -22,7 +25,9 @@ from tests.support.balls import answer_in_balls
 
 EPS = 2.0**-52
 K = 200.0
-"""eps/condition of the sum of absolute terms; two derivations of some hundred roundings each, over 7000 samples."""
+"""eps/condition of the sum of absolute terms; two derivations of some hundred roundings
+each, over 7000 samples.
+"""
 PINS = ("F12", "F32", "F43", "F14")
 U = 2.0**-53
 """Unit round-off of a double."""
@@ -110,7 +115,10 @@ def test_torque_and_pin_forces_agree_with_the_thirteen_equations(drive: int) -> 
 def test_they_keep_their_digits_at_a_stated_distance_from_a_limit(
     offset: float,
 ) -> None:
-    """theta_2 = limit + offset: it assembles on one side of the limit, with the torque of the free bodies in balls."""
+    """theta_2 = limit + offset.
+
+    It assembles on one side of the limit, with the torque of the free bodies in balls.
+    """
     for seed in range(6):
         rng = np.random.default_rng(seed)
         linkage, terms, _ = random_case(rng)
@@ -176,7 +184,10 @@ def free_acceleration(
 
 
 def test_four_bar_of_gtdynamics() -> None:
-    """Torque 1 N m between crank and coupler of a square: 0.125 rad/s^2 (borglab/GTDynamics test_four_bar.py)."""
+    """Torque 1 N m between crank and coupler of a square.
+
+    0.125 rad/s^2 (borglab/GTDynamics test_four_bar.py).
+    """
     bar = fourbar.Bar(2.0, 1.0, 1.0)
     linkage = fourbar.FourBar(2.0, bar, bar, bar)
     terms = (fourbar.Load(2, moment=1.0), fourbar.Load(3, moment=-1.0))
@@ -184,7 +195,10 @@ def test_four_bar_of_gtdynamics() -> None:
 
 
 def test_free_acceleration_of_sympy() -> None:
-    """Links of 997 kg/m, crossed (sympy test_jointsmethod.py, four bar with manual constraints)."""
+    """Links of 997 kg/m, crossed.
+
+    The source is sympy's test_jointsmethod.py, four bar with manual constraints.
+    """
     linkage = fourbar.uniform(0.13, 0.24, 0.21, 0.34, per_metre=997.0)
     relative = np.array([2.1, 0.6655470375077588, 2.527408138024188])
     rate = 0.2
@@ -237,7 +251,9 @@ def test_statics_of_motiongenesis() -> None:
 
 
 READ_BACKWARDS = 16.0 * EPS
-"""Times 1/h4^2, of J/h4^2: theta_4 is rounded by some EPS, theta_2 follows it by 1/h4 and h4 by 1/h4 once more."""
+"""Times 1/h4^2, of J/h4^2: theta_4 is rounded by some EPS, theta_2 follows it by 1/h4
+and h4 by 1/h4 once more.
+"""
 SHAPES = {
     "crank-rocker": (0.3, 0.1, 0.25, 0.22, 0.4),
     "a = d": (0.3, 0.3, 0.25, 0.22, -2.0),
@@ -283,7 +299,10 @@ def slope_of(linkage: fourbar.FourBar, state: State) -> np.ndarray:
 def test_equivalent_inertia_is_that_of_the_kinetic_energy(
     lengths: tuple[float, ...],
 ) -> None:
-    """J against the speeds of the mass centres, J' against its difference, both also in another coordinate."""
+    """J against the speeds of the mass centres, J' against its difference.
+
+    Both are tested in another coordinate too.
+    """
     linkage = of(lengths)
     theta_2 = linkage.ground_angle + np.array([0.7, 2.5, 4.6])
     state = state_of(linkage, theta_2, 1, 3.0)
@@ -392,7 +411,10 @@ def test_positions_that_do_not_close_and_limits_are_quiet() -> None:
 
 
 def test_what_touches_is_up_to_the_rounding_of_the_lengths() -> None:
-    """The lengths add up to 2: what misses a change point by 8 U = 4 EPS touches, by one EPS more it does not."""
+    """The lengths add up to 2.
+
+    What misses a change point by 8 U = 4 EPS touches, by one EPS more it does not.
+    """
     exact, beyond = (0.5, 0.5 + 4 * EPS, 0.5, 0.5), (0.5, 0.5 + 5 * EPS, 0.5, 0.5)
     for lengths, touches in ((exact, True), (beyond, False)):
         assert (loop(*lengths).E1 == 0.0) == touches
@@ -405,7 +427,10 @@ def test_what_touches_is_up_to_the_rounding_of_the_lengths() -> None:
 
 
 def test_a_bar_as_short_as_the_rounding_of_the_others_keeps_its_length() -> None:
-    """d - a = 1e-15 is no rounding of a ground of 3e-15, though it is one of a coupler of 1."""
+    """d - a = 1e-15 is no rounding of a ground of 3e-15.
+
+    It is one of a coupler of 1.
+    """
     assert loop(3e-15, 2e-15, 1.0, 1.0).E2 > 0.0
     # within the rounding of their own, and no further, lengths become equal
     assert loop(0.3, 0.3 * (1.0 + EPS), 0.2, 0.2).a == 0.3
@@ -435,7 +460,10 @@ def test_directions_are_unit_vectors_and_the_last_rate_is_that_of_bar_4_against_
 
 
 def test_a_single_pendulum() -> None:
-    """Of a crank alone: T = (I + m r^2) alpha + m g r cos(theta_2 + phi); of bars without mass none."""
+    """Of a crank alone: T = (I + m r^2) alpha + m g r cos(theta_2 + phi).
+
+    Of bars without mass none.
+    """
     m, r, phi = 0.7, 0.04, 0.5
     linkage = fourbar.FourBar(
         0.3, fourbar.Bar(0.1, m, 1e-3, (r, phi)), fourbar.Bar(0.25), fourbar.Bar(0.22)
@@ -448,7 +476,10 @@ def test_a_single_pendulum() -> None:
 
 
 def test_a_parallelogram_moves_its_coupler_without_turning_it() -> None:
-    """T = (I2 + I4 about the pins + m3 a^2) alpha + the weights at their arms, m3 at A and its own arm at none."""
+    """T = (I2 + I4 about the pins + m3 a^2) alpha + the weights at their arms.
+
+    m3 acts at A, and its own arm is none.
+    """
     a, m2, m3, m4 = 0.1, 0.2, 0.5, 0.4
     bars = (
         fourbar.Bar(a, m2),

@@ -1,4 +1,7 @@
-"""Transmission angle against the dot product, its extremes against a scan, power, distance to singular positions."""
+"""Transmission angle against the dot product, its extremes against a scan.
+
+Power and the distance to singular positions are tested too.
+"""
 
 import math
 
@@ -25,7 +28,9 @@ from tests.fourbar.formulas.test_points import random_positions
 
 EPS = 2.0**-52
 ANGLE = 16.0 * EPS
-"""Rounding of an angle at B, rad: eight operations, and theta_2 itself; magnified by 1/|sin mu|."""
+"""Rounding of an angle at B, rad: eight operations, and theta_2 itself; magnified by
+1/|sin mu|.
+"""
 SCAN = 4001
 HIGHER_ORDER = 1.1
 """What the terms beyond the leading one may add to the miss of a scan."""

@@ -1,4 +1,7 @@
-"""The model files of `fourbar mjcf --for` and `fourbar sdf`, loaded, stepped and read as their comments say."""
+"""The model files of `fourbar mjcf --for` and `fourbar sdf`.
+
+They are loaded, stepped and read as their comments say.
+"""
 
 import cmath
 import importlib
@@ -30,7 +33,10 @@ NUMBER = r"-?[\d.]+(?:e-?\d+)?"
 
 
 def ours(scene: Scene, q: Array, v: Array, a: Array) -> Any:
-    """The formulas at the simulator's own angle, speed and acceleration; the file drives bar 2 whatever the scene."""
+    """The formulas at the simulator's own angle, speed and acceleration.
+
+    The file drives bar 2 whatever the scene.
+    """
     scene = replace(scene, drive_bar=2)
     command = Command(
         np.array([q[0]]), np.array([1]), np.array([v[0]]), np.array([a[0]])
@@ -70,7 +76,10 @@ def read_mujoco(text: str, forward: int) -> tuple[Array, Array, Array, float, Ar
 
 
 def read_warp(text: str, forward: int) -> tuple[Array, Array, Array, float, Array]:
-    """As the comment of the file says; the kernels compile for minutes the first time."""
+    """As the comment of the file says.
+
+    The kernels compile for minutes the first time.
+    """
     mjw = pytest.importorskip("mujoco_warp")
     mujoco = importlib.import_module("mujoco")
     model = mujoco.MjModel.from_xml_string(text)
@@ -219,7 +228,10 @@ def test_a_file_for_genesis_names_what_it_leaves_out() -> None:
 
 @pytest.fixture
 def _genesis() -> Iterator[None]:
-    """Genesis, which starts once in a process: the next test may want other settings."""
+    """Genesis, which starts once in a process.
+
+    The next test may want other settings.
+    """
     gs = pytest.importorskip("genesis")
     gs.init(backend=gs.cpu, precision="64", logging_level="error")
     yield
@@ -259,9 +271,13 @@ def test_newton_reads_the_mjcf_as_the_comment_says(tmp_path: Path) -> None:
 
 
 SINGLE = 1e-2
-"""Of MuJoCo Warp: single precision in a closure of impedance 0.9999 keeps 1e4 roundings; measured 2.5e-3 in a turn."""
+"""Of MuJoCo Warp: single precision in a closure of impedance 0.9999 keeps 1e4
+roundings; measured 2.5e-3 in a turn.
+"""
 YIELDING = 1e-2
-"""Of MJX, whose closure makes up for the missing term by yielding; measured 8.5e-4 in a turn."""
+"""Of MJX, whose closure makes up for the missing term by yielding; measured 8.5e-4 in a
+turn.
+"""
 
 
 @pytest.mark.nightly
@@ -292,7 +308,9 @@ def test_each_file_loads_in_mujoco_and_runs(simulator: str) -> None:
 
 
 CARRIED = 2e-3
-"""Of a closure with a time constant of two timesteps; measured 1.4e-3, the others 1e-5 and less."""
+"""Of a closure with a time constant of two timesteps; measured 1.4e-3, the others 1e-5
+and less.
+"""
 
 
 def released(**changes: Any) -> Scene:
@@ -305,7 +323,9 @@ def released(**changes: Any) -> Scene:
 
 
 FIRST_ORDER = 0.5
-"""Drake's discrete plant errs as its step: half the step leaves half the error, within this factor of two."""
+"""Drake's discrete plant errs as its step: half the step leaves half the error, within
+this factor of two.
+"""
 
 
 FORCE = 0.01
@@ -465,7 +485,9 @@ def test_without_loads_every_model_is_written_and_says_how_to_start(write: Any) 
 
 
 KAMINO = 0.01
-"""Of Kamino's force at B in its third step of 1 ms: single precision, and a first-order step; measured 1.5e-3."""
+"""Of Kamino's force at B in its third step of 1 ms: single precision, and a first-order
+step; measured 1.5e-3.
+"""
 
 
 @pytest.mark.nightly

@@ -1,4 +1,7 @@
-"""The MJCF on its own: exact numbers, clear refusals, and a file that runs in plain MuJoCo."""
+"""The MJCF on its own.
+
+Exact numbers, clear refusals, and a file that runs in plain MuJoCo.
+"""
 
 import math
 from dataclasses import replace
@@ -25,7 +28,9 @@ from fourbar_validation.scenes.suites import list_model_files
 from tests.support.scenes import crank_rocker, thesis
 
 SPEED = 1e-2
-"""The promise of the file: the input within 1 % of omega_2 over a revolution or its range."""
+"""The promise of the file: the input within 1 % of omega_2 over a revolution or its
+range.
+"""
 GAP = 1e-4
 """The promise of the file: the loop closed within this part of the longest bar."""
 SHORT_OF_LIMIT = math.radians(2.0)
@@ -39,7 +44,10 @@ ANY_SIZE = replace(
 
 
 def random_scene(rng: np.random.Generator, kind: DrawnType) -> fourbar.Scene:
-    """Lengths from 5 mm to 100 m, bars ten times lighter or heavier, any speed, branch and direction."""
+    """Lengths from 5 mm to 100 m, any speed, branch and direction.
+
+    Bars are ten times lighter or heavier.
+    """
     size = 10.0 ** rng.uniform(math.log10(0.05), 2.0)
     scene = draw_scene(rng, [size * x for x in draw_lengths(rng, kind)], ANY_SIZE)
     start, stop = choose_range(scene.linkage)
@@ -69,7 +77,10 @@ def gap(data: mujoco.MjData) -> float:
 
 
 def run_alone(scene: fourbar.Scene) -> tuple[float, float, float]:
-    """Plain MuJoCo from keyframe 0 through the sweep: worst gap, worst speed, angle still missing at the end."""
+    """Plain MuJoCo from keyframe 0 through the sweep.
+
+    Worst gap, worst speed, angle still missing at the end.
+    """
     assert (
         isinstance(scene.motion.theta_2, fourbar.Sweep)
         and scene.motion.omega_2 is not None
@@ -123,13 +134,19 @@ def opened(scene: fourbar.Scene) -> tuple[mujoco.MjModel, mujoco.MjData]:
 
 
 def sprung() -> fourbar.Scene:
-    """Springs that count whole turns: the joints start where those put them, far from the angles' first turn."""
+    """Springs that count whole turns.
+
+    The joints start where those put them, far from the angles' first turn.
+    """
     springs = Torsion.at(O2=(0.1, 9.0, 0.0), A=(0.1, -12.0, 0.0))
     return crank_rocker(motion=fourbar.Motion(1.0, 10.0), effects=(springs,))
 
 
 def test_the_joints_count_the_turns_of_every_spring() -> None:
-    """The springs at O4 and B rest three turns up and two down: the joint at A, which none holds, takes the rest."""
+    """The springs at O4 and B rest three turns up and two down.
+
+    The joint at A, which none holds, takes the rest.
+    """
     rests = {"O4": 1.0 + 3 * math.tau, "B": 0.5 - 2 * math.tau}
     springs = Torsion.at(**{pin: (0.1, rest, 0.0) for pin, rest in rests.items()})
     _, data = opened(crank_rocker(motion=fourbar.Motion(1.0, 10.0), effects=(springs,)))
@@ -282,7 +299,10 @@ def test_without_keyframe_no_position_is_written() -> None:
 def test_a_spring_at_a_ground_pin_rests_at_an_angle_from_the_ground(
     pin: str, theta_1: float
 ) -> None:
-    """Hinges count from the world's axis, a scene's rest from the ground bar; the preload moves it by -preload/k."""
+    """Hinges count from the world's axis, a scene's rest from the ground bar.
+
+    The preload moves it by -preload/k.
+    """
     turned = replace(crank_rocker().linkage, ground_angle=theta_1)
     spring = Torsion.at(**{pin: (0.5, 0.4, 0.1)})
     scene = crank_rocker(
@@ -298,7 +318,10 @@ def test_a_spring_at_a_ground_pin_rests_at_an_angle_from_the_ground(
 
 
 def test_a_window_has_its_steps_wherever_it_lies() -> None:
-    """A quarter radian at 3 rad/s takes 1/12 s; the steps in it do not depend on the angle at which it begins."""
+    """A quarter radian at 3 rad/s takes 1/12 s.
+
+    The steps in it do not depend on the angle at which it begins.
+    """
     steps = {
         choose_run(np.array([start, start + 0.25]), 3.0, 0.0).timestep()
         for start in (0.1, 2.0, 4.0)

@@ -1,4 +1,7 @@
-"""Every sentence that a generated MJCF says of itself is run: with loads, effects, and a drive on bar 4."""
+"""Every sentence that a generated MJCF says of itself is run.
+
+With loads, effects, and a drive on bar 4.
+"""
 
 import csv
 import math
@@ -23,9 +26,13 @@ from fourbar_validation.compare.answer import Array
 from tests.support.scenes import crank_rocker, thesis
 
 EXACT = 1e-6
-"""Of the greatest value in a turn, at MuJoCo's own angle, speed and acceleration; measured 2e-7."""
+"""Of the greatest value in a turn, at MuJoCo's own angle, speed and acceleration;
+measured 2e-7.
+"""
 QUICK = 5e-3
-"""The same of a released linkage, whose closure is made to take no energy out; measured 1.9e-3."""
+"""The same of a released linkage, whose closure is made to take no energy out; measured
+1.9e-3.
+"""
 FOUND = 2e-3
 """What a test must find where a sentence says that numbers differ."""
 NEXT_BAR = {
@@ -37,7 +44,10 @@ MATRIX = Path(__file__).parents[3] / "docs" / "examples" / "benchmark.csv"
 
 
 def acted_on(**changes: Any) -> Scene:
-    """Everything that has a counterpart in MJCF acts; a load of each kind on each bar, and the drive is on bar 4."""
+    """Everything that has a counterpart in MJCF acts.
+
+    A load of each kind on each bar, and the drive is on bar 4.
+    """
     spring = fourbar.Spring(Place(1, (0.1, -1.5)), Place(3, (0.08, 0.3)), 200.0, 0.02)
     effects = (
         fourbar.Gravity(),
@@ -108,7 +118,10 @@ class Opened:
     def errors(
         self, answers: dict[str, Any], scene: Scene | None = None
     ) -> dict[str, float]:
-        """Against the formulas at the state that was last forwarded, by the greatest value in a turn."""
+        """Compare with the formulas at the state that was last forwarded.
+
+        Errors are over the greatest value in a turn.
+        """
         d, scene = self.data, scene or self.driven
         round_ = replace(
             scene, drive=None, drive_bar=2, motion=scene.motion.replace(free=None)
@@ -191,7 +204,10 @@ def is_accelerated(file: Opened) -> None:
 
 
 def starts_anew(file: Opened) -> None:
-    """What the viewer shows of an input that cannot turn fully: the same stretch again, from an assembled pose."""
+    """What the viewer shows of an input that cannot turn fully.
+
+    The same stretch again, from an assembled pose.
+    """
     d, last = file.data, 0.0
     for _ in range(round(math.tau / 0.2244 / file.model.opt.timestep)):
         file.step(1)
@@ -328,7 +344,10 @@ def counts_loads_in(file: Opened) -> None:
 
 
 def yields_more(file: Opened) -> None:
-    """In this scene inertia dominates; change points and static loads are measured with the check of files."""
+    """In this scene inertia dominates.
+
+    Change points and static loads are measured with the check of files.
+    """
     file.step()
     file.forward()
     motion = fourbar.solve(file.scene, "position")
@@ -344,7 +363,10 @@ def holds_with_a_flywheel(file: Opened) -> None:
 
 
 def has_one_control_with_a_range(file: Opened) -> None:
-    """Gymnasium's MujocoEnv makes its box of actions of `actuator_ctrlrange`, a row for each control."""
+    """Gymnasium's MujocoEnv makes its box of actions of `actuator_ctrlrange`.
+
+    It has a row for each control.
+    """
     m, d, scene = file.model, file.data, file.scene
     assert m.nu == 1 and m.actuator_ctrlrange.shape == (1, 2)
     turn = fourbar.solve(scene, "force")
@@ -369,7 +391,10 @@ def has_passive_motors(file: Opened) -> None:
 
 
 def was_wrong_before_3_7(file: Opened) -> None:
-    """Compare the two versions of the benchmark's matrix, which is generated, at the worst of three timesteps."""
+    """Compare the two versions of the benchmark's matrix, which is generated.
+
+    They are compared at the worst of three timesteps.
+    """
     errors: dict[str, dict[str, float]] = {"3.3.7": {}, "4.0.0": {}}
     with MATRIX.open(encoding="utf-8", newline="") as table:
         for row in csv.DictReader(table):
@@ -421,7 +446,9 @@ CYLINDER = fourbar.LinearDrive(Place(1, (0.17, -1.1)), Place(3, (0.09, 0.7)))
 PRELOADED = fourbar.Spring(
     Place(1, (0.1, -1.5)), Place(3, (0.08, 0.3)), 200.0, 0.02, 30.0
 )
-"""A spring that pulls even where its ends meet: a tendon's rest length cannot express it."""
+"""A spring that pulls even where its ends meet: a tendon's rest length cannot express
+it.
+"""
 FILES: dict[str, tuple[Scene, Drive]] = {
     "at omega_2": (acted_on(), "flywheel"),
     "at alpha_2": (

@@ -1,4 +1,7 @@
-"""A linkage in a tilted plane: the same motion and forces, turned, in each form of file."""
+"""A linkage in a tilted plane.
+
+The same motion and forces, turned, in each form of file.
+"""
 
 import re
 from xml.etree import ElementTree as ET

@@ -1,4 +1,7 @@
-"""Texts with units where a scene is described in Python: the same numbers as SI gives, and one line for a mistake."""
+"""Texts with units where a scene is described in Python.
+
+The same numbers as SI gives, and one line for a mistake.
+"""
 
 import math
 from collections.abc import Callable
@@ -168,7 +171,8 @@ UNITS: dict[str, tuple[str, Fraction | int]] = {
     "bar": ("N/m^2", 100_000),
     "psi": ("N/m^2", POUND * GRAVITY * 144 / FOOT**2),
 }
-"""Each unit in SI units: A. Thompson, B. N. Taylor, Guide for the Use of the SI, NIST SP 811 (2008), tables 1 to 8 and
+"""Each unit in SI units: A. Thompson, B. N. Taylor, Guide for the Use of the SI, NIST
+SP 811 (2008), tables 1 to 8 and
 appendix B.8; slug, hp and PS by their definitions there.
 """
 PREFIXES: dict[str, int] = {

@@ -1,4 +1,7 @@
-"""Quantities of pint in place of numbers: every place that takes a text with a unit takes them."""
+"""Quantities of pint in place of numbers.
+
+Every place that takes a text with a unit takes them.
+"""
 
 import math
 

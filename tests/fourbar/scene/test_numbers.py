@@ -1,4 +1,7 @@
-"""A scene's own points: where they are, how they move, and the columns that they fill."""
+"""A scene's own points.
+
+Where they are, how they move, and the columns that they fill.
+"""
 
 import json
 from dataclasses import replace
@@ -22,7 +25,8 @@ POINTS = (
 STEP = 1e-5
 """rad, of a central difference."""
 OF_A_DIFFERENCE = 1e-8
-"""m/s: STEP^2 = 1e-10 of its third derivatives is left out, and rounding 1e-16/STEP = 1e-11 m is added, times 10 rad/s.
+"""m/s: STEP^2 = 1e-10 of its third derivatives is left out, and rounding
+1e-16/STEP = 1e-11 m is added, times 10 rad/s.
 Accelerations are ten times larger again, and their derivatives too.
 """
 

@@ -1,4 +1,7 @@
-"""Pictures named in a scene file: kept by it, shown by the page, and no path out of the scene's folder."""
+"""Pictures named in a scene file.
+
+Kept by it, shown by the page, and no path out of the scene's folder.
+"""
 
 import base64
 from dataclasses import replace

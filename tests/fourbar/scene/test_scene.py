@@ -1,4 +1,7 @@
-"""A command of the coupler or the output: the same linkage in the same motion, whichever bar is told to make it."""
+"""A command of the coupler or the output.
+
+The same linkage in the same motion, whichever bar is told to make it.
+"""
 
 import math
 from dataclasses import replace
@@ -39,7 +42,9 @@ from fourbar_validation.run.judge import judge
 U = 2.0**-53
 MODELS = sorted(Path("models").glob("*.toml"))
 RETURNED = 64.0
-"""Times eps and what a change of a command's last digit does, in three formulas one after the other."""
+"""Times eps and what a change of a command's last digit does, in three formulas one
+after the other.
+"""
 DIFFERENCE = 1e-6
 """Relative, of a central difference over 1e-5."""
 BARS = [Bar(0.1, 0.2), Bar(0.25, 0.5, 0.01, (0.12, 0.2)), Bar(0.22, 0.4)]
@@ -161,7 +166,10 @@ def test_limits_of_a_bar_are_where_its_own_sine_is_zero(bar: int) -> None:
 
 
 def test_at_a_limit_of_theta_2_a_command_of_theta_4_has_motion_and_forces() -> None:
-    """The drive on bar 2 alone has no lever there; pin forces with the others are those just before and after."""
+    """The drive on bar 2 alone has no lever there.
+
+    Pin forces with the others are those just before and after.
+    """
     rocker = replace(
         LOADED,
         linkage=FourBar(
@@ -516,14 +524,20 @@ def test_the_harness_asks_who_takes_the_command_and_writes_the_refusal_of_the_ot
 
 
 class Undeclared:
-    """An engine that does not say what commands it takes, and so is asked for none but theta_2."""
+    """An engine that does not say what commands it takes.
+
+    It is asked for none but theta_2.
+    """
 
     name = "undeclared"
 
 
 @pytest.mark.parametrize("bar", [3, 4])
 def test_springs_count_turns_along_the_commanded_angle(bar: int) -> None:
-    """A drag link, whose bars all turn: where a spring is wound is the same whichever of them is told to."""
+    """A drag link, whose bars all turn.
+
+    Where a spring is wound is the same whichever of them is told to.
+    """
     springs = Torsion.at(**{pin: (0.1, 0.3, 0.0) for pin in ("O2", "A", "B", "O4")})
     scene = Scene(
         uniform(0.1, 0.3, 0.25, 0.28),

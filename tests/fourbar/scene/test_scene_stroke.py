@@ -1,4 +1,8 @@
-"""A stroke commanded: it returns itself, its bar moves as when it is commanded alone, and what cannot be is refused."""
+"""A stroke commanded.
+
+It returns itself, its bar moves as when it is commanded alone, and what cannot be is
+refused.
+"""
 
 import math
 from dataclasses import replace
@@ -24,13 +28,19 @@ ROUND_OFF = 1e-11
 BARS = 10.0
 """Of an error bar, as `stability` allows."""
 OF_LONGER_NUMBERS = 1.1
-"""Of an error bar: what the longer numbers lose themselves is a thousandth of what doubles lose, or some of them."""
+"""Of an error bar: what the longer numbers lose themselves is a thousandth of what
+doubles lose, or some of them.
+"""
 ENDS = {2: Place(2, (0.12, 0.4)), 4: Place(4, (0.15, -0.6))}
 GROUND = Place(1, (0.3, 2.2))
 SAMPLED = 0.02
-"""Relative, of the standard deviation of 256 quasi-random samples, whose tails end at half a sample."""
+"""Relative, of the standard deviation of 256 quasi-random samples, whose tails end at
+half a sample.
+"""
 DIFFERENCES = 1e-5
-"""Relative, of differences over two millionths of a length of a tenth: (1e-5)^2 times third derivatives of 1e4."""
+"""Relative, of differences over two millionths of a length of a tenth: (1e-5)^2 times
+third derivatives of 1e4.
+"""
 
 
 def scene(
@@ -91,10 +101,10 @@ def test_the_sides_are_left_and_right_of_the_line_from_pin_to_ground_end() -> No
 def test_error_bars_hold_what_the_angle_of_a_stroke_loses(
     bar: int, strokes: list[float]
 ) -> None:
-    """The ground turned with all that is on it: the same force, every number of which rounds otherwise.
+    """The ground turned with all that is on it.
 
-    Against balls, and not the median of the doubles, which all lose the same in what
-    does not turn.
+    The same force, every number of which rounds otherwise. Against balls, and not the
+    median of the doubles, which all lose the same in what does not turn.
     """
     by_stroke = replace(
         scene(bar, np.array(strokes), stroke_speed=0.2, stroke_acceleration=0.1),

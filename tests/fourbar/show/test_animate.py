@@ -1,4 +1,7 @@
-"""The moving page as a file: what is embedded, that nothing foreign gets in or out, and the films."""
+"""The moving page as a file.
+
+What is embedded, that nothing foreign gets in or out, and the films.
+"""
 
 import base64
 import json

@@ -1,4 +1,7 @@
-"""The summary of `analyze`: its numbers by geometry and by much finer steps, and its words."""
+"""The summary of `analyze`.
+
+Its numbers by geometry and by much finer steps, and its words.
+"""
 
 import math
 import re
@@ -18,9 +21,13 @@ from fourbar.solving import find_last_stage
 from tests.support.scenes import CYLINDER, crank_rocker, thesis
 
 LOCATED = 1e-6
-"""rad or relative: the top of a parabola through neighbours 0.05 degrees apart leaves the fourth power of that."""
+"""rad or relative: the top of a parabola through neighbours 0.05 degrees apart leaves
+the fourth power of that.
+"""
 BENDING = 1e-6
-"""Relative, of a largest moment against that of steps of 0.01 degrees: (0.01 deg)^2 times its curvature."""
+"""Relative, of a largest moment against that of steps of 0.01 degrees: (0.01 deg)^2
+times its curvature.
+"""
 PSI = 0.45359237 * 9.80665 / 0.0254**2
 D, A, B, C = 0.3, 0.1, 0.25, 0.22
 TURN = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.0, math.tau, 360), 10.0))
@@ -177,7 +184,10 @@ def test_each_kind_of_motion_shows_what_it_has_and_nothing_else() -> None:
 def test_the_largest_bending_moment_of_each_bar_is_located_between_the_positions() -> (
     None
 ):
-    """A crank without mass carries the torque of its drive at O2 as the largest moment of all."""
+    """A crank without mass carries the torque of its drive at O2.
+
+    It is the largest moment of all.
+    """
     light = replace(TURN, linkage=replace(TURN.linkage, input=fourbar.Bar(A)), loads=())
     sweeps = (fourbar.Sweep(0.0, math.tau, steps) for steps in (24, 36000))
     coarse, fine = (
@@ -205,7 +215,10 @@ def test_the_largest_bending_moment_of_each_bar_is_located_between_the_positions
 
 
 def test_what_grows_without_bound_has_the_peak_of_its_positions() -> None:
-    """The force of a cylinder has a pole within the sweep, beside which friction reverses: no position there counts."""
+    """The force of a cylinder has a pole within the sweep.
+
+    Friction reverses beside it: no position there counts.
+    """
     scene = fourbar.load(
         Path(__file__).parents[3] / "models" / "capabilities" / "cylinder_1_4.toml"
     )
@@ -251,7 +264,10 @@ def test_friction_at_rest_gives_the_range_that_it_holds() -> None:
 
 
 def test_a_stroke_is_answered_in_strokes_with_its_range_and_bore() -> None:
-    """The cylinder can have the difference and the sum of its two distances from the pivot of the input."""
+    """The cylinder can have the difference and the sum of its two distances.
+
+    They are from the pivot of the input.
+    """
     motion = fourbar.Motion(
         stroke=fourbar.Sweep(0.17, 0.33, 40), stroke_speed=0.2, side="left"
     )
@@ -339,7 +355,10 @@ def test_a_new_scene_has_weight_and_sixty_turns_a_minute(
 def test_the_range_at_rest_reaches_from_the_least_to_the_greatest_that_is_held() -> (
     None
 ):
-    """A friction couple of 0.5 N m at O2 holds the static torque, less or more as much, at each position."""
+    """A friction couple of 0.5 N m at O2 holds the static torque.
+
+    It is less or more by as much, at each position.
+    """
     sweep = fourbar.Motion(fourbar.Sweep(0.2, 1.4, 6), 0.0)
     bare = crank_rocker(motion=sweep, effects=(fourbar.Gravity(),))
     static = fourbar.solve(bare).torque
@@ -353,7 +372,10 @@ def test_the_range_at_rest_reaches_from_the_least_to_the_greatest_that_is_held()
 
 
 def test_a_reversal_of_a_motion_law_is_named_by_its_angle() -> None:
-    """Half of A (1 - cos) swings from 0.3 to 2.0 rad and back: O2 reverses at the far end, at t = 1 s."""
+    """Half of A (1 - cos) swings from 0.3 to 2.0 rad and back.
+
+    O2 reverses at the far end, at t = 1 s.
+    """
     time = np.linspace(0.0, 2.0, 41)
     angle = 0.3 + 0.85 * (1.0 - np.cos(math.pi * time))
     law = Law(tuple(time), tuple(angle), steps=30, ends="rest")
@@ -369,7 +391,10 @@ def test_a_reversal_of_a_motion_law_is_named_by_its_angle() -> None:
 
 
 def test_digits_left_are_those_that_the_error_bar_leaves() -> None:
-    """A torque on bar 4 beside its dead centre: the whole digits of value over error bar."""
+    """A torque on bar 4 beside its dead centre.
+
+    The whole digits of value over error bar.
+    """
     linkage = fourbar.uniform(D, A, B, C)
     stretched = opposite(C, D, A + B)  # bars 2 and 3 in one line
     said = {}
@@ -412,7 +437,10 @@ def swept_finely(steps: int) -> fourbar.Scene:
 def test_the_largest_rates_of_following_bars_are_those_of_fine_steps(
     branch: int,
 ) -> None:
-    """Where nothing acts the summary has speeds and accelerations of bars 3 and 4, signed, and where they are."""
+    """Where nothing acts the summary has speeds and accelerations.
+
+    They are those of bars 3 and 4, signed, with their places.
+    """
     linkage = fourbar.FourBar(D, *(fourbar.Bar(x) for x in (A, B, C)))  # type: ignore[arg-type]
 
     def make(steps: int) -> fourbar.Scene:

@@ -1,4 +1,7 @@
-"""Parallelograms, kites and other linkages with change points as people state them: torque, headings, releases."""
+"""Parallelograms, kites and other linkages with change points as people state them.
+
+Torque, headings, releases.
+"""
 
 import math
 import re
@@ -70,7 +73,10 @@ def first_line(scene: fourbar.Scene) -> str:
 
 
 def test_a_new_parallelogram_is_one_at_every_angle(tmp_path: Path) -> None:
-    """Bars of 0.1, 0.3, 0.1 kg: T2 = (0.05 + 0.3 + 0.05) kg * 9.81 m/s^2 * 0.1 m * cos(theta_2)."""
+    """Bars of 0.1, 0.3, 0.1 kg.
+
+    T2 = (0.05 + 0.3 + 0.05) kg * 9.81 m/s^2 * 0.1 m * cos(theta_2).
+    """
     path = tmp_path / "tp.toml"
     runner = CliRunner()
     lengths = ["300mm", "100mm", "300mm", "100mm"]
@@ -114,7 +120,10 @@ def test_a_hanging_platform(tmp_path: Path) -> None:
 
 
 def test_a_given_couple_lifts_a_bar_on_two_links(tmp_path: Path) -> None:
-    """alpha = 14.8148 - 6.54 cos(theta); omega^2/2 = 14.8148 theta - 6.54 sin(theta)."""
+    """alpha = 14.8148 - 6.54 cos(theta).
+
+    Omega^2/2 = 14.8148 theta - 6.54 sin(theta).
+    """
     scene = read(tmp_path, GIVEN_COUPLE)
     released = fourbar.release(scene)
     angle, omega = released.theta_2, released.omega_2
@@ -250,7 +259,10 @@ def test_the_tolerance_band_of_a_parallelogram_holds_its_nominal_value() -> None
 
 
 def test_equilibria_are_those_of_the_assembly() -> None:
-    """A hanging parallelogram rests below and above alone; the antiparallelogram elsewhere too."""
+    """A hanging parallelogram rests below and above alone.
+
+    The antiparallelogram elsewhere too.
+    """
     scene = fourbar.Scene(
         fourbar.uniform(0.3, 0.1, 0.3, 0.1), effects=(fourbar.Gravity(),)
     )

@@ -1,4 +1,7 @@
-"""The block of a linkage on which nothing acts: rates of the bars that follow, in place of zeros."""
+"""The block of a linkage on which nothing acts.
+
+Rates of the bars that follow, in place of zeros.
+"""
 
 import numpy as np
 import pytest

@@ -15,7 +15,8 @@ from fourbar.solution import DEGREES
 from tests.support.scenes import TURN
 
 ROUND_OFF = 1e-13
-"""Relative: two formulas of a few operations each, at transmission angles above 20 deg."""
+"""Relative: two formulas of a few operations each, at transmission angles above 20 deg.
+"""
 
 
 def test_ratios_and_centres_are_those_of_the_formulas() -> None:
@@ -39,7 +40,10 @@ def test_ratios_and_centres_are_those_of_the_formulas() -> None:
 
 
 def test_what_has_no_value_is_a_dash_and_no_number() -> None:
-    """Bars 2 and 4 parallel: I13 at infinity; bar 4 at a dead centre: no bounded advantage."""
+    """Bars 2 and 4 parallel: I13 at infinity.
+
+    Bar 4 at a dead centre: no bounded advantage.
+    """
     half_turn = fourbar.Scene(
         fourbar.uniform(3.0, 1.0, 3.0, 1.0), fourbar.Motion(np.array([1.0, 2.0]))
     )

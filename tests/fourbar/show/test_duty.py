@@ -1,4 +1,7 @@
-"""Shaking force and moment from momentum, the loads of the pins, and the duty of a motor."""
+"""Shaking force and moment from momentum, and the duty of a motor.
+
+The loads of the pins are tested too.
+"""
 
 import math
 from dataclasses import replace
@@ -58,7 +61,10 @@ def test_bearing_load() -> None:
 
 
 def test_the_duty_of_a_motor() -> None:
-    """Over a turn the drive gives what the damping turns into heat and no more; all else comes back."""
+    """Over a turn the drive gives what the damping turns into heat and no more.
+
+    All else comes back.
+    """
     pins = {"O2": 0.004, "B": 0.02}
     damped = (fourbar.Gravity(), fourbar.Viscous.at(**pins))
     sweep = fourbar.Motion(fourbar.Sweep(0.0, math.tau, 360), 10.0)
@@ -120,7 +126,10 @@ def test_the_json_holds_the_duty() -> None:
 
 
 def test_a_study_has_what_each_of_its_members_has() -> None:
-    """Closed and open sweeps, one member whose ground is another, one that never closes."""
+    """Closed and open sweeps, with members that differ.
+
+    One has another ground, and one never closes.
+    """
     scene = crank_rocker(loads=())
     values = {
         "lengths.ground": np.array([0.3, 0.32, 0.31, 3.0]),
@@ -174,7 +183,10 @@ def test_a_study_has_what_each_of_its_members_has() -> None:
 
 
 def test_a_study_of_a_motion_law_keeps_its_time() -> None:
-    """Its energies are integrals over time, as those of each member alone; speeds are zero at both ends."""
+    """Its energies are integrals over time, as those of each member alone.
+
+    Speeds are zero at both ends.
+    """
     law = Law((0.0, 0.5, 1.0, 1.5, 2.0), (0.0, 0.0, 2.0, 2.0, 0.0), 20, "rest")
     linkage = fourbar.uniform(0.3, 0.1, 0.25, 0.22)
     scene = fourbar.Scene(
@@ -198,7 +210,10 @@ def test_a_study_of_a_motion_law_keeps_its_time() -> None:
 
 
 def test_a_law_over_one_turn_is_closed_where_speed_and_acceleration_repeat() -> None:
-    """Its last position counts once only if it is the first again, which its angle alone does not tell."""
+    """Its last position counts once only if it is the first again.
+
+    Its angle alone does not tell that.
+    """
     time, angle = (0.0, 0.3, 0.7, 1.0), (0.0, 1.5, 5.0, math.tau)
     linkage = fourbar.uniform(0.3, 0.1, 0.25, 0.22)
     closed = {}
@@ -233,7 +248,10 @@ def test_a_law_of_one_turn_is_not_closed_where_the_assembly_needs_two() -> None:
 def test_the_energy_of_a_backward_sweep_is_that_of_the_work_of_the_loads(
     speed: float,
 ) -> None:
-    """What the drive gives and takes back differs by the weight's rise: without mass but one, (m g z) at the ends."""
+    """What the drive gives and takes back differs by the weight's rise.
+
+    Without mass but one, (m g z) at the ends.
+    """
     bars = fourbar.Bar(0.1), fourbar.Bar(0.25), fourbar.Bar(0.22, 0.4)
     scene = fourbar.Scene(
         fourbar.FourBar(0.3, *bars),

@@ -1,4 +1,7 @@
-"""The moving page in a real browser, its picture and numbers against the formulas in Python."""
+"""The moving page in a real browser.
+
+Its picture and numbers are held against the formulas in Python.
+"""
 
 import base64
 import math
@@ -27,11 +30,16 @@ PRINTED = 6e-5
 PRINTED_DEG = 6e-4
 """Angles are shown with three decimals of a degree."""
 SPREAD_PRINTED = 6e-3
-"""Of the worst case: numbers next to it are shown with the digits that it has, three significant ones."""
+"""Of the worst case: numbers next to it are shown with the digits that it has, three
+significant ones.
+"""
 ROUNDED = 1e-12
-"""m: a point of the page is its angle's cosine and sine times a length of half a metre."""
+"""m: a point of the page is its angle's cosine and sine times a length of half a metre.
+"""
 PIXEL = 0.01
-"""Coordinates in the picture are exact but for rounding; a hundredth of a pixel is far below what is seen."""
+"""Coordinates in the picture are exact but for rounding; a hundredth of a pixel is far
+below what is seen.
+"""
 
 
 def number(text: str) -> float:
@@ -287,7 +295,10 @@ def test_the_numbers_of_an_axis_stand_clear_of_each_other_and_a_stroke_stays_in_
 def test_the_page_replays_the_positions_speeds_and_accelerations_of_fourbar(
     browse,
 ) -> None:
-    """A linkage of three bars that swing, on both branches: some of its positions do not assemble."""
+    """A linkage of three bars that swing, on both branches.
+
+    Some of its positions do not assemble.
+    """
     scene = thesis(fourbar.Sweep(0.0, 2.0 * math.pi, 72))
     driver = browse(animate.write_page(scene))
     assert (
@@ -629,7 +640,10 @@ def test_positions_alone_show_no_dynamics(browse) -> None:
 
 
 def test_it_says_why_a_position_has_no_forces(browse) -> None:
-    """T3 of a parallelogram exists nowhere; on its input the drive has forces everywhere, and no remark is shown."""
+    """T3 of a parallelogram exists nowhere.
+
+    On its input the drive has forces everywhere, and no remark is shown.
+    """
     motion = fourbar.Motion(fourbar.Sweep(0.3, 2.0, 4), 1.0)
     for drive_bar, remark in (
         (3, "no torque of the drive holds them in balance"),

@@ -1,4 +1,7 @@
-"""The sheet of one position: every number is that of the solution, in the units of the scene."""
+"""The sheet of one position.
+
+Every number is that of the solution, in the units of the scene.
+"""
 
 import re
 from dataclasses import replace

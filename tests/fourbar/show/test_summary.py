@@ -1,4 +1,7 @@
-"""Jumps and peaks between the steps of a sweep are found where geometry and much finer steps have them."""
+"""Jumps and peaks between the steps of a sweep are found.
+
+They are where geometry and much finer steps have them.
+"""
 
 import math
 import resource
@@ -17,9 +20,13 @@ from fourbar.show.summary import list_sizes, locate_between
 from tests.support.scenes import CYLINDER, crank_rocker, thesis
 
 LOCATED = 1e-7
-"""rad: one of the five steps in which the tests cut a turn, cut down five times by 40, with room."""
+"""rad: one of the five steps in which the tests cut a turn, cut down five times by 40,
+with room.
+"""
 PEAK = 1e-6
-"""Relative, of a largest value against that of steps of 0.01 degrees: (0.01 deg)^2 times its curvature."""
+"""Relative, of a largest value against that of steps of 0.01 degrees: (0.01 deg)^2
+times its curvature.
+"""
 WIPER = fourbar.load(Path(__file__).parents[3] / "models" / "gallery" / "wiper.toml")
 BUCKET = """
 [lengths]
@@ -58,7 +65,10 @@ def swept(scene: fourbar.Scene, steps: int) -> fourbar.Scene:
 def test_dry_friction_reverses_at_the_dead_centres_whatever_the_steps(
     steps: int,
 ) -> None:
-    """The output turns back where bars 2 and 3 are in line: cosine rule for O2, B, O4."""
+    """The output turns back where bars 2 and 3 are in line.
+
+    Cosine rule for O2, B, O4.
+    """
     d, a, b, c = WIPER.linkage.lengths
     stretched, folded = (
         math.acos((r * r + d * d - c * c) / (2.0 * r * d)) for r in (b + a, b - a)
@@ -114,7 +124,10 @@ def test_the_largest_of_coarse_steps_is_that_of_fine_ones() -> None:
 
 
 def test_towards_a_limit_within_the_last_step_it_grows_too() -> None:
-    """A sweep that ends where the loop no longer closes: nothing beyond its last position was looked at."""
+    """A sweep that ends where the loop no longer closes.
+
+    Nothing beyond its last position was looked at.
+    """
     scene = crank_rocker()
     for steps in (9, 20):
         swept = replace(
@@ -190,7 +203,10 @@ def test_the_largest_force_of_a_stroke_is_that_of_fine_steps() -> None:
 def test_the_summary_beside_a_dead_point_is_as_quick_with_pin_friction(
     tmp_path: Path,
 ) -> None:
-    """From 44 in on the linkage does not assemble at first; many couples jam beside the dead point where it begins."""
+    """From 44 in on the linkage does not assemble at first.
+
+    Many couples jam beside the dead point where it begins.
+    """
     seconds = []
     for name, text in (("without", BUCKET), ("with", BUCKET + FRICTION)):
         (scene := tmp_path / f"{name}.toml").write_text(text)

@@ -1,4 +1,7 @@
-"""Summaries of motions that pass a pole, a change point or a gap between two positions of the sweep."""
+"""Summaries of motions that pass a pole, a change point or a gap.
+
+It lies between two positions of the sweep.
+"""
 
 import math
 from dataclasses import replace
@@ -14,15 +17,22 @@ from tests.support.scenes import CYLINDER, crank_rocker
 LEVER = 0.09
 """Distance of the end of CYLINDER from O2, m: the largest lever about O2."""
 PEAK = 1e-6
-"""Relative; five calls locate a peak to 1.6e-6 degrees, and its value to the square of that."""
+"""Relative; five calls locate a peak to 1.6e-6 degrees, and its value to the square of
+that.
+"""
 AT_A_LIMIT = 1e-6
-"""rad; near a limit an angle changes as the root of the distance, whose last digits are some 1e-16."""
+"""rad; near a limit an angle changes as the root of the distance, whose last digits are
+some 1e-16.
+"""
 
 
 def sweep(
     lengths: tuple[float, float, float, float], *degrees: float, **motion: object
 ) -> fourbar.Scene:
-    """Make a scene of bars of 1 kg/m under gravity, swept between two angles of bar 2 in so many steps."""
+    """Make a scene of bars of 1 kg/m under gravity, swept in so many steps.
+
+    The sweep is between two angles of bar 2.
+    """
     start, stop, steps = degrees
     angle = fourbar.Sweep(math.radians(start), math.radians(stop), int(steps))
     command = fourbar.Motion(angle, 10.0, **motion)  # type: ignore[arg-type]
@@ -61,7 +71,10 @@ def test_beside_a_pole_of_a_cylinder_force_and_bore_are_of_the_positions(
 
 
 def test_speed_and_power_beside_a_pole_of_the_force_are_located() -> None:
-    """The largest speed of the stroke is omega times the largest lever; no position of this sweep has it."""
+    """The largest speed of the stroke is omega times the largest lever.
+
+    No position of this sweep has it.
+    """
     motion = fourbar.Motion(fourbar.Sweep(0.1, 0.1 + math.tau, 20), 10.0)
     scene = crank_rocker(motion=motion, drive=CYLINDER)
     solution = fourbar.solve(scene)
@@ -82,7 +95,10 @@ def test_speed_and_power_beside_a_pole_of_the_force_are_located() -> None:
 def test_pin_forces_at_a_change_point_grow_and_the_torque_has_its_largest_value(
     start: float, steps: int
 ) -> None:
-    """Bars of 0.1, 0.3 and 0.1 kg: T2 = (0.05 + 0.3 + 0.05) kg g 0.1 m cos(theta_2), largest at the change points."""
+    """Bars of 0.1, 0.3 and 0.1 kg.
+
+    T2 = (0.05 + 0.3 + 0.05) kg g 0.1 m cos(theta_2), largest at the change points.
+    """
     scene = sweep((0.3, 0.1, 0.3, 0.1), start, start + 360.0, steps)
     facts = find_facts(scene)
     assert facts.between.growing == {"F12", "F32", "F43", "F14"}
@@ -93,7 +109,10 @@ def test_pin_forces_at_a_change_point_grow_and_the_torque_has_its_largest_value(
 
 
 def test_a_search_that_hits_a_pole_still_finds_that_it_grows() -> None:
-    """The third call passes the change point at a distance of 4e-9 rad, after which no value is larger."""
+    """The third call passes the change point at a distance of 4e-9 rad.
+
+    After it no value is larger.
+    """
     a, b = 0.36419445229114195, 0.3900709389998438
     angle = fourbar.Sweep(0.09096220141585265, 4.489191916441563, 36)
     scene = fourbar.Scene(
@@ -122,7 +141,10 @@ def test_ranges_of_a_backward_sweep_are_those_of_its_angles(
 
 
 def test_the_swing_of_an_output_is_not_counted_over_a_gap() -> None:
-    """Both circuits are one for these lengths; over the gap the output goes on from the other end of its range."""
+    """Both circuits are one for these lengths.
+
+    Over the gap the output goes on from the other end of its range.
+    """
     lengths = (0.2, 0.25, 0.21, 0.22)
     widths = []
     for start, stop in ((-170.0, 190.0), (40.0, 400.0), (400.0, 40.0)):
@@ -137,7 +159,10 @@ def test_the_swing_of_an_output_is_not_counted_over_a_gap() -> None:
 
 
 def test_a_gap_within_a_step_is_no_full_turn() -> None:
-    """The longest bar exceeds what lets bar 2 turn by 1 um; no position of the sweep lies in the gap."""
+    """The longest bar exceeds what lets bar 2 turn by 1 um.
+
+    No position of the sweep lies in the gap.
+    """
     lengths = (0.3, 0.1, 0.25, 0.15 - 1e-6)
     scene = sweep(lengths, 5.0, 365.0, 36)
     assert fourbar.solve(scene).assembled.all()
@@ -148,7 +173,10 @@ def test_a_gap_within_a_step_is_no_full_turn() -> None:
 
 @pytest.mark.parametrize("speed", (0.0, 5.0))
 def test_a_pole_between_two_positions_that_rise_past_it_is_found(speed: float) -> None:
-    """The output stands still where bars 2 and 3 are in line; the torque on it grows there."""
+    """The output stands still where bars 2 and 3 are in line.
+
+    The torque on it grows there.
+    """
     d, a, b, c = 0.3, 0.1, 0.25, 0.22
     dead = math.acos(((a + b) ** 2 + d**2 - c**2) / (2.0 * (a + b) * d))
     hidden = 0

@@ -1,4 +1,7 @@
-"""Derivatives against 50-digit differences of another evaluation, and against differences of the formulas."""
+"""Derivatives against 50-digit differences of another evaluation.
+
+They are held against differences of the formulas too.
+"""
 
 import json
 from dataclasses import replace
@@ -30,9 +33,13 @@ TABLED = Load(
     table=Table((0.0, 2.0, 6.0), (0.0, 1.0, 2.0)),
 )
 EXACT = 1e-10
-"""Of the derivative, or of what the quantity would change by if it were proportional to the number."""
+"""Of the derivative, or of what the quantity would change by if it were proportional to
+the number.
+"""
 OF_DIFFERENCES = 3e-9
-"""Central differences of fourth order in doubles: rounding, 1e-15, over a step of 1e-5, with what conditioning adds."""
+"""Central differences of fourth order in doubles: rounding, 1e-15, over a step of 1e-5,
+with what conditioning adds.
+"""
 LEFT_OUT = (
     "bars.coupler.inertia",
     "bars.output.inertia",
@@ -44,7 +51,10 @@ LEFT_OUT = (
 
 @pytest.mark.parametrize("drive", [2, 3, 4])
 def test_derivatives_are_those_of_a_50_digit_reference(drive: int) -> None:
-    """By what a scene leaves out too, which the reference does not move: as where it is stated."""
+    """By what a scene leaves out too, which the reference does not move.
+
+    As where it is stated.
+    """
     effects = (Gravity(), Viscous.at(O2=0.01, A=0.02), Friction.at(B=0.05))
     for theta_2 in ANGLES[1:3]:
         case = scene(effects, drive, theta_2=float(theta_2))
@@ -238,7 +248,10 @@ def test_half_a_turn_from_the_ground_the_first_derivative_is_the_ratio_of_the_sp
 
 
 def test_a_kite_whose_halves_meet_has_derivatives() -> None:
-    """With a = d and b = c the product in Heron's factor has no slope either, and is a constant."""
+    """With a = d and b = c the product in Heron's factor has no slope either.
+
+    It is a constant.
+    """
     slopes = sensitivity(Scene(fourbar.uniform(0.3, 0.3, 0.2, 0.2), Motion(1.0, 10.0)))
     assert slopes.solution.omega_3 is not None
     np.testing.assert_allclose(

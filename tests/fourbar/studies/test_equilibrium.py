@@ -1,4 +1,7 @@
-"""Equilibria: pendulums and free bodies say where and how fast, released motions agree, and none is missed."""
+"""Equilibria: pendulums and free bodies say where and how fast.
+
+Released motions agree, and none is missed.
+"""
 
 import json
 import math
@@ -45,7 +48,10 @@ CLOSE = 1e-12
 def crank_as_pendulum(
     *effects: object, loads: tuple[Load, ...] = (), **motion: object
 ) -> Scene:
-    """A crank-rocker of which the crank alone has mass: theta_2 swings as one body about O2."""
+    """A crank-rocker of which the crank alone has mass.
+
+    theta_2 swings as one body about O2.
+    """
     linkage = FourBar(0.3, Bar(0.1, M, INERTIA, (R, 0.3)), Bar(0.25), Bar(0.22), 0.2)
     return Scene(
         linkage, Motion(**{"theta_2": 0.7, **motion}), loads=loads, effects=effects
@@ -155,7 +161,10 @@ def test_the_frequency_at_a_limit_is_that_of_the_output_as_a_pendulum() -> None:
 
 
 def springy(seed: int) -> Scene:
-    """A linkage of any type with weights, two springs, a force and a couple, at random."""
+    """A linkage of any type with weights, two springs, a force and a couple.
+
+    It is a random one.
+    """
     random = np.random.default_rng(seed)
     while True:
         lengths = random.uniform(0.1, 0.5, 4)
@@ -193,7 +202,10 @@ def springy(seed: int) -> Scene:
 def test_free_bodies_need_no_torque_there_and_its_slope_beside_and_have_no_other(
     name: str | int,
 ) -> None:
-    """As a run judges it: Newton-Euler on three free bodies with their own closure, no virtual work."""
+    """As a run judges it.
+
+    Newton-Euler on three free bodies with their own closure, no virtual work.
+    """
     scene = (
         springy(name)
         if isinstance(name, int)
@@ -317,7 +329,10 @@ def test_loaded_friction_holds_up_to_where_no_torque_is_needed_to_move() -> None
 def test_beside_a_change_point_nothing_is_taken_for_a_rest(
     lengths: tuple[float, ...],
 ) -> None:
-    """A kite in which A comes to O4, turned with its gravity: as many equilibria, and as many undecided, none."""
+    """A kite in which A comes to O4, turned with its gravity.
+
+    As many equilibria, and as many undecided, none.
+    """
     d, a, b, c = lengths
     for turn in (0.0, 0.3, 2.0):
         linkage = FourBar(
@@ -397,7 +412,10 @@ def test_a_sweep_bounds_the_search() -> None:
 
 
 def crossings(time: np.ndarray, angle: np.ndarray, middle: float) -> float:
-    """Frequency from the passages one way through the middle, interpolated by a cubic."""
+    """Compute the frequency from the passages one way through the middle.
+
+    They are interpolated by a cubic.
+    """
     from scipy.interpolate import CubicSpline
 
     roots = CubicSpline(time, angle - middle).roots(extrapolate=False)[::2]
@@ -533,7 +551,10 @@ def test_a_zero_that_falls_on_a_sample_is_found() -> None:
 def test_another_command_has_the_equilibria_of_the_positions_that_it_passes(
     name: str,
 ) -> None:
-    """Those of the input swept over the same; a single position has those of its circuit."""
+    """Those of the input swept over the same.
+
+    A single position has those of its circuit.
+    """
     swept = {"theta_3": (1.0, 1.25), "theta_4": (1.95, 2.4), "stroke": (0.17, 0.3)}[
         name
     ]

@@ -1,4 +1,7 @@
-"""Internal forces: beams of the textbook, equilibrium at the far end, and V as the slope of M."""
+"""Internal forces.
+
+Beams of the textbook, equilibrium at the far end, and V as the slope of M.
+"""
 
 import math
 from dataclasses import replace
@@ -13,7 +16,9 @@ from tests.support.scenes import crank_rocker
 from tests.validation.run.derived.test_derived import rows_of
 
 ROUNDED = 1e-12
-"""Relative to the sum of the terms: some tens of roundings and a division by sin mu, which is above 0.6 here."""
+"""Relative to the sum of the terms: some tens of roundings and a division by sin mu,
+which is above 0.6 here.
+"""
 BARE = fourbar.FourBar(0.3, fourbar.Bar(0.1), fourbar.Bar(0.25), fourbar.Bar(0.22))
 AT = fourbar.Motion(1.0, 0.0)
 
@@ -23,7 +28,10 @@ def solved(scene: fourbar.Scene, bar: int, stations: object = None) -> object:
 
 
 def test_a_force_across_the_coupler_bends_it_as_a_beam_on_two_supports() -> None:
-    """P a b/L under a load P at a from one end: sagging to the right of the bar, which is clockwise before it."""
+    """P a b/L under a load P at a from one end.
+
+    Sagging to the right of the bar, which is clockwise before it.
+    """
     load = fourbar.Load(
         3, (8.0, math.radians(-90.0)), from_centre=(0.05, math.pi), frame="bar"
     )  # 75 mm from A
@@ -53,7 +61,10 @@ def test_a_couple_on_the_output_jumps_where_it_acts() -> None:
 
 
 def test_a_bar_that_hangs_in_its_pins_bends_by_its_own_weight() -> None:
-    """w L^2/8 in the middle of a uniform bar on two pins, w its weight per metre across the bar."""
+    """w L^2/8 in the middle of a uniform bar on two pins.
+
+    w is its weight per metre across the bar.
+    """
     linkage = replace(BARE, coupler=fourbar.Bar(0.25, 2.0))
     scene = fourbar.Scene(linkage, AT, effects=(fourbar.Gravity(9.81),))
     internal, theta = solved(scene, 3), fourbar.solve(scene).theta_3[0]
@@ -84,7 +95,10 @@ def test_a_crank_that_turns_is_pulled_by_its_own_mass() -> None:
 
 
 def test_a_bar_that_speeds_up_bends_by_its_inertia() -> None:
-    """The torque of the drive at O2 is the moment there: m L^2 alpha/3, and V falls to nothing at A."""
+    """The torque of the drive at O2 is the moment there.
+
+    M L^2 alpha/3, and V falls to nothing at A.
+    """
     scene = fourbar.Scene(
         replace(BARE, input=fourbar.Bar(0.1, 3.0)), fourbar.Motion(1.0, 0.0, 50.0)
     )
@@ -124,7 +138,10 @@ LINE = fourbar.LinearDrive(Place(1, (0.25, -2.8)), Place(3, (0.09, 0.17)))
 def test_each_part_of_a_bar_up_to_a_cut_is_in_balance_under_all_that_acts(
     drive: dict[str, object],
 ) -> None:
-    """As a run judges it, which asks free bodies for the forces; where friction jams there are none."""
+    """As a run judges it, which asks free bodies for the forces.
+
+    Where friction jams there are none.
+    """
     motion = fourbar.Motion(fourbar.Sweep(0.1, 6.0, 60), 8.0, 5.0)
     rows = rows_of(
         crank_rocker(motion=motion, effects=EVERYTHING, **drive), "internal_forces"
@@ -156,7 +173,10 @@ def test_what_cannot_be_is_refused_and_what_has_no_forces_is_nan() -> None:
 
 
 def test_feet_that_differ_by_rounding_are_one() -> None:
-    """A load and the inertia act at G, each by its own roundings: between them no part of both bends the bar."""
+    """A load and the inertia act at G, each by its own roundings.
+
+    Between them no part of both bends the bar.
+    """
     bar = fourbar.Bar(0.25, 0.7, 1e-4, (0.13, 0.3))
     linkage = replace(crank_rocker().linkage, coupler=bar)
     load = fourbar.Load(3, (3.0, 0.7), moment=20.0)
@@ -176,7 +196,10 @@ def test_feet_that_differ_by_rounding_are_one() -> None:
 
 
 def test_beyond_its_second_pin_a_uniform_bar_bends_as_a_cantilever() -> None:
-    """The mass of a uniform bar ends at its pin: beyond, P (a - x) of the load alone, and nothing beyond the load."""
+    """The mass of a uniform bar ends at its pin.
+
+    Beyond, P (a - x) of the load alone, and nothing beyond the load.
+    """
     linkage = replace(BARE, output=fourbar.Bar(0.22, 0.4))
     load = fourbar.Load(4, (8.0, math.radians(-90.0)), from_pin=(0.3, 0.0), frame="bar")
     scene = fourbar.Scene(

@@ -1,4 +1,7 @@
-"""Positions by a named angle, a stroke or a time: solved back, of every kind of motion."""
+"""Positions by a named angle, a stroke or a time.
+
+Solved back, of every kind of motion.
+"""
 
 import math
 from dataclasses import replace
@@ -14,7 +17,9 @@ from tests.support.scenes import crank_rocker, thesis
 
 MODELS = Path(__file__).parents[3] / "models"
 LOCATED = 1e-12
-"""rad, m or s: a place is found to its last digits, and solved back with a few eps/condition."""
+"""rad, m or s: a place is found to its last digits, and solved back with a few
+eps/condition.
+"""
 LAW = crank_rocker(
     motion=fourbar.Motion(
         law=fourbar.Law((0.0, 1.0, 2.0), (0.3, 2.0, 0.5), steps=20, ends="rest")

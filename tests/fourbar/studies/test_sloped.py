@@ -1,4 +1,7 @@
-"""Numbers with slopes: every function of NumPy is followed as differences say, or refused by its name."""
+"""Numbers with slopes.
+
+Every function of NumPy is followed as differences say, or refused by its name.
+"""
 
 import math
 from dataclasses import dataclass
@@ -17,7 +20,9 @@ from tests.support.scenes import crank_rocker
 STEP = 2.0**-20
 """Step of central differences: their error is about STEP^2, 1e-12."""
 DIFFERENCES = 1e-9
-"""Relative error allowed to a difference, whose values lose eps/STEP, 2e-10, by rounding."""
+"""Relative error allowed to a difference, whose values lose eps/STEP, 2e-10, by
+rounding.
+"""
 POINTS = (-1.7, -0.4, 0.3, 2.6)
 """Arguments off all jumps."""
 
@@ -100,7 +105,10 @@ def test_what_slopes_cannot_follow_raises(change: Any) -> None:
 
 @dataclass(frozen=True)
 class Drag(Effect):
-    """A couple on the input that grows with the square of its speed, written in two ways."""
+    """A couple on the input that grows with the square of its speed.
+
+    It is written in two ways.
+    """
 
     strength: float
     form: str

@@ -1,4 +1,7 @@
-"""Tolerances: samples against first order and against cases known by hand; what a file may not state."""
+"""Tolerances: samples against first order and against cases known by hand.
+
+What a file may not state.
+"""
 
 import json
 import math
@@ -25,7 +28,9 @@ TABLE = (
     'lengths.coupler = ["0.02 mm", "sigma"]\n'
 )
 QUASI = 0.02
-"""Of a standard deviation from 2048 quasi-random samples: a random sample would scatter by 1/sqrt(2 N) = 0.016."""
+"""Of a standard deviation from 2048 quasi-random samples: a random sample would scatter
+by 1/sqrt(2 N) = 0.016.
+"""
 
 
 def spread(

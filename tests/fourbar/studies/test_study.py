@@ -1,4 +1,7 @@
-"""Studies: a member of many linkages is that linkage alone, to the last digit; what no scene takes has a status."""
+"""Studies: a member of many linkages is that linkage alone, to the last digit.
+
+What no scene takes has a status.
+"""
 
 import tomllib
 from importlib import import_module
@@ -62,7 +65,9 @@ DRIVEN = (
 )
 RUBBING = (Gravity(), PinFriction.at(A=(0.1, 0.008), O4=(0.2, 0.01)))
 BARS = 0.05
-"""Of an error bar: longer numbers lose digits too, a thousandth of what doubles lose, otherwise in arrays."""
+"""Of an error bar: longer numbers lose digits too, a thousandth of what doubles lose,
+otherwise in arrays.
+"""
 RANGES = {
     "lengths.ground": (0.25, 0.35),
     "lengths.input": (0.08, 0.3),

@@ -1,4 +1,7 @@
-"""The findings: what each says of itself, its script where the engine is, and the list of them."""
+"""The findings.
+
+What each says of itself, its script where the engine is, and the list of them.
+"""
 
 import re
 import sys

@@ -1,4 +1,8 @@
-"""The set of problems: its files are those of today, its answers those of derivations that share no code with them."""
+"""The set of problems.
+
+Its files are those of today, its answers those of derivations that share no code with
+them.
+"""
 
 import json
 import math
@@ -57,7 +61,10 @@ def find_distance(first: Any, second: Any) -> Any:
 
 
 def assert_agreement(name: str, answers: Any, share: float = 0.0) -> None:
-    """Assert that each answer lies within its error bar, widened by a share of the largest value for its derivation."""
+    """Assert that each answer lies within its error bar.
+
+    The bar is widened by a share of the largest value for its derivation.
+    """
     problem, compared = read_stored(name), 0
     for quantity, values in problem["answers"].items():
         if quantity not in answers:
@@ -152,11 +159,12 @@ def test_ninety_digits_answer_the_same(name: str) -> None:
 
 
 def slide(mp: Any, scene: Any, place: Any, omega: Any, alpha: Any) -> dict[str, Any]:
-    """Answer a slider-crank by virtual work: the motion as functions of time, which are differentiated in many digits.
+    """Answer a slider-crank by virtual work.
 
-    Each displacement tells one unknown: the crank's turn the torque, the rod's turn
-    about A and the slider's along its guide the force at B, the slider's across it the
-    guide's, and those of a bar as a whole the forces at its first pin.
+    The motion as functions of time, which are differentiated in many digits. Each
+    displacement tells one unknown: the crank's turn the torque, the rod's turn about A
+    and the slider's along its guide the force at B, the slider's across it the guide's,
+    and those of a bar as a whole the forces at its first pin.
     """
     a, b, e = (mp.mpf(scene["lengths"][name]) for name in ("crank", "rod", "offset"))
     weight = mp.mpc(0, -mp.mpf(scene["effects"]["gravity"][0]))
@@ -245,7 +253,10 @@ def test_virtual_work_answers_the_slider_cranks_the_same(name: str) -> None:
 
 
 def pendulum(problem: Any) -> tuple[float, float]:
-    """Return k in theta'' = -k cos theta and the energy theta'^2/2 + k sin theta of a released parallelogram."""
+    """Return k in theta'' = -k cos theta, and the energy.
+
+    The energy of a released parallelogram is theta'^2/2 + k sin theta.
+    """
     scene, start = problem["scene"], problem["command"]
     bars, length = scene["bars"], scene["lengths"]["input"]
     swinging, coupler = [bars["input"], bars["output"]], bars["coupler"]["mass"]
@@ -312,10 +323,11 @@ def test_a02_passes_every_angle_when_energy_says() -> None:
 def solve_pin_forces(
     problem: Any, theta: Any, omega: Any
 ) -> dict[str, list[list[float]]]:
-    """Return the pin forces of a released parallelogram from the balances of its coupler, which does not turn.
+    """Return the pin forces of a released parallelogram.
 
-    Moments of the coupler about B give the part of F32 across it, moments of the input
-    about O2 the part along it.
+    They follow from the balances of its coupler, which does not turn. Moments of the
+    coupler about B give the part of F32 across it, moments of the input about O2 the
+    part along it.
     """
     mp = pytest.importorskip("mpmath").mp
     scene, k = problem["scene"], pendulum(problem)[0]

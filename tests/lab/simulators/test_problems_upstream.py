@@ -1,4 +1,7 @@
-"""The test files for other projects state the answers of models/problems, and no module of this project."""
+"""The test files for other projects state the answers of models/problems.
+
+They import no module of this project.
+"""
 
 import ast
 import json

@@ -1,4 +1,7 @@
-"""Simulators as engines of the protocol: what each is given, how a run is laid out, what is judged of its answer."""
+"""Simulators as engines of the protocol.
+
+What each is given, how a run is laid out, what is judged of its answer.
+"""
 
 import json
 import math
@@ -37,9 +40,13 @@ DIFFERENCES = 1e-5
 IN_EXUDYN = 1e-3
 """Of a turn in 314 steps of its trapezoidal rule; measured 1.6e-4."""
 IN_PINOCCHIO = {True: 1e-6, False: 5e-3}
-"""Of a turn in 314 steps, by RK4 (measured 2e-7) and by the semi-implicit Euler method (3.8e-3)."""
+"""Of a turn in 314 steps, by RK4 (measured 2e-7) and by the semi-implicit Euler method
+(3.8e-3).
+"""
 COARSE = 0.05
-"""Of the torque in the middle number of steps of each simulator's entry; measured 1.2e-2 and less."""
+"""Of the torque in the middle number of steps of each simulator's entry; measured
+1.2e-2 and less.
+"""
 JUDGES = {"problems.py"}
 """Modules that state the formulas' answers; every other hands things to a simulator."""
 PROBLEM = read_problem(PROBLEMS / "crank_rocker.json")
@@ -67,7 +74,10 @@ def find_errors(simulator: Any, **setting: Any) -> dict[str, float]:
 
 @pytest.fixture
 def sealed(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The writers of model files have no formulas: what a simulator receives is the simulator's own assembly."""
+    """The writers of model files have no formulas.
+
+    What a simulator receives is the simulator's own assembly.
+    """
 
     def refused(*_: Any, **__: Any) -> None:
         raise AssertionError("a simulator would receive what the formulas computed")
@@ -111,7 +121,10 @@ def test_a_simulator_starts_from_its_own_assembly_without_the_formulas() -> None
 
 
 class Rigid(Simulator):
-    """A simulator that is the free bodies at the end of each step, but for what a test changes."""
+    """A simulator that is the free bodies at the end of each step.
+
+    A test changes it.
+    """
 
     name, version, device, made_for, changed = (
         "rigid",
@@ -310,7 +323,10 @@ def test_each_solver_of_pinocchio_carries_the_loop() -> None:
 
 
 def test_derivatives_of_the_torque_are_compared_at_the_simulators_own_state() -> None:
-    """By differences of what MuJoCo itself answers along the changes that a differentiable simulator is given."""
+    """By differences of what MuJoCo itself answers along the changes.
+
+    A differentiable simulator is given these changes.
+    """
     mujoco_c = pytest.importorskip(
         "fourbar_lab.simulators.mujoco_c", exc_type=ImportError
     )

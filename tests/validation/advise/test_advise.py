@@ -1,4 +1,7 @@
-"""The advice: the figures it reaches, the file it writes, what it says where nothing serves."""
+"""The advice: the figures it reaches, and the file it writes.
+
+It is tested too what it says where nothing serves.
+"""
 
 import math
 from dataclasses import replace
@@ -65,7 +68,10 @@ def test_the_solver_is_searched_too() -> None:
 
 
 def test_a_drive_elsewhere_is_judged_between_the_steps_too() -> None:
-    """Fourteen steps a turn hold the torque of bar 4 within 0.7 % where they are read, and miss 9 % between."""
+    """Fourteen steps a turn hold the torque of bar 4 within 0.7 % at the steps.
+
+    They miss 9 % between.
+    """
     scene = fourbar.load(MODELS / "drag_link.toml")
     setup = TrialSetup(scene, advise.choose_positions(scene))
     trial = setup.try_out(advise.make_settings(14.0, 3.0))
@@ -96,7 +102,10 @@ def test_figures_of_rockers_and_the_thesis(name: str) -> None:
 
 
 def test_the_file_alone_keeps_the_error(tmp_path: Path) -> None:
-    """What -o writes, loaded by nothing but its text: reset to the keyframe and stepped for a revolution."""
+    """What -o writes, loaded by nothing but its text.
+
+    Reset to the keyframe and stepped for a revolution.
+    """
     scene, out = tmp_path / "scene.toml", tmp_path / "out.xml"
     scene.write_text(fourbar.dump(turning(positions=72)))
     process = CliRunner().invoke(
@@ -134,7 +143,10 @@ def test_the_file_alone_keeps_the_error(tmp_path: Path) -> None:
 
 
 def test_what_lies_between_two_steps_is_judged_too() -> None:
-    """Two steps are right at both of their ends, and miss what the pin forces do amid them."""
+    """Two steps are right at both of their ends.
+
+    They miss what the pin forces do between.
+    """
     scene = replace(turning(), motion=fourbar.Motion(fourbar.Sweep(0.0, 1.0, 36), 10.0))
     setup = TrialSetup(scene, advise.choose_positions(scene))
     trial = setup.try_out(advise.make_settings(12.0, 6.0))

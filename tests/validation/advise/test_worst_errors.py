@@ -26,7 +26,10 @@ COMMAND = command(SCENE)
 
 
 def answer(**off: float) -> dict[str, Any]:
-    """Give the right torque and pin forces, off by a part of their largest value at the last position."""
+    """Give the right torque and pin forces, off at the last position.
+
+    They are off by a part of their largest value.
+    """
     solution = fourbar.solve(SCENE)
     quantities = {name: np.array(getattr(solution, name)) for name in QUANTITIES}
     for name, part in off.items():

@@ -174,7 +174,10 @@ def same(scene: Scene) -> Scene:
 
 
 def inertial_times(scene: Scene, by_mass: float, by_inertia: float) -> Numbers:
-    """m a and I alpha by hand: what they add to static equilibrium is put on as loads at G, as d'Alembert does."""
+    """m a and I alpha by hand.
+
+    What they add to static equilibrium is put on as loads at G, as d'Alembert does.
+    """
     motion = solve(scene, at=(commanded := command(scene)))
     numbers: dict[str, list[np.ndarray]] = {name: [] for name in ("theta_2", *ALL)}
     for i in range(0, len(commanded.theta_2), EVERY):
@@ -260,7 +263,10 @@ def with_gravity(angle: float) -> Callable[[Scene], Numbers]:
 
 
 def in_other_frame(scene: Scene) -> Scene:
-    """A scene of a load whose direction is kept where it turned with its bar, or turns."""
+    """A scene of a load whose direction is kept, or turns with its bar.
+
+    It turned where it now is kept.
+    """
     moment, force = scene.loads
     frame = {"bar": "world", "world": "bar"}[force.frame]
     return replace(scene, loads=(moment, replace(force, frame=frame)))
@@ -399,7 +405,10 @@ MISTAKES: list[tuple[str, str, tuple[str, ...], Callable[[Scene], Numbers], str]
 
 
 def test_every_hypothesis_has_a_case_and_no_two_have_one_text() -> None:
-    """Whatever is swapped, left out or of another unit has a message that a case above demands."""
+    """Whatever is swapped, left out or of another unit has a message.
+
+    A case above demands it.
+    """
 
     def kind(text: str) -> str:
         return re.sub(r"input|coupler|output|load \d|bar \d", "ONE", text)
@@ -516,7 +525,10 @@ EVERY_QUANTITY = [
 def test_every_quantity_is_judged_at_its_own_scale(
     name: str, quantity: str, tmp_path: Path
 ) -> None:
-    """Off by 1e-9 of its largest value it differs, whatever its unit: A_x was once judged in newtons."""
+    """Off by 1e-9 of its largest value it differs, whatever its unit.
+
+    A_x was once judged in newtons.
+    """
     scene = SCENES[name]
     commanded = command(scene)
     commanded = Command(
@@ -580,7 +592,10 @@ def test_one_component_is_judged_by_itself(letter: str, tmp_path: Path) -> None:
 def test_what_is_zero_by_all_its_terms_is_judged_in_its_own_unit(
     torque: str, code: int, tmp_path: Path
 ) -> None:
-    """Bars without mass or load take no torque; half a printed digit over a scale of 0 once excused any number."""
+    """Bars without mass or load take no torque.
+
+    Half a printed digit over a scale of 0 once excused any number.
+    """
     linkage = fourbar.FourBar(
         0.3, fourbar.Bar(0.1), fourbar.Bar(0.25), fourbar.Bar(0.22)
     )
@@ -989,7 +1004,10 @@ def test_a_motion_that_rows_are_not_found_by_is_refused_in_one_line(
 
 
 def write_torques(path: Path, form: Callable[[list[tuple[float, float]]], str]) -> Path:
-    """Write theta_2 in whole degrees and the right torque of a crank-rocker in a form."""
+    """Write theta_2 in whole degrees and the right torque in a form.
+
+    They are of a crank-rocker.
+    """
     scene = SCENES["crank_rocker"]
     degrees = np.arange(0.0, 360.0, 30.0)
     base = command(scene)

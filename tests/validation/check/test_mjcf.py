@@ -1,4 +1,7 @@
-"""Somebody's own MJCF: what differs is named, what it costs is measured, and the file is data."""
+"""Somebody's own MJCF.
+
+What differs is named, what it costs is measured, and the file is data.
+"""
 
 import math
 import os
@@ -67,7 +70,9 @@ STIFF = 'solref="0.02 1" solimp="0.9999 0.9999 0.001 0.5 2"'
 FLOOR = 1e-4
 """What the generated file is off without its flywheel: 3e-5 as measured."""
 STIFF_ENOUGH = 1e-4
-"""One state at d = 0.9999 without pads: 1.5e-5 of the torque, 5e-5 of the forces, as measured."""
+"""One state at d = 0.9999 without pads: 1.5e-5 of the torque, 5e-5 of the forces, as
+measured.
+"""
 
 
 @cache
@@ -147,7 +152,10 @@ def test_the_description_is_that_of_the_scene() -> None:
 
 
 def test_what_is_welded_to_a_bar_is_part_of_it() -> None:
-    """Two masses m at distance s of each other: G in the middle, inertia 2 I + m s^2/2."""
+    """Two masses m at distance s of each other.
+
+    G in the middle, inertia 2 I + m s^2/2.
+    """
     half = (
         '<body pos="{} 0 0"><inertial pos="0 0 0" mass="0.2" diaginertia="1e-3 1e-3'
         ' 1e-3"/></body>'
@@ -239,7 +247,10 @@ def test_how_softly_dry_friction_slips_is_named_and_costs() -> None:
 
 
 def test_a_cause_is_named_without_what_hangs_on_it() -> None:
-    """Solver parameters of friction that a file does not have, and what MuJoCo derives from a mass."""
+    """Solver parameters of friction that a file does not have.
+
+    What MuJoCo derives from a mass is one too.
+    """
     soft = GENERATED.replace('type="hinge"', 'type="hinge" solreffriction="0.1 1"')
     assert {
         d.key
@@ -283,7 +294,10 @@ def test_what_a_difference_costs_is_seen(old: str, new: str) -> None:
 def other_plane(
     closure: str = 'site1="r" site2="q"', axis: str = "0 -1 0", option: str = ""
 ) -> str:
-    """The crank-rocker by another hand: x-z plane, away from the origin, other names, default closure."""
+    """The crank-rocker by another hand.
+
+    x-z plane, away from the origin, other names, default closure.
+    """
     linkage = BARE.linkage
 
     def inertial(number: int) -> str:
@@ -307,7 +321,10 @@ def other_plane(
 def test_bodies_and_sites_are_guessed_from_what_hangs_together_and_from_the_lengths(
     closure: str,
 ) -> None:
-    """The rocker is as good a crank by its hinges alone; without a connect the sites of pin B are looked for too."""
+    """The rocker is as good a crank by its hinges alone.
+
+    Without a connect the sites of pin B are looked for too.
+    """
     text = other_plane(closure)
     rocker = re.search(' *<body name="rocker".*?</body>', text)
     assert rocker is not None  # it comes first in the file
@@ -346,7 +363,10 @@ COSTLY = [
 def test_the_one_thing_that_is_wrong_costs_as_much_alone_in_the_generated_file(
     key: str, old: str, new: str
 ) -> None:
-    """Another tree in another plane, made wrong in one entry: its price is the error of that file, by another model."""
+    """Another tree in another plane, made wrong in one entry.
+
+    Its price is the error of that file, by another model.
+    """
     text = other_plane(f'site1="r" site2="q" {STIFF}')
     assert old in text
     spoilt = examine(BARE, text.replace(old, new), MINE)
@@ -425,7 +445,10 @@ def test_a_servo_on_a_tendon_pulls_also_where_it_is_told_nothing_and_a_motor_doe
 
 
 def test_a_load_that_is_missing_and_an_entry_that_cannot_stand_alone() -> None:
-    """The first has its price; who turns the other way round, or closes the loop otherwise, is another file."""
+    """The first has its price.
+
+    Who turns the other way round, or closes the loop otherwise, is another file.
+    """
     changes: list[tuple[str, Value | None]] = [
         ("loads.coupler, axes of the coupler.force", (0.0, 0.0)), ("pins.A.positive", "clockwise"),
         ("closure.by", "tendon"), ("contacts", "possible"),
@@ -593,7 +616,10 @@ def test_colliding_bars_are_seen() -> None:
 
 @pytest.mark.parametrize("timestep", ["1e-12", "1e9"])
 def test_an_absurd_timestep_is_reported_and_not_run_through(timestep: str) -> None:
-    """One so long that no step is made once agreed in every position: the state at the start, again and again."""
+    """One so long that no step is made once agreed in every position.
+
+    The state at the start, again and again.
+    """
     text = re.sub('timestep="[^"]*"', f'timestep="{timestep}"', GENERATED)
     assert text != GENERATED
     _, through = examine(CRANK_ROCKER, text, {}).answers
@@ -774,7 +800,10 @@ def test_a_file_without_a_scene_is_read_as_a_robot(tmp_path: Path) -> None:
 
 
 def run(tmp_path: Path, text: str, *options: str) -> tuple[int | None, list[float]]:
-    """Exit status of the command on a file of the crank-rocker, and what its comparisons are allowed."""
+    """Return the exit status of the command on a file of the crank-rocker.
+
+    What its comparisons are allowed is returned too.
+    """
     scene, path = tmp_path / "scene.toml", tmp_path / "theirs.xml"
     scene.write_text(fourbar.dump(BARE))
     path.write_text(text)

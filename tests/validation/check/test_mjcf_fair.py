@@ -1,4 +1,7 @@
-"""A file that is right is called right, and where one is wrong its cause stands first."""
+"""A file that is right is called right.
+
+Where one is wrong its cause stands first.
+"""
 
 import math
 import re
@@ -47,7 +50,9 @@ FAST = fourbar.Motion(np.radians(np.linspace(0.0, 3600.0, 61)), 10.0)
 TURNED = -4.0
 """Zero of a joint whose file counts from elsewhere, rad."""
 SOFT_FRICTION = 4e-6
-"""Torque of the file with MuJoCo's default friction, of its largest: 3.4e-6 at one state, as measured."""
+"""Torque of the file with MuJoCo's default friction, of its largest: 3.4e-6 at one
+state, as measured.
+"""
 SOFT_LOOP = 5e-5
 """Pin forces of it, of their largest: the loop yields to the friction, 4.6e-5."""
 BISECTED = 1e-9
@@ -55,7 +60,10 @@ BISECTED = 1e-9
 
 
 def default_friction() -> str:
-    """The file of the dry arm whose friction yields as MuJoCo's does if nothing is said of it."""
+    """The file of the dry arm whose friction yields as MuJoCo's does.
+
+    Nothing is said of it in the file.
+    """
     text = write_mjcf(DRY, drive="none")
     return re.sub(' sol(ref|imp)friction="[^"]*"', "", text)
 
@@ -78,7 +86,10 @@ def error_of(scene: Scene, examined: Examined, how: str, name: str) -> float:
 
 
 def bisect_on_the_couple(text: str, theta_2: float, alpha_2: float) -> float:
-    """Ask MuJoCo for the couple on the input at keyframe 0, moved to an angle by a chain of Newton steps."""
+    """Ask MuJoCo for the couple on the input at keyframe 0.
+
+    It is moved to an angle by a chain of Newton steps.
+    """
     model = mujoco.MjModel.from_xml_string(text)
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, 0)
@@ -115,7 +126,10 @@ def examined_dry() -> Examined:
 
 @pytest.mark.slow
 def test_a_file_with_dry_friction_is_right_to_the_softness_of_its_loop() -> None:
-    """Two trials and a line gave a couple at which the crank accelerates at -56 rad/s^2 in place of 0."""
+    """Two trials and a line gave a couple that accelerates the crank wrongly.
+
+    It was -56 rad/s^2 in place of 0.
+    """
     for how in (ONE_STATE, THROUGH_TIME):
         assert error_of(DRY, examined_dry(), how, "torque") < SOFT_FRICTION
         for pin in ("F12", "F32", "F43", "F14"):
@@ -132,7 +146,10 @@ def written(text: str, folder: Path) -> Path:
 def test_a_file_that_is_as_right_as_a_soft_loop_can_be_is_called_right(
     tmp_path: Path,
 ) -> None:
-    """Its pin forces are 4.6e-5 off, which is what MuJoCo's stiffest constraint leaves; more of it is an error."""
+    """Its pin forces are 4.6e-5 off, which is what MuJoCo's stiffest constraint leaves.
+
+    More of it is an error.
+    """
     report = examine_model("dry", DRY, written(default_friction(), tmp_path), {})
     assert report.counts.status == 0
     at_one_state = {
@@ -177,7 +194,10 @@ def test_the_couple_is_the_one_that_bisection_finds() -> None:
 def test_friction_that_is_too_large_is_seen_at_one_state_and_through_time(
     pin: str,
 ) -> None:
-    """By virtual work 0.5 N m more at O2 is 0.5 N m of torque, at A it is 0.5 |omega_3 - omega_2| / omega_2."""
+    """By virtual work 0.5 N m more at O2 is 0.5 N m of torque.
+
+    At A it is 0.5 |omega_3 - omega_2| / omega_2.
+    """
     text = write_mjcf(DRY, drive="none").replace(
         f'name="{pin}" type="hinge"', f'name="{pin}" type="hinge" LOSS'
     )
@@ -215,7 +235,10 @@ def test_armature_that_the_scene_does_not_have_is_inertia_of_the_input() -> None
 
 
 def limited(pin: str, low: float, high: float) -> str:
-    """The file of the arm without friction, with a joint range in rad of its own zero."""
+    """The file of the arm without friction, with a joint range in rad.
+
+    It has its own zero.
+    """
     text = write_mjcf(BARE, drive="none").replace('limit="disable" ', "")
     hinge = f'name="{pin}" type="hinge"'
     assert hinge in text
@@ -223,7 +246,10 @@ def limited(pin: str, low: float, high: float) -> str:
 
 
 def counted_from_elsewhere(text: str, pin: str) -> str:
-    """The same file with another zero of a joint: its `ref` and range are moved alike."""
+    """The same file with another zero of a joint.
+
+    Its `ref` and range are moved alike.
+    """
 
     def moved(match: re.Match[str]) -> str:
         return f'{match[1]}"{float(match[2]) + TURNED!r}"'
@@ -296,7 +322,10 @@ def turned(scene: Scene, angle: float) -> Scene:
     ids=["with gravity", "level", "from behind", "turned from behind"],
 )
 def test_a_file_may_stand_in_its_plane_as_it_likes(scene: Scene, other: Scene) -> None:
-    """As `loops` writes a scene: gravity down, or the ground along x where the plane is level."""
+    """As `loops` writes a scene.
+
+    Gravity down, or the ground along x where the plane is level.
+    """
     examined = examine(scene, write_mjcf(other, drive="none"), {})
     generated = examine(scene, None, {})
     keys = {d.key for d in find_differences(generated.described, examined.described)}
@@ -330,7 +359,10 @@ def stopped(text: str) -> str:
 
 @cache
 def report_of(spoil: Callable[[str], str], folder: Path) -> ModelReport:
-    """The report on the arm's file with two faults: a mass that is 1 % off, and one that explains the error."""
+    """The report on the arm's file with two faults.
+
+    A mass that is 1 % off, and one that explains the error.
+    """
     text = write_mjcf(BARE, drive="none").replace('mass="0.3"', 'mass="0.303"', 1)
     path = folder / f"{spoil.__name__}.xml"
     path.write_text(spoil(text))
@@ -376,7 +408,10 @@ def set_attribute(text: str, name: str, value: str) -> str:
 def test_a_setting_costs_what_typing_it_into_the_file_gains(
     key: str, was: str, tmp_path: Path
 ) -> None:
-    """In the stiff file that is generated, a timestep would matter less, and the loop's impedance not at all."""
+    """In the stiff file that is generated, a timestep would matter less.
+
+    The loop's impedance would not matter at all.
+    """
     scene = replace(BARE, motion=FAST)
     text = set_attribute(write_mjcf(scene, drive="none"), "integrator", "Euler")
     name = key.partition(".")[2]
@@ -397,7 +432,10 @@ def test_a_setting_costs_what_typing_it_into_the_file_gains(
 
 
 def test_where_no_force_gives_the_acceleration_is_said() -> None:
-    """The tendon of a cylinder that carries at most a part of what the motion asks for."""
+    """The tendon of a cylinder that carries a part of what the motion asks for.
+
+    It carries no more than that part.
+    """
     end, start = fourbar.Place(4, (0.09, 0.7)), fourbar.Place(1, (0.1, -1.0))
     scene = replace(
         BARE, drive_bar=None, drive=fourbar.LinearDrive(start, end),
@@ -454,7 +492,10 @@ MODELS = Path(__file__).parents[3] / "models"
 
 
 def default_constraint(scene: Scene) -> str:
-    """The file of a scene without a drive, its loop closed as MuJoCo does where nothing is said."""
+    """The file of a scene without a drive, its loop closed by default.
+
+    MuJoCo closes it so where nothing is said.
+    """
     text = write_mjcf(scene, replace(RECIPE, pad=None), drive="none")
     closed, times = re.subn(
         '(<connect [^>]*) solref="[^"]*" solimp="[^"]*"', r"\1", text

@@ -1,4 +1,7 @@
-"""Prediction, retry and verdict of a quantity, and the unit of an error where nothing is allowed."""
+"""Prediction, retry and verdict of a quantity.
+
+The unit of an error where nothing is allowed is tested too.
+"""
 
 from collections.abc import Callable
 
@@ -84,7 +87,10 @@ def compare(
     predicted: Predicted | None,
     nearby: Callable[..., dict[str, np.ndarray]] | None = None,
 ) -> dict[str, Row]:
-    """Rows of an answer that is the formulas' own, changed, of a crank at constant speed."""
+    """Rows of an answer that is the formulas' own, changed.
+
+    It is that of a crank at constant speed.
+    """
     motion = fourbar.Motion(fourbar.Sweep(0.1, 6.38, 8), 10.0)
     scene = crank_rocker(motion=motion, loads=())
     solution = fourbar.solve(scene, "force")
@@ -105,7 +111,10 @@ def nothing(quantity: str, mask: np.ndarray) -> np.ndarray:
 def test_where_a_quantity_vanishes_its_error_has_its_own_unit_whoever_answers(
     predicted: Predicted | None,
 ) -> None:
-    """alpha_2 is 0: an answer of 1e-3 rad/s^2 is wrong by that, and nothing is allowed."""
+    """alpha_2 is 0.
+
+    An answer of 1e-3 rad/s^2 is wrong by that, and nothing is allowed.
+    """
 
     def turn(answer: Answer) -> None:
         answer.quantities["alpha_2"][3] = 1e-3

@@ -1,4 +1,7 @@
-"""An answer with one error, at one position, of one quantity: the comparison fails there and nowhere else."""
+"""An answer with one error, at one position, of one quantity.
+
+The comparison fails there and nowhere else.
+"""
 
 import math
 from dataclasses import replace
@@ -22,7 +25,10 @@ FIRST, MIDDLE, LAST = 0, 17, POSITIONS - 1
 
 
 def make_answer(**changed: Array | None) -> Answer:
-    """Make an answer of an exact engine that agrees to the last digit but for what is changed; None: left out."""
+    """Make an answer of an exact engine that agrees to the last digit.
+
+    Some of it is changed; None: left out.
+    """
     quantities = {
         name: np.array(getattr(FORMULAS, name)) for name in COMPARED_QUANTITIES
     }
@@ -47,7 +53,10 @@ def compare(answer: Answer, **held: object) -> dict[str, Row]:
 
 
 def moved(name: str, place: int, by: float) -> Array:
-    """Return a quantity that is off by so many parts of its largest value at one position."""
+    """Return a quantity that is off at one position.
+
+    It is off by so many parts of its largest value.
+    """
     values = np.array(getattr(FORMULAS, name))
     values[place] += by * (1.0 if name[:5] == "theta" else np.abs(values).max())
     return values
@@ -70,7 +79,10 @@ def test_an_error_at_any_position_fails_its_row_there(name: str, place: int) -> 
 
 @pytest.mark.parametrize("factor", (0.2, 5.0))
 def test_what_is_allowed_is_fifty_last_digits_over_the_condition(factor: float) -> None:
-    """Of theta_3 that is 50 eps over |sin(theta_4 - theta_3)| and the shorter of bars 3, 4 over the longest bar."""
+    """Of theta_3 it is 50 eps over the condition of the position.
+
+    That is |sin(theta_4 - theta_3)| and the shorter of bars 3, 4 over the longest bar.
+    """
     assert (K, EPS) == (50.0, 2.0**-52)
     s = abs(math.sin(FORMULAS.theta_4[MIDDLE] - FORMULAS.theta_3[MIDDLE]))
     allowed = 50.0 * 2.0**-52 / (s * 0.22 / 0.3)
@@ -141,7 +153,10 @@ def test_ten_times_its_prediction_an_error_is_degraded_and_no_more(
 
 
 def test_a_scene_of_which_most_numbers_are_undecided_does_not_hold() -> None:
-    """A tolerance that is wider than a thousandth at every position leaves nothing to decide by."""
+    """A tolerance that is wide at every position leaves nothing to decide by.
+
+    It is wider than a thousandth.
+    """
     blind = replace(FORMULAS, condition=np.full(POSITIONS, 1e-14))
     answer = make_answer()
     held = Demands(EQUIVALENCE, ("omega_3", "F12"))

@@ -1,4 +1,7 @@
-"""A drive along a line before the free bodies: every pair of bars holds, faults show, who cannot do it says so."""
+"""A drive along a line before the free bodies.
+
+Every pair of bars holds, faults show, who cannot do it says so.
+"""
 
 from dataclasses import replace
 from itertools import combinations

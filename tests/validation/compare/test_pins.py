@@ -1,4 +1,7 @@
-"""Places from the first pins of their bars, and what is judged without the formulas' conversion of them."""
+"""Places from the first pins of their bars.
+
+They are judged without the formulas' conversion of them.
+"""
 
 import math
 from typing import Any

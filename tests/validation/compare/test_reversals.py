@@ -1,4 +1,7 @@
-"""Where dry friction reverses: found where geometry says, jumping by what statics says, judged on both sides of it."""
+"""Where dry friction reverses.
+
+Found where geometry says, jumping by what statics says, judged on both sides of it.
+"""
 
 import math
 
@@ -31,7 +34,10 @@ def scene(pin: str, drive: int = 2, start: float = 0.1) -> Scene:
 
 
 def dead_centres() -> list[float]:
-    """theta_2 where bars 2 and 3 lie in one line, by the cosine rule: there the rocker turns back."""
+    """theta_2 where bars 2 and 3 lie in one line, by the cosine rule.
+
+    There the rocker turns back.
+    """
     stretched = math.acos(((A + B) ** 2 + D**2 - C**2) / (2 * (A + B) * D))
     folded = math.acos(((B - A) ** 2 + D**2 - C**2) / (2 * (B - A) * D)) + math.pi
     return [stretched, folded]
@@ -42,7 +48,10 @@ def dead_centres() -> list[float]:
     [("O4", dead_centres()), ("B", [math.pi, 2 * math.pi]), ("O2", [])],
 )
 def test_they_are_where_geometry_puts_them(pin: str, places: list[float]) -> None:
-    """The rocker turns at its dead centres; bars 3 and 4 turn together where A lies on the line of centres."""
+    """The rocker turns at its dead centres.
+
+    Bars 3 and 4 turn together where A lies on the line of centres.
+    """
     posed = scene(pin)
     reversals = find_reversals(posed, command(posed), solve(posed))
     assert [reversal.theta_2 for reversal in reversals] == pytest.approx(
@@ -52,7 +61,10 @@ def test_they_are_where_geometry_puts_them(pin: str, places: list[float]) -> Non
 
 
 def test_the_jump_is_that_of_statics() -> None:
-    """The couple on bar 4 changes by 2 f; bar 3 takes the change as a force along itself: 2 f = c |sin mu| |dF43|."""
+    """The couple on bar 4 changes by 2 f.
+
+    Bar 3 takes the change as a force along itself: 2 f = c |sin mu| |dF43|.
+    """
     posed = scene("O4")
     for reversal in find_reversals(posed, command(posed), solve(posed)):
         sine = abs(float(reversal.before.sin_mu[0]))
@@ -65,7 +77,10 @@ def test_the_jump_is_that_of_statics() -> None:
 
 @pytest.mark.parametrize("start", [0.1, 0.0])
 def test_both_sides_are_judged_and_the_reversal_itself_is_not(start: float) -> None:
-    """From 0 the sweep meets both reversals of pin B exactly; the engines' rounding decides their sense there."""
+    """From 0 the sweep meets both reversals of pin B exactly.
+
+    The engines' rounding decides their sense there.
+    """
     record = judge(
         "scene",
         scene("B", start=start),

@@ -1,4 +1,7 @@
-"""What is counted as agreeing: no refusal, no missing number, no empty table; and every form says the same."""
+"""What is counted as agreeing: no refusal, no missing number, no empty table.
+
+Every form says the same.
+"""
 
 import html
 import math

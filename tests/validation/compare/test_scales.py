@@ -1,4 +1,7 @@
-"""What an error is divided by: no other size than that of the quantity itself, where it has one."""
+"""What an error is divided by.
+
+No other size than that of the quantity itself, where it has one.
+"""
 
 import numpy as np
 
@@ -17,7 +20,10 @@ ROCKER = uniform(0.3, 0.25, 0.1, 0.22)
 def test_the_scale_is_the_greatest_value_of_the_well_conditioned_positions_and_elsewhere_the_value_itself() -> (
     None
 ):
-    """Of terms that cancel it would be larger, and near a limit, where forces diverge, too."""
+    """It would be larger of terms that cancel.
+
+    Near a limit, where forces diverge, it would be too.
+    """
     low, high = sorted(
         x.theta_2 for x in limit_positions(ROCKER) if 0.0 < x.theta_2 < np.pi
     )
@@ -43,7 +49,10 @@ def test_the_scale_is_the_greatest_value_of_the_well_conditioned_positions_and_e
 
 
 def test_where_everything_cancels_the_scale_is_that_of_the_forces_that_cancel() -> None:
-    """Two opposite forces at one point of bar 2 of a linkage at rest: no torque; 2 x 50 N on 0.25 m cancel."""
+    """Two opposite forces at one point of bar 2 of a linkage at rest: no torque.
+
+    2 x 50 N on 0.25 m cancel.
+    """
     loads = (
         Load(2, (50.0, 0.0), arm=(0.05, 0.0)),
         Load(2, (-50.0, 0.0), arm=(0.05, 0.0)),

@@ -1,4 +1,7 @@
-"""The one relative error: what a size of nothing demands, and that what is no number is never small."""
+"""The one relative error.
+
+What a size of nothing demands, and that what is no number is never small.
+"""
 
 import math
 
@@ -71,7 +74,10 @@ def test_the_worst_error_is_the_one_that_is_no_number() -> None:
 
 
 def test_of_a_stroke_the_angle_of_its_bar_is_conditioned_by_the_lever() -> None:
-    """From O2 to the line over the longer of both arms; what follows by |sin(theta_4 - theta_3)| too."""
+    """From O2 to the line over the longer of both arms.
+
+    What follows by |sin(theta_4 - theta_3)| too.
+    """
     r, arm = 0.25, 0.09
     drive = LinearDrive(Place(1, (r, 2.5)), Place(2, (arm, 0.3)))
     motion = fourbar.Motion(
@@ -106,7 +112,10 @@ def test_an_angle_is_compared_modulo_one_turn_and_not_half_a_turn() -> None:
 
 
 def test_what_is_allowed_grows_as_the_condition_falls() -> None:
-    """50 eps at condition 1, a hundred times as much at 0.01; an identity is allowed the same everywhere."""
+    """50 eps at condition 1, a hundred times as much at 0.01.
+
+    An identity is allowed the same everywhere.
+    """
     condition = np.array([1.0, 0.1, 0.01])
     allowed = 50.0 * 2.0**-52 * np.array([1.0, 10.0, 100.0])
     assert EQUIVALENCE.allowed(condition) == pytest.approx(allowed, rel=1e-12)
@@ -129,7 +138,10 @@ def test_an_error_that_is_no_number_is_the_worst(missing: float) -> None:
 
 
 def test_the_scale_is_of_positions_whose_condition_is_a_tenth_at_least() -> None:
-    """A rocker's pin forces grow towards its limit: those of worse conditions excuse no others."""
+    """A rocker's pin forces grow towards its limit.
+
+    Those of worse conditions excuse no others.
+    """
     linkage = fourbar.uniform(0.3, 0.25, 0.1, 0.22)
     limit = fourbar.limit_positions(linkage)[0].theta_2
     away = np.array([0.3, 0.2, 1e-2, 1e-4, 1e-6])

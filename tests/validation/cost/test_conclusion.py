@@ -8,7 +8,10 @@ from tests.support.costs import point
 
 
 def test_statement_and_conclusion_have_one_criterion() -> None:
-    """A setting counts by its error at the steps and between them, here and on the front."""
+    """A setting counts by its error at the steps and between them.
+
+    It does so here and on the front.
+    """
     curves = {
         "recommended": [point(30, 5e-5)],
         "d": [replace(point(300, 4e-3), setting=conclusion.DEFAULT)],

@@ -1,4 +1,8 @@
-"""What accuracy costs: the laws hold, every method is right at its own price, a study is resumed where it stopped."""
+"""What accuracy costs.
+
+The laws hold, every method is right at its own price, a study is resumed where it
+stopped.
+"""
 
 import json
 import math
@@ -35,7 +39,10 @@ from tests.support.scenes import crank_rocker, thesis
 
 
 def turning(omega: float = 10.0, positions: int = 36) -> fourbar.Scene:
-    """The crank-rocker a = 0.1, b = 0.25, c = 0.22, d = 0.3 m with gravity, over a revolution."""
+    """The crank-rocker a = 0.1, b = 0.25, c = 0.22, d = 0.3 m, over a revolution.
+
+    It has gravity.
+    """
     sweep = fourbar.Sweep(0.0, 2.0 * math.pi, positions)
     return fourbar.Scene(
         LINKAGE, fourbar.Motion(sweep, omega), effects=(fourbar.Gravity(),)
@@ -301,7 +308,9 @@ def test_fit_floor_and_warning() -> None:
 
 
 JUMPING = (6.4e-2, 3.2e-2, 1.6e-2, 8e-3, 4e-3, 0.44, 1e-3, 5e-4)
-"""Of one pin force in steps doubled from 20 on: first order but for one point, which is no longer the motion."""
+"""Of one pin force in steps doubled from 20 on: first order but for one point, which is
+no longer the motion.
+"""
 
 
 @pytest.mark.parametrize(
@@ -356,7 +365,10 @@ def test_each_quantity_has_its_own_order_and_floor() -> None:
 
 
 def test_no_order_is_expected_where_sag_and_softness_mix() -> None:
-    """A part of the error that does not depend on the time constant flattens the slope; alone, a slope is a fault."""
+    """A part of the error that does not depend on the time constant flattens the slope.
+
+    Alone, a slope is a fault.
+    """
 
     def fit(constant: float, order: float) -> laws.ErrorLaw:
         rungs = [
@@ -380,7 +392,10 @@ def test_no_order_is_expected_where_sag_and_softness_mix() -> None:
 
 
 def test_a_quantity_that_no_timestep_brings_down_is_no_law_and_is_reported() -> None:
-    """In the thesis's mechanism the torque falls by its order with Euler, and the pin forces are wrong throughout."""
+    """In the thesis's mechanism the torque falls by its order with Euler.
+
+    The pin forces are wrong throughout.
+    """
     ladder = [
         change(point(160.0 * 2**k, 0.05 / 2**k), F12=error)
         for k, error in enumerate((1.8, 0.9, 1.1, 0.7))
@@ -403,7 +418,10 @@ def test_a_quantity_that_no_timestep_brings_down_is_no_law_and_is_reported() -> 
 
 
 def test_a_dip_and_a_motion_lost_at_coarse_steps_are_no_jump() -> None:
-    """Where two sources cancel the error dips; the softest closures, and the fewest steps, carry no motion at all."""
+    """Where two sources cancel the error dips.
+
+    The softest closures, and the fewest steps, carry no motion at all.
+    """
     ladder = [
         point(20.0 * 2**k, error)
         for k, error in enumerate((0.9, math.inf, 0.3, 3e-2, 1e-4, 1.2e-2, 6e-3, 3e-3))

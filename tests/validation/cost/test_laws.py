@@ -1,4 +1,7 @@
-"""Laws of the error and what is concluded from them, on points that follow a stated law."""
+"""Laws of the error and what is concluded from them.
+
+The points follow a stated law.
+"""
 
 import math
 from dataclasses import replace

@@ -1,4 +1,7 @@
-"""Each effect and each pair of effects through every engine that has it, and faults that the run must catch."""
+"""Each effect and each pair of effects through every engine that has it.
+
+The run must catch the faults.
+"""
 
 from collections.abc import Callable, Iterable
 from dataclasses import replace
@@ -72,7 +75,10 @@ NO_COUNTERPART = {
 
 @cache
 def scene(*names: str) -> Scene:
-    """A crank-rocker with the effects named, driven on bar 2; one for all faults in them."""
+    """A crank-rocker with the effects named, driven on bar 2.
+
+    One for all faults in them.
+    """
     terms = [ACTING[name] for name in names]
     return crank_rocker(
         motion=fourbar.Motion(fourbar.Sweep(0.13, 0.13 + 2 * np.pi, 12), 10.0, 3.0),
@@ -140,7 +146,10 @@ def test_all_at_once_on_every_drive_and_branch(drive: int, branch: int) -> None:
 
 
 def test_a_turned_frame_turns_gravity_with_it() -> None:
-    """Ground, input and gravity turned by one angle: the same torque and the same forces, turned."""
+    """Ground, input and gravity turned by one angle.
+
+    The same torque and the same forces, turned.
+    """
     posed, by = scene("gravity"), 0.7
     motion = posed.motion.replace(
         angle=fourbar.Sweep(0.13 + by, 0.13 + by + 2 * np.pi, 12)
@@ -208,7 +217,10 @@ def moved(effect: Effect) -> Effect:
 def test_an_effect_that_acts_elsewhere_in_the_formulas_fails_the_run(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The formulas have it at another pin, on another bar or in another direction; the engines where it is."""
+    """The formulas have it at another pin, on another bar or in another direction.
+
+    The engines where it is.
+    """
     true, kind = (
         question.solve,
         "loads" if isinstance(ACTING[name], Load) else "effects",

@@ -1,4 +1,7 @@
-"""What a scene does not name does not exist: nothing of it in the formulas, in the MJCF or in the compiled model."""
+"""What a scene does not name does not exist.
+
+Nothing of it in the formulas, in the MJCF or in the compiled model.
+"""
 
 import subprocess
 import sys
@@ -122,7 +125,10 @@ def test_each_effect_adds_what_it_needs_and_no_more(
 
 
 def test_an_effect_of_zero_size_is_still_named() -> None:
-    """A torque of 0 that the scene writes down is the scene's; what it leaves out is not there at all."""
+    """A torque of 0 that the scene writes down is the scene's.
+
+    What it leaves out is not there at all.
+    """
     mjcf = write_mjcf(crank_rocker(loads=(), effects=(Friction.at(A=0.0),)))
     assert "frictionloss=" in mjcf and 'frictionloss="0.0"' not in write_mjcf(
         crank_rocker(loads=(), effects=())

@@ -1,4 +1,7 @@
-"""The exact engines: published figures, round-off agreement, the right branch, limits, faults that must show."""
+"""The exact engines.
+
+Published figures, round-off agreement, the right branch, limits, faults that must show.
+"""
 
 import math
 from collections.abc import Callable
@@ -200,7 +203,10 @@ def test_a_force_at_a_point_drives(name: str, bar: int, frame: str) -> None:
 def test_it_assembles_where_the_circles_meet_and_on_the_commanded_branch(
     name: str,
 ) -> None:
-    """On random linkages, bars up to a million times shorter than others; B lies left of the diagonal on branch +1."""
+    """On random linkages, bars up to a million times shorter than others.
+
+    B lies left of the diagonal on branch +1.
+    """
     rng = np.random.default_rng(7)
     missing = 0
     for number in range(200):
@@ -302,7 +308,10 @@ REFUSED = {
 
 @each_engine
 def test_bars_without_mass_or_inertia(name: str) -> None:
-    """Exudyn and Pinocchio hold them; MuJoCo and OpenSim would drop them, and OpenSim and Drake divide by some."""
+    """Exudyn and Pinocchio hold them.
+
+    MuJoCo and OpenSim would drop them, and OpenSim and Drake divide by some.
+    """
     without_mass, without_inertia = REFUSED[name]
     for number in (2, 3, 4):
         for values, refused in (
@@ -318,7 +327,10 @@ def test_bars_without_mass_or_inertia(name: str) -> None:
 
 @each_engine
 def test_light_bars_are_held_or_refused(name: str) -> None:
-    """Below 2.2e-16 kg Pinocchio's sum of two inertias puts the mass centre elsewhere."""
+    """Below 2.2e-16 kg Pinocchio puts the mass centre elsewhere.
+
+    It sums two inertias.
+    """
     linkage = with_bar(2, mass=0.2).linkage
     light = {
         bar: replace(getattr(linkage, bar), mass=1e-18)
@@ -355,7 +367,10 @@ def test_the_floor_of_mujoco_is_where_it_is_stated_to_be() -> None:
 def test_simbody_loses_a_constraint_where_the_limit_says(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Bars 3 and 4 nearly in one line: just inside the limit it is exact, well beyond it the force is lost."""
+    """Bars 3 and 4 nearly in one line.
+
+    Just inside the limit it is exact, well beyond it the force is lost.
+    """
     from fourbar_lab.engines import opensim
 
     linkage = with_bar(2, mass=0.2).linkage
@@ -455,7 +470,9 @@ PLANTED = {
         "angle": (larger, {"theta_3", "theta_4"}),
     },
 }
-"""By engine and method: what is put in its place, and the quantities on which that must show."""
+"""By engine and method: what is put in its place, and the quantities on which that must
+show.
+"""
 
 
 SPOILED = Scene(
@@ -518,7 +535,10 @@ STROKES = {
 
 
 def commanded(what: str, branch: int) -> Scene:
-    """A crank-rocker commanded at another bar than the input, or by the stroke of the cylinder that drives it."""
+    """A crank-rocker commanded at another bar than the input, or by a stroke.
+
+    The stroke is that of the cylinder that drives it.
+    """
     if what in ("theta_3", "theta_4"):
         bar, angles = (
             int(what[-1]),
@@ -692,7 +712,10 @@ def test_near_a_jam_an_engine_finds_the_one_solution_that_there_is(
 def test_a_loop_that_just_closes_closes_however_the_ground_is_turned(
     ground_angle: float,
 ) -> None:
-    """Its discriminant is 0 exactly; from turned directions it was undecided, and read as open."""
+    """Its discriminant is 0 exactly.
+
+    From turned directions it was undecided, and read as open.
+    """
     bars = (Bar(length) for length in (1.0, 2.0, 4.0))
     folded = Scene(
         FourBar(3.0, *bars, ground_angle=ground_angle), Motion(ground_angle, 1.0)

@@ -1,4 +1,7 @@
-"""Engines in environments of their own: read from engines.toml, installed once, and judged side by side."""
+"""Engines in environments of their own.
+
+Read from engines.toml, installed once, and judged side by side.
+"""
 
 import sys
 import zipfile

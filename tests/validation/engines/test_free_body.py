@@ -1,4 +1,7 @@
-"""The free bodies against levers, energy and 50 digits, never against the formulas; and faults in them must show."""
+"""The free bodies against levers, energy and 50 digits, never against the formulas.
+
+Faults in them must show.
+"""
 
 import math
 from collections.abc import Callable
@@ -34,7 +37,8 @@ from tests.whole.test_imports import ROOT, imported
 
 EPS = 2.0**-52
 DIGITS = 50.0 * EPS
-"""Of the sum of the terms: an equation of some fifty roundings, evaluated in doubles."""
+"""Of the sum of the terms: an equation of some fifty roundings, evaluated in doubles.
+"""
 ONE = [engine for engine in ENGINES if engine.name == "free-body"]
 RECTANGLE = fourbar.FourBar(0.3, fourbar.Bar(0.1), fourbar.Bar(0.3), fourbar.Bar(0.1))
 
@@ -96,7 +100,10 @@ def gap(
 
 
 def test_the_angles_solve_the_closure_equations_to_50_digits() -> None:
-    """Against Newton in 50 digits from its own angles: the error is that of the last digits of the longest bar."""
+    """Against Newton in 50 digits from its own angles.
+
+    The error is that of the last digits of the longest bar.
+    """
     rng = np.random.default_rng(3)
     checked = 0
     with mp.workdps(50):
@@ -141,7 +148,10 @@ def test_a_lever_of_an_upright_rectangle(
     F43: tuple[int, int],
     F14: tuple[int, int],
 ) -> None:
-    """10 N push bar 4 at B along the coupler; the bars are upright and 0.1 m long, and the coupler a two-force bar."""
+    """10 N push bar 4 at B along the coupler.
+
+    The bars are upright and 0.1 m long, and the coupler a two-force bar.
+    """
     load = Load(4, (10.0, 0.0), arm=(0.05, math.pi / 2))
     got = answered(Scene(RECTANGLE, fourbar.Motion(math.pi / 2, 0.0), drive, (load,)))
     assert got["torque"][0] == pytest.approx(torque, abs=1e-14)
@@ -150,7 +160,10 @@ def test_a_lever_of_an_upright_rectangle(
 
 
 def test_weight_of_a_crank_and_a_flywheel() -> None:
-    """Bar 2 alone has mass: T = (I + m r^2 + J) alpha + m g r cos theta_2, and O2 carries its weight and m a_G."""
+    """Bar 2 alone has mass.
+
+    T = (I + m r^2 + J) alpha + m g r cos theta_2, and O2 carries its weight and m a_G.
+    """
     bar = fourbar.Bar(0.1, 2.0, 0.003, (0.04, 0.0))
     linkage = replace(RECTANGLE, input=bar)
     scene = Scene(
@@ -174,7 +187,10 @@ TORSION = fourbar.effects.Torsion.at(O4=(2.0, 1.9, 0.1))
 
 @pytest.mark.parametrize("drive", [2, 4])
 def test_over_a_turn_what_stores_energy_gives_it_back(drive: int) -> None:
-    """The work of the drive over a revolution at constant speed is zero; the sum over a period converges like n^-n."""
+    """The work of the drive over a revolution at constant speed is zero.
+
+    The sum over a period converges like n^-n.
+    """
     motion = fourbar.Motion(np.arange(512) * (2.0 * math.pi / 512), 10.0)
     got = answered(
         crank_rocker(
@@ -208,7 +224,10 @@ def test_over_a_turn_what_stores_energy_gives_it_back(drive: int) -> None:
     ids=lambda effect: effect.key,
 )
 def test_what_brakes_takes_the_power_that_the_drive_gives_more(effect: Any) -> None:
-    """Couple times slip at each pin, at every position; of pin friction with the forces that it changes itself."""
+    """Couple times slip at each pin, at every position.
+
+    Of pin friction with the forces that it changes itself.
+    """
     with_, without = (
         answered(crank_rocker(effects=(effect,))),
         answered(crank_rocker(effects=())),
@@ -256,7 +275,10 @@ def test_dry_friction_does_nothing_at_rest() -> None:
     ],
 )
 def test_friction_of_one_pin(F: complex, C: complex, x: float) -> None:
-    """x = |F + C x| by hand; where the couple adds to its own load by as much as it is, the pin jams."""
+    """x = |F + C x| by hand.
+
+    Where the couple adds to its own load by as much as it is, the pin jams.
+    """
     couples = continue_couples(
         np.array([[F]], dtype=complex),
         np.array([[[C]]], dtype=complex),

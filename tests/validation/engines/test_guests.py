@@ -1,4 +1,8 @@
-"""Engines outside: what they answer is judged as anybody's, and whatever they do costs their own rows alone."""
+"""Engines outside.
+
+What they answer is judged as anybody's, and whatever they do costs their own rows
+alone.
+"""
 
 import re
 import shutil
@@ -46,7 +50,10 @@ def _ended() -> Iterator[None]:
 
 
 def judged(scene: fourbar.Scene, *entries: str, seconds: float = 60.0) -> Verdicts:
-    """Verdict and reason by engine and quantity; a name without a colon is a class of tests.support."""
+    """Verdict and reason by engine and quantity.
+
+    A name without a colon is a class of tests.support.
+    """
     entries = tuple(
         entry if re.search("[: ]", entry) else HERE + entry for entry in entries
     )
@@ -424,7 +431,10 @@ def test_a_guest_that_integrates_is_asked_for_released_motions(
 
 
 def test_names_stand_apart() -> None:
-    """Of another engine, of two guests, and of those whose hello fails: by entry, class or file."""
+    """Of another engine, of two guests, and of those whose hello fails.
+
+    By entry, class or file.
+    """
     entries = [
         HERE + "OfAnother",
         HERE + "Right",
@@ -581,7 +591,10 @@ def answer(scene, at):
 def test_parts_judged_by_another_code_are_made_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Runs that are interrupted once the first part is there; what the second one says of its parts."""
+    """Runs that are interrupted once the first part is there.
+
+    What the second one says of its parts.
+    """
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     (tmp_path / "mine.py").write_text(
         "class Mine:\n    name = 'mine'\n    def answer(self, scene, at):\n"

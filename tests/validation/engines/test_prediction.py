@@ -1,4 +1,7 @@
-"""What is predicted where rounding decides whether the loop closes: nothing that does not depend on it is excused."""
+"""What is predicted where rounding decides whether the loop closes.
+
+Nothing that does not depend on it is excused.
+"""
 
 import math
 
@@ -35,7 +38,10 @@ BOUNDED = ("theta_3", "theta_4", "B", "G3", "G4", "sin_mu", "condition")
 
 
 def touch() -> Scene:
-    """Command bar 2 to within a rounding of where its loop ceases to close, in the sense in which it closes."""
+    """Command bar 2 to within a rounding of where its loop ceases to close.
+
+    It goes in the sense in which it closes.
+    """
     limit = next(x.theta_2 for x in limit_positions(ROCKER) if 0.0 < x.theta_2 < np.pi)
     angles = limit + np.arange(-6, 7) * EPS
     scene = Scene(ROCKER, Motion(angles, 3.0))
@@ -85,7 +91,10 @@ def test_what_the_input_decides_is_predicted_to_its_last_digits() -> None:
 def test_the_bound_of_the_angles_is_that_of_the_triangle(
     b: float, c: float, stretched: bool
 ) -> None:
-    """Close a triangle that misses its line by the margin, by the cosine rule in 200 bits."""
+    """Close a triangle that misses its line by the margin.
+
+    The cosine rule is used in 200 bits.
+    """
     from flint import arb, ctx
 
     e = b + c if stretched else abs(b - c)

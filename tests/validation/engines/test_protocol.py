@@ -1,4 +1,7 @@
-"""Scenes, commands and answers as JSON: what is stated comes back bit for bit, and what is wrong is said in a line."""
+"""Scenes, commands and answers as JSON.
+
+What is stated comes back bit for bit, and what is wrong is said in a line.
+"""
 
 import json
 import math
@@ -38,9 +41,10 @@ def through_text(data):
 
 
 def stated(scene):
-    """What a guest is told: every place from its bar's pin, every mass, the motion apart.
+    """What a guest is told.
 
-    No words, pictures, points and tolerances.
+    Every place from its bar's pin, every mass, the motion apart. No words, pictures,
+    points and tolerances.
     """
     scene = state_from_pins(scene)
     link = scene.linkage
@@ -119,7 +123,10 @@ def test_every_scene_and_command_comes_back_bit_for_bit():
 
 
 def test_nothing_travels_that_the_formulas_computed():
-    """Every number of a scene's JSON stands in its file's text; what the file leaves out is left out."""
+    """Every number of a scene's JSON stands in its file's text.
+
+    What the file leaves out is left out.
+    """
     scene = replace(
         crank_rocker(), effects=(fourbar.Gravity(), fourbar.Viscous((("O2", 0.01),)))
     )
@@ -373,7 +380,10 @@ def test_a_setting_that_is_none_is_refused_in_one_line(data) -> None:
 
 
 def test_an_engine_through_time_may_be_faster_by_what_the_acceleration_gives() -> None:
-    """omega^2 = omega_0^2 + 2 alpha theta: of a stroke too, whose bar has the motion that the formulas state."""
+    """omega^2 = omega_0^2 + 2 alpha theta.
+
+    Of a stroke too, whose bar has the motion that the formulas state.
+    """
     command = list_positions(
         fourbar.load(MODELS / "capabilities" / "stroke_input.toml")
     )

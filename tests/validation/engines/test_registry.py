@@ -1,4 +1,7 @@
-"""Engines of the lab join a run where it is installed; no other distribution adds one."""
+"""Engines of the lab join a run where it is installed.
+
+No other distribution adds one.
+"""
 
 from collections.abc import Iterator
 from importlib.metadata import Distribution, PackageNotFoundError

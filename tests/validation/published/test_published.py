@@ -1,4 +1,8 @@
-"""Printed figures: the thesis's torque error by error, its tables, its errata, and answers of public test cases."""
+"""Printed figures.
+
+The thesis's torque error by error, its tables, its errata, and answers of public test
+cases.
+"""
 
 from collections import Counter
 from pathlib import Path
@@ -46,9 +50,13 @@ from tests.support import scenes
 LISTED = 0.5e-12
 """Half a unit of the last digit listed below."""
 TYPED = 4.0 * 2.0**-52
-"""Relative; two spellings of one input, 57*153^2/12 cm^2 or 11.119275 m^2, differ by a few roundings."""
+"""Relative; two spellings of one input, 57*153^2/12 cm^2 or 11.119275 m^2, differ by a
+few roundings.
+"""
 PRINTED_GAP = 20.0 * np.radians(0.5e-5) + 55.0 * np.radians(0.5e-6)
-"""cm; theta_4 is printed to five decimals of a degree at least, theta_3 to six: half a unit of each, by its bar."""
+"""cm; theta_4 is printed to five decimals of a degree at least, theta_3 to six: half a
+unit of each, by its bar.
+"""
 T4 = (
     309.30935923198564, 309.330779939797, 309.313000742774, 309.304477356844,
     309.002005400392, 308.804407126702, 308.8044071267012, 308.80440716278196,
@@ -87,7 +95,10 @@ def test_the_thesis_without_its_errors_is_ours() -> None:
 
 
 def test_round_off_holds_for_other_pivots_and_inputs_typed_otherwise() -> None:
-    """Against fifty digits: rows in any order, each number moved by a rounding; the bound is not idle either."""
+    """Against fifty digits: rows in any order, each number moved by a rounding.
+
+    The bound is not idle either.
+    """
     matrix, sides = make_equations(ProgramErrors())
     with mpmath.workdps(50):
         exact = [
@@ -164,7 +175,10 @@ def test_every_figure_is_compared() -> None:
 
 
 def test_every_difference_is_what_its_errata_make_of_ours() -> None:
-    """Save three misprints, for which no computation is known; an agreement needs no misprint to explain it."""
+    """Save three misprints, for which no computation is known.
+
+    An agreement needs no misprint to explain it.
+    """
     differ = [figure for figure in ALL if figure.verdict() == "differs"]
     assert all(is_explained(figure) for figure in differ)
     misprints = {
@@ -189,7 +203,10 @@ def test_every_difference_is_what_its_errata_make_of_ours() -> None:
 
 
 def test_each_erratum_named_is_needed() -> None:
-    """No figure names an erratum and yet is right before it is made (one entry of the matrix is, by its two digits)."""
+    """No figure names an erratum and yet is right before it is made.
+
+    One entry of the matrix is, by its two digits.
+    """
     idle = [
         f"{figure.table} {figure.name}"
         for figure in ALL
@@ -325,7 +342,10 @@ def test_public_test_cases_agree_to_the_last_digit() -> None:
 
 
 def test_answers_that_sympy_leaves_to_be_solved() -> None:
-    """Mass matrix and forcing as printed in test_jointsmethod.py give the accelerations that are compared."""
+    """Mass matrix and forcing give the accelerations that are compared.
+
+    They are as printed in test_jointsmethod.py.
+    """
     mass = np.array(
         [
             [3.452709815256506e01, 7.003948798374735e00, -4.939690970641498e00],

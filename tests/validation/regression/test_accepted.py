@@ -1,4 +1,7 @@
-"""What the exact engines say of the scenes of a run is the accepted state, on whatever machine that was made."""
+"""What the exact engines say of the scenes of a run is the accepted state.
+
+It is so on whatever machine that was made.
+"""
 
 from dataclasses import replace
 
@@ -16,7 +19,9 @@ from tests.support.runs import compare_rows, read_run
 
 SUITE = read_default_suite()
 EXACT = [engine for engine in ENGINES if not engine.through_time]
-"""A simulation through time takes longer than all of them; `validation run --against accepted` asks it too."""
+"""A simulation through time takes longer than all of them; `validation run --against
+accepted` asks it too.
+"""
 
 
 def test_nothing_got_worse_since_the_accepted_state() -> None:
@@ -45,7 +50,10 @@ def test_nothing_got_worse_since_the_accepted_state() -> None:
 
 @pytest.mark.parametrize("turns", [0, 800])
 def test_a_row_states_the_condition_that_its_allowance_comes_from(turns: int) -> None:
-    """By which a move is distinguished from round-off: one limit position has 7 digits, the next 13."""
+    """By which a move is distinguished from round-off.
+
+    One limit position has 7 digits, the next 13.
+    """
     name, scene = next(
         (name, SUITE.scene(i))
         for i in range(len(SUITE))

@@ -1,4 +1,7 @@
-"""What changed since the accepted state: real changes distinguished from round-off, the surroundings first."""
+"""What changed since the accepted state.
+
+Real changes distinguished from round-off, the surroundings first.
+"""
 
 import ast
 import contextlib
@@ -161,7 +164,10 @@ def test_accept_keeps_the_run_next_to_the_results_or_in_a_stated_folder(
 
 
 def damaged(folder: Path) -> Iterator[tuple[Path, str]]:
-    """A run's folder damaged in one place after the other: the file that is to blame, and words of the message."""
+    """A run's folder damaged in one place after the other.
+
+    The file that is to blame, and words of the message.
+    """
     files = {path: path.read_bytes() for path in folder.iterdir()}
     table, times, about = (
         folder / name for name in ("results.csv", "timings.csv", "record.json")
@@ -383,7 +389,10 @@ def test_a_run_with_too_many_rows_for_a_text_is_read_from_its_columns(
 def test_two_long_runs_are_read_scene_by_scene_and_little_of_them_is_kept(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """One row group after the other, both in step; every row is counted, of each kind the worst are listed."""
+    """One row group after the other, both in step.
+
+    Every row is counted, of each kind the worst are listed.
+    """
     monkeypatch.setattr("fourbar_validation.compare.columns.GROUP_ROWS", 60)
     for module in (
         "fourbar_validation.compare.columns",
@@ -485,7 +494,10 @@ def test_a_part_of_a_long_run_compares_with_its_part_and_a_table_out_of_order_wi
 
 
 def disagreeing(worse: set[tuple[str, str]]) -> tuple[list[Row], list[Row]]:
-    """Two runs of three scenes by three exact engines, a simulation and an identity; `worse`: engine and quantity."""
+    """Two runs of three scenes by three exact engines, a simulation and an identity.
+
+    `worse`: engine and quantity.
+    """
     names = [
         (engine, quantity)
         for engine in ("one", "two", "three", "sim")
@@ -671,7 +683,10 @@ def test_a_renamed_scene_is_found_by_what_it_states(
 
 
 def test_what_grew_within_its_allowance_is_shown_and_no_regression() -> None:
-    """Another kernel of the BLAS turns 3.4e-7 into 5.2e-7 where 1 is allowed; a wider allowance excuses nothing."""
+    """Another kernel of the BLAS turns 3.4e-7 into 5.2e-7 where 1 is allowed.
+
+    A wider allowance excuses nothing.
+    """
     shipped = replace(ROW, quantity="as shipped", error=3.4e-7, allowed=1.0)
     changes = compare_rows((HERE, [shipped]), (HERE, [replace(shipped, error=5.2e-7)]))
     assert [change.kind for change in changes.changes] == [
@@ -771,7 +786,10 @@ LOOSE = replace(
 def test_a_wider_tolerance_is_a_regression_over_two_nights(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The first night widens it and is not accepted; the second hides an error in it."""
+    """The first night widens it and is not accepted.
+
+    The second hides an error in it.
+    """
     strict = save_run(tmp_path / "strict", [ROW])
     accepted = tmp_path / "accepted"
     assert status(["accept", str(strict), "--to", str(accepted)]) == 0
@@ -1008,7 +1026,10 @@ def test_accepted_runs_are_rows_of_one_table_that_pandas_reads(tmp_path: Path) -
 def test_a_name_that_does_not_print_or_is_a_formula_is_one_name_everywhere(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Escapes change the order of names, and a spreadsheet calculates a cell that begins with =."""
+    """Escapes change the order of names.
+
+    A spreadsheet calculates a cell that begins with =.
+    """
     judge_here(monkeypatch)
     names = ["a\x1b", "aB", "b\nc", "=cmd|'calc'!A0", "+1", "'quoted"]
     text = fourbar.dump(

@@ -1,4 +1,7 @@
-"""report.html in a real browser: quiet, readable in the dark, its links and its download right."""
+"""report.html in a real browser.
+
+Quiet, readable in the dark, its links and its download right.
+"""
 
 import base64
 import gzip
@@ -47,7 +50,9 @@ return found.sort((a, b) => a[0] - b[0]).slice(0, 5);
 
 
 SMALLEST = 9.0
-"""px, of text at the size at which it is shown. Its box is two px more: room above its letters."""
+"""px, of text at the size at which it is shown. Its box is two px more: room above its
+letters.
+"""
 TEXTS = """
 const clipped = [];
 let smallest = Infinity;

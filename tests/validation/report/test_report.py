@@ -1,4 +1,8 @@
-"""The report as text: every number traceable to its row, short enough where it must be, whatever a scene is called."""
+"""The report as text.
+
+Every number traceable to its row, short enough where it must be, whatever a scene is
+called.
+"""
 
 import base64
 import csv
@@ -194,7 +198,10 @@ def test_the_errors_drawn_are_the_largest_of_their_stretches() -> None:
 
 
 def test_the_times_of_engines_are_those_of_the_run() -> None:
-    """The median over scenes; of an engine that refused none, and beside our own consistency that of the formulas."""
+    """The median over scenes.
+
+    Of an engine that refused none, and beside our own consistency that of the formulas.
+    """
     scenes = []
     for k in (1.0, 2.0, 8.0):
         timings = [
@@ -345,7 +352,10 @@ def test_every_engine_of_a_report_has_a_mark_of_its_own(
 def test_a_run_prints_one_row_an_engine_and_the_rest_on_demand(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Beside the error what is allowed to it; a share of undecided numbers is no error; our own rows are one."""
+    """Beside the error what is allowed to it; a share of undecided numbers is no error.
+
+    Our own rows are one.
+    """
     row = Row(
         "first",
         "mujoco-simulated",
@@ -418,7 +428,10 @@ OF_MINE = Row(
 def test_failures_are_one_line_an_engine_and_cause(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A mistake that explains more scenes is named before one that fits a few by chance."""
+    """A mistake that explains more scenes is named first.
+
+    It comes before one that fits a few by chance.
+    """
     swapped, sign = "F32 and F43 are exchanged: F32, F43", "sign reversed"
     scenes = [
         record_of(

@@ -40,7 +40,10 @@ def write(folder: Path, polycoef: str = "0 0.8842 0 0 0", axis: int = 1) -> Path
 
 
 def ask_mujoco(path: Path) -> tuple[np.ndarray, np.ndarray]:
-    """Find the follower's position at each of the leader's at which MuJoCo's own equality is satisfied."""
+    """Find the follower's position at each of the leader's.
+
+    MuJoCo's own equality is satisfied at it.
+    """
     model = mujoco.MjModel.from_xml_path(str(path))
     data = mujoco.MjData(model)
     leader = np.radians(np.linspace(-40.0, 40.0, 41))
@@ -107,7 +110,10 @@ def test_the_printed_polynomial_does_in_mujoco_what_was_said(tmp_path: Path) -> 
 def test_the_smallest_largest_error_is_that_of_the_textbooks(
     function: object, degree: int, smallest: float
 ) -> None:
-    """Chebyshev's theorem: x^n is missed by 2^(1-n) by polynomials of degree n - 1, |x| by 1/8 by parabolas."""
+    """Chebyshev's theorem.
+
+    X^n is missed by 2^(1-n) by polynomials of degree n - 1, |x| by 1/8 by parabolas.
+    """
     x = np.linspace(-1.0, 1.0, 2001)
     y = function(x)  # type: ignore[operator]
     left = np.polynomial.polynomial.polyval(x, fit_minimax(x, y, degree)) - y

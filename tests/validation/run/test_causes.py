@@ -37,7 +37,10 @@ def nothing(numbers: dict[str, np.ndarray], at: Command) -> None:
 
 
 def make_guest(*replacements: tuple[str, str], change: Change = nothing) -> type:
-    """Make the page's engine with other words in its text, and other numbers at last."""
+    """Make the page's engine with other words in its text.
+
+    Its numbers are others at last.
+    """
     text = SOLVER
     for old, new in replacements:
         assert old in text, old
@@ -271,7 +274,10 @@ def test_a_mistake_is_named_wherever_the_drive_acts(bar: int) -> None:
 def test_the_joint_of_a_driven_bar_carries_the_bars_behind_it(
     pin: str, bar: int
 ) -> None:
-    """The work of the weights in a tree whose driven joint alone turns is that of its torque."""
+    """The work of the weights in a tree is that of its torque.
+
+    Its driven joint alone turns.
+    """
     scene = crank_rocker(loads=(), drive_bar=bar)
     standing = scene.motion.replace(speed=0.0, acceleration=0.0)
     scene = replace(scene, motion=standing, effects=(fourbar.Gravity(),))

@@ -1,4 +1,7 @@
-"""The harness itself, with engines with given answers: silence, NaN and breakdowns must cost the run."""
+"""The harness itself, with engines with given answers.
+
+Silence, NaN and breakdowns must cost the run.
+"""
 
 from dataclasses import replace
 
@@ -30,7 +33,10 @@ from tests.support.scenes import crank_rocker
 
 
 class Echo:
-    """Answers with the formulas' own numbers, changed by `spoil`; only for tests of the harness."""
+    """Answers with the formulas' own numbers, changed by `spoil`.
+
+    Only for tests of the harness.
+    """
 
     name = "echo"
 
@@ -155,7 +161,10 @@ def test_a_torque_off_by_a_billionth_fails() -> None:
 
 
 class OffAtTheReversal(Echo):
-    """Everything is off by a thousandth at the dead centre of `with_friction`, and nowhere else."""
+    """Everything is off by a thousandth at the dead centre of `with_friction`.
+
+    Nowhere else is anything off.
+    """
 
     def spoil(self, answer: Answer) -> Answer:
         for values in answer.quantities.values():
@@ -168,7 +177,10 @@ AT_REST = 1
 
 
 def with_friction() -> Scene:
-    """A crank-rocker with dry friction at O4, at the dead centre of bar 4 and on either side of it."""
+    """A crank-rocker with dry friction at O4, at the dead centre of bar 4.
+
+    It is on either side of it too.
+    """
     linkage = fourbar.uniform(0.3, 0.1, 0.25, 0.22)
     d, a, b, c = linkage.lengths
     psi = np.arccos((d * d + (a + b) ** 2 - c * c) / (2.0 * d * (a + b)))
@@ -288,7 +300,10 @@ class AnswersAnyway(Echo):
 
 
 def test_an_answer_that_the_formulas_withhold_is_not_compared() -> None:
-    """On bar 3 of a parallelogram no torque exists: no agreement, whatever the engine says; the motion is judged."""
+    """On bar 3 of a parallelogram no torque exists.
+
+    No agreement, whatever the engine says; the motion is judged.
+    """
     motion = fourbar.Motion(np.linspace(0.3, 2.0, 5), 1.0)
     for engine in (Echo, AnswersAnyway):
         rows = rows_of(engine, Scene(fourbar.uniform(1.0, 0.5, 1.0, 0.5), motion, 3))
@@ -362,7 +377,10 @@ def test_an_engine_is_started_once_a_scene_and_no_question_is_put_twice(
 def test_an_engine_that_is_commanded_by_a_stroke_is_given_no_angle(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The angle, its rates and the lever are what the formulas computed from the stroke: it finds its own."""
+    """Angle, rates and lever are what the formulas computed from the stroke.
+
+    The engine finds its own.
+    """
     commands: list[Command] = []
     answering = FreeBody.answer
 

@@ -1,4 +1,7 @@
-"""Scenes that once failed with engines that are right: the harness holds them, and what is wrong there still fails."""
+"""Scenes that once failed with engines that are right.
+
+The harness holds them, and what is wrong there still fails.
+"""
 
 from dataclasses import replace
 
@@ -58,7 +61,10 @@ def test_engines_that_are_right_raise_no_alarm(name: str) -> None:
 
 @pytest.mark.slow
 def test_ratios_over_ten_decades_raise_no_alarm() -> None:
-    """As `run --random N --type uneven`. In the last the forces were summed more strictly than its coupler allows."""
+    """As `run --random N --type uneven`.
+
+    In the last the forces were summed more strictly than its coupler allows.
+    """
     scenes = [
         (index, draw_random_scene(0, index, ()))
         for index in (1, 6, 8, 9, 10, 32, 36, 61)
@@ -80,7 +86,10 @@ def test_ratios_over_ten_decades_raise_no_alarm() -> None:
 def test_a_free_motion_near_a_limit_raises_no_alarm(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The engines get theta_2, omega_2 and alpha_2 of the independent theta_4, rounded: what that costs is computed."""
+    """The engines get theta_2, omega_2 and alpha_2 of the independent theta_4, rounded.
+
+    What that costs is computed.
+    """
     monkeypatch.setattr(released, "FORWARD", {})
     scene = FAULT_SCENES["double rocker released"]
     often = replace(
@@ -95,7 +104,10 @@ def test_a_free_motion_near_a_limit_raises_no_alarm(
 def test_what_is_wrong_by_more_than_is_predicted_fails(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Where the law in the condition is too strict, what is computed in its place is no licence."""
+    """The law in the condition is too strict in places.
+
+    What is computed in its place there is no licence.
+    """
     true = fourbar.solve
 
     def off(*arguments: object, **keywords: object) -> Solution:
@@ -130,7 +142,10 @@ def test_an_error_bar_of_no_error_fails(monkeypatch: pytest.MonkeyPatch) -> None
 
 
 class AboutCentres:
-    """Newton and Euler in doubles, bar by bar, with the moments about the mass centres."""
+    """Newton and Euler in doubles, bar by bar.
+
+    The moments are about the mass centres.
+    """
 
     name = "about centres"
     factor = 1.0
@@ -209,7 +224,10 @@ class AMillionthOff(AboutCentres):
 
 @pytest.mark.slow
 def test_moments_about_far_centres_are_right_to_full_accuracy() -> None:
-    """The digits that such a method loses are computed, and the reason says for which."""
+    """The digits that such a method loses are computed.
+
+    The reason says for which.
+    """
     pytest.importorskip("flint")
     suite = Hard()
     names = [suite.name(index) for index in range(len(suite))]

@@ -1,4 +1,8 @@
-"""A run in parts: the bytes of a whole one, and a line that names what is missing, damaged or of another run."""
+"""A run in parts.
+
+The bytes of a whole one, and a line that names what is missing, damaged or of another
+run.
+"""
 
 import json
 import shutil
@@ -26,7 +30,10 @@ def small_tasks(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def parts(tmp_path: Path) -> list[str]:
-    """The folders of three parts: of four tasks the first and the last are of part 1."""
+    """The folders of three parts.
+
+    Of four tasks the first and the last are of part 1.
+    """
     folders = [str(tmp_path / f"part-{k}") for k in (1, 2, 3)]
     for k, folder in enumerate(folders, 1):
         assert status(["run", *OPTIONS, "--part", f"{k}/3", "-o", folder]) == HOLDS

@@ -1,4 +1,7 @@
-"""A released linkage that reaches a limit position: judged to its end, whatever an engine does there."""
+"""A released linkage that reaches a limit position.
+
+Judged to its end, whatever an engine does there.
+"""
 
 import json
 from dataclasses import replace
@@ -17,7 +20,10 @@ from fourbar_validation.run.judge import judge, judge_for_report
 
 
 def falling(coupler: float = 0.15, **motion: Any) -> Scene:
-    """It falls from rest until bars 3 and 4 lie in one line; with a coupler of 0.12 m that is a change point."""
+    """It falls from rest until bars 3 and 4 lie in one line.
+
+    With a coupler of 0.12 m that is a change point.
+    """
     linkage = fourbar.FourBar(
         0.3, fourbar.Bar(0.2, 0.2), fourbar.Bar(coupler, 0.5), fourbar.Bar(0.22, 0.4)
     )
@@ -39,11 +45,12 @@ states itself; an engine that loses more than this has become worse.
 def find_spread_by_energy(
     scene: Scene, solution: fourbar.Solution, instant: int, engine: str
 ) -> float:
-    """How far theta_2 goes apart, rad, where an engine's loss of energy happens at an instant.
+    """Find how far theta_2 goes apart, rad.
 
-    The linkage has one freedom, so that its speed at an angle follows from its energy:
-    an engine that keeps its bars together errs by no more than what its energy does. It
-    loses that where the bars come into line and the constraint forces are large.
+    An engine's loss of energy happens at an instant. The linkage has one freedom, so
+    that its speed at an angle follows from its energy: an engine that keeps its bars
+    together errs by no more than what its energy does. It loses that where the bars
+    come into line and the constraint forces are large.
     """
     start, step, _ = free.FORWARD[engine]
     times = np.linspace(0.0, 1.0, len(solution))
@@ -142,7 +149,10 @@ def test_an_engine_that_is_nan_before_the_limit_or_behind_it_fails(
 
 
 def test_an_engine_is_run_at_twice_its_step_however_close_the_instants_are() -> None:
-    """Released from rest by a couple alone: kinetic energy and work are equal, and their difference is no scale."""
+    """Released from rest by a couple alone.
+
+    Kinetic energy and work are equal, and their difference is no scale.
+    """
     scene = replace(falling(), effects=(), loads=(fourbar.Load(4, moment=0.1),))
     for steps in (20, 200):  # 10 and 1 ms apart
         released = fourbar.Free(0.2, steps)
@@ -157,7 +167,10 @@ def test_an_engine_is_run_at_twice_its_step_however_close_the_instants_are() -> 
 def test_an_engine_that_predicts_nothing_of_itself_is_undecided(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """One that is wrong by 3 rad at its step and by 5 rad at twice it has no digit by which it could agree."""
+    """One is wrong by 3 rad at its step and by 5 rad at twice it.
+
+    It has no digit by which it could agree.
+    """
     off = iter([3.0, 5.0])
     rows = answering(
         monkeypatch,

@@ -1,4 +1,7 @@
-"""A run held against an earlier one says of the failure that it names how it stood there."""
+"""A run held against an earlier one says how a failure stood there.
+
+It is the failure that the verdict names.
+"""
 
 from dataclasses import replace
 from pathlib import Path
@@ -76,7 +79,10 @@ def test_a_rule_that_is_weaker_than_before_stands_first(
 def test_the_verdict_says_since_when_of_the_failure_that_it_names(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The cause of most scenes is named, of which the first scene that fails has none."""
+    """The cause of most scenes is named.
+
+    The first scene that fails does not have it.
+    """
     judge_here(monkeypatch)
     rows = {
         "a": [replace(FAILED, quantity="torque")],

@@ -1,4 +1,7 @@
-"""Parts of a run in its folder: of this run, undamaged, each in its place, or made again."""
+"""Parts of a run in its folder.
+
+Of this run, undamaged, each in its place, or made again.
+"""
 
 from pathlib import Path
 

@@ -162,7 +162,7 @@ IN_LINE = (
 def test_lengths_that_miss_a_change_point_by_roundings_are_the_same(
     command: int, gap: int
 ) -> None:
-    """Rounding decides in each statement anew whether there is a change point at all."""
+    """Rounding decides in each statement whether there is a change point."""
     judged = 0
     for lengths, sense, branch in product(IN_LINE, (-1, 1), (-1, 1)):
         ground, *others = lengths

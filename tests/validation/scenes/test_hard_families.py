@@ -1,4 +1,7 @@
-"""Hard cases: what must happen does, predictions are sharp, limits are where they were, the watch bites."""
+"""Hard cases: what must happen does, and predictions are sharp.
+
+Limits are where they were, and the watch bites.
+"""
 
 import math
 from dataclasses import replace
@@ -117,7 +120,10 @@ def test_beyond_a_toggle_no_engine_finds_a_position() -> None:
 def test_near_a_toggle_all_but_the_sine_has_its_digits_though_it_has_few_itself(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """A millionth of the torque stood within what the last digits of theta_2 excuse there, for every engine."""
+    """A millionth of the torque is within what the last digits excuse.
+
+    They are those of theta_2, for every engine.
+    """
     lengths, true = (
         draw_linkage(DrawnType.TRIPLE_ROCKER, 0),
         fourbar_validation.run.question.solve,
@@ -167,7 +173,10 @@ def test_an_answer_nearby_is_one_within_the_rounding_of_theta_2() -> None:
 
 
 def test_an_answer_nearby_has_the_sine_of_the_formulas() -> None:
-    """Of a shift in many digits: 1e-9 rad from a limit position a sine of the formulas is met to its last digit."""
+    """Of a shift in many digits.
+
+    1e-9 rad from a limit position a sine of the formulas is met to its last digit.
+    """
     lengths = draw_linkage(DrawnType.TRIPLE_ROCKER, 0)
     (psi, stretched), *_ = find_collinear_3_4(lengths)
     near = set_angles(
@@ -182,7 +191,10 @@ def test_an_answer_nearby_has_the_sine_of_the_formulas() -> None:
 
 
 class Spoiled:
-    """The formulas' numbers with the pin force at A spoiled; only for tests of the harness."""
+    """The formulas' numbers with the pin force at A spoiled.
+
+    Only for tests of the harness.
+    """
 
     name, part = "spoiled", 0.0
 
@@ -232,7 +244,10 @@ def test_near_a_toggle_a_wrong_force_fails_that_the_law_excuses() -> None:
 
 
 def test_predictions_know_what_no_law_in_sines_knows() -> None:
-    """A parallelogram that stays parallel is regular in the formulas and 1/d^3 in the data; a scale changes nothing."""
+    """A parallelogram that stays parallel is regular in the formulas.
+
+    It is 1/d^3 in the data; a scale changes nothing.
+    """
     for name, scene in toggle(distances=(1e-4,), seeds=range(1)):
         at_ = fourbar.command(scene)
         for quantity in ("torque", "F32"):
@@ -254,7 +269,10 @@ def test_every_declared_limit_is_measured() -> None:
 def test_a_limit_is_where_it_was(
     limit: Measured, tmp_path: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Should this fail after an engine upgrade, the engine has lifted or worsened the limit: measure it again."""
+    """A failure after an engine's upgrade means another limit.
+
+    The engine has lifted or worsened it: measure it again.
+    """
     monkeypatch.chdir(tmp_path)  # MuJoCo writes its warnings into the working folder
     assert limit.holds(limit.inside)
     assert not limit.holds(limit.outside)
@@ -280,7 +298,10 @@ def alarm(answer: Answer, name: str) -> bool:
 def test_power_and_acceleration_see_what_the_gap_does_not(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """A closure stiffer than RK4 can follow: torque 98 % wrong and worse with a gap of 6e-6 m."""
+    """A closure stiffer than RK4 can follow.
+
+    Torque 98 % wrong and worse with a gap of 6e-6 m.
+    """
 
     class Stiff(ClosedLoop):
         def __init__(self, mjcf: str) -> None:
@@ -322,7 +343,10 @@ def test_a_crank_that_does_not_turn_as_commanded_is_seen() -> None:
 def test_a_reset_and_what_caused_it_are_seen(
     what: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Any
 ) -> None:
-    """A state or an acceleration that MuJoCo takes for bad, once, in the middle of the run."""
+    """A state or an acceleration that MuJoCo takes for bad.
+
+    It occurs once, in the middle of the run.
+    """
     monkeypatch.chdir(tmp_path)
     true, calls = ClosedLoop.forward, []
 
@@ -374,7 +398,10 @@ def test_a_free_motion_through_change_points_in_every_engine() -> None:
 def test_an_engine_that_drifts_unpredicted_fails(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Wrong by the same amount with either step: its own step says nothing of it, the exact solution does."""
+    """Wrong by the same amount with either step.
+
+    Its own step says nothing of it, the exact solution does.
+    """
     from fourbar_validation.engines import pinocchio
 
     (name, scene), *_ = families.released(durations=(1.0,), steps=4)
@@ -395,7 +422,10 @@ def test_an_engine_that_drifts_unpredicted_fails(
 
 
 def test_a_golden_file_of_others_swept_through_its_change_point() -> None:
-    """a, b, c, d = 1, 3, 2, 4 through 180 deg exactly: others stored -99 910 N m there."""
+    """a, b, c, d = 1, 3, 2, 4 through 180 deg exactly.
+
+    Others stored -99 910 N m there.
+    """
     linkage = fourbar.uniform(4.0, 1.0, 3.0, 2.0)
     scene = Scene(linkage, fourbar.Motion(np.radians([170.0, 180.0, 190.0]), 10.0))
     s = fourbar.solve(scene)

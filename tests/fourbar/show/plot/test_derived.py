@@ -1,4 +1,7 @@
-"""Curves of shaking force, ratios and instant centres: what they draw is what the solution has."""
+"""Curves of shaking force, ratios and instant centres.
+
+What they draw is what the solution has.
+"""
 
 import numpy as np
 import pytest

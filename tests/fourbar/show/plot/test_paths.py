@@ -1,4 +1,7 @@
-"""Paths run along the curve: no false corner, through both branches, and where the drawing has the point."""
+"""Paths run along the curve.
+
+No false corner, through both branches, and where the drawing has the point.
+"""
 
 from dataclasses import replace
 
@@ -18,7 +21,10 @@ LONGEST = 2.0 / 150.0
 
 
 def measure_chords(path: np.ndarray) -> tuple[float, float]:
-    """Return the longest chord as a part of the extent, and the sharpest turn between two, deg."""
+    """Return the longest chord as a part of the extent.
+
+    The sharpest turn between two, deg, is returned too.
+    """
     steps = np.diff(path, axis=0) @ np.array([1.0, 1.0j])
     extent = float(np.ptp(path, axis=0).max())
     turns = np.abs(np.angle(steps[1:] / steps[:-1]))

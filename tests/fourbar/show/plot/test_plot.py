@@ -1,4 +1,7 @@
-"""Drawings: what they show against the formulas, that nothing overlaps, and that they reach the file whole."""
+"""Drawings: what they show against the formulas.
+
+Nothing may overlap, and they must reach the file atomically.
+"""
 
 import math
 import subprocess
@@ -51,11 +54,15 @@ from tests.support.scenes import crank_rocker, thesis
 
 SIGNATURES = {"svg": b"<?xml", "png": b"\x89PNG", "pdf": b"%PDF"}
 BALANCE = 1e-12
-"""Force and moment sums of a free body, relative to their largest term: a few tens of roundings."""
+"""Force and moment sums of a free body, relative to their largest term: a few tens of
+roundings.
+"""
 
 
 BESIDE_A_CHORD = 150.0**-2
-"""Of a path's extent: a chord of a 150th leaves a curve whose radius is an eighth by that."""
+"""Of a path's extent: a chord of a 150th leaves a curve whose radius is an eighth by
+that.
+"""
 TOUCH = 1.0
 """Boxes of texts may share this many pixels: a box is wider than its ink."""
 
@@ -590,7 +597,9 @@ def test_the_position_of_a_motion_through_time_is_one_that_it_passes(
 
 
 ENERGY = 1e-6
-"""Of the work against the kinetic energy, relative: the spline's (dt omega)^4, its instants 2 ms apart."""
+"""Of the work against the kinetic energy, relative: the spline's (dt omega)^4, its
+instants 2 ms apart.
+"""
 
 
 def test_the_work_of_what_acts_is_the_kinetic_energy() -> None:

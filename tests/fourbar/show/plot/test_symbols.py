@@ -1,4 +1,7 @@
-"""What acts is drawn: a symbol for everything a scene file can name, where and in the direction it acts."""
+"""What acts is drawn.
+
+A symbol for everything a scene file can name, where and in the direction it acts.
+"""
 
 import cmath
 import math
@@ -35,7 +38,10 @@ TABLED = Load(4, (5.0, 0.2), table=Table((0.0, math.pi, math.tau), (1.0, -1.0, 1
 
 @pytest.fixture(scope="module")
 def everything() -> Scene:
-    """Every effect that a scene file can name, by its own example, and loads of both frames."""
+    """Every effect that a scene file can name, by its own example.
+
+    Loads of both frames are added.
+    """
     effects = "\n".join(kind.example for kind in list_kinds().values())
     lengths = (
         '[lengths]\nground = "0.3 m"\ninput = "0.1 m"\n'
@@ -55,7 +61,10 @@ def test_everything_that_acts_has_a_symbol(everything: Scene) -> None:
 
 
 def test_symbols_stand_where_the_formulas_let_them_act(everything: Scene) -> None:
-    """A load's arrow begins at its point and points along it; a spring joins its two points."""
+    """A load's arrow begins at its point and points along it.
+
+    A spring joins its two points.
+    """
     solution = fourbar.solve(everything)
     axes = Figure().subplots()
     for index in (5, 30):
@@ -94,7 +103,10 @@ def test_symbols_stand_where_the_formulas_let_them_act(everything: Scene) -> Non
 def test_nothing_at_a_pin_hides_a_bar_and_what_lies_off_a_bar_is_joined_to_it(
     everything: Scene,
 ) -> None:
-    """Rings stay within a crank of a twelfth of the coupler; a plate goes from pin to point to pin."""
+    """Rings stay within a crank of a twelfth of the coupler.
+
+    A plate goes from pin to point to pin.
+    """
     lengths = {"input": 0.02, "coupler": 0.25, "output": 0.22}
     short = replace(
         everything.linkage,

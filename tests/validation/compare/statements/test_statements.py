@@ -1,4 +1,7 @@
-"""What the formulas state of a linkage, compared with engines: it holds on every type, and planted errors are seen."""
+"""What the formulas state of a linkage, compared with engines.
+
+It holds on every type, and planted errors are seen.
+"""
 
 import math
 from collections.abc import Callable
@@ -280,7 +283,10 @@ def test_an_engine_that_does_not_answer_agrees_with_nothing(
 
 
 class Shy:
-    """Refuses whatever is not the scene of the test: the positions of the statements."""
+    """Refuses whatever is not the scene of the test.
+
+    The positions of the statements.
+    """
 
     name = "shy"
 

@@ -1,4 +1,7 @@
-"""MuJoCo's own picture of the generated MJCF: what it shows, and that a machine without OpenGL gets a reason."""
+"""MuJoCo's own picture of the generated MJCF.
+
+What it shows, and that a machine without OpenGL gets a reason.
+"""
 
 import base64
 import io

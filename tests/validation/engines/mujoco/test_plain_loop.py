@@ -11,7 +11,10 @@ from tests.support.scenes import crank_rocker, thesis
 
 
 def test_it_answers_to_round_off() -> None:
-    """Where bar 2 or 3 is driven, under loads placed from any origin, close to limits."""
+    """Where bar 2 or 3 is driven, close to limits.
+
+    Loads are placed from any origin.
+    """
     scenes = [crank_rocker(drive_bar=bar) for bar in (2, 3)]
     scenes += [thesis(np.radians([100.0, 135.0])), load(MODELS / "crank_rocker.toml")]
     for scene in scenes:

@@ -1,4 +1,7 @@
-"""What MJCF cannot say and MuJoCo is given at each stage of a step: motion laws and loads over theta_2."""
+"""What MJCF cannot say and MuJoCo is given at each stage of a step.
+
+Motion laws and loads over theta_2.
+"""
 
 import math
 from collections.abc import Callable
@@ -21,7 +24,9 @@ from fourbar_validation.run.judge import judge
 from tests.support.scenes import crank_rocker
 
 KINK = 1e-5
-"""rad; where the cubic pieces of a law meet within a step of RK4 the motion errs by h^2: measured 3e-6 here."""
+"""rad; where the cubic pieces of a law meet within a step of RK4 the motion errs by
+h^2: measured 3e-6 here.
+"""
 SIMULATED = [replace(engine, order=None) for engine in ENGINES if engine.through_time]
 LAWS: dict[str, Law | Rise] = {
     "periodic": Law(
@@ -69,7 +74,10 @@ def failing(posed: Scene) -> set[str]:
 @pytest.mark.parametrize("drive", [2, 4])
 @pytest.mark.parametrize("name", LAWS)
 def test_a_motion_law_is_run_through(name: str, drive: int) -> None:
-    """The whole scene at once: a table of a load too, gravity, and dry friction whose sense changes with the law's."""
+    """The whole scene at once.
+
+    A table of a load too, gravity, and dry friction whose sense changes with the law's.
+    """
     effects = (Gravity(), Friction.at(O2=0.02, O4=0.03))
     posed = crank_rocker(
         motion=fourbar.Motion(law=LAWS[name]),
@@ -152,7 +160,10 @@ def test_a_fault_in_a_table_fails_the_run(
 def test_a_drive_that_does_not_follow_the_law_fails_the_run(
     factor: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The engine is judged at the motion it made; that it is not the law's, its own speed says."""
+    """The engine is judged at the motion it made.
+
+    That it is not the law's, its own speed says.
+    """
     monkeypatch.setattr(
         runner.LawSegment, "alpha", changed(runner.LawSegment.alpha, factor)
     )
@@ -175,7 +186,10 @@ def test_the_callback_ends_with_the_run() -> None:
 @pytest.mark.parametrize("torque", [0.05, 5.0])
 @pytest.mark.parametrize("omega", [10.0, 0.01])
 def test_dry_friction_is_simulated_at_any_speed(omega: float, torque: float) -> None:
-    """Slow slip and large torques: the friction reaches its full size within the last digits of the slip."""
+    """Slow slip and large torques.
+
+    The friction reaches its full size within the last digits of the slip.
+    """
     motion = fourbar.Motion(fourbar.Sweep(0.13, 0.13 + 2 * math.pi, 12), omega)
     effects = (Friction.at(O2=torque, A=torque, B=torque, O4=torque),)
     rows = simulated(crank_rocker(motion=motion, loads=(), effects=effects))

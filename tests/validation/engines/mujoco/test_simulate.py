@@ -108,7 +108,10 @@ def test_within_1e_5_of_the_scale(name: str) -> None:
 @pytest.mark.parametrize("index", [1, 6, 10, 21])
 @pytest.mark.parametrize("loaded", [False, True], ids=["bare", "loaded"])
 def test_slow_linkages_hold_as_well(loaded: bool, index: int) -> None:
-    """One pass of Newton's method is all they get; under loads the closure must be the stiffer for it."""
+    """One pass of Newton's method is all they get.
+
+    Under loads the closure must be the stiffer for it.
+    """
     drawn = draw_random_scene(7, index, tuple(DrawnType))
     slow = replace(
         drawn,
@@ -193,7 +196,10 @@ def test_a_change_point_is_a_declared_limit() -> None:
 
 
 def test_error_falls_with_the_fourth_power_of_the_timestep() -> None:
-    """RK4, the closure's time constant held in seconds, so that the softness stays what it is."""
+    """RK4, the closure's time constant held in seconds.
+
+    The softness stays what it is.
+    """
     posed = crank_rocker(motion=fourbar.Motion(TURN, 10.0))
 
     def error(answer: Answer) -> float:
@@ -255,7 +261,10 @@ SIMULATION = [
 def test_the_closure_is_as_stiff_as_the_lightest_bar_that_it_joins_needs(
     links: float,
 ) -> None:
-    """With pads for bars of one size the inertial torque was 3e-5 wrong at 10 g, 3e-3 at 1 g."""
+    """With pads for bars of one size the inertial torque was wrong.
+
+    It was off by 3e-5 at 10 g, by 3e-3 at 1 g.
+    """
     record = judge("hood", hood(links), SIMULATION)
     assert {row.verdict for row in record.rows} == {AGREES}
     assert record.answers[0].evidence["mass_ratio"] > 1e5
@@ -392,7 +401,10 @@ def test_an_input_that_must_hurry_is_not_led() -> None:
 
 
 def test_near_a_pole_of_the_drive_on_the_coupler_no_simulation_is_accused() -> None:
-    """One of ten thousand random linkages stands 1.5e-3 rad from where omega_3 vanishes: T3 and every force diverge."""
+    """One of ten thousand random linkages stands close to a pole.
+
+    At 1.5e-3 rad from where omega_3 vanishes T3 and every force diverge.
+    """
     scene = draw_random_scene(2026, 2265, tuple(DrawnType))
     assert np.nanmin(fourbar.solve(scene).drive_condition) < 0.003
     assert not [row for row in judge("", scene, SIMULATION).rows if row.failed]

@@ -1,4 +1,7 @@
-"""The errors that `cost` plots are those of a second loop, for every drive, integrator and softness."""
+"""The errors that `cost` plots are those of a second loop.
+
+It is so for every drive, integrator and softness.
+"""
 
 import math
 import statistics
@@ -23,7 +26,8 @@ from tests.support.second_loop import (
 )
 
 AGREES = 0.05
-"""Part by which two loops may differ that read the same run at positions of their own."""
+"""Part by which two loops may differ that read the same run at positions of their own.
+"""
 
 NOISE = 1.6
 """Factor between the times of a step of two models of one loop: 0.7 to 1.05 were measured on two busy cores."""
@@ -107,7 +111,10 @@ QUICK = ("defaults, Euler", "no pads", "pads")
 
 
 def make_scene(drive: str) -> fourbar.Scene:
-    """Return a turn of a crank, or of the window in which the drive stays far from its poles."""
+    """Return a turn of a crank, or a window.
+
+    The drive stays far from its poles in it.
+    """
     if drive == "cylinder":
         scene = fourbar.load(MODELS / "capabilities" / "cylinder_2_4.toml")
         window = fourbar.Sweep(math.radians(80.0), math.radians(150.0), 60)
@@ -190,7 +197,10 @@ def test_a_step_takes_as_long_as_in_a_second_loop(drive: str, case: str) -> None
 
 
 def test_finer_steps_do_not_make_the_defaults_worse_where_bar_4_is_driven() -> None:
-    """Their softness alone is left; read through another one the error grew as the steps fell."""
+    """Their softness alone is left.
+
+    Read through another one the error grew as the steps fell.
+    """
     scene = make_scene("drag_link 4")
     setup = TrialSetup(scene, command(scene))
     errors = []

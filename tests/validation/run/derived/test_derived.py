@@ -1,4 +1,7 @@
-"""What is derived from `solve` is judged: each check holds, and each fails where its public call errs."""
+"""What is derived from `solve` is judged.
+
+Each check holds, and each fails where its public call errs.
+"""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -154,7 +157,9 @@ def test_equilibria_near_a_limit_are_compared_too(gravity: float) -> None:
 NEARLY_MEET = fourbar.Spring(
     Place(1, (0.05, 0.0)), Place(2, (0.05005, 0.0)), 2e4, 0.1, 3e3
 )
-"""Its ends come within 0.05 mm of each other: there its line turns by half a turn within 1 mrad of the input."""
+"""Its ends come within 0.05 mm of each other: there its line turns by half a turn
+within 1 mrad of the input.
+"""
 MASSLESS = {
     bar: fourbar.Bar(length)
     for bar, length in (("input", 0.3), ("coupler", 0.25), ("output", 0.15))
@@ -217,7 +222,9 @@ BARELY = {
     "sensitivity": (1.00049, 0.3, 5e-4, 0.7),
     "tolerances": (0.99991, 0.3, 3e-4, 0.7),
 }
-"""Lengths, m, at positions of condition 0.1 and more, that the check's own changes bring to where nothing assembles."""
+"""Lengths, m, at positions of condition 0.1 and more, that the check's own changes
+bring to where nothing assembles.
+"""
 
 
 @pytest.mark.parametrize("engine", BARELY)

@@ -1,4 +1,7 @@
-"""Rows of what `analyze` prints: they agree, and each number that is off fails its own."""
+"""Rows of what `analyze` prints.
+
+They agree, and each number that is off fails its own.
+"""
 
 import re
 from collections.abc import Callable

@@ -1,4 +1,7 @@
-"""Closures of robots: what makes a planar four-bar, and the reason where none is made."""
+"""Closures of robots.
+
+What makes a planar four-bar, and the reason where none is made.
+"""
 
 import math
 from dataclasses import replace

@@ -1,4 +1,7 @@
-"""A loop inside its robot: MuJoCo asked a second way in the whole model, and the formulas."""
+"""A loop inside its robot.
+
+MuJoCo asked a second way in the whole model, and the formulas.
+"""
 
 import math
 from functools import cache
@@ -64,7 +67,10 @@ def open_loop(name: str) -> tuple[LoopInside, LoopScene]:
 
 
 def spread_over_range(inside: LoopInside, made: LoopScene, count: int) -> np.ndarray:
-    """Angles of bar 2 in the loop's plane, within the range that its hinges leave it, rad."""
+    """Angles of bar 2 in the loop's plane, rad.
+
+    They lie within the range that its hinges leave it.
+    """
     sweep = made.scene.motion.angle
     assert isinstance(sweep, Sweep)
     angles = np.linspace(sweep.start, sweep.stop, count + 2)[1:-1]
@@ -74,10 +80,10 @@ def spread_over_range(inside: LoopInside, made: LoopScene, count: int) -> np.nda
 
 
 def ask_again(inside: LoopInside, theta_2: float, alpha_2: float) -> float:
-    """Find all joint forces at once by `mj_forward` alone, with the hinges that are not driven left to themselves.
+    """Find all joint forces at once by `mj_forward` alone.
 
-    Newton's method on the accelerations of the driven and the held joints; then
-    bisection on the couple.
+    The hinges that are not driven are left to themselves. Newton's method on the
+    accelerations of the driven and the held joints; then bisection on the couple.
     """
     state = inside.state(theta_2, 2.0)
     assert state is not None
@@ -127,7 +133,10 @@ def test_the_torque_is_the_one_that_mujoco_gives_when_asked_by_itself(
 
 @pytest.mark.parametrize("name", [*FILES, *TEXTS])
 def test_rigid_pins_in_the_robot_are_the_formulas_of_its_scene(name: str) -> None:
-    """Multipliers on MuJoCo's mass matrix of the whole robot, against a scene of three bars, and its free bodies."""
+    """Multipliers on MuJoCo's mass matrix of the whole robot.
+
+    They are held against a scene of three bars, and its free bodies.
+    """
     inside, made = open_loop(name)
     angles = spread_over_range(inside, made, 5)
     rows = inside.answer_states(angles.tolist(), 2.0, 3.0).rows
@@ -148,7 +157,10 @@ def _turn_back(inside: LoopInside, made: LoopScene) -> float:
 
 
 def test_the_start_of_a_simulation_is_not_judged() -> None:
-    """It begins exactly closed, where the loop has not yielded yet: the forces are those of a single state."""
+    """It begins exactly closed, where the loop has not yielded yet.
+
+    The forces are those of a single state.
+    """
     inside, _ = open_loop("excavator")
     assert inside.find_constant() == 0.02
     start = inside.loop.angles[1]

@@ -1,4 +1,7 @@
-"""The loops of a robot's file as they are measured: all, one by name, by a scene of one's own."""
+"""The loops of a robot's file as they are measured.
+
+All, one by name, by a scene of one's own.
+"""
 
 from dataclasses import replace
 from pathlib import Path
@@ -30,7 +33,10 @@ def test_both_fingers_of_a_gripper_are_measured_and_are_alike() -> None:
 
 @pytest.mark.slow
 def test_a_scene_with_axes_of_its_own_gives_the_same_errors() -> None:
-    """The axes of the scene are turned by 0.3 rad against those of the loop's plane; no weight acts across it."""
+    """The axes of the scene are turned by 0.3 rad against those of the loop's plane.
+
+    No weight acts across it.
+    """
     file = read_robot(ROBOTS / "biped_foot.xml")
     options = MeasureOptions(PoseOptions(), "rod")
     (made,) = measure_loops(file, options, None).loops
@@ -54,7 +60,10 @@ TILTED = Plane((-2.0, 5.0, 1.0), (1.0, -2.0, 0.5))
 @pytest.mark.slow
 @pytest.mark.parametrize("plane", [Plane(), TILTED], ids=["level", "tilted"])
 def test_loads_of_the_file_act_and_its_motor_does_not(plane: Plane) -> None:
-    """With rigid pins the robot's torque and forces are those of the scene, loads and all."""
+    """With rigid pins the robot's torque and forces are those of the scene.
+
+    Loads are included.
+    """
     assert len(ROCKER.loads) == 2
     text = write_mjcf(ROCKER, drive="motor", plane=plane)
     file = RobotFile(Path("arm.xml"), text)

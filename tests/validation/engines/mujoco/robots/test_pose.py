@@ -1,4 +1,7 @@
-"""Poses of robots: the file's own, stated ones, and the loops closed again around them."""
+"""Poses of robots.
+
+The file's own, stated ones, and the loops closed again around them.
+"""
 
 import math
 

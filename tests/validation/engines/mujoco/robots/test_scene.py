@@ -1,8 +1,9 @@
-"""A scene from a loop against MuJoCo, asked in the whole robot: inverse dynamics, and multipliers of the closure.
+"""A scene from a loop against MuJoCo, asked in the whole robot.
 
-Every other joint of the robot stands still. Nothing of the scene enters: the loop is
-closed by Newton's method on MuJoCo's own residual of the equality, its speeds and
-accelerations follow from MuJoCo's Jacobian.
+Inverse dynamics, and multipliers of the closure. Every other joint of the robot stands
+still. Nothing of the scene enters: the loop is closed by Newton's method on MuJoCo's
+own residual of the equality, its speeds and accelerations follow from MuJoCo's
+Jacobian.
 """
 
 import cmath
@@ -31,7 +32,8 @@ MODELS = ROOT / "models" / "robots"
 FOOT = (MODELS / "biped_foot.xml").read_text()
 GRIPPER = (MODELS / "gripper.xml").read_text()
 EXACT = 1e-8
-"""Relative: the difference quotient of the Jacobian loses half the digits of a double."""
+"""Relative: the difference quotient of the Jacobian loses half the digits of a double.
+"""
 DIFFERENCE = 1e-5
 """s, step of that quotient along the motion."""
 
@@ -89,7 +91,10 @@ class WholeRobot:
     def rates(
         self, jacobian: np.ndarray, driven: float, rest: np.ndarray
     ) -> np.ndarray:
-        """Solve J rates + rest = 0 with the driven rate given and all other joints still."""
+        """Solve J rates + rest = 0 with the driven rate given.
+
+        All other joints are still.
+        """
         rates = np.zeros(self.model.nv)
         rates[self.dofs["O2"]] = driven
         wanted = -(jacobian @ rates + rest)
@@ -98,7 +103,10 @@ class WholeRobot:
         return rates
 
     def ask(self, qpos: np.ndarray, omega: float) -> Whole:
-        """Torque and pin forces at a closed pose, constant speed of the driven joint."""
+        """Torque and pin forces at a closed pose.
+
+        The driven joint has constant speed.
+        """
         model, data = self.model, self.data
         _, jacobian = self.closure(qpos)
         still = np.zeros(len(jacobian))
@@ -125,7 +133,10 @@ class WholeRobot:
         return Whole(float(solved[-1]), forces)
 
     def pin_forces(self, multipliers: np.ndarray) -> dict[str, float]:
-        """Sizes in the plane, from the recursion of MuJoCo with the closing force and gravcomp applied."""
+        """Sizes in the plane, from the recursion of MuJoCo.
+
+        The closing force and gravcomp are applied.
+        """
         model, data = self.model, self.data
         data.xfrc_applied[:] = 0.0
         lifted = model.body_gravcomp * model.body_mass
@@ -164,7 +175,10 @@ def read(
 
 
 def compare(text: str, made: LoopScene, speed: float = 3.0) -> None:
-    """Hold torque and pin forces of the scene against the whole robot over the sweep."""
+    """Hold torque and pin forces of the scene against the whole robot.
+
+    They are compared over the sweep.
+    """
     robot = WholeRobot(text, made)
     assert made.scene.motion.theta_2 is not None
     solution = fourbar.solve(made.scene)
