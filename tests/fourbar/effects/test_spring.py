@@ -190,7 +190,10 @@ def test_every_engine_stops_where_the_spring_is_wound() -> None:
     assert [row for row in record.rows if row.failed] == []
     within = Scene(scene.linkage, Motion(Sweep(0.1, 3.6, 12), 10.0), effects=(spring,))
     record = judge("scene", within)
-    assert [row for row in record.rows if row.failed] == [] and record.left_out == []
+    assert [row for row in record.rows if row.failed] == []
+    # the spring is the only effect
+    fewer = "superposed: the scene has fewer than two loads and effects"
+    assert record.left_out == [fewer]
 
 
 def test_where_the_loop_closes_between_the_positions_alone_no_spring_begins() -> None:
