@@ -62,3 +62,15 @@ def test_where_everything_cancels_the_scale_is_that_of_the_forces_that_cancel() 
     scale = scale_of("torque", scene, solution, solution.torque)
     assert np.all(scale >= 0.25 * 100.0)
     assert np.all(scale <= 4.0 * 0.25 * 100.0)
+
+
+def test_what_the_input_alone_decides_has_no_scale_of_the_other_bars() -> None:
+    """Beside a limit alpha_3 grows without bound, and a_A does not."""
+    low = min(x.theta_2 for x in limit_positions(ROCKER) if 0.0 < x.theta_2 < np.pi)
+    scene = Scene(ROCKER, Motion(np.array([low + 1e-9]), 10.0))
+    solution = solve(scene)
+    assert abs(solution.alpha_3[0]) > 1e9
+    for name in ("v_A", "v_G2", "a_A", "a_G2"):
+        values = getattr(solution, name)
+        size = np.hypot(*values.T)
+        np.testing.assert_allclose(scale_of(name, scene, solution, values), size)

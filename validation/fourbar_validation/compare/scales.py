@@ -26,6 +26,7 @@ from fourbar_validation.compare.effects import find_size as size_of
 from fourbar_validation.compare.line import place_line
 from fourbar_validation.compare.pins import find_centre, state_from_pins
 from fourbar_validation.compare.tolerance import (
+    OF_THE_INPUT,
     WELL_CONDITIONED,
     Array,
     K,
@@ -87,7 +88,8 @@ class Sizes:
         judged by another's scale.
         """
         unit = UNITS[quantity]
-        key = quantity if unit in OF_EACH_BAR else unit
+        of_its_own = unit in OF_EACH_BAR or quantity in OF_THE_INPUT
+        key = quantity if of_its_own else unit
         if key not in self._sums:
             with np.errstate(divide="ignore", invalid="ignore"):
                 terms = TERMS[unit](quantity, self)
@@ -146,10 +148,15 @@ def _sum_angular_accelerations(quantity: str, sizes: Sizes) -> Array:
     )
 
 
-def _sum_velocities(_: str, sizes: Sizes) -> Array:
+def _choose_bars(quantity: str) -> tuple[int, ...]:
+    """Choose the bars whose motion is a term of a point's velocity or acceleration."""
+    return (2,) if quantity in OF_THE_INPUT else MOVING_BARS
+
+
+def _sum_velocities(quantity: str, sizes: Sizes) -> Array:
     scene, formulas = sizes.scene, sizes.formulas
     total, drive = np.zeros(len(formulas)), _compute_drive_arms(scene)
-    for number in MOVING_BARS:
+    for number in _choose_bars(quantity):
         arm = (
             scene.linkage.bar(number).length
             + _compute_arm(scene, number)
@@ -159,10 +166,10 @@ def _sum_velocities(_: str, sizes: Sizes) -> Array:
     return total
 
 
-def _sum_accelerations(_: str, sizes: Sizes) -> Array:
+def _sum_accelerations(quantity: str, sizes: Sizes) -> Array:
     scene, formulas = sizes.scene, sizes.formulas
     total = np.zeros(len(formulas))
-    for number in MOVING_BARS:
+    for number in _choose_bars(quantity):
         omega, alpha = (
             getattr(formulas, f"omega_{number}"),
             getattr(formulas, f"alpha_{number}"),
@@ -199,8 +206,8 @@ def _sum_powers(_: str, sizes: Sizes) -> Array:
     return np.asarray(sizes.sum_terms(COUPLE.value) * np.abs(speed))
 
 
-A_FORCE, A_VELOCITY = "F12", "v_A"
-"""Any quantities of their units."""
+A_FORCE, A_VELOCITY = "F12", "v_B"
+"""Quantities of their units to which every bar contributes."""
 TERMS: dict[str, Callable[[str, Sizes], Array]] = {
     "rad": _return_one,
     "1": _return_one,
