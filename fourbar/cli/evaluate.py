@@ -324,6 +324,7 @@ def _write_positions(
     """Write every position, as JSON, CSV or a table, whose columns may be named."""
     from fourbar.show.block import write_motor
     from fourbar.show.columns import read_columns
+    from fourbar.show.gas import list_gas_notes
     from fourbar.show.tables import print_positions
     from fourbar.solution import write_csv, write_json
 
@@ -332,7 +333,8 @@ def _write_positions(
     columns = [] if names is None else read_columns(scene, solution, names)
     if form == "json":
         motor = write_motor(scene, solution, units)
-        return write_json(solution, units, motor=motor)
+        notes = list_gas_notes(scene, solution, units)
+        return write_json(solution, units, motor=motor, notes=notes)
     if form == "csv":
         chosen = _list_chosen(columns, units) if columns else None
         return write_csv(solution, units, decimal or ".", chosen)

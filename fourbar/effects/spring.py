@@ -1,7 +1,7 @@
 """Linear springs, each between two points of two bars, the ground included."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 import numpy as np
@@ -50,6 +50,8 @@ class Spring:
     stiffness : N/m, >= 0.
     length : distance at which it pulls with the preload alone, m, >= 0.
     preload : N, > 0 pulls, < 0 pushes.
+    stroke : by which a gas spring can be shorter than `length`, m; None: not stated.
+        It changes no force, so that it does not count where springs are compared.
     """
 
     start: Place
@@ -57,6 +59,7 @@ class Spring:
     stiffness: float
     length: float = 0.0
     preload: float = 0.0
+    stroke: float | None = field(default=None, compare=False)
     numbers: ClassVar[dict[str, Declared]] = {
         "stiffness": Declared("N/m", AT_LEAST_ZERO),
         "length": Declared("m", AT_LEAST_ZERO),
@@ -115,7 +118,7 @@ class Spring:
                 last,
                 f"must be no less than the extended_force, {first:.6g} N",
             )
-        return cls(start, end, (last - first) / stroke, extended, -first)
+        return cls(start, end, (last - first) / stroke, extended, -first, stroke)
 
     def with_places(self, change: Callable[[Place], Place]) -> "Spring":
         """Return the same spring with its ends changed."""

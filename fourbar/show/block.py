@@ -24,6 +24,7 @@ from fourbar.quantities import LINE, PIN_FORCES
 from fourbar.scene import Scene
 from fourbar.scene.motion import BRANCH_NAMES
 from fourbar.show.duty import DUTY_UNITS, bearing_load, describe_drive
+from fourbar.show.gas import list_gas_notes
 from fourbar.show.position import PositionSheet
 from fourbar.show.summary import Facts, find_duty, locate_between, summarize
 from fourbar.show.units import (
@@ -689,6 +690,7 @@ class _Block:
                 f"dry friction reverses, and the pin forces jump, at {name} = {places}"
             )
         lines += self._warn()
+        lines += list_gas_notes(facts.scene, facts.solution, self.units)
         if facts.error is not None:
             below = (
                 f"below 1e{math.ceil(math.log10(facts.error)):+03d}"

@@ -25,6 +25,7 @@ from fourbar.quantities import COUPLE, LINE, NOT_ASSEMBLED, PIN_FORCES, SINGULAR
 from fourbar.scene import Command, with_signs
 from fourbar.scene.motion import BRANCH_NAMES
 from fourbar.show.duty import read_drive
+from fourbar.show.gas import list_gas_notes
 from fourbar.show.tables import (
     MOST_ROWS,
     make_plain_table,
@@ -378,7 +379,14 @@ def _count_equilibria(rest: Equilibria) -> list[str]:
         for ends in rest.held
         if all(position.held != ends for position in rest.found)
     ]
-    return lines
+    return lines + _list_notes(rest)
+
+
+def _list_notes(rest: Equilibria) -> list[str]:
+    """List where gas springs of the scene are beyond their stroke."""
+    scene = rest.positions.scene
+    assert scene is not None
+    return list_gas_notes(scene, rest.positions, COMMON)
 
 
 def _write_holding(rest: Equilibria) -> tuple[list[str], Any]:
@@ -465,6 +473,7 @@ def write_equilibria_json(title: str, rest: Equilibria) -> str:
         indifferent=rest.indifferent,
         held=rest.held,
         not_decided=rest.not_decided,
+        notes=_list_notes(rest),
         positions={
             "drive_bar": positions.drive_bar,
             "status": positions.status,

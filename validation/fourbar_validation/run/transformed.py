@@ -374,10 +374,15 @@ def _convert_springs(effect: Springs, to: _Conversion, linkage: FourBar) -> Spri
                 end=to.place(spring.end, linkage),
                 length=to.length * spring.length,
                 preload=to.length * spring.preload,
+                stroke=_scale_stroke(spring.stroke, to.length),
             )
             for spring in effect.springs
         )
     )
+
+
+def _scale_stroke(stroke: float | None, factor: float) -> float | None:
+    return None if stroke is None else factor * stroke
 
 
 def _convert_torsion(effect: Torsion, to: _Conversion, linkage: FourBar) -> Torsion:

@@ -1,0 +1,90 @@
+"""Where gas springs are beyond their stroke: against the geometry of a parallelogram."""
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+
+import fourbar
+from fourbar.cli import status
+
+HATCH = """
+[lengths]
+ground = "100 mm"
+input = "400 mm"
+coupler = "100 mm"
+output = "400 mm"
+[bars.input]
+mass = "10 kg"
+[motion]
+theta_2 = { from = "10 deg", to = "80 deg", steps = 7 }
+omega_2 = "0 rad/s"
+[effects]
+gravity = ["9.81 m/s^2", "-90 deg"]
+[[effects.springs]]
+from = { bar = 1, from_pin = ["200 mm", "-90 deg"] }
+to = { bar = 2, from_pin = ["300 mm", "0 deg"] }
+gas = { extended = "EXTENDED", stroke = "STROKE", extended_force = "300 N" }
+"""
+"""The spring from 0.2 m below O2 to 0.3 m along the input: by the law of cosines
+distance^2 = 0.2^2 + 0.3^2 + 2 0.2 0.3 sin(theta_2)."""
+
+
+def reach(distance: float) -> str:
+    """Return the angle at which the ends are so far apart, as it is printed."""
+    sine = (distance**2 - 0.2**2 - 0.3**2) / (2.0 * 0.2 * 0.3)
+    return f"{math.degrees(math.asin(sine)):.4g} deg"
+
+
+def write(folder: Path, extended: str, stroke: str) -> str:
+    file = folder / "hatch.toml"
+    text = HATCH.replace("EXTENDED", extended).replace("STROKE", stroke)
+    file.write_text(text, encoding="utf-8")
+    return str(file)
+
+
+def test_a_gas_spring_beyond_its_stroke_is_told(tmp_path, capsys):
+    for extended, stroke, expected in (
+        (
+            "400 mm",
+            "150 mm",
+            f"extended length of 400 mm from theta_2 = {reach(0.4)} on",
+        ),
+        (
+            "600 mm",
+            "150 mm",
+            f"compressed length of 450 mm up to theta_2 = {reach(0.45)}",
+        ),
+        ("300 mm", "150 mm", "extended length of 300 mm throughout"),
+    ):
+        file = write(tmp_path, extended, stroke)
+        for command in ("analyze", "equilibrium"):
+            assert status([command, file]) == 0
+            printed = " ".join(capsys.readouterr().out.split())
+            assert expected in printed, (command, printed)
+            assert "has no stops" in printed
+            assert status([command, file, "--json"]) == 0
+            (note,) = json.loads(capsys.readouterr().out)["notes"]
+            assert "has no stops" in note
+    assert (
+        status(["analyze", write(tmp_path, "400 mm", "150 mm"), "--at", "80deg"]) == 0
+    )
+    printed = " ".join(capsys.readouterr().out.split())
+    assert "longer than its extended length of 400 mm here" in printed
+
+
+def test_a_gas_spring_within_its_stroke_is_not_told(tmp_path, capsys):
+    file = write(tmp_path, "600 mm", "300 mm")
+    for command in ("analyze", "equilibrium"):
+        assert status([command, file]) == 0
+        assert "gas spring" not in capsys.readouterr().out
+
+
+def test_a_spring_at_its_end_is_within_its_stroke(tmp_path, capsys):
+    scene = fourbar.load(write(tmp_path, "500 mm", "150 mm"))
+    longest = math.sqrt(0.13 + 0.12 * math.sin(math.radians(80.0)))
+    file = write(tmp_path, f"{1000.0 * longest!r} mm", "150 mm")
+    assert np.isfinite(fourbar.solve(scene, "force").torque).all()
+    assert status(["analyze", file]) == 0
+    assert "gas spring" not in capsys.readouterr().out
