@@ -1,6 +1,7 @@
 """The commands that write files: pictures, models for simulators; and the workbench."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import wraps
 from itertools import chain, count
 from pathlib import Path
@@ -36,6 +37,53 @@ def plane_options(command: Callable[..., None]) -> Callable[..., None]:
             name, default=default, show_default=True, metavar='"X Y Z"', help=text
         )(placed)
     return placed
+
+
+def scene_or_lengths(command: Callable[..., None]) -> Callable[..., None]:
+    """Add SCENE, --lengths and --omega, one of the first two to be given."""
+    for add in (
+        click.option(
+            "--omega", metavar="W", help="Speed of the input with --lengths, rad/s."
+        ),
+        click.option(
+            "--lengths",
+            nargs=4,
+            metavar="D A B C",
+            help="Lengths of ground, input, coupler, output, m.",
+        ),
+        click.argument("scene", type=given.FILE, required=False),
+    ):
+        command = add(command)
+    return command
+
+
+@contextmanager
+def _describe(
+    scene: Path | None, lengths: tuple[str, ...] | None, omega: str | None, out: Path
+) -> Iterator[Scene]:
+    """Open the scene, or make one of the lengths; its defaults are told at the end."""
+    if (scene is None) == (lengths is None):
+        raise click.UsageError("give a scene file or --lengths D A B C, one of the two")
+    if scene is not None:
+        if omega is not None:
+            raise click.UsageError(
+                "--omega goes with --lengths; a scene states its own omega_2"
+            )
+        with given.open_scene(scene) as described:
+            yield described
+        return
+    from fourbar.mjcf import list_defaults, make_scene
+    from fourbar.writing import STANDARD_STREAM
+
+    assert lengths is not None
+    speed = {}
+    if omega is not None:
+        speed["omega"] = given.read_number("--omega", omega, "rad/s")
+    made = make_scene(*given.read_lengths(lengths), **speed)
+    yield made
+    to_output = out == STANDARD_STREAM
+    for line in list_defaults(made):
+        click.echo(line, err=to_output)
 
 
 without_loads_option = click.option(
@@ -160,14 +208,7 @@ def animate(
 
 
 @click.command()
-@click.argument("scene", type=given.FILE, required=False)
-@click.option(
-    "--lengths",
-    nargs=4,
-    metavar="D A B C",
-    help="Lengths of ground, input, coupler, output, m.",
-)
-@click.option("--omega", metavar="W", help="Speed of the input with --lengths, rad/s.")
+@scene_or_lengths
 @click.option(
     "--for",
     "simulator",
@@ -199,35 +240,14 @@ def mjcf(
 ) -> None:
     """Write a scene, or four lengths, as MJCF for MuJoCo and its kin."""
     from fourbar import mjcf as writer
-    from fourbar.writing import STANDARD_STREAM
 
-    if (scene is None) == (lengths is None):
-        raise click.UsageError("give a scene file or --lengths D A B C, one of the two")
-    if scene is not None and omega is not None:
-        raise click.UsageError(
-            "--omega goes with --lengths; a scene states its own omega_2"
-        )
-
-    if scene is not None:
-        with given.open_scene(scene) as described:
-            text = writer.write_mjcf_for(described, simulator, drive, plane)
-            given.print_to(text, out)
-    elif lengths is not None:
-        speed = (
-            {}
-            if omega is None
-            else {"omega": given.read_number("--omega", omega, "rad/s")}
-        )
-        made = writer.make_scene(*given.read_lengths(lengths), **speed)
-        text = writer.write_mjcf_for(made, simulator, drive, plane)
+    with _describe(scene, lengths, omega, out) as described:
+        text = writer.write_mjcf_for(described, simulator, drive, plane)
         given.print_to(text, out)
-        to_output = out == STANDARD_STREAM
-        for line in writer.list_defaults(made):
-            click.echo(line, err=to_output)
 
 
 @click.command()
-@given.scene_argument
+@scene_or_lengths
 @click.option(
     "--for",
     "reader",
@@ -240,26 +260,39 @@ def mjcf(
 @plane_options
 @given.text_option(".sdf", ".world", ".xml", required=True)
 def sdf(
-    scene: Path, reader: str, without_loads: bool, plane: "Plane", out: Path
+    scene: Path | None,
+    lengths: tuple[str, ...] | None,
+    omega: str | None,
+    reader: str,
+    without_loads: bool,
+    plane: "Plane",
+    out: Path,
 ) -> None:
-    """Write a scene as SDF for Gazebo or Drake."""
+    """Write a scene, or four lengths, as SDF for Gazebo or Drake."""
     from fourbar.mjcf.assembly import write_sdf as written
 
-    with given.open_scene(scene) as described:
+    with _describe(scene, lengths, omega, out) as described:
         text = written(described, reader, without_loads=without_loads, plane=plane)
         given.print_to(text, out)
 
 
 @click.command()
-@given.scene_argument
+@scene_or_lengths
 @without_loads_option
 @plane_options
 @given.text_option(".usda", ".usd", required=True)
-def usd(scene: Path, without_loads: bool, plane: "Plane", out: Path) -> None:
-    """Write a scene as USD text (.usda) for Newton."""
+def usd(
+    scene: Path | None,
+    lengths: tuple[str, ...] | None,
+    omega: str | None,
+    without_loads: bool,
+    plane: "Plane",
+    out: Path,
+) -> None:
+    """Write a scene, or four lengths, as USD text (.usda) for Newton."""
     from fourbar.mjcf.assembly import write_usd as written
 
-    with given.open_scene(scene) as described:
+    with _describe(scene, lengths, omega, out) as described:
         text = written(described, without_loads=without_loads, plane=plane)
         given.print_to(text, out)
 

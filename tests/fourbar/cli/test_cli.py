@@ -200,6 +200,24 @@ def test_text_is_not_written_under_a_name_whose_readers_refuse_it(
     assert not (tmp_path / name).exists()
 
 
+@pytest.mark.parametrize(("command", "ending"), [("sdf", "sdf"), ("usd", "usda")])
+def test_four_lengths_are_written_for_every_simulator(
+    command: str, ending: str, tmp_path: Path, run: Fourbar
+) -> None:
+    lengths = ("300 mm", "10 cm", 0.25, 0.22)
+    target = tmp_path / f"bars.{ending}"
+    code, out, err = run(
+        command, "--lengths", *lengths, "--omega", "60 rpm", "-o", target
+    )
+    assert (code, err) == (0, "") and "1 kg/m" in out
+    writer = import_module("fourbar.mjcf.assembly")
+    made = import_module("fourbar.mjcf").make_scene(
+        0.3, 0.1, 0.25, 0.22, omega=2.0 * math.pi
+    )
+    written = getattr(writer, f"write_{command}")(made)
+    assert target.read_text(encoding="utf-8") == written
+
+
 def test_csv_has_the_same_numbers(run: Fourbar) -> None:
     file = MODELS / "crank_rocker.toml"
     code, out, err = run("analyze", file, "--csv")

@@ -304,6 +304,8 @@ def test_some_positions_do_not_assemble(
         (["mjcf"], ["scene file or --lengths"]),
         (["mjcf", "x.toml", "--lengths", "1", "1", "1", "1"], ["one of the two"]),
         (["mjcf", "x.toml", "--omega", "1"], ["--omega goes with --lengths"]),
+        (["sdf", "x.toml", "--lengths", "1", "1", "1", "1"], ["one of the two"]),
+        (["usd"], ["one of the two"]),
         (["mjcf", "--lengths", "0.3", "0.1", "0.25"], ["Missing option"]),
         (
             ["mjcf", "--lengths", "0.3", "0.1", "0.25", "-1"],
