@@ -454,8 +454,17 @@ def _write_equilibrium(equilibrium: Equilibrium, *, friction: bool) -> list[str]
 
 def _write_range(ends: tuple[RestPosition, RestPosition]) -> str:
     first, last = ends
+    apart = math.remainder(last.theta_2 - first.theta_2, 2.0 * math.pi)
+    if first.branch == last.branch and abs(apart) < SAME_PLACE:
+        return "everywhere on its circuit"
     text = f"{_write_degrees(first.theta_2)} to {_write_degrees(last.theta_2)}"
     return text if first.branch == last.branch else f"{text} through a limit"
+
+
+SAME_PLACE = 1e-9
+"""Angle between the ends of a range, rad, below which it goes round: no friction holds
+within less, and nothing is printed finer than 1e-6 rad.
+"""
 
 
 def _write_degrees(angle: float) -> str:

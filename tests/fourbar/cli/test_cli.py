@@ -218,6 +218,19 @@ def test_four_lengths_are_written_for_every_simulator(
     assert target.read_text(encoding="utf-8") == written
 
 
+def test_what_rests_at_every_angle_is_no_range_of_one(
+    tmp_path: Path, run: Fourbar
+) -> None:
+    bar = fourbar.Bar(0.1, 1.0, centre=(0.0, 0.0))
+    linkage = fourbar.FourBar(0.3, bar, fourbar.Bar(0.25), fourbar.Bar(0.22))
+    motion = fourbar.Motion(fourbar.Sweep(0.0, 2.0 * math.pi, 36), 1.0)
+    scene = fourbar.Scene(linkage, motion, effects=(fourbar.Gravity(),))
+    save(scene, tmp_path / "balanced.toml")
+    code, out, _ = run("equilibrium", tmp_path / "balanced.toml")
+    assert code == 0
+    assert "indifferent (Q = 0 throughout): everywhere on its circuit" in out
+
+
 def test_csv_has_the_same_numbers(run: Fourbar) -> None:
     file = MODELS / "crank_rocker.toml"
     code, out, err = run("analyze", file, "--csv")
