@@ -219,14 +219,21 @@ def half_angle(
     ss = t * sk
     squares = (kk, ss, -sk) if opposite else (ss, kk, sk)
     half = compute_factors(lengths, *squares)
+    return half._replace(side=find_side(psi, passing, opposite=opposite))
+
+
+def find_side(psi: Number, passing: Passing, *, opposite: bool) -> Number:
+    """Find the sign that the roots together have at psi (rad, not reduced).
+
+    It is 1 unless a root passes through zero. `opposite`: as in `half_angle`.
+    """
     if not is_any(passing.outer | passing.inner):
-        return half
+        return 1.0
     sign_k = np.copysign(1.0, np.cos(0.5 * psi))
-    sign_s = np.copysign(1.0, t) * sign_k
+    sign_s = np.copysign(1.0, tangent(0.5 * psi)) * sign_k
     if opposite:
         sign_k, sign_s = sign_s, -sign_k
-    side = select(passing.outer, sign_k, 1.0) * select(passing.inner, sign_s, 1.0)
-    return half._replace(side=side)
+    return select(passing.outer, sign_k, 1.0) * select(passing.inner, sign_s, 1.0)
 
 
 def signed_root(half: HalfAngle, branch: Number) -> Number:

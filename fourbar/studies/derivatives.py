@@ -15,9 +15,9 @@ from fourbar.effects.effect import Actions
 from fourbar.errors import InputError, expect
 from fourbar.evaluation.case import Case
 from fourbar.evaluation.evaluate import list_kinematics
-from fourbar.formulas.arithmetic import Number, polar
+from fourbar.formulas.arithmetic import Number, polar, without_slopes
 from fourbar.formulas.path import Path
-from fourbar.formulas.position import HalfAngle, compute_factors
+from fourbar.formulas.position import HalfAngle, compute_factors, find_side
 from fourbar.quantities import (
     FORCES,
     NOT_ASSEMBLED,
@@ -360,11 +360,13 @@ class _SlopedPath(Path):
 
         The angle is in rad.
         """
-        h = 0.5 * (q - self.theta_1)
-        s, k = np.sin(h), np.cos(h)
-        if self.bar == 4:
-            return compute_factors(self.lengths, k * k, s * s, -(s * k))
-        return compute_factors(self.lengths, s * s, k * k, s * k)
+        psi = q - self.theta_1
+        s, k = np.sin(0.5 * psi), np.cos(0.5 * psi)
+        opposite = self.bar == 4
+        squares = (k * k, s * s, -(s * k)) if opposite else (s * s, k * k, s * k)
+        # a sign has no slope: the linkages beside keep the assembly
+        side = find_side(without_slopes(psi), self.passing, opposite=opposite)
+        return compute_factors(self.lengths, *squares)._replace(side=side)
 
     def input_direction(self, q: Number, half: HalfAngle) -> Number:
         """Compute e^{i q}."""

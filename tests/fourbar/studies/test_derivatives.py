@@ -259,3 +259,21 @@ def test_a_kite_whose_halves_meet_has_derivatives() -> None:
         slopes.solution.omega_3 / 10.0,
         rtol=1e-13,
     )
+
+
+@pytest.mark.parametrize("branch", [1, -1])
+def test_slopes_of_a_parallelogram_keep_its_assembly_past_the_change_points(
+    branch: int,
+) -> None:
+    """Differences are those of a study, whose members keep it too."""
+    linkage = fourbar.uniform(0.3, 0.1, 0.3, 0.1)
+    motion = Motion(np.radians([40.0, 200.0, 269.0, 330.0]), 6.0, branch=branch)
+    parallelogram = Scene(linkage, motion, effects=(Gravity(),))
+    slopes = sensitivity(parallelogram)
+    key, step = "bars.coupler.mass", 1e-3
+    mass = linkage.coupler.mass
+    study = fourbar.vary(parallelogram, {key: np.array([mass - step, mass + step])})
+    torque = fourbar.solve(study).torque
+    expected = (torque[1] - torque[0]) / (2.0 * step)
+    column = list(slopes.keys).index(key)
+    np.testing.assert_allclose(slopes.by["torque"][column], expected, rtol=1e-9)

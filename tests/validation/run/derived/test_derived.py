@@ -60,6 +60,44 @@ def test_every_engine_compares_and_holds() -> None:
     assert not failing(rows)
 
 
+@pytest.mark.parametrize("branch", [1, -1])
+@pytest.mark.parametrize("ground", [0.3, 0.1])
+def test_a_parallelogram_is_judged_over_its_whole_turn(
+    ground: float, branch: int
+) -> None:
+    """Beside a change point a member keeps the nominal assembly, and is not its own."""
+    rod = fourbar.Bar(ground, mass=2.0)
+    crank = fourbar.Bar(0.05)
+    linkage = fourbar.FourBar(ground, crank, rod, fourbar.Bar(0.05))
+    motion = fourbar.Motion(
+        fourbar.Sweep(0.0, 2.0 * np.pi, 36), 2.0 * np.pi, branch=branch
+    )
+    scene = Scene(linkage, motion, effects=(fourbar.Gravity(),))
+    for check in ("study", "sensitivity", "tolerances"):
+        rows = rows_of(scene, check)
+        assert any(row.compared for row in rows)
+        assert not failing(rows), check
+
+
+def test_a_member_of_a_parallelogram_in_another_assembly_is_caught(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Alone its lengths make a linkage without a change point, which swings back."""
+    linkage = fourbar.uniform(0.3, 0.1, 0.3, 0.1)
+    motion = fourbar.Motion(fourbar.Sweep(0.2, 6.0, 12), 6.0)
+    scene = Scene(linkage, motion, effects=(fourbar.Gravity(),))
+    true = fourbar.solve
+
+    def other(asked: Any, *arguments: Any, **options: Any) -> Any:
+        solution = true(asked, *arguments, **options)
+        if isinstance(asked, fourbar.Study):
+            solution.theta_4[1] += 0.5
+        return solution
+
+    monkeypatch.setattr(fourbar, "solve", other)
+    assert "theta_4" in failing(rows_of(scene, "study"))
+
+
 def altered(
     call: Callable[..., Any], change: Callable[[Any], None]
 ) -> Callable[..., Any]:

@@ -25,12 +25,15 @@ from fourbar_validation.compare.rows import Row
 from fourbar_validation.compare.tolerance import divide, magnitude
 from fourbar_validation.run.derived.variants import (
     SceneFile,
+    ask_beside,
     ask_free_bodies,
     at_places,
     hold_to,
+    is_near_change_point,
     keep_worst,
     make_row,
     split_parts,
+    stays_beside,
     take_few,
     take_member,
 )
@@ -42,6 +45,8 @@ numbers tell apart.
 """
 APART = 1e-2
 """Difference of its numbers from member to member, relative, for angles in rad."""
+APART_NEAR_CHANGE_POINT = 1e-5
+"""The same near a change point, where larger differences make linkages of their own."""
 CORNERS = (0.07, 2.3, 4.1, 0.07 + 2.0 * np.pi)
 """rad from the first position; where the table of a load that the run adds is bent."""
 
@@ -87,17 +92,20 @@ def study(question: Question) -> list[Row]:
     """Judge a square study in which every number varies, member by member."""
     scene = furnish(take_few(question), question)
     places, key = np.asarray(scene.motion.angle), command_key(scene)
+    apart = APART
+    if is_near_change_point(scene.linkage):
+        apart = APART_NEAR_CHANGE_POINT
     stated = SceneFile(scene).find_stated(fourbar.sensitivity(scene).keys)
     del stated[key]
     values = {
-        key: np.array([x + number * APART * step for number in range(MEMBERS)])
+        key: np.array([x + number * apart * step for number in range(MEMBERS)])
         for key, (x, step) in stated.items()
     }
     # the places of each member lie within those of the scene: nothing says that a table
     # reaches further
     positions = np.array(
         [
-            places + APART * number * (places.mean() - places)
+            places + apart * number * (places.mean() - places)
             for number in range(MEMBERS)
         ]
     )
@@ -107,11 +115,12 @@ def study(question: Question) -> list[Row]:
             NotAskedError
         ):  # the others are judged, beside one that never assembles
             changes = {
-                name: number * APART * entry.step for name, entry in stated.items()
+                name: number * apart * entry.step for name, entry in stated.items()
             }
             members[number] = SceneFile(at_places(scene, member_positions)).move(
                 changes
             )
+    nominal = ask_free_bodies(scene)
     rows = []
     with np.errstate(all="ignore"):
         solved = fourbar.solve(fourbar.vary(scene, values | {key: positions}))
@@ -121,7 +130,7 @@ def study(question: Question) -> list[Row]:
                 "study",
                 one,
                 take_member(solved, number),
-                ask_free_bodies(one),
+                ask_beside(one, scene, nominal),
             )
     return keep_worst(rows)
 
@@ -174,10 +183,11 @@ def sensitivity(question: Question) -> list[Row]:
     if scene.motion.stroke is None:
         directions[command_key(scene)] = 1.0
 
+    nominal = ask_free_bodies(scene)
+
     def along(part: float) -> dict[str, Array]:
-        return ask_free_bodies(
-            file.move({key: part * STEP * step for key, step in directions.items()})
-        ).quantities
+        changes = {key: part * STEP * step for key, step in directions.items()}
+        return ask_beside(file.move(changes), scene, nominal).quantities
 
     near, far = [(along(part), along(-part)) for part in (1.0, 2.0)]
     rows = []
@@ -226,6 +236,7 @@ def tolerances(question: Question) -> list[Row]:
         fourbar.Tolerance(f"lengths.{name}", width, name == "output") for name in names
     )
     scene = replace(scene, tolerances=(scene.tolerances or tuple(defaults))[:MOST])
+    _require_beside(scene)
     spread, expected = fourbar.tolerances(scene, SAMPLES), _compute_expected(scene)
     errors: dict[str, Array] = {}
     for name in (*UNKNOWNS, LINE.value):
@@ -249,6 +260,27 @@ def tolerances(question: Question) -> list[Row]:
         make_row(question, "tolerances", name, error, SPREAD, spread.theta_2, reason)
         for name, error in errors.items()
     ]
+
+
+def _require_beside(scene: Scene) -> None:
+    """Require that what the tolerances reach keeps to the nominal assembly.
+
+    Raises NotAskedError if they reach past the change point of the nominal linkage by
+    more than a perturbation.
+    """
+    file = SceneFile(replace(scene, tolerances=()))
+    reaches = [
+        tolerance.width * (3.0 if tolerance.sigma else 1.0)
+        for tolerance in scene.tolerances
+    ]
+    keys = [tolerance.key for tolerance in scene.tolerances]
+    for signs in product((1.0, -1.0), repeat=len(keys)):
+        changes = {
+            key: sign * reach
+            for key, sign, reach in zip(keys, signs, reaches, strict=True)
+        }
+        if not stays_beside(file.move(changes), scene):
+            raise NotAskedError("the tolerances reach far past a change point")
 
 
 class Expected(NamedTuple):
@@ -275,12 +307,13 @@ def _compute_expected(scene: Scene) -> dict[str, Expected]:
     The result is by the parts of the unknowns.
     """
     bare = replace(scene, tolerances=())
-    nominal = split_parts(ask_free_bodies(bare))
+    answer = ask_free_bodies(bare)
+    nominal = split_parts(answer)
     file = SceneFile(bare)
     numbers = file.find_stated(tolerance.key for tolerance in scene.tolerances)
 
     def changed(changes: dict[str, float]) -> dict[str, Array]:
-        parts = split_parts(ask_free_bodies(file.move(changes)))
+        parts = split_parts(ask_beside(file.move(changes), bare, answer))
         return {
             part: _subtract(part, values, nominal[part])
             for part, values in parts.items()

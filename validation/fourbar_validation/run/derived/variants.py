@@ -16,8 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.files import dump, loads
+from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.quantities import LINE, OK, SCALARS, UNKNOWNS
-from fourbar.scene import Command, Scene
+from fourbar.scene import Command, Scene, with_signs
 from fourbar.scene import command as command_of
 from fourbar.solution import Solution
 from fourbar_validation.compare.answer import Answer, Array
@@ -52,6 +53,12 @@ jumps at the point.
 NOT_AT_REST = 1e-3
 """Part of the speeds over sin^2 mu below which a dry pin may reverse. Small changes of
 a number reverse it then.
+"""
+NEAR_A_CHANGE_POINT = 1e-3
+"""Part of the sum of the lengths by which a linkage near a change point misses it."""
+A_PERTURBATION = 5e-4
+"""Part of the squared sum of the lengths. Changed linkages keep to the nominal assembly
+if they miss its change point by less than twice as much. See `measure_misses`.
 """
 GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 
@@ -217,6 +224,67 @@ def ask_free_bodies(scene: Scene, command: Command | None = None) -> Answer:
         return ask_at(
             FreeBody(), scene, command_of(scene) if command is None else command
         )
+
+
+def is_near_change_point(linkage: FourBar) -> bool:
+    """Return whether two lengths are together nearly as long as the other two."""
+    d, a, b, c = linkage.lengths
+    differences = d + a - b - c, d + b - a - c, d + c - a - b
+    least = min(abs(difference) for difference in differences)
+    return least <= NEAR_A_CHANGE_POINT * math.fsum(linkage.lengths)
+
+
+def measure_misses(linkage: FourBar, bar: int) -> Array:
+    """Measure by how much change points are missed at the ends of the diagonal's range.
+
+    With the bar commanded, the diagonal is at least |d - r| and at most d + r, where r
+    is its length; the other two bars, m and n, are in line where the diagonal is m + n
+    or |m - n|. The miss is the difference of the squares over the square of the sum.
+    """
+    d = linkage.ground
+    lengths = [linkage.bar(number).length for number in MOVING_BARS]
+    r = lengths.pop(bar - 2)
+    m, n = lengths
+    misses = np.array([(d - r) ** 2 - (m - n) ** 2, (d + r) ** 2 - (m + n) ** 2])
+    return np.abs(misses) / math.fsum(linkage.lengths) ** 2
+
+
+def stays_beside(member: Scene, scene: Scene) -> bool:
+    """Return whether a member misses by little each change point that the scene has."""
+    bar = scene.motion.bar
+    nominal = measure_misses(scene.linkage, bar)
+    changed = measure_misses(member.linkage, bar)
+    return bool(np.all(changed[nominal <= A_PERTURBATION] <= A_PERTURBATION))
+
+
+def ask_beside(member: Scene, scene: Scene, nominal: Answer) -> Answer:
+    """Ask the free bodies about a linkage with slightly changed numbers.
+
+    Near a change point each position has the closure nearest to the nominal one: of
+    both, that whose bars turn least from where they are in the nominal linkage.
+
+    Parameters
+    ----------
+    scene, nominal : nominal linkage, and the free bodies' answer at its positions, of
+        which the member has as many.
+    """
+    if not is_near_change_point(scene.linkage):
+        return ask_free_bodies(member)
+    commanded = command_of(member)
+    closures = []
+    turns = []
+    for sign in (1, -1):
+        signs = np.full_like(commanded.branch, sign)
+        closure = with_signs(member.linkage, commanded._replace(branch=signs))
+        answer = ask_free_bodies(member, closure)
+        turn = np.zeros(len(signs))
+        for bar in MOVING_BARS:
+            name = f"theta_{bar}"
+            turn += 1.0 - np.cos(answer.quantities[name] - nominal.quantities[name])
+        closures.append(closure.branch)
+        turns.append(turn)
+    nearest = np.where(turns[0] <= turns[1], *closures).astype(np.int8)
+    return ask_free_bodies(member, commanded._replace(branch=nearest))
 
 
 def hold_to(
