@@ -1,7 +1,4 @@
-"""Judge a run on the workers of a Dask cluster.
-
-Usage: python dask_run.py SCHEDULER PARTS DIR [options of run ...].
-"""
+"""Judge a run on a Dask cluster: dask_run.py SCHEDULER PARTS DIR [options of run]."""
 
 import io
 import subprocess

@@ -59,7 +59,7 @@ class Spring:
     stiffness: float
     length: float = 0.0
     preload: float = 0.0
-    stroke: float | None = field(default=None, compare=False)
+    stroke: float | None = field(default=None, compare=False, repr=False)
     numbers: ClassVar[dict[str, Declared]] = {
         "stiffness": Declared("N/m", AT_LEAST_ZERO),
         "length": Declared("m", AT_LEAST_ZERO),

@@ -89,7 +89,7 @@ def test_the_first_sentences_are_those_of_the_table() -> None:
     default = next(row for row in ROWS if row[0] == "Euler, MuJoCo's defaults")
     assert float(six[3]) < 1e-6
     assert f"Six digits of every pin force cost {six[4]} ms" in PAGE
-    assert f"pay the same {default[4]} ms for two digits" in PAGE
+    assert f"cost the same {default[4]} ms for two digits" in PAGE
     assert 1e-3 < float(default[3]) < 1e-2
 
 

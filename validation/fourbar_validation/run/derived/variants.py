@@ -246,7 +246,8 @@ def measure_misses(linkage: FourBar, bar: int) -> Array:
     r = lengths.pop(bar - 2)
     m, n = lengths
     misses = np.array([(d - r) ** 2 - (m - n) ** 2, (d + r) ** 2 - (m + n) ** 2])
-    return np.abs(misses) / math.fsum(linkage.lengths) ** 2
+    missed: Array = np.abs(misses) / math.fsum(linkage.lengths) ** 2
+    return missed
 
 
 def stays_beside(member: Scene, scene: Scene) -> bool:
