@@ -20,6 +20,8 @@ from fourbar_validation.robots.mimic import (
     show_mimic,
 )
 
+ROUND_OFF = 1e-12
+"""rad, or without unit: angles and ratios of a few units in double precision."""
 KNEE = Scene(
     FourBar(0.3, Bar(0.04, 0.1), Bar(0.295, 0.12), Bar(0.045, 0.9), -0.5 * math.pi),
     fourbar.Motion(np.radians(np.linspace(-40.0, 40.0, 161)), 5.0),
@@ -31,6 +33,84 @@ FILE = """<mujoco><worldbody>
 <body name="shank" pos="0 -0.3 0"><joint name="s" axis="0 0 {axis}"/>
 <inertial pos="0.1 0 0" mass="0.9" diaginertia="0.012 0.012 0.012"/></body>
 </worldbody><equality><joint joint1="s" joint2="c" polycoef="{polycoef}"/></equality></mujoco>"""
+
+
+GRIPPER = Scene(
+    FourBar(0.03, Bar(0.04, 0.02), Bar(0.034, 0.02), Bar(0.04, 0.02)),
+    fourbar.Motion(np.radians(np.linspace(60.0, 120.0, 61)), 1.0),
+    title="gripper",
+)
+PARALLELOGRAM = replace(
+    GRIPPER,
+    linkage=FourBar(0.03, Bar(0.04, 0.02), Bar(0.03, 0.02), Bar(0.04, 0.02)),
+)
+UPRIGHT = """<mujoco><worldbody>
+<body name="crank"><joint name="drive" axis="0 0 {sense}"/>
+<geom type="capsule" fromto="0 0 0 0 0.04 0" size="0.004"/>{pad}</body>
+<body name="rocker" pos="0.03 0 0"><joint name="rocker_j" axis="0 0 {sense}"/>
+<geom type="capsule" fromto="0 0 0 0 0.04 0" size="0.004"/></body>
+</worldbody><equality><joint joint1="rocker_j" joint2="drive" polycoef="{polycoef}"/>
+</equality></mujoco>"""
+"""Both bars stand along +y at the zeros of their joints."""
+PAD = """<body pos="0 0.04 0"><joint name="pad"/><geom size="0.004"/></body>"""
+
+
+def write_upright(
+    folder: Path, polycoef: str = "0 1 0 0 0", sense: int = 1, pad: str = PAD
+) -> Path:
+    path = folder / "upright.xml"
+    path.write_text(UPRIGHT.format(polycoef=polycoef, sense=sense, pad=pad))
+    return path
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("sense", "pad"), [(1, PAD), (1, ""), (-1, PAD), (-1, "")])
+def test_theta_2_is_counted_from_where_the_file_has_the_bar(
+    sense: int, pad: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    report = measure_mimic(
+        write_upright(tmp_path, sense=sense, pad=pad), "rocker_j", GRIPPER
+    )
+    assert math.degrees(report.file.angle) == pytest.approx(0.95783, abs=5e-6)
+    show_mimic(report)
+    sign = "+" if sense > 0 else "-"
+    assert f"theta_2 is 90 deg {sign} drive, from 60 to 120 deg" in (
+        capsys.readouterr().out
+    )
+    # typed into the file, a polynomial turns the rocker as the loop does
+    best = report.fitted[3]
+    polycoef = " ".join(repr(number) for number in best.coefficients)
+    again = measure_mimic(
+        write_upright(tmp_path, polycoef, sense, pad), "rocker_j", GRIPPER
+    )
+    assert again.file.angle == pytest.approx(best.angle, rel=1e-9)
+    assert abs(best.coefficients[0]) <= best.angle + ROUND_OFF
+
+
+@pytest.mark.slow
+def test_a_parallelogram_loses_nothing_and_its_crossed_form_much(
+    tmp_path: Path,
+) -> None:
+    path = write_upright(tmp_path)
+    report = measure_mimic(path, "rocker_j", PARALLELOGRAM)
+    assert report.file.angle <= ROUND_OFF
+    assert report.file.ratio <= ROUND_OFF
+    # of the crossed form tan(theta_4/2) = (a + d)/(a - d) tan(theta_2/2), here 7 times
+    theta_2 = np.radians(np.linspace(60.0, 120.0, 61))
+    theta_4 = 2.0 * np.arctan(7.0 * np.tan(theta_2 / 2.0))
+    missed = (theta_2 - 0.5 * math.pi) - (theta_4 - 2.0 * math.atan(7.0))
+    motion = PARALLELOGRAM.motion.replace(branch=-1)
+    crossed = measure_mimic(path, "rocker_j", replace(PARALLELOGRAM, motion=motion))
+    assert crossed.file.angle == pytest.approx(np.abs(missed).max(), rel=1e-9)
+
+
+@pytest.mark.slow
+def test_a_motion_through_a_change_point_is_refused(tmp_path: Path) -> None:
+    angles = np.radians(np.linspace(-30.0, 30.0, 61))
+    motion = PARALLELOGRAM.motion.replace(angle=angles)
+    through = replace(PARALLELOGRAM, motion=motion)
+    with pytest.raises(InputError, match=r"'0 deg'.*change point"):
+        measure_mimic(write_upright(tmp_path), "rocker_j", through)
 
 
 def write(folder: Path, polycoef: str = "0 0.8842 0 0 0", axis: int = 1) -> Path:

@@ -11,7 +11,7 @@ import click
 import numpy as np
 
 from fourbar.errors import InputError
-from fourbar.quantities import OK
+from fourbar.quantities import CHANGE_POINT, OK
 from fourbar.scene import Command, Scene, command
 from fourbar.solving import solve
 from fourbar_validation.compare.answer import Array
@@ -43,7 +43,7 @@ class MimicError:
     """Largest errors of a polynomial over the motion."""
 
     coefficients: tuple[float, ...]
-    """a0, a1, ... of (theta_2 - zero), lowest power first."""
+    """a0, a1, ... of the leader counted from its zero, lowest power first."""
     angle: float
     """rad."""
     ratio: float
@@ -76,8 +76,8 @@ def measure_mimic(
 ) -> MimicReport:
     """Hold the polynomial of a joint against the loop of a scene over its motion.
 
-    The leader's position is taken as theta_2, and the follower's zero is theta_4 where
-    the leader is at its own.
+    The leader's zero is the theta_2 at which the file has the input, and the follower's
+    is theta_4 there. Where the file does not tell, the leader's position is theta_2.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ def measure_mimic(
     """
     file = read_robot(path, assets)
     with examine_guarded(path) as examined:
-        equality: JointEquality = examined(READ, file, joint)
+        equality: JointEquality = examined(READ, file, joint, scene)
     positions = np.unique(command(scene).theta_2)
     low, high = float(positions[0]), float(positions[-1])
     if len(positions) < FEWEST:
@@ -100,15 +100,16 @@ def measure_mimic(
             f"must be a range of at least {FEWEST} positions: a ratio is of a motion",
         )
     branch = int(command(scene).branch[0])
-    zero = equality.leader_zero
+    zero = _find_zero(equality, 0.5 * (low + high))
     theta_2 = np.union1d(np.linspace(low, high, SAMPLES), positions)
     through_zero = np.union1d(theta_2, zero)
     theta_4, ratio = _follow(scene, through_zero, branch)
     origin = theta_4[np.searchsorted(through_zero, zero)]
     inside = np.searchsorted(through_zero, theta_2)
-    turned = equality.sense * (theta_4 - origin)[inside]
+    # both joints from their zeros, each in its own sense
+    turned = equality.side * equality.sense * (theta_4 - origin)[inside]
     ratio = equality.sense * ratio[inside]
-    x = theta_2 - zero
+    x = equality.side * (theta_2 - zero)
     own = _measure(equality.coefficients, x, turned, ratio)
     left = np.polynomial.polynomial.polyval(x, own.coefficients) - turned
     stated = np.searchsorted(theta_2, positions)
@@ -125,6 +126,16 @@ def measure_mimic(
     )
 
 
+def _find_zero(equality: JointEquality, middle: float) -> float:
+    """Return theta_2 at the leader's zero, rad.
+
+    Whole turns bring what is read from the file near the motion.
+    """
+    if equality.theta_2 is None:
+        return equality.leader_zero
+    return middle + math.remainder(equality.theta_2 - middle, math.tau)
+
+
 def _follow(scene: Scene, theta_2: Array, branch: int) -> tuple[Array, Array]:
     """Return theta_4, continuous, and omega_4/omega_2 at angles of bar 2."""
     moving = replace(scene, motion=scene.motion.replace(speed=1.0, acceleration=0.0))
@@ -133,12 +144,16 @@ def _follow(scene: Scene, theta_2: Array, branch: int) -> tuple[Array, Array]:
     closed = solution.status_code == OK
     if not closed.all():
         angle = math.degrees(float(theta_2[~closed][0]))
-        raise InputError(
-            "motion.theta_2",
-            f"{angle:.6g} deg",
+        reason = (
             "the loop does not close there; the motion and the zero of the file's"
-            " joints must be in its range",
+            " joints must be in its range"
         )
+        if solution.status_code[~closed][0] == CHANGE_POINT:
+            reason = (
+                "a change point, where the output may go on in two ways; neither the"
+                " motion nor the zero of the file's joints may be there"
+            )
+        raise InputError("motion.theta_2", f"{angle:.6g} deg", reason)
     assert solution.omega_4 is not None
     return np.unwrap(solution.theta_4), np.asarray(solution.omega_4)
 
@@ -194,8 +209,8 @@ def show_mimic(report: MimicReport) -> None:
     low, high = (f"{math.degrees(angle):.6g}" for angle in report.swing)
     _say(
         f"{equality.follower} follows {equality.leader} by polycoef"
-        f" {_write(equality.coefficients)}; theta_2 is {equality.leader}, from {low} to"
-        f" {high} deg"
+        f" {_write(equality.coefficients)}; theta_2 is {_write_theta_2(equality)}, from"
+        f" {low} to {high} deg"
     )
     _say(
         f"largest error of the angle: {_deg(own.angle)} deg through the zero of the "
@@ -210,6 +225,16 @@ def show_mimic(report: MimicReport) -> None:
             polycoef = _write((*error.coefficients, *[0.0] * missing))
             ratio = f"{error.ratio:.4g}"
             _say(ROW.format(str(degree), fit, _deg(error.angle), ratio, polycoef))
+
+
+def _write_theta_2(equality: JointEquality) -> str:
+    """Write theta_2 as what the file makes it: the leader and an angle."""
+    if equality.theta_2 is None:
+        return f"{equality.leader} (no pin at the end of its bar tells another zero)"
+    zero = equality.theta_2 - equality.side * equality.leader_zero
+    angle = f"{math.degrees(math.remainder(zero, math.tau)) + 0.0:.6g} deg"
+    sign = "+" if equality.side > 0.0 else "-"
+    return f"{angle} {sign} {equality.leader}"
 
 
 def _deg(angle: float) -> str:

@@ -4,15 +4,25 @@ By its polynomial one joint follows another.
 """
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import mujoco
+import numpy as np
 
 from fourbar.errors import InputError
+from fourbar.scene import Scene
+from fourbar_validation.compare.answer import Array
 from fourbar_validation.engines.mujoco.robots.ancestry import name_joint
 from fourbar_validation.engines.mujoco.robots.compiled import compile_robot
 from fourbar_validation.engines.mujoco.robots.loop import RobotFile
 from fourbar_validation.engines.mujoco.robots.pose import HINGE, find_joint
+from fourbar_validation.engines.mujoco.robots.scene import is_seen_from_behind
+
+SAME_LENGTH = 1e-3
+"""Relative difference of a length in a file from that in a scene: files state three or
+four digits.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,10 +41,19 @@ class JointEquality:
     """x0, rad: the leader in the rest pose of the file."""
     sense: float
     """+1 if both joints turn about the same direction, -1 if about opposite ones."""
+    theta_2: float | None
+    """theta_2 of the scene in the rest pose, rad; None where the file does not tell
+    where the input or the ground ends.
+    """
+    side: float
+    """+1 if theta_2 grows with the leader, -1 if it falls."""
 
 
-def read_joint_equality(file: RobotFile, name: str) -> JointEquality:
-    """Read the equality by which a joint follows another.
+def read_joint_equality(file: RobotFile, name: str, scene: Scene) -> JointEquality:
+    """Read the equality by which a joint follows another, in the loop of a scene.
+
+    The leader turns the input and the follower the output. Where the input points in
+    the rest pose is read from what the file has at its end.
 
     Raises
     ------
@@ -47,7 +66,7 @@ def read_joint_equality(file: RobotFile, name: str) -> JointEquality:
         ties = model.eq_type[number] == mujoco.mjtEq.mjEQ_JOINT
         leader = int(model.eq_obj2id[number])
         if ties and int(model.eq_obj1id[number]) == joint and leader >= 0:
-            return _describe(model, number, joint, leader)
+            return _describe(model, number, joint, leader, scene)
     raise InputError(
         "--mimic",
         name,
@@ -56,7 +75,7 @@ def read_joint_equality(file: RobotFile, name: str) -> JointEquality:
 
 
 def _describe(
-    model: mujoco.MjModel, number: int, follower: int, leader: int
+    model: mujoco.MjModel, number: int, follower: int, leader: int, scene: Scene
 ) -> JointEquality:
     for joint in (follower, leader):
         if int(model.jnt_type[joint]) != HINGE:
@@ -66,10 +85,96 @@ def _describe(
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     along = float(data.xaxis[follower] @ data.xaxis[leader])
+    theta_2, side = _measure_input(model, data, leader, follower, scene)
     return JointEquality(
         name_joint(model, follower),
         name_joint(model, leader),
         tuple(model.eq_data[number, :5].tolist()),
         float(model.qpos0[model.jnt_qposadr[leader]]),
         math.copysign(1.0, along),
+        theta_2,
+        side,
     )
+
+
+def _measure_input(
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    leader: int,
+    follower: int,
+    scene: Scene,
+) -> tuple[float | None, float]:
+    """Return theta_2 in the rest pose, rad, and the sense in which the leader turns it.
+
+    The plane is seen from the tip of the leader's axis, or from behind where the output
+    of the scene is then that of the file. None if the input or the ground is not found.
+    """
+    linkage = scene.linkage
+    ground, input_length, _, output_length = linkage.lengths
+    normal = data.xaxis[leader]
+    line = data.xanchor[follower] - data.xanchor[leader]
+    line = line - (line @ normal) * normal
+    if not _is_same(float(np.linalg.norm(line)), ground):
+        return None, 1.0
+    x = line / np.linalg.norm(line)
+    y = np.cross(normal, x)
+    input_angle = _find_line(model, data, leader, input_length, (x, y))
+    if input_angle is None:
+        return None, 1.0
+    output_angle = _find_line(model, data, follower, output_length, (x, y))
+    behind = output_angle is not None and is_seen_from_behind(
+        scene, 0.0, input_angle, output_angle
+    )
+    side = -1.0 if behind else 1.0
+    return linkage.ground_angle + side * input_angle, side
+
+
+def _find_line(
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    joint: int,
+    length: float,
+    axes: tuple[Array, Array],
+) -> float | None:
+    """Return the angle of a bar from its hinge to its other pin, rad.
+
+    The pin is what lies at the length of the bar: a hinge, else a site, else the end of
+    a capsule or cylinder. None if there is nothing, or if it lies in several
+    directions.
+    """
+    for places in _list_places(model, data, int(model.jnt_bodyid[joint])):
+        directions = []
+        for place in places:
+            apart = place - data.xanchor[joint]
+            across, up = (float(apart @ axis) for axis in axes)
+            if _is_same(math.hypot(across, up), length):
+                directions.append(math.atan2(up, across))
+        if directions:
+            first, *others = directions
+            spread = (abs(math.remainder(one - first, math.tau)) for one in others)
+            return first if max(spread, default=0.0) <= SAME_LENGTH else None
+    return None
+
+
+def _list_places(
+    model: mujoco.MjModel, data: mujoco.MjData, body: int
+) -> Iterator[list[Array]]:
+    """Yield the hinges of the bodies on a body, its sites, and the ends of its rods."""
+    on_body = model.body_parentid[model.jnt_bodyid] == body
+    hinges = np.flatnonzero(on_body & (model.jnt_type == HINGE))
+    yield [data.xanchor[number] for number in hinges]
+    sites = np.flatnonzero(model.site_bodyid == body)
+    yield [data.site_xpos[number] for number in sites]
+    ends = []
+    rods = (mujoco.mjtGeom.mjGEOM_CAPSULE, mujoco.mjtGeom.mjGEOM_CYLINDER)
+    for number in np.flatnonzero(model.geom_bodyid == body):
+        if mujoco.mjtGeom(int(model.geom_type[number])) in rods:
+            axis = data.geom_xmat[number].reshape(3, 3)[:, 2]
+            reach = model.geom_size[number, 1] * axis
+            middle = data.geom_xpos[number]
+            ends += [middle - reach, middle + reach]
+    yield ends
+
+
+def _is_same(one: float, other: float) -> bool:
+    return math.isclose(one, other, rel_tol=SAME_LENGTH)
