@@ -63,6 +63,7 @@ def test_a_scene_is_written_that_the_formulas_solve(tmp_path: Path) -> None:
     assert result.output.splitlines()[-1] == f"written to {out}"
     text = out.read_text()
     assert text.startswith("# Pins: O2 right_driver, A right_finger, B ")
+    assert "# Bars: ground palm, " in text  # as the list of closures names it
     assert "# not in the scene: contacts" in text
     scene = fourbar.load(out)
     assert scene.motion.omega_2 == pytest.approx(2.0 * math.pi)

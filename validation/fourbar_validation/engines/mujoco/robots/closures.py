@@ -519,6 +519,7 @@ class _Finder:
                 closures=tuple(closures),
                 cut=cut,
                 bodies=bodies,
+                ground=chain.ground_name,
                 hinges=hinges,
                 senses=layout.senses,
                 points=layout.points,

@@ -58,7 +58,11 @@ class RobotLoop:
     cut: str | None
     """Pin that the equality is; None where it is a weld within a bar."""
     bodies: Mapping[int, tuple[int, ...]]
-    """Bodies of each bar, 1 to 4: one, or the two that a weld joins."""
+    """Bodies of each bar, 1 to 4: one, or the two that a weld joins. Each is the body
+    of the file that the others of the bar are fixed to.
+    """
+    ground: str
+    """Name of the body that carries both branches of the loop: part of bar 1."""
     hinges: Mapping[str, int]
     """Joint of each pin that is a hinge."""
     senses: Mapping[str, float]

@@ -36,6 +36,7 @@ from fourbar_validation.engines.mujoco.robots.closures import (
     choose_loop,
     describe_equality,
     find_closures,
+    name_body,
 )
 from fourbar_validation.engines.mujoco.robots.compiled import (
     CompiledRobot,
@@ -244,10 +245,12 @@ class _SceneOfLoop:
         closing = loop.name if loop.cut else ""
         hinges = {pin: name_joint(model, joint) for pin, joint in loop.hinges.items()}
         pins = (f"{pin} {hinges.get(pin, closing)}" for pin in PAIRS)
-        bars = (
-            f"{name} {' + '.join(model.body(body).name for body in loop.bodies[bar])}"
-            for bar, name in BAR_NAMES.items()
-        )
+        bars = []
+        for bar, name in BAR_NAMES.items():
+            bodies = [name_body(model, body) for body in loop.bodies[bar]]
+            if bar == 1:  # as the list of closures names it, not what it is fixed to
+                bodies[0] = loop.ground
+            bars.append(f"{name} {' + '.join(bodies)}")
         lines = [f"Pins: {', '.join(pins)}.", f"Bars: {', '.join(bars)}."]
         held = [name_joint(model, joint) for joint in loop.held]
         if held:
