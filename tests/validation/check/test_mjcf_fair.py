@@ -25,13 +25,15 @@ from fourbar.solving import solve
 from fourbar_validation.check.differences import find_differences
 from fourbar_validation.check.mjcf import ModelReport, examine_model
 from fourbar_validation.compare.rows import AGREES, DEGRADED
-from fourbar_validation.engines.mujoco.robots.loop import RobotFile
+from fourbar_validation.engines.mujoco.robots.loop import PoseOptions, RobotFile
+from fourbar_validation.engines.mujoco.robots.scene import read_loop_scene
 from fourbar_validation.engines.mujoco.theirs import (
     ONE_STATE,
     THROUGH_TIME,
     Examined,
     predict_softness,
 )
+from fourbar_validation.robots.files import read_robot
 from tests.support.robots import answer_of
 from tests.support.robots import examine_text as examine
 from tests.support.scenes import mirrored
@@ -557,3 +559,40 @@ def test_loads_of_passive_motors_are_the_loads_of_the_scene() -> None:
     keys = {d.key for d in find_differences(generated.described, examined.described)}
     assert not {key for key in keys if key.startswith(("loads.", "actuators."))}
     assert error_of(scene, examined, ONE_STATE, "F32") < 1e-4
+
+
+FINGER = """<mujoco><compiler angle="degree" autolimits="true"/>
+<default><geom density="2700" contype="0" conaffinity="0"/></default>
+<worldbody><body name="palm">
+<body name="crank"><joint name="motor" axis="0 0 -1" range="-40 40" armature="2e-5"/>
+<geom type="capsule" fromto="0 0 0 0 0.03 0" size="0.004"/>
+<body name="tip" pos="0 0.03 0" quat="0.9238795 0 0 0.3826834">
+<joint name="tip_j" axis="0 0 -1"/>
+<geom type="capsule" fromto="0 0 0 0.05 0.01 0" size="0.004"/>
+<geom type="box" size="0.03 0.006 0.006" pos="0.06 0.04 0"/>
+<site name="a" pos="0.05 0.01 0"/></body></body>
+<body name="follower" pos="0.035 0 0" euler="0 180 0"><joint name="follow" axis="0 0 1"/>
+<geom type="capsule" fromto="0 0 0 0 0.05 0" size="0.004"/>
+<site name="b" pos="0 0.0722 0"/></body>
+</body></worldbody>
+<equality><connect name="close" site1="a" site2="b"/></equality></mujoco>"""
+"""A soft loop whose scene, as `loops` writes it, ends at the range of its motor."""
+
+
+@pytest.mark.slow
+def test_a_range_that_ends_where_the_motion_does_is_not_the_cause(
+    tmp_path: Path,
+) -> None:
+    """Both limits are touched, to round-off, at the ends of the sweep.
+
+    The soft loop is the error, and the file is judged as it is without the range.
+    """
+    path = tmp_path / "finger.xml"
+    path.write_text(FINGER)
+    scene = read_loop_scene(read_robot(path), PoseOptions(), None, None).scene
+    report = examine_model("finger", scene, path, {})
+    path.write_text(FINGER.replace(' range="-40 40"', ""))
+    free = examine_model("finger", scene, path, {})
+    assert report.differences[0].key == "closure.solimp"
+    assert any("the stops of joint 'motor'" in note for note in report.notes)
+    assert force_errors(report) == pytest.approx(force_errors(free), rel=1e-9)

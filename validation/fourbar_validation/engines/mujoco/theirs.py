@@ -75,6 +75,10 @@ MOST_STEPS = 400_000
 """A revolution at 628 steps per turn is a thousandth of this; more would be minutes."""
 PRICING = 60.0
 """Seconds in which differences are tried one by one; each takes two evaluations."""
+TOUCHED = 1e-9
+"""rad. A position that is no farther beyond a limit is at it: scenes state angles with
+twelve digits, and the loop is assembled to 1e-12.
+"""
 DRIVING = 1e3
 """Armature over all other inertia from which it is a flywheel that drives. The speed
 then ripples by 1e-3.
@@ -361,6 +365,9 @@ class UserLoop(Assembled):
             for i in range(len(self.model.actuator_trntype))
             if self.model.actuator_trntype[i] == mujoco.mjtTrn.mjTRN_SITE
         ]
+        # a sweep over the range of a joint ends at its limits, to round-off on either
+        # side: they push where they are passed, not where they are touched
+        self.model.jnt_margin[:] -= TOUCHED
         self._jac = np.zeros((3, self.model.nv))
 
     def _find_flywheel(self) -> float:
