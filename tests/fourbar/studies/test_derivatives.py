@@ -20,7 +20,7 @@ from fourbar.scene import Scene
 from fourbar.scene.motion import Free, FromLimit, Motion
 from fourbar.solution import find_values
 from fourbar.studies.derivatives import sensitivity
-from fourbar.studies.keys import list_entries
+from fourbar.studies.keys import list_entries, read_place
 from fourbar_lab.slopes import judge_slopes
 from fourbar_lab.tally import Tally
 from tests.fourbar.studies.test_study import ANGLES, DRIVEN, LINK, LOADS, RUBBING, scene
@@ -158,6 +158,51 @@ def test_positions_alone_and_through_a_change_point() -> None:
         -1 / (0.1 * np.tan([1.0, 2.0])),
         rtol=EXACT,
     )
+
+
+def test_past_a_change_point_derivatives_are_of_the_same_assembly() -> None:
+    """Those of the first half of the turn, of a parallelogram on the other half too."""
+    theta_2 = np.array([1.0, 4.0, 5.5, 8.0])
+    parallelogram = Scene(fourbar.uniform(0.3, 0.1, 0.3, 0.1), Motion(theta_2, 1.0))
+    slopes = sensitivity(parallelogram)
+    # with b = d, c = a: dB = da e^{i theta_2}, which turns the output alone
+    np.testing.assert_allclose(
+        slopes.of("theta_4", "lengths.input"),
+        -1.0 / (0.1 * np.tan(theta_2)),
+        rtol=EXACT,
+    )
+    np.testing.assert_allclose(slopes.of("theta_4", "motion.theta_2"), 1.0, rtol=EXACT)
+
+
+def differ_by_a_study(nominal: Scene, key: str) -> Any:
+    """Difference theta_3 of the members of a study on both sides of a number."""
+    step = 1e-6
+    number = read_place(nominal, list_entries(nominal)[key].place)
+    beside = {key: np.array([number - step, number + step])}
+    below, above = fourbar.solve(fourbar.vary(nominal, beside), "position").theta_3
+    return np.angle(np.exp(1j * (above - below))) / (2.0 * step)
+
+
+PARALLELOGRAM = (0.3, 0.1, 0.3, 0.1)
+KITE = (0.3, 0.1, 0.1, 0.3)
+
+
+@pytest.mark.parametrize("branch", [1, -1])
+@pytest.mark.parametrize(
+    ("lengths", "command"),
+    [(PARALLELOGRAM, "theta_2"), (PARALLELOGRAM, "theta_4"), (KITE, "theta_2")],
+)
+def test_derivatives_are_the_differences_of_a_study_at_change_points(
+    lengths: tuple[float, ...], branch: int, command: str
+) -> None:
+    angles = np.array([0.7, 2.4, 4.0, 5.5])
+    motion = Motion(**{command: angles}, branch=branch)
+    nominal = Scene(fourbar.uniform(*lengths), motion)
+    of = sensitivity(nominal).of
+    for key in ("lengths.ground", "lengths.input", "lengths.coupler"):
+        np.testing.assert_allclose(
+            of("theta_3", key), differ_by_a_study(nominal, key), rtol=1e-6, atol=1e-6
+        )
 
 
 @pytest.mark.parametrize(

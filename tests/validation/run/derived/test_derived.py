@@ -12,7 +12,9 @@ import pytest
 
 import fourbar
 from fourbar.effects import Place
+from fourbar.evaluation.case import Case
 from fourbar.scene import Scene, command
+from fourbar.studies import derivatives
 from fourbar.studies.keys import read_numbers
 from fourbar_lab.fault_scenes import FAULT_SCENES
 from fourbar_validation.compare.rows import DERIVED as DERIVED_ROWS
@@ -58,44 +60,6 @@ def test_every_engine_compares_and_holds() -> None:
         compared == ENGINES == {check.__name__ for check in CHECKS} == set(DERIVED_ROWS)
     )
     assert not failing(rows)
-
-
-@pytest.mark.parametrize("branch", [1, -1])
-@pytest.mark.parametrize("ground", [0.3, 0.1])
-def test_a_parallelogram_is_judged_over_its_whole_turn(
-    ground: float, branch: int
-) -> None:
-    """Beside a change point a member keeps the nominal assembly, and is not its own."""
-    rod = fourbar.Bar(ground, mass=2.0)
-    crank = fourbar.Bar(0.05)
-    linkage = fourbar.FourBar(ground, crank, rod, fourbar.Bar(0.05))
-    motion = fourbar.Motion(
-        fourbar.Sweep(0.0, 2.0 * np.pi, 36), 2.0 * np.pi, branch=branch
-    )
-    scene = Scene(linkage, motion, effects=(fourbar.Gravity(),))
-    for check in ("study", "sensitivity", "tolerances"):
-        rows = rows_of(scene, check)
-        assert any(row.compared for row in rows)
-        assert not failing(rows), check
-
-
-def test_a_member_of_a_parallelogram_in_another_assembly_is_caught(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """Alone its lengths make a linkage without a change point, which swings back."""
-    linkage = fourbar.uniform(0.3, 0.1, 0.3, 0.1)
-    motion = fourbar.Motion(fourbar.Sweep(0.2, 6.0, 12), 6.0)
-    scene = Scene(linkage, motion, effects=(fourbar.Gravity(),))
-    true = fourbar.solve
-
-    def other(asked: Any, *arguments: Any, **options: Any) -> Any:
-        solution = true(asked, *arguments, **options)
-        if isinstance(asked, fourbar.Study):
-            solution.theta_4[1] += 0.5
-        return solution
-
-    monkeypatch.setattr(fourbar, "solve", other)
-    assert "theta_4" in failing(rows_of(scene, "study"))
 
 
 def altered(
@@ -146,6 +110,55 @@ def test_a_public_call_that_errs_fails(
     assert quantity in failing(
         next(check for check in CHECKS if check.__name__ == engine)(question)
     )
+
+
+CHANGE_POINTS = {
+    "a parallelogram": (0.3, 0.1, 0.3, 0.1),
+    "another parallelogram": (0.1, 0.05, 0.1, 0.05),
+    "a kite": (0.3, 0.1, 0.1, 0.3),
+}
+NEAREST = ("study", "sensitivity", "tolerances")
+"""Checks whose members keep the nominal assembly."""
+
+
+def passing_change_points(name: str, branch: int) -> Scene:
+    d, a, b, c = CHANGE_POINTS[name]
+    linkage = fourbar.FourBar(d, fourbar.Bar(a), fourbar.Bar(b, 2.0), fourbar.Bar(c))
+    motion = fourbar.Motion(fourbar.Sweep(0.0, 2.0 * np.pi, 36), 6.3, branch=branch)
+    return fourbar.Scene(linkage, motion, effects=(fourbar.Gravity(),))
+
+
+@pytest.mark.parametrize("branch", [1, -1])
+@pytest.mark.parametrize("name", CHANGE_POINTS)
+def test_members_near_a_change_point_keep_the_nominal_assembly(
+    name: str, branch: int
+) -> None:
+    scene = passing_change_points(name, branch)
+    for engine in NEAREST:
+        rows = rows_of(scene, engine)
+        assert {"theta_4", "torque"} <= {row.quantity for row in rows if row.compared}
+        assert not failing(rows)
+
+
+def test_a_member_in_the_other_closure_fails(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each member solved alone changes over to the other motion past 180 deg."""
+    monkeypatch.setattr(Case, "beside", lambda case, _: case)
+    scene = passing_change_points("a parallelogram", 1)
+    assert {"theta_4", "torque"} <= failing(rows_of(scene, "study"))
+
+
+def test_derivatives_of_the_other_closure_fail(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(derivatives, "find_side", lambda *_, **__: 1.0)
+    scene = passing_change_points("a parallelogram", 1)
+    assert {"theta_4", "torque"} <= failing(rows_of(scene, "sensitivity"))
+    assert {"theta_4", "torque"} <= failing(rows_of(scene, "tolerances"))
+
+
+def test_tolerances_far_past_a_change_point_are_not_asked() -> None:
+    scene = passing_change_points("a parallelogram", 1)
+    wide = fourbar.Tolerance("lengths.input", 0.01)
+    with pytest.raises(NotAskedError, match="far past a change point"):
+        rows_of(replace(scene, tolerances=(wide,)), "tolerances")
 
 
 def changed(**numbers: Any) -> Callable[[Any], Any]:
