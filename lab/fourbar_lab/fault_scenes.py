@@ -269,14 +269,10 @@ FAULT_SCENES: dict[str, Scene] = {
         FourBar(1.0, Bar(1.0, 0.2), Bar(2.0, 0.5), Bar(1e-6, 0.4)),
         Motion(math.pi + np.array([5e-4, 1e-3, 1.9e-3, 1.99e-3]), 10.0),
     ),
-    "short output at a limit": Scene(
-        FourBar(
-            0.46599177115155876,
-            Bar(0.786199977855261, 0.2),
-            Bar(0.40097461956653324, 0.5),
-            Bar(0.17820900130669004, 0.4),
-        ),
-        Motion(-0.8201413926223766, 10.0),
+    "short coupler and output near a limit": Scene(
+        FourBar(1.0, Bar(1.0, 0.2), Bar(0.005, 0.5), Bar(0.004, 0.4)),
+        # within a hundredth of where both are in line
+        Motion(0.99 * 2.0 * math.asin(0.0045), 10.0),
     ),
     "left open": Scene(ROCKER, Motion(omega_2=3.0)),
     "many turns away": Scene(

@@ -65,6 +65,24 @@ def list_rows(scene: fourbar.Scene) -> dict[str, Any]:
     return {row.quantity: row for row in check_transformed(question)}
 
 
+def test_a_spring_whose_ends_nearly_meet_is_not_judged_there() -> None:
+    """The rounding of its ends turns its line; at the other positions it is judged."""
+    ends = Place(1, (0.1, 0.8)), Place(2, (0.1, 0.0))
+    spring = fourbar.Spring(*ends, 80.0, 0.05)
+    meet = 0.8 + 1e-5
+    rows = []
+    for angles in (np.array([meet, 2.0, 2.5]), np.array([3.0, 2.0, 2.5])):
+        motion = fourbar.Motion(angles, 10.0)
+        scene = crank_rocker(
+            motion=motion, loads=(), effects=(fourbar.Springs((spring,)),)
+        )
+        question = ask("scene", scene, ())
+        few = transformed._take_few(question)
+        rows.append(int(few.fit.sum()))
+        assert not [row for row in list_rows(scene).values() if row.failed]
+    assert rows == [2, 3]
+
+
 @pytest.mark.parametrize("name", SCENES)
 def test_a_scene_has_the_same_numbers_however_it_is_stated(name: str) -> None:
     rows = list_rows(SCENES[name])

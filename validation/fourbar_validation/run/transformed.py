@@ -36,6 +36,7 @@ from fourbar.scene import Command, Scene, with_signs
 from fourbar.scene.motion import Motion
 from fourbar.solution import Solution
 from fourbar.solving import solve
+from fourbar_validation.compare.line import place_line
 from fourbar_validation.compare.pins import find_centre, state_from_pins
 from fourbar_validation.compare.rows import Row
 from fourbar_validation.compare.scales import Sizes
@@ -50,6 +51,7 @@ from fourbar_validation.compare.tolerance import (
     find_condition,
     magnitude,
     mark_touching,
+    sum_lengths,
 )
 from fourbar_validation.engines.description import find_inertia, find_mass
 from fourbar_validation.run.question import NotAskedError, Question, spread_evenly
@@ -238,6 +240,7 @@ def _take_few(question: Question) -> _Few:
         & (solution.condition >= WELL_CONDITIONED)
         & (solution.drive_condition >= WELL_CONDITIONED)
         & ~question.reversing(AT_A_REVERSAL)
+        & _mark_long_springs(scene, solution)
     )
     indices = np.flatnonzero(fit)
     if not len(indices):
@@ -257,6 +260,25 @@ def _take_few(question: Question) -> _Few:
         drive=placed.drive,
     )
     return _Few(few, command, _solve(few, command), question, fit[positions])
+
+
+def _mark_long_springs(scene: Scene, solution: Solution) -> Mask:
+    """Mark where the ends of each spring lie apart, (n,).
+
+    Where they nearly meet rounding turns its line, whatever the loop's condition.
+    """
+    scene = state_from_pins(scene)
+    theta = {bar: getattr(solution, f"theta_{bar}") for bar in MOVING_BARS}
+    long = np.ones(len(solution), dtype=bool)
+    for effect in scene.effects:
+        if not isinstance(effect, Springs):
+            continue
+        for spring in effect.springs:
+            line = place_line(
+                scene.linkage, LinearDrive(spring.start, spring.end), theta
+            )
+            long &= line.stroke >= WELL_CONDITIONED * sum_lengths(scene.linkage)
+    return long
 
 
 def _solve(scene: Scene, command: Command) -> Solution:
