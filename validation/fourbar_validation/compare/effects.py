@@ -14,7 +14,7 @@ import numpy as np
 from fourbar.errors import FourBarError
 from fourbar.linkage import MOVING_BARS, PIN_FORCE, FourBar
 from fourbar.solution import Solution
-from fourbar_validation.compare.pins import find_centre
+from fourbar_validation.compare.pins import find_centre, find_mass
 from fourbar_validation.compare.reversals import compute_slip
 from fourbar_validation.compare.tolerance import Array, magnitude, sum_lengths
 
@@ -53,7 +53,7 @@ def _find_gravity(gravity: "Gravity", linkage: FourBar, _: Solution) -> float:
     """Sum the weights with their levers about the bars' first pins."""
     bars = [(number, linkage.bar(number)) for number in MOVING_BARS]
     return sum(
-        bar.mass
+        find_mass(bar)
         * abs(gravity.magnitude)
         * _multiply_levers(linkage, [(number, find_centre(bar)[0])])
         for number, bar in bars

@@ -1,4 +1,4 @@
-"""Places and mass centres from the first pins of their bars.
+"""Masses, inertias, and places from the first pins of bars.
 
 The arithmetic is the harness's own.
 """
@@ -21,6 +21,28 @@ def find_centre(bar: Bar) -> tuple[float, float]:
     They are as stated, or mid-bar.
     """
     return bar.centre if bar.centre is not None else (bar.length / 2.0, 0.0)
+
+
+def find_mass(bar: Bar) -> float:
+    """Return the mass, kg: as stated, or density times the volume from pin to pin."""
+    if bar.density is None:
+        return bar.mass
+    if bar.section is not None:
+        height, thickness = bar.section
+        return bar.density * (height * thickness) * bar.length
+    assert bar.diameter is not None
+    radius = bar.diameter / 2.0
+    return bar.density * (math.pi * (radius * radius)) * bar.length
+
+
+def find_inertia(bar: Bar) -> float:
+    """Return the moment of inertia about G, kg m^2.
+
+    It is as stated, or that of a uniform slender bar, m L^2/12.
+    """
+    if bar.inertia is not None:
+        return bar.inertia
+    return find_mass(bar) * bar.length**2 / 12.0
 
 
 def state_from_pins(scene: Scene) -> Scene:

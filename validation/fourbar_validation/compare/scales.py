@@ -24,7 +24,12 @@ from fourbar.solution import Solution
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.effects import find_size as size_of
 from fourbar_validation.compare.line import place_line
-from fourbar_validation.compare.pins import find_centre, state_from_pins
+from fourbar_validation.compare.pins import (
+    find_centre,
+    find_inertia,
+    find_mass,
+    state_from_pins,
+)
 from fourbar_validation.compare.tolerance import (
     OF_THE_INPUT,
     WELL_CONDITIONED,
@@ -88,8 +93,7 @@ class Sizes:
         judged by another's scale.
         """
         unit = UNITS[quantity]
-        of_its_own = unit in OF_EACH_BAR or quantity in OF_THE_INPUT
-        key = quantity if of_its_own else unit
+        key = quantity if unit in OF_EACH_BAR else f"{unit} {_choose_bars(quantity)}"
         if key not in self._sums:
             with np.errstate(divide="ignore", invalid="ignore"):
                 terms = TERMS[unit](quantity, self)
@@ -248,8 +252,8 @@ def _sum_force_terms(scene: Scene, formulas: Solution) -> Array:
         )
         lever = 1.0 + abs(find_centre(bar)[0]) / bar.length
         total += (
-            lever * bar.mass * magnitude(acceleration)
-            + bar.moment_of_inertia * np.abs(alpha) / bar.length
+            lever * find_mass(bar) * magnitude(acceleration)
+            + find_inertia(bar) * np.abs(alpha) / bar.length
         )
     for term in (*scene.loads, *scene.effects):
         total += size_of(term, scene.linkage, formulas)

@@ -27,8 +27,8 @@ from fourbar.effects import (
 )
 from fourbar.linkage import MOVING_BARS
 from fourbar.scene import Scene
-from fourbar_validation.compare.pins import find_centre
-from fourbar_validation.engines.description import PINS, find_inertia, find_mass
+from fourbar_validation.compare.pins import find_centre, find_inertia, find_mass
+from fourbar_validation.engines.description import PINS
 
 Ball: TypeAlias = Any
 Complex: TypeAlias = Any

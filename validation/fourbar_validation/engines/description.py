@@ -16,7 +16,12 @@ from fourbar.linkage import MOVING_BARS, Bar, FourBar
 from fourbar.quantities import COUPLE, LINE, UNKNOWNS
 from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Array
-from fourbar_validation.compare.pins import find_centre, resolve
+from fourbar_validation.compare.pins import (
+    find_centre,
+    find_inertia,
+    find_mass,
+    resolve,
+)
 
 PINS = {"O2": (1, 2), "A": (2, 3), "B": (3, 4), "O4": (1, 4)}
 FIRST_PIN = {2: "O2", 3: "A", 4: "O4"}
@@ -54,28 +59,6 @@ class ModelEntry(NamedTuple):
     element: str = ""
     """Tag and name, for example `joint "A"`. Empty if no single element states it."""
     attribute: str = ""
-
-
-def find_mass(bar: Bar) -> float:
-    """Return the mass, kg: as stated, or density times the volume from pin to pin."""
-    if bar.density is None:
-        return bar.mass
-    if bar.section is not None:
-        height, thickness = bar.section
-        return bar.density * (height * thickness) * bar.length
-    assert bar.diameter is not None
-    radius = bar.diameter / 2.0
-    return bar.density * (math.pi * (radius * radius)) * bar.length
-
-
-def find_inertia(bar: Bar) -> float:
-    """Return the moment of inertia about G, kg m^2.
-
-    It is as stated, or that of a uniform slender bar, m L^2/12.
-    """
-    if bar.inertia is not None:
-        return bar.inertia
-    return find_mass(bar) * bar.length**2 / 12.0
 
 
 def about_first_pin(bar: Bar) -> float:

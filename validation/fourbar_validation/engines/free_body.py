@@ -18,12 +18,11 @@ from fourbar.quantities import COUPLE, LINE
 from fourbar.scene import Command, Scene, with_signs
 from fourbar_validation.compare.answer import Answer, Array
 from fourbar_validation.compare.line import DriveLine, place_line
-from fourbar_validation.compare.pins import find_centre, state_from_pins
+from fourbar_validation.compare.pins import find_centre, find_mass, state_from_pins
 from fourbar_validation.engines.description import (
     FORCE_AT,
     SHARED,
     about_first_pin,
-    find_mass,
     find_unknown,
     list_speeds,
 )

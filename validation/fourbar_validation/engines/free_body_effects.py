@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.scene import Scene, command, with_signs
 from fourbar_validation.compare.answer import Array
-from fourbar_validation.compare.pins import find_centre
-from fourbar_validation.engines.description import PINS, declares, find_mass
+from fourbar_validation.compare.pins import find_centre, find_mass
+from fourbar_validation.engines.description import PINS, declares
 from fourbar_validation.engines.free_body_closure import Complex, close, cross
 
 HALF_TURN = math.pi * (1.0 - 1e-12)

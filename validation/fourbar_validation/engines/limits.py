@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.mjcf.document import compute_load_ratio
 from fourbar.scene import Scene
+from fourbar_validation.compare.pins import find_centre
 
 
 class Boundary(NamedTuple):
@@ -100,7 +101,7 @@ def find_exceeded(scene: Scene, speed: float) -> str | None:
         return FASTEST.reason
     if scene.linkage.input.length * speed**2 < SLOWEST.boundary:
         return SLOWEST.reason
-    centres = (abs(scene.linkage.bar(number).mass_centre[0]) for number in MOVING_BARS)
+    centres = (abs(find_centre(scene.linkage.bar(number))[0]) for number in MOVING_BARS)
     if any(0.0 < r < NEAREST_CENTRE.boundary for r in centres):
         return NEAREST_CENTRE.reason
     if compute_load_ratio(scene) > HEAVIEST.boundary:

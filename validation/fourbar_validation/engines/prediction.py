@@ -28,7 +28,7 @@ import numpy as np
 from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.quantities import PIN_FORCES, STAGE_OF, VECTORS
 from fourbar.scene import Command, Scene, with_signs
-from fourbar_validation.compare.pins import find_centre
+from fourbar_validation.compare.pins import find_centre, find_mass
 from fourbar_validation.compare.tolerance import (
     EPS,
     OF_THE_INPUT,
@@ -274,7 +274,7 @@ def _compute_sensitivity(
         strongest += abs(base["torque"]) / sum_lengths(
             scene.linkage
         )  # the couple on a bar is rounded too
-        heaviest = max(scene.linkage.bar(bar).mass for bar in MOVING_BARS)
+        heaviest = max(find_mass(scene.linkage.bar(bar)) for bar in MOVING_BARS)
         for bar in MOVING_BARS:
             _add_response(loop, base, move(**{f"couple_{bar}": strongest * step}))
             _add_response(

@@ -25,9 +25,8 @@ from fourbar.scene import Command, Scene, with_signs
 from fourbar.scene import command as command_of
 from fourbar.scene.motion import COMMANDS, STROKE_COMMAND, Free, Motion
 from fourbar_validation.compare.answer import Answer, Array, EngineError, ReleasedAnswer
-from fourbar_validation.compare.pins import state_from_pins
+from fourbar_validation.compare.pins import find_mass, state_from_pins
 from fourbar_validation.compare.rows import write_one_line
-from fourbar_validation.engines.description import find_mass
 
 PROTOCOL = 3
 """Number of the contract; a change that an engine must know of raises it."""

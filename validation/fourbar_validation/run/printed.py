@@ -186,13 +186,13 @@ def check_blocks(question: Question) -> Iterator[Row]:
     error = (together.status_code[ends] != solution.status_code[long[ends]]).astype(
         float
     )
-    sizes = Sizes(scene, solution)
-    for quantity, ours in expected.items():
+    with np.errstate(all="ignore"):  # beyond the range of doubles there is no size
+        scales = Sizes(scene, solution).scales([*expected], [*expected.values()])
+    for (quantity, ours), scale in zip(expected.items(), scales, strict=True):
         one, due = found[quantity][ends], ours[long[ends]]
         finite = np.isfinite(magnitude(due))
         error[finite != np.isfinite(magnitude(one))] = np.inf
-        with np.errstate(all="ignore"):  # beyond the range of doubles there is no size
-            size = sizes.scale(quantity, ours)[long[ends]]
+        size = scale[long[ends]]
         condition = find_condition(quantity, scene.linkage, solution)[long[ends]]
         condition = np.where(
             np.isnan(condition), 1.0, condition

@@ -22,6 +22,7 @@ from fourbar.scene import Command, Scene, with_signs
 from fourbar.solution import Solution
 from fourbar_validation.compare.answer import Array, ReleasedAnswer
 from fourbar_validation.compare.compare import Comparison
+from fourbar_validation.compare.pins import find_centre, find_inertia, find_mass
 from fourbar_validation.compare.rows import (
     AGREES,
     DEGRADED,
@@ -138,15 +139,12 @@ def make_pendulum(scene: Scene) -> Pendulum | None:
     J = W = 0.0
     for number in MOVING_BARS:
         bar = scene.linkage.bar(number)
-        r, phi = bar.mass_centre
+        r, phi = find_centre(bar)
+        mass = find_mass(bar)
         if phi != 0.0:
             return None
-        J += (
-            bar.mass * a * a
-            if number == 3
-            else bar.moment_of_inertia + bar.mass * r * r
-        )
-        W += bar.mass * down.magnitude * (a if number == 3 else r)
+        J += mass * a * a if number == 3 else find_inertia(bar) + mass * r * r
+        W += mass * down.magnitude * (a if number == 3 else r)
     phi_0 = float(np.asarray(scene.motion.theta_2)) - math.pi / 2
     pendulum = Pendulum(J, W, phi_0, scene.motion.omega_2)
     over_the_top = scene.motion.omega_2**2 > 2.0 * W / J * (1.0 - math.cos(phi_0))

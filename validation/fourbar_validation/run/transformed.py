@@ -37,7 +37,12 @@ from fourbar.scene.motion import Motion
 from fourbar.solution import Solution
 from fourbar.solving import solve
 from fourbar_validation.compare.line import place_line
-from fourbar_validation.compare.pins import find_centre, state_from_pins
+from fourbar_validation.compare.pins import (
+    find_centre,
+    find_inertia,
+    find_mass,
+    state_from_pins,
+)
 from fourbar_validation.compare.rows import Row
 from fourbar_validation.compare.scales import Sizes
 from fourbar_validation.compare.tolerance import (
@@ -49,11 +54,11 @@ from fourbar_validation.compare.tolerance import (
     count_half_turns,
     divide,
     find_condition,
+    find_worst,
     magnitude,
     mark_touching,
     sum_lengths,
 )
-from fourbar_validation.engines.description import find_inertia, find_mass
 from fourbar_validation.run.question import NotAskedError, Question, spread_evenly
 
 SAMPLE = 5
@@ -188,8 +193,7 @@ class _Few:
         theta_1 = self.scene.linkage.ground_angle
         condition = 1.0 / count_half_turns(theta_1, self.command.angle)
         allowed = 0.0 if transformation.exact else EQUIVALENCE.factor / condition
-        largest = np.where(np.isnan(errors), np.inf, errors)[:, self.fit].max(axis=1)
-        worst = int(largest.argmax())
+        worst = find_worst(errors[:, self.fit].max(axis=1))
         return self.question.row(
             name,
             errors[worst],
@@ -235,12 +239,13 @@ def _take_few(question: Question) -> _Few:
     if scene.counts_turns and mark_touching(scene.linkage, in_line).any():
         raise NotAskedError("rounding decides how far its torsion springs are wound")
     assert solution.drive_condition is not None
+    placed = state_from_pins(scene)
     fit = (
         (solution.status_code == OK)
         & (solution.condition >= WELL_CONDITIONED)
         & (solution.drive_condition >= WELL_CONDITIONED)
         & ~question.reversing(AT_A_REVERSAL)
-        & _mark_long_springs(scene, solution)
+        & _mark_long_springs(placed, solution)
     )
     indices = np.flatnonzero(fit)
     if not len(indices):
@@ -249,7 +254,7 @@ def _take_few(question: Question) -> _Few:
     chosen = spread_evenly(indices, SAMPLE)
     positions = np.concatenate([[begin], chosen[chosen != begin]])
     command = at.part(positions)._replace(remainder=None)
-    placed, link = state_from_pins(scene), scene.linkage
+    link = scene.linkage
     two, three, four = (_make_plain(link.bar(bar)) for bar in MOVING_BARS)
     few = Scene(
         FourBar(link.ground, two, three, four, link.ground_angle),
@@ -265,9 +270,10 @@ def _take_few(question: Question) -> _Few:
 def _mark_long_springs(scene: Scene, solution: Solution) -> Mask:
     """Mark where the ends of each spring lie apart, (n,).
 
-    Where they nearly meet rounding turns its line, whatever the loop's condition.
+    Where they nearly meet rounding turns its line, whatever the loop's condition. The
+    places are pairs from first pins.
     """
-    scene = state_from_pins(scene)
+    least = WELL_CONDITIONED * sum_lengths(scene.linkage)
     theta = {bar: getattr(solution, f"theta_{bar}") for bar in MOVING_BARS}
     long = np.ones(len(solution), dtype=bool)
     for effect in scene.effects:
@@ -277,7 +283,7 @@ def _mark_long_springs(scene: Scene, solution: Solution) -> Mask:
             line = place_line(
                 scene.linkage, LinearDrive(spring.start, spring.end), theta
             )
-            long &= line.stroke >= WELL_CONDITIONED * sum_lengths(scene.linkage)
+            long &= line.stroke >= least
     return long
 
 

@@ -81,6 +81,24 @@ def steeper(answer: Any) -> None:
     answer.by["torque"] *= 1.000001
 
 
+def lost(answer: Any) -> None:
+    answer.by["torque"][:] = np.nan
+
+
+def lost_at_one_position(answer: Any) -> None:
+    answer.by["torque"][0, 1] = np.nan
+
+
+def left_out(answer: Any) -> None:
+    del answer.by["torque"]
+
+
+def enlarged(answer: Any) -> None:
+    """Off by a millionth, in an answer whose own values would be a wide scale."""
+    steeper(answer)
+    answer.solution.torque[:] *= 1e6
+
+
 def stiffer(answer: Any) -> None:
     answer.V[1, 2] *= 1.0 + 1e-8
 
@@ -94,6 +112,9 @@ def narrower(answer: Any) -> None:
     [
         ("study", "solve", swapped, "torque"),
         ("sensitivity", "sensitivity", steeper, "torque"),
+        ("sensitivity", "sensitivity", lost, "torque"),
+        ("sensitivity", "sensitivity", lost_at_one_position, "torque"),
+        ("sensitivity", "sensitivity", enlarged, "torque"),
         ("tolerances", "tolerances", narrower, "torque"),
         ("internal_forces", "internal_forces", stiffer, "V3"),
     ],
@@ -110,6 +131,16 @@ def test_a_public_call_that_errs_fails(
     assert quantity in failing(
         next(check for check in CHECKS if check.__name__ == engine)(question)
     )
+
+
+def test_a_derivative_that_is_left_out_ends_its_check(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Which the run counts as a failure."""
+    call = altered(fourbar.sensitivity, left_out)
+    monkeypatch.setattr(fourbar, "sensitivity", call)
+    with pytest.raises(fourbar.InputError, match="'torque': is not known"):
+        rows_of(DERIVED, "sensitivity")
 
 
 CHANGE_POINTS = {

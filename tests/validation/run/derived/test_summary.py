@@ -61,6 +61,19 @@ FAULTS: dict[str, tuple[str, Callable[[Facts], Facts]]] = {
             f, angles={**f.angles, 3: (f.angles[3][0], move_peak(f.angles[3][1], 1e-6))}
         ),
     ),
+    "a range that is a whole turn too wide": (
+        "ranges",
+        lambda f: replace(
+            f,
+            angles={
+                **f.angles,
+                3: (
+                    f.angles[3][0],
+                    f.angles[3][1]._replace(value=f.angles[3][1].value + 2.0 * np.pi),
+                ),
+            },
+        ),
+    ),
     "a peak of the positions": (
         "peaks",
         lambda f: replace(f, peak=move_peak(f.peak, -1e-6)),

@@ -17,7 +17,12 @@ from fourbar.scene import command as command_of
 from fourbar_validation.compare.answer import Answer, Array
 from fourbar_validation.compare.derived import CUT
 from fourbar_validation.compare.line import place_line
-from fourbar_validation.compare.pins import find_centre, state_from_pins
+from fourbar_validation.compare.pins import (
+    find_centre,
+    find_inertia,
+    find_mass,
+    state_from_pins,
+)
 from fourbar_validation.compare.rows import Row
 from fourbar_validation.compare.tolerance import divide
 from fourbar_validation.engines.free_body import move
@@ -184,7 +189,7 @@ def free_piece(
         for start, end in ((0.0, cut), (cut, length)):
             _push_rigid(
                 piece,
-                described.mass * (end - start) / length,
+                find_mass(described) * (end - start) / length,
                 (start, end),
                 a_pin,
                 gravity,
@@ -192,9 +197,9 @@ def free_piece(
     else:
         centre = make_vector(find_centre(described))
         to_G = motion.unit[bar] * centre
-        piece.push(bar, -described.mass * (a_pin + motion.swing(bar, to_G)), to_G)
+        piece.push(bar, -find_mass(described) * (a_pin + motion.swing(bar, to_G)), to_G)
         piece.place = centre.real
-        piece.couple(bar, -described.moment_of_inertia * motion.alpha[bar])
+        piece.couple(bar, -find_inertia(described) * motion.alpha[bar])
     return piece
 
 

@@ -25,7 +25,12 @@ from fourbar.scene.motion import Motion, Sweep
 from fourbar.studies.equilibrium import Equilibrium
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.compare.derived import REST
-from fourbar_validation.compare.pins import find_centre, state_from_pins
+from fourbar_validation.compare.pins import (
+    find_centre,
+    find_inertia,
+    find_mass,
+    state_from_pins,
+)
 from fourbar_validation.compare.rows import Row
 from fourbar_validation.compare.tolerance import (
     EPS,
@@ -33,7 +38,6 @@ from fourbar_validation.compare.tolerance import (
     WELL_CONDITIONED,
     K,
 )
-from fourbar_validation.engines.description import find_inertia
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.prediction import FIRST_ORDER
 from fourbar_validation.engines.registry import find_missing
@@ -387,4 +391,5 @@ def _sum_inertias(scene: Scene) -> float:
         for effect in scene.effects
         if effect.key == "flywheel"
     )
-    return sum(bar.mass * reach**2 + find_inertia(bar) for bar in bars) + sum(wheels)
+    of_bars = sum(find_mass(bar) * reach**2 + find_inertia(bar) for bar in bars)
+    return of_bars + sum(wheels)

@@ -191,7 +191,9 @@ def sensitivity(question: Question) -> list[Row]:
 
     near, far = [(along(part), along(-part)) for part in (1.0, 2.0)]
     rows = []
-    for name in (name for name in (*UNKNOWNS, LINE.value) if name in derivatives.by):
+    for name in (*UNKNOWNS, LINE.value):
+        if name not in nominal.quantities:
+            continue
         first, second = (
             _subtract(name, up[name], down[name]) for up, down in (near, far)
         )
@@ -199,13 +201,15 @@ def sensitivity(question: Question) -> list[Row]:
         terms = np.array(
             [step * derivatives.of(name, key) for key, step in directions.items()]
         )
-        size = magnitude(derivatives.value(name)) + sum(
+        size = magnitude(nominal.quantities[name]) + sum(
             magnitude(term) for term in terms
         )
         comparable = np.array([status == "ok" for status in derivatives.status]) | (
             name not in FORCES
         )
-        comparable &= divide(magnitude(slope - coarse), size) <= CONVERGED
+        # a derivative that is no number is compared, and fails
+        bent = divide(magnitude(slope - coarse), size) > CONVERGED
+        comparable &= np.isfinite(magnitude(slope)) & ~bent
         error = np.where(
             comparable, divide(magnitude(terms.sum(axis=0) - slope), size), 0.0
         )
@@ -262,6 +266,11 @@ def tolerances(question: Question) -> list[Row]:
     ]
 
 
+def _find_reach(tolerance: fourbar.Tolerance) -> float:
+    """Return how far the worst case of a tolerance reaches."""
+    return tolerance.width * (3.0 if tolerance.sigma else 1.0)
+
+
 def _require_beside(scene: Scene) -> None:
     """Require that what the tolerances reach keeps to the nominal assembly.
 
@@ -269,15 +278,16 @@ def _require_beside(scene: Scene) -> None:
     more than a perturbation.
     """
     file = SceneFile(replace(scene, tolerances=()))
-    reaches = [
-        tolerance.width * (3.0 if tolerance.sigma else 1.0)
+    # what moves neither a length nor a drawn pin moves no change point
+    of_lengths = [
+        tolerance
         for tolerance in scene.tolerances
+        if tolerance.key.startswith(("lengths.", "pins."))
     ]
-    keys = [tolerance.key for tolerance in scene.tolerances]
-    for signs in product((1.0, -1.0), repeat=len(keys)):
+    for signs in product((1.0, -1.0), repeat=len(of_lengths)):
         changes = {
-            key: sign * reach
-            for key, sign, reach in zip(keys, signs, reaches, strict=True)
+            tolerance.key: sign * _find_reach(tolerance)
+            for tolerance, sign in zip(of_lengths, signs, strict=True)
         }
         if not stays_beside(file.move(changes), scene):
             raise NotAskedError("the tolerances reach far past a change point")
@@ -349,9 +359,7 @@ def _compute_expected(scene: Scene) -> dict[str, Expected]:
     variances = np.array(
         [[1.0 if tolerance.sigma else 1.0 / 3.0] for tolerance in scene.tolerances]
     )
-    reaches = widths * np.array(
-        [[3.0 if tolerance.sigma else 1.0] for tolerance in scene.tolerances]
-    )
+    reaches = np.array([[_find_reach(tolerance)] for tolerance in scene.tolerances])
     expected = {}
     for part in nominal:
         values, slope = (

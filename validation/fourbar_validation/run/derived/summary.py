@@ -209,9 +209,12 @@ def _judge_ranges(judged: _SummaryJudge) -> None:
         ends = judged.facts.angles[bar]
         low, high = ends
         there = judged.ask([low.place, high.place]).quantities[f"theta_{bar}"]
-        judged.add("ranges", np.abs(wrap_angle(there - [low.value, high.value])))
         fine = np.unwrap(judged.fine.quantities[f"theta_{bar}"])
         fine -= 2.0 * math.pi * round((fine.min() - low.value) / (2.0 * math.pi))
+        # both ends of one range: one that is a whole turn too wide has another end
+        near = np.array([fine.min(), fine.max()])
+        reached = near + wrap_angle(there - near)
+        judged.add("ranges", np.abs(reached - [low.value, high.value]))
         judged.add_excess("ranges", fine.max() - high.value, low.value - fine.min())
     least = judged.facts.transmission
     answers = judged.ask(least.place), judged.fine

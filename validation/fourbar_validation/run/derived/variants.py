@@ -32,6 +32,7 @@ from fourbar_validation.compare.tolerance import (
     ErrorBound,
     find_used,
     magnitude,
+    sum_lengths,
 )
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.registry import make_prediction
@@ -231,7 +232,7 @@ def is_near_change_point(linkage: FourBar) -> bool:
     d, a, b, c = linkage.lengths
     differences = d + a - b - c, d + b - a - c, d + c - a - b
     least = min(abs(difference) for difference in differences)
-    return least <= NEAR_A_CHANGE_POINT * math.fsum(linkage.lengths)
+    return least <= NEAR_A_CHANGE_POINT * sum_lengths(linkage)
 
 
 def measure_misses(linkage: FourBar, bar: int) -> Array:
@@ -246,7 +247,7 @@ def measure_misses(linkage: FourBar, bar: int) -> Array:
     r = lengths.pop(bar - 2)
     m, n = lengths
     misses = np.array([(d - r) ** 2 - (m - n) ** 2, (d + r) ** 2 - (m + n) ** 2])
-    missed: Array = np.abs(misses) / math.fsum(linkage.lengths) ** 2
+    missed: Array = np.abs(misses) / sum_lengths(linkage) ** 2
     return missed
 
 

@@ -506,12 +506,13 @@ class _SceneOfLoop:
 
         `theta_2`: that of the pose, counted in the turns of the sweep.
         """
-        apart = []
-        for branch in (OPEN, CROSSED):
-            motion = Motion(np.array([theta_2]), branch=branch)
-            theta_4 = float(solve(Scene(linkage, motion), "position").theta_4[0])
-            away = math.remainder(theta_4 - self.loop.angles[3], math.tau)
-            apart.append(abs(away) if math.isfinite(away) else math.inf)
+        theta_1, theta_4 = linkage.ground_angle, self.loop.angles[3]
+        apart = [
+            _miss_output(
+                Scene(linkage, Motion(branch=branch)), theta_1, theta_2, theta_4
+            )
+            for branch in (OPEN, CROSSED)
+        ]
         if not abs(apart[0] - apart[1]) > FLAT:
             text = "the bars of pin B are in line in this pose: open is taken"
             self._remark(f"{text}; --pose states another")
