@@ -176,7 +176,7 @@ def results(functions: list[str], names: list[str]) -> dict[str, type]:
 
 def text() -> str:
     """Return the reference."""
-    names = [name for name in dir(fourbar) if name != "__version__"]
+    names = dir(fourbar)
     functions = [name for name in names if not inspect.isclass(getattr(fourbar, name))]
     classes = [name for name in names if name not in functions]
     parts = [

@@ -371,20 +371,12 @@ def list_leading(solution: Solution) -> dict[str, list[Any]]:
 class ScalarColumn(NamedTuple):
     """One column of numbers: a quantity, or a component or the size of one."""
 
-    name: str
+    heading: str
+    """`F12_x`, or `F12_x [lbf]`."""
     unit: str
     """Unit of the values."""
     values: Array | None
     """One for each position; None for what was not evaluated."""
-    names_unit: bool
-    """The heading names the unit."""
-
-    @property
-    def heading(self) -> str:
-        """Heading of the column: `F12_x`, or `F12_x [lbf]`."""
-        if not self.names_unit or self.unit == "1":
-            return self.name
-        return f"{self.name} [{self.unit}]"
 
 
 def list_scalars(solution: Solution, units: Conversion = SI) -> list[ScalarColumn]:
@@ -397,13 +389,14 @@ def list_scalars(solution: Solution, units: Conversion = SI) -> list[ScalarColum
         name: find_values(solution, name, units) for name in _list_quantities(solution)
     }
     quantities |= load_show("derived").list_derived(solution, units)
-    columns = [
-        ScalarColumn(part, find_unit_in(find_unit(name), units)[0], column, bool(units))
-        for name, values in quantities.items()
-        for part, column in _split_columns(name, values).items()
-    ]
+    columns = []
+    for name, values in quantities.items():
+        unit, _ = find_unit_in(find_unit(name), units)
+        named = f" [{unit}]" if units and unit != "1" else ""
+        for part, column in _split_columns(name, values).items():
+            columns.append(ScalarColumn(f"{part}{named}", unit, column))
     if solution.time is None and (time := compute_times(solution)) is not None:
-        columns.append(ScalarColumn("time", "s", time, bool(units)))
+        columns.append(ScalarColumn("time [s]" if units else "time", "s", time))
     return columns
 
 
@@ -411,13 +404,15 @@ def _split_columns(name: str, values: Array | None) -> dict[str, Array | None]:
     """Split a quantity into columns of one number a position, members in turn."""
     if is_scalar(name):
         return {name: None if values is None else values.ravel()}
-    parts: dict[str, Array | None] = {f"{name}_x": None, f"{name}_y": None}
+    x = y = size = None
+    if values is not None:
+        x, y = values[..., 0].ravel(), values[..., 1].ravel()
+    parts = {f"{name}_x": x, f"{name}_y": y}
     if has_size(name):
-        parts[f"|{name}|"] = None
-    if values is None:
-        return parts
-    x, y = values[..., 0].ravel(), values[..., 1].ravel()
-    return dict(zip(parts, (x, y, np.hypot(x, y)), strict=False))
+        if x is not None and y is not None:
+            size = np.hypot(x, y)
+        parts[f"|{name}|"] = size
+    return parts
 
 
 def is_scalar(name: str) -> bool:

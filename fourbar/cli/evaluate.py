@@ -116,7 +116,7 @@ def new(
 def _add_unit(option: str, text: str, unit: str | None) -> str:
     """Add the unit of all numbers to a number that states none.
 
-    Raises InputError if there is no such unit.
+    Raises InputError if neither the number nor the option states one.
     """
     if not given.is_bare(text):
         return text

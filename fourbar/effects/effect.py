@@ -18,8 +18,8 @@ from fourbar.quantities import Array
 Joints = tuple[float, float, float]
 """Angles of pins O2, A, O4, rad."""
 AT_REST = 50.0 * 2.0**-52
-"""Largest slip that counts as zero, relative to the coefficients it is made of. The
-slip is a difference of these, and of the input's coefficient; less is round-off.
+"""Largest slip that counts as zero, relative to the sum of the input's coefficient and
+of the two that it is the difference of; less is round-off.
 """
 
 

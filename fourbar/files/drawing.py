@@ -191,10 +191,17 @@ def find_drawn(drawing: DrawnPins, line: ForceDrive | None, name: str) -> float 
         return drawing.angle(ANGLES[name])
     if name != STROKE_COMMAND[0] or not isinstance(line, LinearDrive):
         return None
-    start, end = (
-        drawing.from_bar(place.bar, place.vector()) for place in (line.start, line.end)
-    )
+    start, end = _draw_ends(drawing, line)
     return abs(end - start)
+
+
+def _draw_ends(drawing: DrawnPins, line: LinearDrive) -> tuple[complex, complex]:
+    """Return the drawn places of the ends of a cylinder, m."""
+    start, end = line.start, line.end
+    return (
+        drawing.from_bar(start.bar, start.vector()),
+        drawing.from_bar(end.bar, end.vector()),
+    )
 
 
 def _find_side(drawing: DrawnPins, line: LinearDrive) -> str | None:
@@ -202,10 +209,8 @@ def _find_side(drawing: DrawnPins, line: LinearDrive) -> str | None:
 
     It is None if the cylinder does not join the ground to a bar.
     """
-    ends = {
-        place.bar: drawing.from_bar(place.bar, place.vector())
-        for place in (line.start, line.end)
-    }
+    bars = line.start.bar, line.end.bar
+    ends = dict(zip(bars, _draw_ends(drawing, line), strict=True))
     (bar,) = ends.keys() - {1} or (None,)
     if 1 not in ends or bar is None:
         return None

@@ -230,7 +230,7 @@ def find_side(psi: Number, passing: Passing, *, opposite: bool) -> Number:
     if not is_any(passing.outer | passing.inner):
         return 1.0
     sign_k = np.copysign(1.0, np.cos(0.5 * psi))
-    sign_s = np.copysign(1.0, tangent(0.5 * psi)) * sign_k
+    sign_s = np.copysign(1.0, np.sin(0.5 * psi))
     if opposite:
         sign_k, sign_s = sign_s, -sign_k
     return select(passing.outer, sign_k, 1.0) * select(passing.inner, sign_s, 1.0)

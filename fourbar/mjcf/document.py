@@ -480,7 +480,7 @@ def choose_run(theta_2: Array, omega: float, alpha: float) -> WindowMotion:
 
 
 def find_start(scene: Scene) -> Start:
-    """Find the start of the motion: its first position that assembles."""
+    """Find the start of the motion: the first position that assembles, as it moves."""
     commanded = command(scene)
     alpha = scene.motion.alpha_2
     speed = scene.motion.omega_2 or 0.0

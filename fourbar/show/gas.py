@@ -5,20 +5,19 @@ does not exist.
 """
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fourbar.effects import Spring, Springs
 from fourbar.evaluation.case import compute_state
-from fourbar.scene import Scene, command_at
+from fourbar.scene import Command, Scene, command_at
 from fourbar.show.units import write_short
 from fourbar.solution import Array, Conversion, Solution
-from fourbar.solving import solve
+from fourbar.studies.equilibrium import bisect
 
 AT_END = 1e-6
 """Part of a gas spring's length within which it is at its end. A scene that states the
 end as a place has fewer digits than that.
 """
-HALVINGS = 40
-"""Halvings of a step of the sweep: an end is then located to a double's digits."""
 
 
 def list_gas_notes(scene: Scene, solution: Solution, units: Conversion) -> list[str]:
@@ -30,13 +29,20 @@ def list_gas_notes(scene: Scene, solution: Solution, units: Conversion) -> list[
     for number, spring in enumerate(_list_springs(scene), 1):
         if spring.stroke is None:
             continue
-        shortest = spring.length - spring.stroke
-        room = AT_END * spring.length
+        distance = _measure(scene, spring, solution.at)
+        distance = np.where(solution.assembled, distance, np.nan)
         for sign, end, word in (
             (1.0, spring.length, "longer than its extended length of"),
-            (-1.0, shortest, "shorter than its compressed length of"),
+            (
+                -1.0,
+                spring.length - spring.stroke,
+                "shorter than its compressed length of",
+            ),
         ):
-            stretches = _list_stretches(scene, solution, number - 1, sign, end, room)
+            room = AT_END * spring.length
+            with np.errstate(invalid="ignore"):
+                beyond = sign * (distance - end) > room
+            stretches = _list_stretches(scene, solution, spring, end, beyond)
             if not stretches:
                 continue
             length = write_short(end, "m", units)
@@ -50,22 +56,19 @@ def list_gas_notes(scene: Scene, solution: Solution, units: Conversion) -> list[
     return notes
 
 
-def _list_springs(scene: Scene) -> list[Spring]:
+def _list_springs(scene: Scene) -> tuple[Spring, ...]:
     """List the springs of a scene in the order of its file."""
-    springs = list[Spring]()
     for effect in scene.settled().effects:
         if isinstance(effect, Springs):
-            springs += effect.springs
-    return springs
+            return effect.springs
+    return ()
 
 
-def _measure(scene: Scene, solution: Solution, index: int) -> Array:
+def _measure(scene: Scene, spring: Spring, at: Command) -> Array:
     """Measure how far the ends of a spring are apart at each position, m."""
-    state = compute_state(scene, solution.at)
-    spring = _list_springs(scene)[index]
+    state = compute_state(scene, at)
     across = spring.end.locate(state) - spring.start.locate(state)
-    distance = np.broadcast_to(np.abs(across), solution.assembled.shape)
-    return np.where(solution.assembled, distance, np.nan)
+    return np.broadcast_to(np.abs(across), at.places.shape)
 
 
 Stretch = tuple[float | None, float | None]
@@ -73,49 +76,60 @@ Stretch = tuple[float | None, float | None]
 
 
 def _list_stretches(
-    scene: Scene, solution: Solution, index: int, sign: float, end: float, room: float
+    scene: Scene,
+    solution: Solution,
+    spring: Spring,
+    end: float,
+    beyond: NDArray[np.bool_],
 ) -> list[Stretch]:
-    """List where a spring is beyond one of its ends."""
-    with np.errstate(invalid="ignore"):
-        beyond = sign * (_measure(scene, solution, index) - end) > room
-    places = solution.at.places if solution.time is None else solution.time
-    stretches, start = list[Stretch](), None
-    for row in range(len(beyond)):
-        if row and beyond[row] != beyond[row - 1]:
-            place = float(places[row])
-            if (
-                scene.motion.free is None
-                and solution.assembled[row - 1 : row + 1].all()
-            ):
-                low, high = float(places[row - 1]), place
-                place = _locate(scene, index, sign, end, low, high)
-            if beyond[row]:
-                start = place
-            else:
-                stretches.append((start, place))
-                start = None
+    """List where a spring is beyond one of its ends, from where it is at positions."""
+    rows = np.flatnonzero(beyond[1:] != beyond[:-1])
+    crossings = _locate_crossings(scene, solution, spring, end, rows)
+    stretches = list[Stretch]()
+    start = None
+    for row, place in zip(rows, crossings, strict=True):
+        if beyond[row]:
+            stretches.append((start, float(place)))
+        else:
+            start = float(place)
     if beyond[-1]:
         stretches.append((start, None))
     return stretches
 
 
-def _locate(
-    scene: Scene, index: int, sign: float, end: float, low: float, high: float
-) -> float:
-    """Find between two positions where a spring reaches one of its ends."""
+def _locate_crossings(
+    scene: Scene, solution: Solution, spring: Spring, end: float, rows: NDArray[np.intp]
+) -> Array:
+    """Find where a spring reaches one of its ends in the steps that begin at rows.
 
-    def is_beyond(place: float) -> bool:
-        one = solve(scene, "position", at=command_at(scene, np.array([place])))
-        return bool(sign * (_measure(scene, one, index)[0] - end) > 0.0)
+    It is the later position of a step in which nothing lies between the two: of a
+    release, of a list, and where the loop does not close.
+    """
+    at = solution.at
+    places = np.array(at.places[rows + 1], dtype=float)
+    assembled = solution.assembled[rows] & solution.assembled[rows + 1]
+    if scene.motion.free is not None or isinstance(scene.motion.angle, np.ndarray):
+        assembled[:] = False
+    if not assembled.any():
+        return places
+    rows = rows[assembled]
+    low, high = at.places[rows], at.places[rows + 1]
+    before = _measure(scene, spring, _command_between(scene, at, low)) > end
 
-    at_low = is_beyond(low)
-    for _ in range(HALVINGS):
-        middle = 0.5 * (low + high)
-        if is_beyond(middle) == at_low:
-            low = middle
-        else:
-            high = middle
-    return 0.5 * (low + high)
+    def is_as_before(middle: Array) -> NDArray[np.bool_]:
+        distance = _measure(scene, spring, _command_between(scene, at, middle))
+        return np.equal(distance > end, before)
+
+    low, high = bisect(is_as_before, low, high)
+    places[assembled] = 0.5 * (low + high)
+    return places
+
+
+def _command_between(scene: Scene, at: Command, places: Array) -> Command:
+    """Return the command at places between its own."""
+    if at.time is not None or at.stroke is not None:
+        return command_at(scene, places)
+    return Command(places, np.full(places.shape, at.branch[0]), None, 0.0, bar=at.bar)
 
 
 def _write_stretch(solution: Solution, stretch: Stretch, units: Conversion) -> str:

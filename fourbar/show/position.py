@@ -7,7 +7,6 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from fourbar.evaluation.case import Case, compute_state
 from fourbar.linkage import MOVING_BARS, PIN_FORCE
 from fourbar.quantities import DERIVED_NAMES
 from fourbar.scene import Scene
@@ -179,21 +178,17 @@ class PositionSheet:
         """Write the forces along the paths of points to the force of the drive.
 
         The points are those of bars 2 and 4 on which the drive does not act. By virtual
-        work the ratio is (ds/dq)/|dP/dq|, s what the force does its work along.
+        work the ratio is that of the speed at which the drive does its work to the
+        point's.
         """
-        at = self.solution.at
-        case = Case.of(self.scene, at.bar)
-        if case.drive is None:
+        if self.scene.drive is None:
             return []
-        state = compute_state(self.scene, at)
-        work = np.abs(case.drive.gain(state))
-        driven = {place.bar for _, place in case.drive.ends}
+        driven = {place.bar for _, place in self.scene.drive.ends}
         rows = []
-        for point in self.scene.settled().points:
+        for point in self.scene.points:
             if point.bar in {2, 4} - driven:
-                path = state.point_coefficient(point.bar, point.place.vector())
-                with np.errstate(divide="ignore"):
-                    ratio = work / np.abs(path)
+                column = f"stroke_speed/v_{point.name}"
+                ratio = np.abs(read_column(self.scene, self.solution, column).values)
                 label = f"F_{point.name}/drive_force"
                 text = f"  (force along the path of {point.name} to the drive's)"
                 rows.append(self._write_number(label, ratio, "1", text))

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from fourbar.formulas.mobility import (
+    TURN,
     change_points,
     circuits,
     classify,
@@ -454,7 +455,7 @@ def _write_equilibrium(equilibrium: Equilibrium, *, friction: bool) -> list[str]
 
 def _write_range(ends: tuple[RestPosition, RestPosition]) -> str:
     first, last = ends
-    apart = math.remainder(last.theta_2 - first.theta_2, 2.0 * math.pi)
+    apart = math.remainder(last.theta_2 - first.theta_2, TURN)
     if first.branch == last.branch and abs(apart) < SAME_PLACE:
         return "everywhere on its circuit"
     text = f"{_write_degrees(first.theta_2)} to {_write_degrees(last.theta_2)}"

@@ -322,7 +322,7 @@ def _find_least_sizes(curve: CircuitCurve, grid: _Grid) -> tuple[_Zeros, Array]:
     def slopes_as_at_start(tau: Array) -> NDArray[np.bool_]:
         return curve.slope(curve.in_rows(tau, branch)) * start > 0.0
 
-    _, after = _bisect(slopes_as_at_start, tau, tau + grid.gap[turning])
+    _, after = bisect(slopes_as_at_start, tau, tau + grid.gap[turning])
     least = curve.in_rows(after, branch)
     Q = curve.force(least)
     size = grid.size[first][turning]
@@ -342,7 +342,7 @@ def _find_sign_changes(curve: CircuitCurve, grid: _Grid) -> _Zeros:
     def has_sign_of_start(tau: Array) -> NDArray[np.bool_]:
         return curve.force(curve.in_rows(tau, branch)) * start > 0.0
 
-    _, after = _bisect(has_sign_of_start, tau, tau + grid.gap[between])
+    _, after = bisect(has_sign_of_start, tau, tau + grid.gap[between])
     zeros = curve.in_rows(after, branch)
     size = grid.size[first][between]
     continuous = np.abs(curve.force(zeros)) <= A_JUMP * size
@@ -467,11 +467,11 @@ def _find_edge(
 
     The places are neighbours.
     """
-    inside, _ = _bisect(lambda away: held(tau + sense * away), np.zeros(tau.shape), gap)
+    inside, _ = bisect(lambda away: held(tau + sense * away), np.zeros(tau.shape), gap)
     return np.asarray(np.remainder(tau + sense * inside, TURN))
 
 
-def _bisect(
+def bisect(
     holds: Callable[[Array], NDArray[np.bool_]], low: Array, high: Array
 ) -> tuple[Array, Array]:
     """Narrow each interval to the two neighbours between which something ends.

@@ -31,6 +31,7 @@ from fourbar.show.plot.style import (
     OPEN,
     choose_force_line,
     find_greatest,
+    find_peak_index,
     place_legend,
     set_degree_ticks,
     write_number,
@@ -170,7 +171,7 @@ def clip(
     lowest = min(float(np.nanmin(value)) for value in curves.values())
     axes.set_ylim(0.0 if lowest >= 0.0 else -limit * factor, limit * factor)
     name, worst = max(curves.items(), key=lambda item: find_greatest(item[1]))
-    index = int(np.nanargmax(np.where(np.isfinite(worst), np.abs(worst), np.nan)))
+    index = find_peak_index(worst)
     if abs(worst[index]) <= limit:
         return
     words = (
@@ -385,7 +386,7 @@ def mark_peak(axes: "Axes", over: Array, values: Array, unit: str) -> None:
     """Mark the largest magnitude of a curve by a ring with its value."""
     if not np.isfinite(values).any():
         return
-    index = int(np.nanargmax(np.where(np.isfinite(values), np.abs(values), np.nan)))
+    index = find_peak_index(values)
     place, peak = float(over[index]), float(values[index])
     axes.plot(place, peak, "o", ms=5.0, mew=1.1, ls="none", zorder=5, **OPEN)
     low, high = axes.get_xlim()

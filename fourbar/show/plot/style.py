@@ -195,6 +195,11 @@ def find_greatest(*values: Array) -> float:
     return float(flat.max()) if flat.size else 0.0
 
 
+def find_peak_index(values: Array) -> int:
+    """Return the index of the largest finite magnitude; one is finite."""
+    return int(np.nanargmax(np.where(np.isfinite(values), np.abs(values), np.nan)))
+
+
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 

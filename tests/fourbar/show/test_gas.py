@@ -5,6 +5,7 @@ import math
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 import fourbar
 from fourbar.cli import status
@@ -88,3 +89,57 @@ def test_a_spring_at_its_end_is_within_its_stroke(tmp_path, capsys):
     assert np.isfinite(fourbar.solve(scene, "force").torque).all()
     assert status(["analyze", file]) == 0
     assert "gas spring" not in capsys.readouterr().out
+
+
+DRIVE = """
+[drive]
+from = { bar = 1, from_pin = ["200 mm", "-90 deg"] }
+to = { bar = 2, from_pin = ["300 mm", "0 deg"] }
+"""
+SWEEP = """theta_2 = { from = "10 deg", to = "80 deg", steps = 7 }
+omega_2 = "0 rad/s"
+"""
+MOTIONS = {
+    "bar 4": 'theta_4 = { from = "10 deg", to = "80 deg", steps = 7 }\n',
+    "a law": (
+        'law = { time = ["0 s", "1 s", "3 s"], theta_2 = ["10 deg", "30 deg",'
+        ' "80 deg"], ends = "rest", steps = 20 }\n'
+    ),
+    "a stroke": (
+        'stroke = { from = "390 mm", to = "497 mm", steps = 7 }\nside = "left"\n'
+    ),
+}
+
+
+@pytest.mark.parametrize("motion", MOTIONS)
+def test_ends_are_found_whatever_is_commanded(
+    motion: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = Path(write(tmp_path, "400 mm", "150 mm"))
+    text = file.read_text(encoding="utf-8").replace(SWEEP, MOTIONS[motion])
+    if motion == "a stroke":
+        text = text.replace("[motion]", f"{DRIVE}[motion]")
+    file.write_text(text, encoding="utf-8")
+    assert status(["equilibrium", str(file)]) == 0
+    printed = " ".join(capsys.readouterr().out.split())
+    assert f"extended length of 400 mm from theta_2 = {reach(0.4)} on" in printed
+    assert status(["analyze", str(file)]) == 0
+    printed = " ".join(capsys.readouterr().out.split())
+    expected = {
+        "bar 4": f"from theta_4 = {reach(0.4)} on",
+        "a law": "from t = ",
+        "a stroke": "from stroke = 400 mm on",
+    }
+    assert f"extended length of 400 mm {expected[motion]}" in printed
+
+
+def test_between_the_positions_of_a_list_nothing_is_located(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = Path(write(tmp_path, "400 mm", "150 mm"))
+    listed = 'theta_2 = ["10 deg", "80 deg", "12 deg", "50 deg"]\n'
+    text = file.read_text(encoding="utf-8").replace(SWEEP, listed)
+    file.write_text(text, encoding="utf-8")
+    assert status(["analyze", str(file)]) == 0
+    printed = " ".join(capsys.readouterr().out.split())
+    assert "from theta_2 = 80 deg to theta_2 = 12 deg and from theta_2 = 50" in printed
