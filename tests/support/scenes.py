@@ -8,6 +8,10 @@ import numpy as np
 
 import fourbar
 
+ON_COUPLER = fourbar.LinearDrive(
+    fourbar.Place(1, (0.25, -2.8)), fourbar.Place(3, (0.09, 0.17))
+)
+"""A cylinder from the ground to the coupler."""
 CYLINDER = fourbar.LinearDrive(
     fourbar.Place(1, (0.25, math.radians(-160.0))), fourbar.Place(2, (0.09, 0.17))
 )

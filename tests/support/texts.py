@@ -43,3 +43,23 @@ bar = 4
 force = ["50 N", "0 deg"]
 from_pin = ["8 cm", "0 deg"]
 """
+PLIERS = """\
+title = "Pliers: effort at the handle, force at the jaw"
+[lengths]
+ground = "2.4 in"
+input = "0.8 in"
+coupler = "1.23 in"
+output = "1.55 in"
+[motion]
+theta_2 = "49 deg"
+[points]
+handle = { bar = 2, from_pin = ["4.26 in", "0 deg"] }
+jaw = { bar = 4, from_pin = ["1 in", "0 deg"] }
+"""
+LENGTHS = """\
+[lengths]
+ground = "0.3 m"
+input = "0.1 m"
+coupler = "0.25 m"
+output = "0.22 m"
+"""

@@ -1,4 +1,4 @@
-"""Imports run downwards from layer to layer, and `import fourbar` loads numpy alone."""
+"""Imports run downwards from layer to layer, and solving loads numpy alone."""
 
 import ast
 import runpy
@@ -102,7 +102,7 @@ def imported(path: Path, *, types: bool = False) -> set[str]:
     return names
 
 
-def test_import_fourbar_loads_numpy_alone() -> None:
+def test_solving_loads_numpy_alone() -> None:
     """With the names that a first program uses.
 
     The others are imported on their first use.

@@ -15,7 +15,7 @@ import pytest
 import fourbar
 from fourbar.cli import status
 from fourbar.errors import HOLDS
-from tests.support.texts import COORDINATES, HUNG, PULL
+from tests.support.texts import COORDINATES, HUNG, PLIERS, PULL
 
 WIDTH = 80
 PRINTED = 1e-5
@@ -132,21 +132,6 @@ def test_the_output_angle_is_known(ask: Steps, tmp_path: Path) -> None:
         text = ask("analyze", "midterm.toml", "--units", "in rad")
         assert row_of(text, "bar 2") == pytest.approx([theta_2], abs=5e-5)
         assert row_of(text, "P") == pytest.approx(place, rel=PRINTED)
-
-
-PLIERS = """\
-title = "Pliers: effort at the handle, force at the jaw"
-[lengths]
-ground = "2.4 in"
-input = "0.8 in"
-coupler = "1.23 in"
-output = "1.55 in"
-[motion]
-theta_2 = "49 deg"
-[points]
-handle = { bar = 2, from_pin = ["4.26 in", "0 deg"] }
-jaw = { bar = 4, from_pin = ["1 in", "0 deg"] }
-"""
 
 
 def test_pliers_have_their_advantage_without_a_speed(

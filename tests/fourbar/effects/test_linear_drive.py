@@ -209,7 +209,7 @@ def test_the_condition_is_the_slope_of_the_stroke_over_what_its_ends_could_move(
 ) -> None:
     """In [0, 1] for linkages of every type.
 
-    Ds/dtheta_2 here from differences of the stroke.
+    ds/dtheta_2 here from differences of the stroke.
     """
     rng = np.random.default_rng(start_bar + 10 * end_bar)
     seen = 0

@@ -17,24 +17,15 @@ from fourbar.files import dump, loads
 from fourbar.scene import Scene
 from fourbar_validation.engines.free_body import FreeBody
 from tests.support.scenes import crank_rocker
+from tests.support.texts import PLIERS
 
 ROUND_OFF = 1e-11
 """Relative, times the condition: two ways of some hundred roundings each."""
 DIRECTION = 1.1
 
-PLIERS = """
-title = "Pliers: a hand at the handle, the jaw's grip as the load"
-[lengths]
-ground = "2.4 in"
-input = "0.8 in"
-coupler = "1.23 in"
-output = "1.55 in"
-[motion]
-theta_2 = "49 deg"
-omega_2 = "1 rad/s"
-[points]
-handle = { bar = 2, from_pin = ["4.26 in", "0 deg"] }
-jaw = { bar = 4, from_pin = ["1 in", "0 deg"] }
+HELD = (
+    PLIERS.replace("[points]", 'omega_2 = "1 rad/s"\n[points]')
+    + """\
 [drive]
 point = "handle"
 direction = "90 deg"
@@ -44,11 +35,13 @@ point = "jaw"
 force = ["-1 lbf", "90 deg"]
 frame = "bar"
 """
+)
+"""A hand at the handle, the grip of the jaw as the load."""
 
 
 def test_pliers_multiply_the_force_of_the_hand() -> None:
     """Right: omega_4/omega_2 0.1332544 and a force ratio of 4.26/0.1332544 = 31.969."""
-    s = fourbar.solve(loads(PLIERS))
+    s = fourbar.solve(loads(HELD))
     assert s.drive_force is not None and s.omega_4 is not None
     assert s.omega_4[0] / s.omega_2[0] == pytest.approx(0.1332544, abs=5e-8)
     grip = 4.4482216152605
@@ -139,7 +132,7 @@ def test_where_the_point_moves_across_the_direction_there_is_no_lever() -> None:
 
 
 def test_a_study_and_a_file_carry_it() -> None:
-    scene = loads(PLIERS)
+    scene = loads(HELD)
     assert loads(dump(scene)) == scene
     keys = {"drive.direction": [math.pi / 2, 1.2], "points.handle.from_pin.0": 0.1}
     varied = fourbar.solve(fourbar.vary(scene, keys))
@@ -172,7 +165,7 @@ def test_a_drive_that_is_stated_wrongly_is_refused_in_one_line(
     old: str, new: str, words: str
 ) -> None:
     with pytest.raises(InputError) as refused:
-        loads(PLIERS.replace(old, new, 1))
+        loads(HELD.replace(old, new, 1))
     assert words in str(refused.value) and "\n" not in str(refused.value)
 
 

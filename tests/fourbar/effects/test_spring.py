@@ -250,8 +250,7 @@ def test_turns_are_counted_through_change_points(
     command = {f"theta_{bar}": Sweep(least + 0.03, most - 0.03, 2000)}
     motion = Motion(**command, **{f"omega_{bar}": 5.0}, branch=branch)
     scene = Scene(link, motion)
-    if not (solve(scene, "velocity").status_code == 0).any():
-        pytest.skip("the bar stands still in this assembly")
+    assert (solve(scene, "velocity").status_code == 0).any()
     for pin in PINS:
         between = continuous(scene, pin)
         rest = between[0] - 1.0

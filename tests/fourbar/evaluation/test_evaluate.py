@@ -227,7 +227,7 @@ def test_a_long_sweep_searches_for_friction_at_its_ends_alone(
 def test_what_gravity_drops_of_its_direction_shows_in_the_error_bar() -> None:
     """Compare a heavy crank beside its equilibrium with balls.
 
-    Cos(-pi/2) as a double is 6e-17, and taken for zero.
+    cos(-pi/2) as a double is 6e-17, and taken for zero.
     """
     scene = Scene(
         FourBar(0.3, Bar(0.1, 1e6), Bar(0.25, 0.5), Bar(0.22, 0.4)),

@@ -1,6 +1,6 @@
 """Free motion against exact solutions and its own equilibrium.
 
-Test_free_motion_reference.py has the digits.
+test_free_motion_reference.py has the digits.
 """
 
 import math

@@ -20,9 +20,9 @@ from fourbar.errors import InputError
 from fourbar.files import dump, load, loads, save
 from fourbar.quantities.units import UnitError, to_si
 from tests.support.scenes import crank_rocker
+from tests.support.texts import LENGTHS
 
 MODELS = sorted((Path(__file__).parents[3] / "models").glob("*.toml"))
-LENGTHS = '[lengths]\nground = "0.3 m"\ninput = "0.1 m"\ncoupler = "0.25 m"\noutput = "0.22 m"\n'
 PRINTED = 0.5e-9
 """Half a unit of the last digit that the figures are given with."""
 

@@ -17,11 +17,8 @@ from fourbar.scene.pictures import LARGEST, Picture
 from fourbar.show import animate
 from tests.fourbar.show.test_animate import PNG, embedded
 from tests.support.scenes import crank_rocker
+from tests.support.texts import LENGTHS
 
-LENGTHS = (
-    '[lengths]\nground = "0.3 m"\ninput = "0.1 m"\n'
-    'coupler = "0.25 m"\noutput = "0.22 m"\n'
-)
 EMBEDDED = "data:image/png;base64," + base64.b64encode(PNG).decode()
 
 

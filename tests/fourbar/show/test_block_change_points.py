@@ -122,7 +122,7 @@ def test_a_hanging_platform(tmp_path: Path) -> None:
 def test_a_given_couple_lifts_a_bar_on_two_links(tmp_path: Path) -> None:
     """alpha = 14.8148 - 6.54 cos(theta).
 
-    Omega^2/2 = 14.8148 theta - 6.54 sin(theta).
+    omega^2/2 = 14.8148 theta - 6.54 sin(theta).
     """
     scene = read(tmp_path, GIVEN_COUPLE)
     released = fourbar.release(scene)

@@ -12,7 +12,7 @@ import pytest
 import fourbar
 from fourbar.effects import Place
 from fourbar.errors import InputError
-from tests.support.scenes import crank_rocker
+from tests.support.scenes import ON_COUPLER, crank_rocker
 from tests.validation.run.derived.test_derived import rows_of
 
 ROUNDED = 1e-12
@@ -127,12 +127,9 @@ EVERYTHING = (
 )  # fmt: skip
 
 
-LINE = fourbar.LinearDrive(Place(1, (0.25, -2.8)), Place(3, (0.09, 0.17)))
-
-
 @pytest.mark.parametrize(
     "drive",
-    [{"drive_bar": 2}, {"drive_bar": 3}, {"drive_bar": 4}, {"drive": LINE}],
+    [{"drive_bar": 2}, {"drive_bar": 3}, {"drive_bar": 4}, {"drive": ON_COUPLER}],
     ids=str,
 )
 def test_each_part_of_a_bar_up_to_a_cut_is_in_balance_under_all_that_acts(

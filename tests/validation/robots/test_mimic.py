@@ -192,7 +192,7 @@ def test_the_smallest_largest_error_is_that_of_the_textbooks(
 ) -> None:
     """Chebyshev's theorem.
 
-    X^n is missed by 2^(1-n) by polynomials of degree n - 1, |x| by 1/8 by parabolas.
+    x^n is missed by 2^(1-n) by polynomials of degree n - 1, |x| by 1/8 by parabolas.
     """
     x = np.linspace(-1.0, 1.0, 2001)
     y = function(x)  # type: ignore[operator]

@@ -18,7 +18,7 @@ from fourbar_validation.run.transformed import (
     check_transformed,
 )
 from fourbar_validation.scenes.random import DrawnType, draw_random_scene
-from tests.support.scenes import crank_rocker
+from tests.support.scenes import ON_COUPLER, crank_rocker
 
 EVERYTHING: tuple[Effect, ...] = (
     fourbar.Gravity(9.81, -1.2),
@@ -34,7 +34,6 @@ LOADS = (
     fourbar.Load(3, (2.0, -1.4), from_pin=(0.1, 0.3), frame="bar", moment=-0.2),
     fourbar.Load(2, (1.0, 2.0), from_pin=(0.04, -0.6)),
 )
-CYLINDER = fourbar.LinearDrive(Place(1, (0.25, -2.8)), Place(3, (0.09, 0.17)))
 AT_A_POINT = fourbar.PointDrive(Place(3, (0.1, 0.2)), 1.1, "bar")
 SCENES = {
     "everything": crank_rocker(loads=LOADS, effects=EVERYTHING),
@@ -45,7 +44,7 @@ SCENES = {
     ),
     "drive on the coupler": crank_rocker(loads=LOADS, drive_bar=3),
     "drive on the output": crank_rocker(loads=LOADS, drive_bar=4),
-    "cylinder": crank_rocker(loads=LOADS, drive=CYLINDER),
+    "cylinder": crank_rocker(loads=LOADS, drive=ON_COUPLER),
     "point": crank_rocker(loads=LOADS, drive=AT_A_POINT),
     "bar 4 commanded": crank_rocker(
         motion=fourbar.Motion(theta_4=fourbar.Sweep(2.3, 2.8, 12), omega_4=2.0),

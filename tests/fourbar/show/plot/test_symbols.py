@@ -31,6 +31,7 @@ from fourbar.show.summary import locate_between
 from tests.fourbar.show.plot.test_plot import clashes, composed
 from tests.fourbar.show.test_animate import embedded
 from tests.support.scenes import crank_rocker
+from tests.support.texts import LENGTHS
 
 TURNING = Load(3, (2.0, 0.5), from_centre=(0.03, 1.0), frame="bar")
 TABLED = Load(4, (5.0, 0.2), table=Table((0.0, math.pi, math.tau), (1.0, -1.0, 1.0)))
@@ -43,11 +44,7 @@ def everything() -> Scene:
     Loads of both frames are added.
     """
     effects = "\n".join(kind.example for kind in list_kinds().values())
-    lengths = (
-        '[lengths]\nground = "0.3 m"\ninput = "0.1 m"\n'
-        'coupler = "0.25 m"\noutput = "0.22 m"\n'
-    )
-    described = loads(f'{lengths}[motion]\nomega_2 = "3 rad/s"\n[effects]\n{effects}\n')
+    described = loads(f'{LENGTHS}[motion]\nomega_2 = "3 rad/s"\n[effects]\n{effects}\n')
     return crank_rocker(loads=(TURNING, TABLED), effects=described.effects, drive_bar=4)
 
 
