@@ -28,6 +28,7 @@ from fourbar.formulas.mobility import (
     choose_range,
     turns_fully,
 )
+from fourbar.formulas.motion import Coefficients
 from fourbar.formulas.torque import inertia
 from fourbar.quantities import JAMMED, NOT_ASSEMBLED, SINGULAR
 from fourbar.scene import Command, Scene
@@ -50,6 +51,10 @@ torsion spring wound by half a turn makes Q jump, which is no zero.
 STILL = 1e-3
 """Ratio of the turns of bars 2 and 4 below which bar 2 stands at a limit. theta_4 then
 takes the place of theta_2.
+"""
+ROUNDING = 1e-12
+"""Part of the fastest bar's turn below which the turn of a bar is rounding: at a limit
+of the bar it is some 1e-16 over the condition.
 """
 A_RANGE = 3
 """Samples in a row where Q is nothing: fewer may be a zero that falls on one."""
@@ -212,7 +217,8 @@ def _describe(
     bar = 4 if abs(state.k.h2[0]) < STILL * abs(state.k.h4[0]) else 2
     square = float(state.k[bar - 2][0]) ** 2
     along_curve = float(curve.slope(point[None])[0])
-    inertias = inertia(curve.lengths.a, curve.case.bodies, state.position, state.k)
+    moving = _drop_rounding(state.k)
+    inertias = inertia(curve.lengths.a, curve.case.bodies, state.position, moving)
     slope, J = along_curve / square, float(np.sum(inertias)) / square
     stability = "undecided"
     if abs(along_curve) > A_JUMP * size:  # never of NaN
@@ -223,6 +229,16 @@ def _describe(
     return Equilibrium(
         curve.place(point), stability, f"theta_{bar}", slope, J, frequency, held
     )
+
+
+def _drop_rounding(k: Coefficients) -> Coefficients:
+    """Return the coefficients with zero for a bar that stands at a limit.
+
+    The square of what rounding leaves there is no inertia.
+    """
+    h = np.array([k.h2, k.h3, k.h4])
+    h[np.abs(h) < ROUNDING * np.abs(h).max(axis=0)] = 0.0
+    return k._replace(h2=h[0], h3=h[1], h4=h[2])
 
 
 class _Zeros(NamedTuple):

@@ -576,3 +576,19 @@ def test_another_command_has_the_equilibria_of_the_positions_that_it_passes(
     single = replace(commanded, motion=Motion(**{name: swept[0]}, **side))
     single_input = replace(commanded, motion=Motion(float(theta_2[0])))
     assert len(equilibrium(single).found) == len(equilibrium(single_input).found) > 0
+
+
+def test_what_stands_at_a_limit_has_no_inertia_and_no_frequency() -> None:
+    """Bar 4 alone has mass and stands still to first order at its limits."""
+    output = fourbar.Bar(0.25, 1.0, 0.002, (0.1, 0.0))
+    bars = fourbar.Bar(0.4), fourbar.Bar(0.2), output
+    scene = Scene(fourbar.FourBar(0.3, *bars, 0.5), effects=(fourbar.Gravity(),))
+    found = equilibrium(scene).found
+    at_limits = [each for each in found if each.inertia < 1e-6]
+    assert len(at_limits) == 2
+    assert all(each.inertia == 0.0 for each in at_limits)
+    assert all(each.frequency is None for each in at_limits)
+    others = [each for each in found if each.stability == "stable" and each.inertia]
+    # a pendulum of bar 4 about O4, whatever moves with it
+    pendulum = math.sqrt(9.81 * 0.1 / (0.002 + 0.01)) / (2.0 * math.pi)
+    assert [each.frequency for each in others] == pytest.approx([pendulum] * 2)

@@ -224,6 +224,29 @@ def test_equilibria_that_err_fail(
     assert failing(rows_of(DERIVED, "equilibria")) >= quantities
 
 
+def test_a_frequency_of_an_inertia_that_is_rounding_fails(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    output = fourbar.Bar(0.25, 1.0, 0.002, (0.1, 0.0))
+    bars = fourbar.Bar(0.4), fourbar.Bar(0.2), output
+    scene = Scene(fourbar.FourBar(0.3, *bars, 0.5), effects=(fourbar.Gravity(),))
+    assert not failing(rows_of(scene, "equilibria"))
+    call = fourbar.equilibrium
+
+    def with_frequency(asked: Scene) -> Any:
+        answer = call(asked)
+        found = [
+            each._replace(frequency=1e16)
+            if each.stability == "stable" and each.frequency is None
+            else each
+            for each in answer.found
+        ]
+        return answer._replace(found=tuple(found))
+
+    monkeypatch.setattr(fourbar, "equilibrium", with_frequency)
+    assert "frequency" in failing(rows_of(scene, "equilibria"))
+
+
 @pytest.mark.parametrize("gravity", [-0.7, 2.1])
 def test_equilibria_near_a_limit_are_compared_too(gravity: float) -> None:
     scene = replace(

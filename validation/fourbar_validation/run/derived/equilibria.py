@@ -278,6 +278,8 @@ def _judge(scene: Scene, equilibrium: Equilibrium) -> tuple[float, dict[str, flo
                 else abs(equilibrium.frequency - frequency)
             )
             errors["frequency"] = apart / frequency / (0.5 * sum(part)) * K * EPS
+        elif equilibrium.frequency is not None and part[1] >= 1.0:
+            errors["frequency"] = math.inf  # of an inertia that is rounding
     return off, errors
 
 
