@@ -12,9 +12,9 @@ validate: setup
 	@echo "validate: scenes in MuJoCo and Pinocchio, half a minute; the report is results/report.html"
 	$(BIN)/python -m validation run
 
-# the contributor's loop: two minutes on two idle cores
+# the contributor's loop: some five minutes on two idle cores
 test: check
-	@echo "test: the quick tests, two minutes"
+	@echo "test: the quick tests, some five minutes"
 	$(BIN)/python -m pytest -n 2 --dist worksteal -m "not slow"
 
 # every test that is not of a night

@@ -217,6 +217,7 @@ def test_no_class_name_stands_for_two_things() -> None:
     assert not [name for name, count in names.items() if count > 1]
 
 
+@pytest.mark.slow
 def test_the_picture_of_the_layers_is_what_the_imports_make() -> None:
     picture = (ROOT / "docs" / "architecture.svg").read_text(encoding="utf-8")
     assert (

@@ -367,6 +367,7 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
+@pytest.mark.slow
 @pytest.mark.posix
 @pytest.mark.usefixtures("interruptible")
 @pytest.mark.timeout(120 + 20 * KILLS)
@@ -601,6 +602,7 @@ class Blunders:
         )
 
 
+@pytest.mark.slow
 def test_of_a_long_suite_what_fails_has_pictures_and_what_is_nearest_to_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -87,6 +87,7 @@ def without(
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("library", ENGINES)
 def test_the_others_run_and_the_missing_named_with_the_reason(
     library: str, tmp_path: Path

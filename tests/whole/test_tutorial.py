@@ -19,6 +19,7 @@ BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 SESSION = re.compile(r"^\$ (.*)\n((?:(?!\$ ).*\n)*)", re.MULTILINE)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("page", ["tutorial", "thesis"])
 def test_a_page_does_and_prints_what_it_says(
     page: str,

@@ -298,6 +298,7 @@ def test_degrees_are_of_angles_alone_and_named(run: Fourbar) -> None:
     )
 
 
+@pytest.mark.slow
 def test_the_table_of_positions_says_in_what_units(run: Fourbar) -> None:
     code, out, err = run("analyze", MODELS / "thesis.toml", "--table")
     assert (code, err) == (HOLDS, "")

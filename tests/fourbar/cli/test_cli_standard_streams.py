@@ -29,6 +29,7 @@ def call_fourbar(
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["-", "/dev/stdin"])
 @pytest.mark.posix
 def test_a_scene_is_read_from_standard_input(name: str, tmp_path: Path) -> None:

@@ -200,6 +200,7 @@ def test_the_largest_force_of_a_stroke_is_that_of_fine_steps() -> None:
         assert fine.at.stroke[i + 1] <= place <= fine.at.stroke[i]
 
 
+@pytest.mark.slow
 def test_the_summary_beside_a_dead_point_is_as_quick_with_pin_friction(
     tmp_path: Path,
 ) -> None:

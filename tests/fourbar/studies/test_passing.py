@@ -81,6 +81,7 @@ def test_a_law_passes_an_angle_up_and_down() -> None:
     assert begins.time is not None and begins.time[0] == 0.0
 
 
+@pytest.mark.slow
 def test_a_release_is_met_when_it_first_passes() -> None:
     """By a much finer release: the angle lies between two of its instants."""
     fine = fourbar.release(

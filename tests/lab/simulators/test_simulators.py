@@ -238,6 +238,7 @@ def test_a_force_that_is_not_read_is_missing_and_the_others_count(
     assert np.isnan(errors.pop("F43")) and max(errors.values()) < EXACT
 
 
+@pytest.mark.slow
 def test_the_host_serves_a_simulator_its_settings_and_derivatives(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

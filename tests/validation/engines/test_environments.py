@@ -139,6 +139,7 @@ def test_an_adapter_of_ours_is_held_to_what_it_is_held_to_here() -> None:
     assert guest.version and not guest.generated
 
 
+@pytest.mark.slow
 def test_an_engine_is_asked_for_its_steps_an_error_or_a_setting() -> None:
     pytest.importorskip("mujoco")
     entry = Entry("mine", adapter="mujoco-simulated", steps=(48, 96))

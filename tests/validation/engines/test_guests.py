@@ -345,6 +345,7 @@ def test_what_is_killed_from_outside_is_asked_again(tmp_path: Path) -> None:
     assert verdicts(by_engine["unlucky"]) == {AGREES} and not lives.stat().st_size
 
 
+@pytest.mark.slow
 def test_a_class_is_served_by_our_host() -> None:
     classes = "Right Angle Changes Prints Empty Leaves Lacks Shapes Elsewhere Complex"
     by_engine = judged(SCENE, *classes.split())
@@ -382,6 +383,7 @@ def test_a_class_is_served_by_our_host() -> None:
     ].startswith("at.omega_2")
 
 
+@pytest.mark.slow
 def test_a_guest_is_asked_for_what_its_hello_names(tmp_path: Path) -> None:
     four = crank_rocker(
         motion=fourbar.Motion(theta_4=fourbar.Sweep(1.8, 2.5, 8), omega_4=3.0)
@@ -411,6 +413,7 @@ def test_a_guest_is_asked_for_what_its_hello_names(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.slow
 def test_a_guest_that_integrates_is_asked_for_released_motions(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -558,6 +561,7 @@ def test_a_guest_that_kills_its_worker_turns_no_other_engine_red(
     assert summary.counts.status == 1
 
 
+@pytest.mark.slow
 def test_a_report_shows_the_versions_that_guests_state(tmp_path: Path) -> None:
     stated = {"numpy-like": "", "own": "2.1", "own 3.0": "3.0"}
     hello = '["gravity"]}'
@@ -588,6 +592,7 @@ def answer(scene, at):
 """
 
 
+@pytest.mark.slow
 def test_parts_judged_by_another_code_are_made_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
