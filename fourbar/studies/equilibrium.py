@@ -52,9 +52,9 @@ STILL = 1e-3
 """Ratio of the turns of bars 2 and 4 below which bar 2 stands at a limit. theta_4 then
 takes the place of theta_2.
 """
-ROUNDING = 1e-12
-"""Part of the fastest bar's turn below which the turn of a bar is rounding: at a limit
-of the bar it is some 1e-16 over the condition.
+ROUNDING = 1e-6
+"""Part of the fastest bar's turn below which the turn of a bar is rounding: where the
+input stands at a limit, an angle of 16 digits leaves its turn some 1e-8.
 """
 A_RANGE = 3
 """Samples in a row where Q is nothing: fewer may be a zero that falls on one."""
