@@ -259,7 +259,7 @@ def _report_interruption(
     os._exit(INTERRUPTED)
 
 
-STARTED_AS = [("-m", name) for name in ("fourbar", "validation", "fourbar_validation")]
+_STARTED_AS = [("-m", name) for name in ("fourbar", "validation", "fourbar_validation")]
 """The commands of this project. A program that imports it reports its own
 interruptions.
 """
@@ -267,6 +267,6 @@ if Path(sys.argv[0] if sys.argv else "").stem in (
     "fourbar",
     "fourbar-validation",
 ) or any(
-    pair in STARTED_AS for pair in zip(sys.orig_argv, sys.orig_argv[1:], strict=False)
+    pair in _STARTED_AS for pair in zip(sys.orig_argv, sys.orig_argv[1:], strict=False)
 ):
     sys.excepthook = _report_interruption

@@ -28,7 +28,7 @@ ENDS = {1: ("O2", "O4"), 2: ("O2", "A"), 3: ("A", "B"), 4: ("O4", "B")}
 """The pins at both ends of each bar; its angle is measured at the first."""
 FIRST_PIN = {bar: first for bar, (first, _) in ENDS.items()}
 SECOND_PIN = {bar: second for bar, (_, second) in ENDS.items()}
-NO_NUMBERS = (bool, str, bytes, complex)
+_NO_NUMBERS = (bool, str, bytes, complex)
 """Types that `require` rejects although `float` may read them."""
 A_BRANCH = "must be +1 (open) or -1 (crossed)"
 MOST_STEPS = 100_000_000
@@ -60,7 +60,7 @@ def require(key: str, value: object, unit: str = "1", bound: str = ANY) -> float
     """
     number = math.nan
     if unit != "1":
-        value = read_quantity(value)
+        value = _read_quantity(value)
     if unit != "1" and isinstance(value, str):
         from fourbar.quantities.units import UnitError, to_si
 
@@ -69,7 +69,7 @@ def require(key: str, value: object, unit: str = "1", bound: str = ANY) -> float
         except UnitError as error:
             like = f'must be {bound}, in {unit} or with a unit, like "1 {unit}"'
             raise InputError(key, value, f"{error}; {like}") from None
-    elif not isinstance(value, NO_NUMBERS) and not getattr(value, "shape", ()):
+    elif not isinstance(value, _NO_NUMBERS) and not getattr(value, "shape", ()):
         with suppress(TypeError, ValueError, OverflowError):
             number = float(value)  # type: ignore[arg-type]
     if not math.isfinite(number) or not is_within(number, bound):
@@ -89,7 +89,7 @@ def require_whole(key: str, value: object, among: Container[int], allowed: str) 
     return int(value)
 
 
-def read_quantity(value: object) -> object:
+def _read_quantity(value: object) -> object:
     """Return a `pint.Quantity` as text with its unit, in a list if it is an array.
 
     Other values are returned as they are.
@@ -108,7 +108,7 @@ def convert_to_unit(key: str, value: object, unit: str) -> object:
     Numbers and arrays stay.
     """
     if unit != "1":
-        value = read_quantity(value)
+        value = _read_quantity(value)
     if isinstance(value, (list, tuple)):
         return [convert_to_unit(key, entry, unit) for entry in value]
     return (

@@ -231,11 +231,11 @@ class Solution(Quantities):  # noqa: PLW1641 - arrays have no hash
         """
         evaluated = [
             column
-            for column in list_scalars(self, require_units(units))
+            for column in _list_scalars(self, require_units(units))
             if column.values is not None
         ]
         columns = {column.heading: column.values for column in evaluated}
-        table = make_data_frame({**list_leading(self), **columns})
+        table = make_data_frame({**_list_leading(self), **columns})
         table.attrs["units"] = {column.heading: column.unit for column in evaluated}
         return table
 
@@ -320,9 +320,9 @@ def write_csv(
     `chosen`: the columns by heading, in these units; left out: all quantities.
     """
     size = solution.theta_2.size
-    first = list_leading(solution) if chosen is None else {}
+    first = _list_leading(solution) if chosen is None else {}
     scalars: Mapping[str, Array | None] = (
-        {column.heading: column.values for column in list_scalars(solution, units)}
+        {column.heading: column.values for column in _list_scalars(solution, units)}
         if chosen is None
         else chosen
     )
@@ -349,7 +349,7 @@ def write_csv(
     return text.getvalue()
 
 
-def list_leading(solution: Solution) -> dict[str, list[Any]]:
+def _list_leading(solution: Solution) -> dict[str, list[Any]]:
     """List the first columns of a table, one entry for each position.
 
     Of a study the number of the member is one.
@@ -368,7 +368,7 @@ def list_leading(solution: Solution) -> dict[str, list[Any]]:
     }
 
 
-class ScalarColumn(NamedTuple):
+class _ScalarColumn(NamedTuple):
     """One column of numbers: a quantity, or a component or the size of one."""
 
     heading: str
@@ -379,7 +379,7 @@ class ScalarColumn(NamedTuple):
     """One for each position; None for what was not evaluated."""
 
 
-def list_scalars(solution: Solution, units: Conversion = SI) -> list[ScalarColumn]:
+def _list_scalars(solution: Solution, units: Conversion = SI) -> list[_ScalarColumn]:
     """List every quantity as columns of numbers, vectors as `A_x`, `A_y`.
 
     Of a pin force the magnitude too, and where it is known the time. In other units
@@ -394,9 +394,9 @@ def list_scalars(solution: Solution, units: Conversion = SI) -> list[ScalarColum
         unit, _ = find_unit_in(find_unit(name), units)
         named = f" [{unit}]" if units and unit != "1" else ""
         for part, column in _split_columns(name, values).items():
-            columns.append(ScalarColumn(f"{part}{named}", unit, column))
+            columns.append(_ScalarColumn(f"{part}{named}", unit, column))
     if solution.time is None and (time := compute_times(solution)) is not None:
-        columns.append(ScalarColumn("time [s]" if units else "time", "s", time))
+        columns.append(_ScalarColumn("time [s]" if units else "time", "s", time))
     return columns
 
 

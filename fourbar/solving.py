@@ -40,7 +40,7 @@ from fourbar.scene.numbers import POINT_STAGES
 from fourbar.scene.scene import Independent, with_signs
 from fourbar.solution import Array, Solution, unwrap
 
-LONG_BLOCK = BLOCK // 4
+_LONG_BLOCK = BLOCK // 4
 """Positions with error bars evaluated at a time. Longer numbers fill the cache sooner.
 """
 Part = tuple[Any, ...]
@@ -118,7 +118,7 @@ def solve(
     )
 
 
-class Requested(NamedTuple):
+class _Requested(NamedTuple):
     """Quantities that are evaluated, and the number of positions."""
 
     shape: tuple[int, ...]
@@ -133,7 +133,7 @@ class Requested(NamedTuple):
     @property
     def block(self) -> int:
         """Number of positions evaluated at a time."""
-        return BLOCK if self.last_stage < ERROR else LONG_BLOCK
+        return BLOCK if self.last_stage < ERROR else _LONG_BLOCK
 
     @property
     def asks_forces(self) -> bool:
@@ -144,7 +144,7 @@ class Requested(NamedTuple):
 class Results:
     """Status codes and arrays of all positions, which are filled block by block."""
 
-    def __init__(self, request: Requested) -> None:
+    def __init__(self, request: _Requested) -> None:
         shape, given = request.shape, request.out or {}
         self.codes: NDArray[np.uint8] = np.zeros(shape, dtype=np.uint8)
         self.arrays: dict[str, Array] = {}
@@ -173,7 +173,9 @@ class Results:
                 array[*part, 0], array[*part, 1] = value.real, value.imag
 
 
-def _make_case(scene: Scene, commanded: Command, request: Requested, side: int) -> Case:
+def _make_case(
+    scene: Scene, commanded: Command, request: _Requested, side: int
+) -> Case:
     """Make the case of one linkage.
 
     Its effects count turns from where the motion begins.
@@ -185,7 +187,7 @@ def _make_case(scene: Scene, commanded: Command, request: Requested, side: int) 
     return case.begin_with(stated if stated.bar == commanded.bar else commanded)
 
 
-def _solve_alone(case: Case, commanded: Command, request: Requested) -> Results | None:
+def _solve_alone(case: Case, commanded: Command, request: _Requested) -> Results | None:
     """Solve a single position in plain numbers.
 
     Arrays of one entry cost several times as much. None for several positions, and
@@ -215,7 +217,7 @@ def _solve_alone(case: Case, commanded: Command, request: Requested) -> Results 
     return results
 
 
-def _solve_blocks(case: Case, commanded: Command, request: Requested) -> Results:
+def _solve_blocks(case: Case, commanded: Command, request: _Requested) -> Results:
     """Solve the positions of one linkage block by block."""
     results, evaluated = Results(request), None
     for part in split(len(commanded.angle), request.block):
@@ -227,7 +229,7 @@ def _solve_blocks(case: Case, commanded: Command, request: Requested) -> Results
 
 
 def _solve_released(
-    scene: Scene, independent: Independent, request: Requested
+    scene: Scene, independent: Independent, request: _Requested
 ) -> Results:
     """Solve a released motion, as the commands of bars 2 and 4 that it is made of."""
     results = Results(request)
@@ -322,7 +324,7 @@ def find_requested(
     commanded: Command,
     stage: str | None,
     out: Mapping[str, Array] | None,
-) -> Requested:
+) -> _Requested:
     """Find what is evaluated for the arguments of `solve`; an InputError as there.
 
     If a bar other than the input is commanded, theta_2 and sin_mu, whose sign is the
@@ -371,7 +373,7 @@ def find_requested(
         )
     if commanded.bar != 2:
         wanted = {**dict.fromkeys(wanted), "theta_2": None, "sin_mu": None}.keys()
-    return Requested(shape, last_stage, wanted, out)
+    return _Requested(shape, last_stage, wanted, out)
 
 
 def _list_stages(points: tuple[str, ...]) -> dict[str, str]:
@@ -410,7 +412,7 @@ def make_solution(
     change_points : times at which a free motion passed a change point, s.
     """
     codes, quantities_by_name = results.codes, results.arrays
-    unwrap_angles(quantities_by_name, commanded.bar)
+    _unwrap_angles(quantities_by_name, commanded.bar)
     if commanded.stroke is not None:
         # as commanded, wherever it has a value
         for name in {"stroke", "stroke_speed"} & quantities_by_name.keys():
@@ -456,7 +458,7 @@ def make_solution(
     )
 
 
-def unwrap_angles(arrays: Mapping[str, Array], bar: int) -> None:
+def _unwrap_angles(arrays: Mapping[str, Array], bar: int) -> None:
     """Make every computed angle continuous along its sweep.
 
     The commanded angle stays as it is stated.

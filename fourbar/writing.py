@@ -21,7 +21,7 @@ from fourbar.errors import DependencyError, InputError
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-TEMPORARY = ".part"
+_TEMPORARY = ".part"
 """Suffix of the name of an unfinished file."""
 STANDARD_STREAM = Path("-")
 """Path that stands for standard input or standard output. The former if a file is read,
@@ -107,7 +107,7 @@ def name_file(path: Path) -> Iterator[None]:
             error.filename2,
         )  # a copy names what it reads first, whichever of the two is full
         if error.filename is None or any(
-            str(name).endswith(TEMPORARY) for name in both
+            str(name).endswith(_TEMPORARY) for name in both
         ):
             error.filename, error.filename2 = str(path), None
         raise
@@ -161,7 +161,7 @@ def write_bytes(path: str | Path, data: bytes, *, private: bool = False) -> None
 
     with name_file(target):
         handle, temporary = tempfile.mkstemp(
-            prefix=f".{target.name[:100]}.", suffix=TEMPORARY, dir=target.parent
+            prefix=f".{target.name[:100]}.", suffix=_TEMPORARY, dir=target.parent
         )
         try:
             with os.fdopen(handle, "wb") as file:

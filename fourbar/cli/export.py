@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from fourbar.mjcf.plane import Plane
 
 
-def plane_options(command: Callable[..., None]) -> Callable[..., None]:
+def _plane_options(command: Callable[..., None]) -> Callable[..., None]:
     """Add --axis and --origin, given to the command as `plane`."""
 
     @wraps(command)
@@ -39,7 +39,7 @@ def plane_options(command: Callable[..., None]) -> Callable[..., None]:
     return placed
 
 
-def scene_or_lengths(command: Callable[..., None]) -> Callable[..., None]:
+def _scene_or_lengths(command: Callable[..., None]) -> Callable[..., None]:
     """Add SCENE, --lengths and --omega, one of the first two to be given."""
     for add in (
         click.option(
@@ -86,7 +86,7 @@ def _describe(
         click.echo(line, err=to_output)
 
 
-without_loads_option = click.option(
+_without_loads_option = click.option(
     "--without-loads",
     is_flag=True,
     help="Leave the loads to your program; the file format has none.",
@@ -208,7 +208,7 @@ def animate(
 
 
 @click.command()
-@scene_or_lengths
+@_scene_or_lengths
 @click.option(
     "--for",
     "simulator",
@@ -227,7 +227,7 @@ def animate(
         " your controller."
     ),
 )
-@plane_options
+@_plane_options
 @given.text_option(".xml", ".mjcf", required=True)
 def mjcf(
     scene: Path | None,
@@ -247,7 +247,7 @@ def mjcf(
 
 
 @click.command()
-@scene_or_lengths
+@_scene_or_lengths
 @click.option(
     "--for",
     "reader",
@@ -256,8 +256,8 @@ def mjcf(
     show_default=True,
     help="Simulator that will load the file.",
 )
-@without_loads_option
-@plane_options
+@_without_loads_option
+@_plane_options
 @given.text_option(".sdf", ".world", ".xml", required=True)
 def sdf(
     scene: Path | None,
@@ -277,9 +277,9 @@ def sdf(
 
 
 @click.command()
-@scene_or_lengths
-@without_loads_option
-@plane_options
+@_scene_or_lengths
+@_without_loads_option
+@_plane_options
 @given.text_option(".usda", ".usd", required=True)
 def usd(
     scene: Path | None,

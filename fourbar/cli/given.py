@@ -13,14 +13,14 @@ from fourbar.linkage import ANY, POSITIVE, require
 from fourbar.scene import Scene
 from fourbar.solution import Conversion
 
-SCENE_TEXT = "fourbar.scene_text"
+_SCENE_TEXT = "fourbar.scene_text"
 """Key of the scene file's text in the context of a command. Standard input is read
 once.
 """
 MOST_POSITIONS = 1_000_000
 """Positions that `analyze` prints: about a gigabyte of text."""
 FILE = click.Path(path_type=Path)
-KEYS_OF_A_SCENE = (
+_KEYS_OF_A_SCENE = (
     "motion",
     "lengths",
     "bars",
@@ -126,7 +126,7 @@ def open_scene(path: Path) -> Iterator[Scene]:
     from fourbar.writing import require_file
 
     context, text = click.get_current_context(), read_text(path)
-    context.meta[SCENE_TEXT] = text
+    context.meta[_SCENE_TEXT] = text
     scene, out = loads(text, str(path)), context.params.get("out")
     if out is not None:
         require_file(out, path)
@@ -134,7 +134,7 @@ def open_scene(path: Path) -> Iterator[Scene]:
     try:
         yield scene
     except InputError as error:
-        if error.file is None and error.key.startswith(KEYS_OF_A_SCENE):
+        if error.file is None and error.key.startswith(_KEYS_OF_A_SCENE):
             raise error.in_file(str(path)) from None
         raise
 
@@ -167,7 +167,7 @@ def suit_units() -> Conversion:
 
     from fourbar.show.units import units_of_scene
 
-    return units_of_scene(tomllib.loads(click.get_current_context().meta[SCENE_TEXT]))
+    return units_of_scene(tomllib.loads(click.get_current_context().meta[_SCENE_TEXT]))
 
 
 def is_bare(text: str) -> bool:

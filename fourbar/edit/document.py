@@ -38,14 +38,14 @@ EXAMPLES = {
     "kg/m^3": "7850 kg/m^3",
 }
 """Examples of the numbers of a bar by their SI unit."""
-SECTION = ("20 mm", "5 mm")
+_SECTION = ("20 mm", "5 mm")
 """Example of a pair of lengths: height and thickness of a cross-section."""
-MOVING = {
+_MOVING = {
     **{"rad": "60 deg", "rad/s": "10 rad/s", "rad/s^2": "0 rad/s^2"},
     **{"m": "500 mm", "m/s": "100 mm/s", "m/s^2": "0 mm/s^2"},
 }
 """Examples of what is commanded, likewise."""
-LONGEST_TEXT = 10_000
+_LONGEST_TEXT = 10_000
 """Characters of one entry."""
 
 
@@ -98,7 +98,7 @@ def _offer_bars(offers: dict[str, Any]) -> None:
         for name, number in Bar.numbers.items():
             if number.pair:
                 polar = [EXAMPLES[number.unit], "0 deg"]
-                value = polar if number.pair == "rad" else [*SECTION]
+                value = polar if number.pair == "rad" else [*_SECTION]
                 offers["parts"].append({"at": ["bars", bar, name], "value": value})
             elif number.left_out is not REQUIRED:
                 fields.setdefault(bar, {})[name] = EXAMPLES[number.unit]
@@ -120,7 +120,7 @@ def _offer_commands() -> dict[str, Any]:
         names[0]: {
             "label": label,
             "fields": (
-                {name: MOVING[Motion.numbers[name].unit] for name in names} | words
+                {name: _MOVING[Motion.numbers[name].unit] for name in names} | words
             ),
         }
         for names, (label, words) in commands.items()
@@ -159,11 +159,11 @@ class SceneDocument:
 
         The value is a text, or a number where the file has one.
         """
-        if len(text) > LONGEST_TEXT:
+        if len(text) > _LONGEST_TEXT:
             raise InputError(
                 name_entry(path),
                 text[:60],
-                f"must have {LONGEST_TEXT} characters at most",
+                f"must have {_LONGEST_TEXT} characters at most",
             )
         old = self.at(path)
         if not text.strip() and old is not None and not isinstance(path[-1], int):

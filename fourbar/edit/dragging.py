@@ -22,13 +22,13 @@ from fourbar.scene.drawing import DrawnPins
 from fourbar.solving import solve
 
 PINS = ("A", "B", "O4")
-SAME_ANGLE = 1e-9
+_SAME_ANGLE = 1e-9
 """rad. Difference below which the position shown is the one that is drawn."""
-LEAST_DIGITS = 1e-12
+_LEAST_DIGITS = 1e-12
 """Finest grain, relative to the number itself."""
 
 
-class Handle(NamedTuple):
+class _Handle(NamedTuple):
     """A point of the drawing that can be dragged, besides the pins."""
 
     name: str
@@ -57,13 +57,13 @@ class Handle(NamedTuple):
         return self._asdict() | plain
 
 
-def list_handles(scene: Scene) -> list[Handle]:
+def list_handles(scene: Scene) -> list[_Handle]:
     """List everything that can be dragged.
 
     These are mass centres, points, loads, and the ends of what acts on a line.
     """
     handles = [
-        Handle(
+        _Handle(
             f"mass centre of {name}",
             ("bars", name, "centre"),
             n,
@@ -84,7 +84,7 @@ def list_handles(scene: Scene) -> list[Handle]:
         if load.arm is not None:
             G = scene.linkage.bar(load.bar).to_centre
             arm = cmath.rect(*load.arm)
-            handle = Handle(name, (*path, "arm"), load.bar, G, arm, turns=False)
+            handle = _Handle(name, (*path, "arm"), load.bar, G, arm, turns=False)
         else:
             handle = _hold_place(name, path, load.place, scene)
         handles.append(
@@ -100,7 +100,7 @@ def list_handles(scene: Scene) -> list[Handle]:
     return handles
 
 
-def _hold_drive(drive: ForceDrive, scene: Scene) -> list[Handle]:
+def _hold_drive(drive: ForceDrive, scene: Scene) -> list[_Handle]:
     """List the handles of a drive that exerts a force: its ends, or its point."""
     if drive.has_stroke:
         return _hold_ends("drive", ("drive",), drive, scene)
@@ -108,7 +108,7 @@ def _hold_drive(drive: ForceDrive, scene: Scene) -> list[Handle]:
     return [_hold_place("point of drive", ("drive",), place, scene)]
 
 
-def _hold_ends(name: str, path: Path, line: Any, scene: Scene) -> list[Handle]:
+def _hold_ends(name: str, path: Path, line: Any, scene: Scene) -> list[_Handle]:
     """List the handles of both ends of a line between two bars."""
     return [
         _hold_place(f"{end} of {name}", (*path, end), place, scene)
@@ -116,7 +116,7 @@ def _hold_ends(name: str, path: Path, line: Any, scene: Scene) -> list[Handle]:
     ]
 
 
-def _hold_place(name: str, path: Path, place: Place | None, scene: Scene) -> Handle:
+def _hold_place(name: str, path: Path, place: Place | None, scene: Scene) -> _Handle:
     """Make the handle of a place by the form in which it is stated.
 
     The handle of a named point is that of the point.
@@ -128,8 +128,8 @@ def _hold_place(name: str, path: Path, place: Place | None, scene: Scene) -> Han
     if place.from_centre is not None:
         G = scene.linkage.bar(place.bar).to_centre
         pair = cmath.rect(*place.from_centre)
-        return Handle(name, (*path, "from_centre"), place.bar, G, pair)
-    return Handle(name, (*path, "from_pin"), place.bar, 0j, place.vector())
+        return _Handle(name, (*path, "from_centre"), place.bar, G, pair)
+    return _Handle(name, (*path, "from_pin"), place.bar, 0j, place.vector())
 
 
 class Dragged(NamedTuple):
@@ -255,7 +255,7 @@ def _drag_drawn_pin(
     if dragged.what not in PINS:
         raise InputError("drag", dragged.what, "must be one of " + ", ".join(PINS))
     drawn = drawing.angle(2)
-    if abs(math.remainder(dragged.theta_2 - drawn, 2.0 * math.pi)) > SAME_ANGLE:
+    if abs(math.remainder(dragged.theta_2 - drawn, 2.0 * math.pi)) > _SAME_ANGLE:
         raise InputError(
             "drag",
             dragged.what,
@@ -341,7 +341,7 @@ def _write_like(
 
 def write_rounded(value: float, grain: float, unit: str) -> str:
     """Write a number with its unit, to the power of ten next below the grain."""
-    finest = max(grain, LEAST_DIGITS * abs(value), 1e-300)
+    finest = max(grain, _LEAST_DIGITS * abs(value), 1e-300)
     digits = -math.floor(math.log10(finest))
     shown = f"{round(value, digits):.{max(digits, 0)}f}"
     return f"{shown.rstrip('0').rstrip('.') if '.' in shown else shown} {unit}"

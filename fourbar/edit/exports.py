@@ -32,7 +32,7 @@ from fourbar.solution import Conversion, write_csv
 from fourbar.solving import find_last_stage, solve
 from fourbar.writing import write_text
 
-ENDINGS = {
+_ENDINGS = {
     **{kind: kind for kind in ("svg", "png", "pdf", "csv")},
     "mjcf": "xml",
     "page": "html",
@@ -117,10 +117,10 @@ class Exports:
         from fourbar.show.animate import write
         from fourbar.show.plot import draw
 
-        if name not in ENDINGS:
-            raise InputError("format", name, "must be one of " + ", ".join(ENDINGS))
+        if name not in _ENDINGS:
+            raise InputError("format", name, "must be one of " + ", ".join(_ENDINGS))
         self.folder.mkdir(exist_ok=True)
-        path = self.folder / f"{self.stem}.{ENDINGS[name]}"
+        path = self.folder / f"{self.stem}.{_ENDINGS[name]}"
         if name == "csv":
             write_text(path, write_csv(solve(scene, find_last_stage(scene)), units))
         elif name == "mjcf":  # which has units of its own

@@ -17,14 +17,14 @@ from pathlib import Path
 from fourbar.errors import InputError
 
 ENDING = ".edit.html"
-ADDRESS = re.compile(r"url=(http://127\.0\.0\.1:\d+/[A-Za-z0-9_-]+/)\"")
+_ADDRESS = re.compile(r"url=(http://127\.0\.0\.1:\d+/[A-Za-z0-9_-]+/)\"")
 PAGE = """<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8"><meta name="referrer" content="no-referrer">
 <meta http-equiv="refresh" content="0; url={address}">
 <title>The workbench</title></head>
 <body><a href="{address}">The workbench</a></body></html>
 """
-LOCKED_BYTE = 1 << 30
+_LOCKED_BYTE = 1 << 30
 """Byte of the page that Windows locks: far behind its text, which others read."""
 PATIENCE = 10.0
 """Time that a server may take from locking its page to writing it, s."""
@@ -83,7 +83,7 @@ class Redirect:
         deadline = time.monotonic() + PATIENCE
         while time.monotonic() < deadline:
             if self.path.exists() and (
-                address := ADDRESS.search(
+                address := _ADDRESS.search(
                     self.path.read_text(encoding="utf-8", errors="replace")
                 )
             ):
@@ -115,7 +115,7 @@ def _lock(handle: int) -> bool:
         if sys.platform == "win32":
             import msvcrt
 
-            os.lseek(handle, LOCKED_BYTE, os.SEEK_SET)
+            os.lseek(handle, _LOCKED_BYTE, os.SEEK_SET)
             msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)
             os.lseek(handle, 0, os.SEEK_SET)
         else:

@@ -30,17 +30,17 @@ from fourbar.errors import FourBarError, InputError
 from fourbar.show.animate import write_page
 from fourbar.show.tolerances import collect_tolerances
 
-LOOPBACK = "127.0.0.1"
+_LOOPBACK = "127.0.0.1"
 LARGEST_REQUEST = 2_000_000
 """Bytes; a scene file has half a million at most."""
-MOST_PAGES = 16
+_MOST_PAGES = 16
 MOST_WAITING = 100
 """Requests of all pages that wait; of a drag only the latest does."""
 MOST_CONNECTIONS = 64
 """Connections besides those of pages; where there are more the oldest one is closed."""
 IDLE = 10.0
 """Time within which a request must be complete, s."""
-PAUSE = 0.5
+_PAUSE = 0.5
 """Time without new connections where the process can open no more files, s."""
 GONE = 90.0
 """Time from the last page's leaving to the server's end, s. A page in the background
@@ -63,8 +63,8 @@ class Workbench:
         self.session, self.ended = session, asyncio.Event()
         self.loop = asyncio.get_running_loop()
         self.address: asyncio.Future[str] = self.loop.create_future()
-        self.pages: set[PageLine] = set()
-        self.waiting: deque[tuple[PageLine, dict[str, Any]]] = deque()
+        self.pages: set[_PageLine] = set()
+        self.waiting: deque[tuple[_PageLine, dict[str, Any]]] = deque()
         self.one = ThreadPoolExecutor(
             1
         )  # the session is touched from this thread alone
@@ -83,18 +83,18 @@ class Workbench:
         if name in self.timers:
             self.timers.pop(name).cancel()
 
-    def join(self, line: "PageLine") -> None:
+    def join(self, line: "_PageLine") -> None:
         """Welcome a page."""
         self.pages.add(line)
         self.never("gone")
 
-    def leave(self, line: "PageLine") -> None:
+    def leave(self, line: "_PageLine") -> None:
         """Forget a page; some time after the last one the server ends."""
         self.pages.discard(line)
         if not self.pages:
             self.later("gone", GONE, self.ended.set)
 
-    def tell(self, about: dict[str, Any], *, to: "PageLine | None" = None) -> None:
+    def tell(self, about: dict[str, Any], *, to: "_PageLine | None" = None) -> None:
         """Send an answer to one page or to all."""
         data = pack_frame(about)
         for line in [to] if to else list(self.pages):
@@ -105,7 +105,7 @@ class Workbench:
                     lambda done: done.cancelled() or done.exception()
                 )
 
-    def take(self, line: "PageLine", asked: dict[str, Any]) -> None:
+    def take(self, line: "_PageLine", asked: dict[str, Any]) -> None:
         """Put a request in the queue.
 
         A later request of the same gesture replaces one that waits.
@@ -232,18 +232,18 @@ class Workbench:
         `redirect`: page that leads browsers and other servers here.
         """
         try:
-            listening = socket.create_server((LOOPBACK, port))
+            listening = socket.create_server((_LOOPBACK, port))
         except (OSError, OverflowError) as error:
             raise InputError(
                 "--port", port, f"the port cannot be opened: {error}"
             ) from None
         listening.setblocking(False)
         own_port = listening.getsockname()[1]
-        self.entrance = Entrance(make_application(self, own_port), listening)
+        self.entrance = _Entrance(_make_application(self, own_port), listening)
         for name in (signal.SIGINT, signal.SIGTERM):
             with suppress(NotImplementedError):  # Windows: KeyboardInterrupt
                 self.loop.add_signal_handler(name, self.ended.set)
-        address = f"http://{LOOPBACK}:{own_port}/{self.session.token}/"
+        address = f"http://{_LOOPBACK}:{own_port}/{self.session.token}/"
         self.one.submit(self._keep)
         self.address.set_result(address)
         if redirect is not None:
@@ -269,7 +269,7 @@ class Workbench:
         self.aside.shutdown(wait=False, cancel_futures=True)
 
 
-class Entrance:
+class _Entrance:
     """The listening socket, which closes connections that say nothing for a while.
 
     If there are many, the oldest is closed.
@@ -298,7 +298,7 @@ class Entrance:
         except OSError:
             # no more files (EMFILE, ENFILE): the socket would offer it again and again
             IOLoop.current().remove_handler(self.listening)
-            IOLoop.current().call_later(PAUSE, self._open)
+            IOLoop.current().call_later(_PAUSE, self._open)
             self._close_oldest(MOST_CONNECTIONS // 4)
             return
         if len(self.streams) >= MOST_CONNECTIONS:
@@ -322,7 +322,7 @@ class Entrance:
         self.listening.close()
 
 
-class Guarded(RequestHandler):
+class _Guarded(RequestHandler):
     """Answers only requests for this address, with the token."""
 
     def initialize(self, bench: Workbench, hosts: frozenset[str]) -> None:
@@ -371,7 +371,7 @@ class Guarded(RequestHandler):
             print(f"error: {kind.__name__}: {error}", file=sys.stderr)
 
 
-class Page(Guarded):
+class Page(_Guarded):
     """The page itself."""
 
     async def get(self, token: str) -> None:
@@ -388,7 +388,7 @@ class Page(Guarded):
         self.finish(text)
 
 
-class Report(Guarded):
+class Report(_Guarded):
     """The report of the harness, in a sandbox without an origin.
 
     It reaches nothing here.
@@ -402,15 +402,15 @@ class Report(Guarded):
         self.finish(self.bench.check.report.read_bytes())
 
 
-class PageLine(WebSocketHandler, Guarded):
+class _PageLine(WebSocketHandler, _Guarded):
     """The line between a page and the session."""
 
     def prepare(self) -> None:
         """Refuse what is no page of this server: a browser always states the origin."""
-        Guarded.prepare(self)
+        _Guarded.prepare(self)
         if "Origin" not in self.request.headers:
             raise HTTPError(403)
-        if len(self.bench.pages) >= MOST_PAGES:
+        if len(self.bench.pages) >= _MOST_PAGES:
             raise HTTPError(503)
 
     def check_origin(self, origin: str) -> bool:
@@ -439,13 +439,13 @@ class PageLine(WebSocketHandler, Guarded):
         self.bench.leave(self)
 
 
-def make_application(bench: Workbench, port: int) -> Application:
+def _make_application(bench: Workbench, port: int) -> Application:
     """Make the application of a workbench that listens at a port."""
     served = {
         "bench": bench,
-        "hosts": frozenset(f"{name}:{port}" for name in (LOOPBACK, "localhost")),
+        "hosts": frozenset(f"{name}:{port}" for name in (_LOOPBACK, "localhost")),
     }
-    routes = {"": Page, "report": Report, "live": PageLine}
+    routes = {"": Page, "report": Report, "live": _PageLine}
     return Application(
         [
             (rf"/(?P<token>[A-Za-z0-9_-]+)/{place}", handler, served)

@@ -34,7 +34,7 @@ from fourbar.writing import read_bytes, write_bytes
 
 SCHEMA = "fourbar-edit/2"
 ENDING = ".edit"
-MOST_STATES = 500
+_MOST_STATES = 500
 """Number of states that undo and redo reach."""
 MOST_CHARACTERS = 10_000_000
 """Characters of all these states. With those kept to compare they stay below
@@ -50,10 +50,10 @@ LARGEST_STATE = 100_000_000
 """Bytes of a state file."""
 NEW = ("300 mm", "100 mm", "250 mm", "220 mm")
 """Ground, input, coupler and output of a new scene."""
-AS_THE_FILE = "as the file"
+_AS_THE_FILE = "as the file"
 """Units of results that follow those of lengths.ground."""
 UNITS = (
-    AS_THE_FILE,
+    _AS_THE_FILE,
     "SI",
     "imperial",
     "mm N N.mm deg",
@@ -85,7 +85,7 @@ class Session:
         )
         self.state_file = self.path.with_name(self.path.name + ENDING)
         self.token = secrets.token_urlsafe(32)  # of this process alone
-        self.unit_names, self.pressure_text = AS_THE_FILE, ""
+        self.unit_names, self.pressure_text = _AS_THE_FILE, ""
         text = read_text(self.path) if self.path.exists() else write_new_scene(NEW)
         self.disk = self._read_disk()
         self.texts, self.place, self.kept = [text], 0, {"start": text}
@@ -169,7 +169,7 @@ class Session:
     @property
     def units(self) -> Conversion:
         """Units of results: as chosen, or those of the file."""
-        if self.unit_names != AS_THE_FILE:
+        if self.unit_names != _AS_THE_FILE:
             return _read_units(self.unit_names)
         return units_of_scene(self.now.plain)
 
@@ -252,12 +252,12 @@ class Session:
 
         A request that is refused changes nothing.
         """
-        action = ACTIONS.get(str(asked.get("do")))
+        action = _ACTIONS.get(str(asked.get("do")))
         before = (self.texts, self.place, self.now)
         try:
             if action is None:
                 raise InputError(
-                    "do", asked.get("do"), "must be one of " + ", ".join(ACTIONS)
+                    "do", asked.get("do"), "must be one of " + ", ".join(_ACTIONS)
                 )
             note = action(self, asked) or {}
             return self.answer() | note
@@ -291,7 +291,8 @@ class Session:
             self.texts = [*self.texts[: self.place + 1], now.text]
             self.place += 1
         while (
-            len(self.texts) > MOST_STATES or sum(map(len, self.texts)) > MOST_CHARACTERS
+            len(self.texts) > _MOST_STATES
+            or sum(map(len, self.texts)) > MOST_CHARACTERS
         ):
             self.texts, self.place = self.texts[1:], self.place - 1
         self.now, self.gesture = now, gesture
@@ -305,7 +306,7 @@ _read_units = cache(units)
 
 def _require_units(name: str) -> None:
     """Raise InputError for units that cannot be read."""
-    if name != AS_THE_FILE:
+    if name != _AS_THE_FILE:
         _read_units(name)
 
 
@@ -313,7 +314,7 @@ def _hash_text(data: bytes) -> str:
     return hashlib.sha256(data).hexdigest()
 
 
-SUITED = ("m", "N", "N m", "kg")
+_SUITED = ("m", "N", "N m", "kg")
 """SI units whose quantities a new entry states in the scene's own units."""
 
 
@@ -325,7 +326,7 @@ def _suit_entry(value: Any, plain: dict[str, Any]) -> Any:
         return [_suit_entry(inner, plain) for inner in value]
     if not isinstance(value, str):
         return value
-    for si in SUITED:
+    for si in _SUITED:
         unit, factor = find_unit_in(si, units_of_scene(plain))
         try:
             number = factor * to_si(value, si)
@@ -585,7 +586,7 @@ def _export(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
     return {"note": f"wrote {file}"}
 
 
-ACTIONS: dict[str, Callable[[Session, dict[str, Any]], dict[str, Any] | None]] = {
+_ACTIONS: dict[str, Callable[[Session, dict[str, Any]], dict[str, Any] | None]] = {
     "set": lambda session, asked: session.change(
         lambda of: of.set(asked["path"], str(asked["value"])),
         str(asked.get("gesture", "")),

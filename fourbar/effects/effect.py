@@ -129,7 +129,7 @@ class Actions:
         couple, by the arm of the point that is nearer to the pin; between moving bars
         it is in no sum of another bar.
         """
-        pin = find_common_pin(start.bar, end.bar)
+        pin = _find_common_pin(start.bar, end.bar)
         if pin is None:
             self.pull_ends(start, end, force)
             return
@@ -273,7 +273,7 @@ class Actions:
 
 
 @cache
-def find_common_pin(first: int, second: int) -> str | None:
+def _find_common_pin(first: int, second: int) -> str | None:
     """Return the pin at which two bars meet, or None if they have none in common."""
     return next((pin for pin, bars in PINS.items() if {first, second} == {*bars}), None)
 

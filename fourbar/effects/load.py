@@ -34,7 +34,7 @@ from fourbar.linkage import (
 )
 
 TURN = 2.0 * math.pi
-BEYOND_TURN = 2.0 * PI_LOW
+_BEYOND_TURN = 2.0 * PI_LOW
 """2 pi less TURN, rad: what counts after many turns."""
 FRAMES = ("world", "bar")
 """Axes in which the direction of a force is kept."""
@@ -109,7 +109,7 @@ class Table:
         past = (
             rest
             + (np.rint((away - rest) / TURN) - turns) * TURN
-            + (lost - turns * BEYOND_TURN)
+            + (lost - turns * _BEYOND_TURN)
         )
         return before + rise * (past / width)
 

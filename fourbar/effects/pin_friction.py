@@ -207,7 +207,7 @@ class PinFriction(PinRows):
             actions.pin_couple(pin, -actions.sense(pin) * (mu * r * load))
 
 
-class Sliding(NamedTuple):
+class _Sliding(NamedTuple):
     """Solutions of n independent problems."""
 
     x: Array
@@ -218,7 +218,7 @@ class Sliding(NamedTuple):
     """(n,), in (0, 1]: the least stretch of the equations' slope, 0 where they jam."""
 
 
-def solve_sliding(F: Array, C: Array, k: Array) -> Sliding:
+def solve_sliding(F: Array, C: Array, k: Array) -> _Sliding:
     """Solve n problems in p unknowns.
 
     F (n, p, 2) is in N, C (n, p, p, 2) in 1/m, k (n, p) in m.
@@ -257,7 +257,7 @@ def solve_sliding(F: Array, C: Array, k: Array) -> Sliding:
     with np.errstate(invalid="ignore"):
         for _ in range(2):  # removes the rounding of the search and of the quadratic
             right, slope = _compute_right_side(F, C, k, x)
-            x = x + compute_step(right - x, slope)
+            x = x + _compute_step(right - x, slope)
         _, slope = _compute_right_side(F, C, k, x)
     matrix = np.eye(p) - slope
     far = np.ones(n)
@@ -265,7 +265,7 @@ def solve_sliding(F: Array, C: Array, k: Array) -> Sliding:
     far[usable] = np.minimum(
         np.linalg.svd(matrix[usable], compute_uv=False)[:, -1], 1.0
     )
-    return Sliding(x, count, far)
+    return _Sliding(x, count, far)
 
 
 def _solve_quadratic(F: Array, C: Array, k: Array) -> tuple[Array, NDArray[np.uint8]]:
@@ -298,7 +298,7 @@ def _compute_right_side(F: Array, C: Array, k: Array, x: Array) -> tuple[Array, 
     return k * size, k[..., None] * np.einsum("npi,npqi->npq", unit, C)
 
 
-def compute_step(gap: Array, slope: Array) -> Array:
+def _compute_step(gap: Array, slope: Array) -> Array:
     """Solve (1 - slope) step = gap, zero where that cannot be solved, (n, p)."""
     matrix = np.eye(gap.shape[1]) - slope
     usable = np.asarray(
@@ -315,7 +315,7 @@ def _iterate(F: Array, C: Array, k: Array, x: Array) -> Array:
     done = np.zeros(len(x), dtype=bool)
     for _ in range(STEPS):
         right, slope = _compute_right_side(F, C, k, x)
-        newton = np.maximum(x + compute_step(right - x, slope), 0.0)
+        newton = np.maximum(x + _compute_step(right - x, slope), 0.0)
         plain_gap = np.abs(_compute_right_side(F, C, k, right)[0] - right).max(axis=1)
         newton_gap = np.abs(_compute_right_side(F, C, k, newton)[0] - newton).max(
             axis=1
@@ -363,7 +363,7 @@ def _search(F: Array, C: Array, k: Array) -> tuple[Array, NDArray[np.int_]]:
         members, last = problem[moving], x[moving]
         right, slope = _compute_right_side(F[members], C[members], k[members], last)
         new = np.clip(
-            last + compute_step(right - last, slope), 0.0, 1e12 * size[members, None]
+            last + _compute_step(right - last, slope), 0.0, 1e12 * size[members, None]
         )
         least_change = np.minimum(
             np.abs(new - last).max(axis=1), np.abs(new - before[moving]).max(axis=1)

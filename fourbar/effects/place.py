@@ -165,12 +165,12 @@ def require_place(key: str, place: object) -> Place:
         return Place(bar, point=place.point)
     ((name, pair),) = forms.items()
     if name == "from_centre":
-        require_mass_centre(key, bar)
+        _require_mass_centre(key, bar)
     checked: Any = {name: require_pair(f"{key}.{name}", pair, STATED_PLACES[name])}
     return Place(bar, **checked)
 
 
-def require_mass_centre(key: str, bar: int) -> None:
+def _require_mass_centre(key: str, bar: int) -> None:
     """Raise InputError for a place from the mass centre of the ground."""
     if bar == 1:
         raise InputError(

@@ -43,12 +43,12 @@ A_PERTURBATION = 1e-3
 """Part of the sum of the lengths: a member of a study that misses a change point of the
 nominal linkage by more is a linkage of its own.
 """
-NO_POSITIONS = np.empty(0, dtype=np.intp)
-NO_MOTION = Coefficients(*[np.nan] * 8)
+_NO_POSITIONS = np.empty(0, dtype=np.intp)
+_NO_MOTION = Coefficients(*[np.nan] * 8)
 """Coefficients of NaN, used where only positions are evaluated."""
 
 
-def find_undecided(
+def _find_undecided(
     factor: Any, constant: Any, size: Any, part: float = UNDECIDED
 ) -> Any:
     """Mark where doubles cannot decide the sign of a factor of Heron's formula.
@@ -229,7 +229,7 @@ class Case(NamedTuple):
                 q, half, branch, condition=condition, margin=margin
             )
         else:
-            position, k = path.position(q, half, branch), NO_MOTION
+            position, k = path.position(q, half, branch), _NO_MOTION
             position, sine = path.in_order(position), position.sin_mu
             speed = acceleration = 0.0
         return State(
@@ -315,11 +315,11 @@ class Case(NamedTuple):
                 if is_any(
                     constant < 0.0
                 ):  # otherwise both terms are positive and nothing cancels
-                    close = close | find_undecided(
+                    close = close | _find_undecided(
                         factor, constant, 4.0 * lengths.a * lengths.d
                     )
         if not is_any(close):
-            return half, NO_POSITIONS
+            return half, _NO_POSITIONS
         from fourbar.formulas.many_digits import decide_half_angles
 
         index = np.flatnonzero(np.broadcast_to(close, np.shape(q)))

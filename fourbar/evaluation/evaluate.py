@@ -50,7 +50,7 @@ if TYPE_CHECKING:
     from fourbar.effects import ForceDrive
 
 FORCE, ERROR = STAGES.index("force"), STAGES.index("error")
-LONG_EPS = float(np.finfo(np.longdouble).eps)
+_LONG_EPS = float(np.finfo(np.longdouble).eps)
 """Distance of long doubles beside 1."""
 ROUNDINGS = 16.0
 """Roundings of a chain of formulas that count in full. Some fifty move a result by
@@ -60,11 +60,11 @@ STEP = 2.0**-14
 """Part of s^2 by which an angle is moved for a slope. A force changes by that part, of
 which doubles keep digits.
 """
-LEAST_STEP = 2.0**-46
+_LEAST_STEP = 2.0**-46
 """Step as a part of the angle, at least of 1 rad. A shorter step is rounded to less
 than two digits.
 """
-WITHOUT_FORCES = (NO_DIRECTION, WOUND, NO_LEVER)
+_WITHOUT_FORCES = (NO_DIRECTION, WOUND, NO_LEVER)
 """Statuses of positions without forces, because an effect or the drive has no value."""
 
 
@@ -100,7 +100,7 @@ def evaluate(
         dynamics = case.dynamics(state, acceleration, case.side)
         error_bars = {}
         if last_stage == ERROR:
-            error_bars = compute_error_bars(
+            error_bars = _compute_error_bars(
                 case, command, state, dynamics, refined_rows
             )
         codes, forces = _list_forces(
@@ -237,7 +237,7 @@ def _withhold_forces(case: Case, codes: Any, values: dict[str, Any]) -> None:
 
     Pin forces are NaN at change points too.
     """
-    gone = np.isin(codes, WITHOUT_FORCES)
+    gone = np.isin(codes, _WITHOUT_FORCES)
     of_pins = {*PIN_FORCES, "force_error"}
     if any(term.loaded_pins for term in case.terms):
         of_pins |= values.keys()  # the drive balances friction of those forces
@@ -245,10 +245,10 @@ def _withhold_forces(case: Case, codes: Any, values: dict[str, Any]) -> None:
         if name == "drive_condition":
             continue
         missing = gone | (codes == CHANGE_POINT) if name in of_pins else gone
-        values[name] = np.where(missing, make_no_value(value), value)
+        values[name] = np.where(missing, _make_no_value(value), value)
 
 
-def compute_error_bars(
+def _compute_error_bars(
     case: Case,
     command: Command,
     state: State,
@@ -311,8 +311,10 @@ def compute_error_bars(
         )
         gap = np.fmax(gap, unresolved)
         drive_gap = np.fmax(drive_gap, drive_unresolved)
-    drive_error = compute_error_bar(drive_gap, np.abs(dynamics.drive))
-    force_error = compute_error_bar(gap, reduce(np.maximum, map(np.abs, dynamics.pins)))
+    drive_error = _compute_error_bar(drive_gap, np.abs(dynamics.drive))
+    force_error = _compute_error_bar(
+        gap, reduce(np.maximum, map(np.abs, dynamics.pins))
+    )
     return {case.drive_names.error: drive_error, "force_error": force_error}
 
 
@@ -351,14 +353,14 @@ def _compute_unresolved(
     )
     with np.errstate(all="ignore"):
         share = np.divide(
-            ROUNDINGS * LONG_EPS * np.fmax(np.abs(state.q), 1.0),
-            np.where(step >= LEAST_STEP * np.fmax(np.abs(state.q), 1.0), step, np.nan),
+            ROUNDINGS * _LONG_EPS * np.fmax(np.abs(state.q), 1.0),
+            np.where(step >= _LEAST_STEP * np.fmax(np.abs(state.q), 1.0), step, np.nan),
         )
         *pins, drive = (np.abs(after - before) * share for before, after in pairs)
     return reduce(np.maximum, pins), drive
 
 
-def compute_error_bar(gap: Any, size: Any) -> Any:
+def _compute_error_bar(gap: Any, size: Any) -> Any:
     """Compute the error bar from the distance to the longer number.
 
     The size of the value has a part in it. The error bar is the size of the value, so
@@ -381,17 +383,17 @@ def is_finite(values: Mapping[str, Any]) -> bool:
 
 
 def withhold_infinite(case: Case, evaluated: Evaluated) -> None:
-    """Apply `withhold` to evaluated positions if any of their values is not finite."""
+    """Apply `_withhold` to evaluated positions if any of their values is not finite."""
     codes, values, state = evaluated
     if not is_finite(values):
         in_line: Any = False
         if state is not None and case.drive is None:
             sine = case.path.drive_sine(state.position, case.drive_bar)
             in_line = np.abs(sine) <= NO_DIGIT_LEFT
-        withhold(values, codes, np.broadcast_to(in_line, codes.shape))
+        _withhold(values, codes, np.broadcast_to(in_line, codes.shape))
 
 
-def withhold(
+def _withhold(
     values: dict[str, Any], code: NDArray[np.uint8], in_line: NDArray[np.bool_]
 ) -> None:
     """Set the status of each position at which a promised quantity is not finite.
@@ -418,7 +420,7 @@ def withhold(
         for name in names:
             infinite |= ~np.isfinite(values[name])
             values[name] = np.where(
-                np.isfinite(values[name]), values[name], make_no_value(values[name])
+                np.isfinite(values[name]), values[name], _make_no_value(values[name])
             )
         infinite &= promised & ~gone
         code[infinite] = OVERFLOW
@@ -427,10 +429,12 @@ def withhold(
         gone |= infinite
         for name in names:
             if name != "drive_condition":
-                values[name] = np.where(gone, make_no_value(values[name]), values[name])
+                values[name] = np.where(
+                    gone, _make_no_value(values[name]), values[name]
+                )
 
 
-def make_no_value(quantity: Any) -> complex:
+def _make_no_value(quantity: Any) -> complex:
     """Return NaN; of a vector in both components."""
     return complex(np.nan, np.nan) if np.iscomplexobj(quantity) else np.nan
 

@@ -44,11 +44,11 @@ from fourbar.scene.scene import Independent
 RELATIVE, ABSOLUTE = 3e-15, 3e-15
 """Tolerances of a step of DOP853. Below them a long fast motion errs by its round-off.
 """
-SCIPY_LEAST = 100.0 * 2.0**-52
+_SCIPY_LEAST = 100.0 * 2.0**-52
 """Least relative tolerance that SciPy's constructor takes without a warning. The solver
 works with a smaller one.
 """
-CHANGE_OVER = 0.5
+_CHANGE_OVER = 0.5
 """Part of the other angle's sine below which the angle is changed."""
 STEPS = 200_000
 """A motion that needs more steps than this is given up, after a few minutes: some
@@ -384,7 +384,7 @@ class _Run:
         sines, bar = _compute_sines(position), 6 - self.reading.bar
         if self.reading.bar == 3:  # only at the start
             bar = max((2, 4), key=lambda number: abs(sines[number]))
-        elif abs(sines[self.reading.bar]) >= CHANGE_OVER * abs(sines[bar]):
+        elif abs(sines[self.reading.bar]) >= _CHANGE_OVER * abs(sines[bar]):
             return False
         q, reading = self.theta[bar], self.readings[bar]
         reading.branch = float(reading.path.sign(q, math.copysign(1.0, sines[bar])))
@@ -439,7 +439,7 @@ class _Run:
                 self.t,
                 self.y,
                 end,
-                rtol=SCIPY_LEAST,
+                rtol=_SCIPY_LEAST,
                 atol=ABSOLUTE,
             )
             solver.rtol = RELATIVE

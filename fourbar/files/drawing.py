@@ -22,14 +22,14 @@ from fourbar.solving import solve
 
 DRAWN = "drawn"
 """Word that stands for the drawn angle, stroke or side; key of a drawn place."""
-STANDS_ALONE = "must be left out: `drawn` states the place"
+_STANDS_ALONE = "must be left out: `drawn` states the place"
 APART = 0.05
 """Distance of the pins from the drawing above which no motion has that assembly. It is
 a part of the longest bar.
 """
 ANGLES = {names[0]: bar for bar, names in COMMANDS.items()}
 """Bars by the names of their angles."""
-NUMBERS_OF_BARS = {name: bar for bar, name in BAR_NAMES.items()}
+_NUMBERS_OF_BARS = {name: bar for bar, name in BAR_NAMES.items()}
 
 
 def from_pins(
@@ -87,7 +87,7 @@ def state_lengths(
 ) -> dict[str, Any]:
     """State a drawing by lengths, and each place of it in its bar's frame."""
     met = meet_lengths(drawing, top["pins"])
-    lengths = {name: f"{met[bar - 1]!r} m" for name, bar in NUMBERS_OF_BARS.items()}
+    lengths = {name: f"{met[bar - 1]!r} m" for name, bar in _NUMBERS_OF_BARS.items()}
     lengths["ground_angle"] = f"{drawing.angle(1)!r} rad"
     stated = {
         key: _state_places(read, key, value, drawing)
@@ -134,13 +134,15 @@ def _state_places(
         if len(value) == 1:
             return place
         if "from_pin" in value:
-            raise read.refuse(f"{key}.from_pin", value["from_pin"], STANDS_ALONE)
+            raise read.refuse(f"{key}.from_pin", value["from_pin"], _STANDS_ALONE)
         value = {name: entry for name, entry in value.items() if name != DRAWN}
         value["from_pin"] = place
     stated = {}
     for name, entry in value.items():
         of_bar = (
-            NUMBERS_OF_BARS[name] if key == "bars" and name in NUMBERS_OF_BARS else own
+            _NUMBERS_OF_BARS[name]
+            if key == "bars" and name in _NUMBERS_OF_BARS
+            else own
         )
         stated[name] = _state_places(read, f"{key}.{name}", entry, drawing, of_bar)
     return stated

@@ -15,7 +15,7 @@ from fourbar.quantities.units import UNIT_MISSING, UnitError, to_si
 
 BARE_KEY = re.compile(r"[A-Za-z0-9_-]{1,40}")
 LONGEST_SHOWN = 60
-FOREIGN = (
+_FOREIGN = (
     *("crank", "slider", "rod", "piston", "rail", "cam", "gear", "offset"),
     *("link5", "bar5", "dyad", "precision_points"),
 )
@@ -28,13 +28,13 @@ ELSEWHERE = (
 """Address for people with another mechanism."""
 DIRECTIONS = {"up": "90 deg", "down": "-90 deg", "left": "180 deg", "right": "0 deg"}
 """Words for directions, as the suggestions of an error know them."""
-MEANT = {
+_MEANT = {
     **{"weight": "mass", "torque": "moment", "couple": "moment"},
     **{"rate": "stiffness", "k": "stiffness", "material": "density"},
     **{"x": "from_pin", "y": "from_pin", "speed": "omega_2", "rpm": "omega_2"},
 }
 """Words that are no keys, and the keys that may be meant by them."""
-LIKELY = {"rad": "deg", "m": "mm", "rad/s": "rpm"}
+_LIKELY = {"rad": "deg", "m": "mm", "rad/s": "rpm"}
 """Units that a number without one may have been meant in, other than the SI unit."""
 
 
@@ -77,7 +77,7 @@ class Reader:
             )
         for name, entry in value.items():
             if name not in names:
-                hint = ELSEWHERE if name in FOREIGN else _suggest(name, names)
+                hint = ELSEWHERE if name in _FOREIGN else _suggest(name, names)
                 allowed = f"unknown key; {hint}allowed: {', '.join(names)}"
                 raise self.refuse(_join_key(key, name), entry, allowed)
         return value
@@ -149,7 +149,7 @@ class Reader:
     def in_si(self, key: str, value: object, unit: str, wanted: str) -> float:
         """Convert a text with a unit to a number in `unit`."""
         if isinstance(value, (int, float)) and not isinstance(value, bool):
-            like = f"{value:.6g} {LIKELY.get(unit, unit)}"
+            like = f"{value:.6g} {_LIKELY.get(unit, unit)}"
             missing = f'the unit is missing; did you mean "{like}"? {wanted}'
             raise self.refuse(key, value, missing)
         if value == "drawn":
@@ -164,7 +164,7 @@ class Reader:
             if unit == "rad" and value.casefold() in DIRECTIONS:
                 hint = f'did you mean "{DIRECTIONS[value.casefold()]}"? '
             elif str(error) == UNIT_MISSING:
-                hint = f'did you mean "{value.strip()} {LIKELY.get(unit, unit)}"? '
+                hint = f'did you mean "{value.strip()} {_LIKELY.get(unit, unit)}"? '
             raise self.refuse(key, value, f"{error}; {hint}{wanted}") from None
 
     def declared(self, key: str, value: object, by: Declared) -> Any:
@@ -278,8 +278,8 @@ def write_pair(
 
 def _suggest(word: object, names: list[str]) -> str:
     """Suggest the valid word that is nearest to one that is not, or means the same."""
-    if isinstance(word, str) and MEANT.get(word) in names:
-        return f'did you mean "{MEANT[word]}"? '
+    if isinstance(word, str) and _MEANT.get(word) in names:
+        return f'did you mean "{_MEANT[word]}"? '
     close = (
         difflib.get_close_matches(word[:LONGEST_SHOWN], names, 1)
         if isinstance(word, str)

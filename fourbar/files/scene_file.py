@@ -81,9 +81,9 @@ dotted key's parts.
 """
 LONGEST_LINE = 60
 """Characters shown of a line that cannot be read."""
-MOST_LOADS = 1000
+_MOST_LOADS = 1000
 """Each load is a term at every position."""
-MOST_SPRINGS = 1000
+_MOST_SPRINGS = 1000
 TABLES = (
     "title",
     "source",
@@ -97,8 +97,8 @@ TABLES = (
     "effects",
     "tolerances",
 )
-A_LINE = "a drive along a line has from and to alone"
-A_POINT = "a force acts at a place: state point, from_pin or from_centre"
+_A_LINE = "a drive along a line has from and to alone"
+_A_POINT = "a force acts at a place: state point, from_pin or from_centre"
 MOST_POINTS = 1000
 """Each is three columns of every table."""
 
@@ -164,7 +164,7 @@ def loads(text: str, name: str = "scene") -> Scene:
         raise (error if error.file else error.in_file(shown)) from None
 
 
-UNQUOTED = re.compile(r"[=,\[{]\s*([+-]?\.?[0-9][0-9.]*\s*[A-Za-z°µ][^\",#\]}]*)")
+_UNQUOTED = re.compile(r"[=,\[{]\s*([+-]?\.?[0-9][0-9.]*\s*[A-Za-z°µ][^\",#\]}]*)")
 """9 in, where "9 in" is meant."""
 PLACE = re.compile(r" \(at (?:line (\d+), column (\d+)|end of document)\)$")
 
@@ -184,7 +184,7 @@ def _explain_unreadable(text: str, reason: str, shown: str) -> InputError:
     start = max(0, column - 1 - LONGEST_LINE // 2)
     value = lines[line - 1][start : start + LONGEST_LINE].strip()
     why = " ".join(reason[: place.start()].split())[:120]
-    for bare in UNQUOTED.finditer(lines[line - 1]):
+    for bare in _UNQUOTED.finditer(lines[line - 1]):
         if bare.start(1) < column <= bare.end(1) + 1:
             why = (
                 "a number with a unit stands in quotes, like"
@@ -205,9 +205,9 @@ def read_scene(read: Reader, document: dict[str, Any], folder: str) -> Scene:
     bars = {point.name: point.bar for point in points}
     drive_bar, drive = _read_drive(read, top.get("drive", {}), bars)
     entries = top.get("loads", [])
-    if not isinstance(entries, list) or len(entries) > MOST_LOADS:
+    if not isinstance(entries, list) or len(entries) > _MOST_LOADS:
         raise read.refuse(
-            "loads", entries, f"must be written as [[loads]], at most {MOST_LOADS}"
+            "loads", entries, f"must be written as [[loads]], at most {_MOST_LOADS}"
         )
     effects = read.table("effects", top.get("effects", {}), list_kinds())
     motion, linkage = top.get("motion", {}), _read_linkage(read, top)
@@ -248,13 +248,13 @@ def _read_drive(
     entry = read_table_with_place(read, "drive", value, allowed)
     if "from" in entry or "to" in entry:
         for name in entry.keys() - {"from", "to"}:
-            raise read.refuse(f"drive.{name}", entry[name], A_LINE)
+            raise read.refuse(f"drive.{name}", entry[name], _A_LINE)
         return None, LinearDrive(*_read_ends(read, "drive", entry, bars))
     if not entry.keys() & {*PLACES_OF_ENDS, "direction", "frame"}:
         return read.whole("drive.bar", entry.get("bar", 2), 2, 4), None
     place = read_stated_place(read, "drive", entry, bars, 2)
     if place == Place(place.bar):
-        raise read.refuse("drive.point", None, A_POINT)
+        raise read.refuse("drive.point", None, _A_POINT)
     direction = read.quantity("drive.direction", entry.get("direction"), "rad")
     frame = read.choice("drive.frame", entry.get("frame", FRAMES[0]), FRAMES)
     return None, PointDrive(place, direction, frame)
@@ -540,8 +540,8 @@ def _read_springs(
     read: Reader, key: str, value: object, bars: Mapping[str, int]
 ) -> Springs:
     """Read springs and gas springs."""
-    if not isinstance(value, list) or not 1 <= len(value) <= MOST_SPRINGS:
-        raise read.refuse(key, value, f"must be a list of 1 to {MOST_SPRINGS} springs")
+    if not isinstance(value, list) or not 1 <= len(value) <= _MOST_SPRINGS:
+        raise read.refuse(key, value, f"must be a list of 1 to {_MOST_SPRINGS} springs")
     springs = []
     for index, entry in enumerate(value):
         path = f"{key}[{index}]"

@@ -377,10 +377,10 @@ def write_new_scene(lengths: tuple[str, ...] | list[str]) -> str:
     FourBar(d, Bar(a), Bar(b), Bar(c))
     lines = "\n".join(f"{name} = {_quote(text)}" for name, text in stated)
     lines = f'[lengths]\n{lines}\nground_angle = "0 deg"  # from O2 to O4'
-    return _fill_in(lines, (a, b, c), BRANCH_LINE)
+    return _fill_in(lines, (a, b, c), _BRANCH_LINE)
 
 
-BRANCH_LINE = '# branch = "crossed"  # left out: open\n'
+_BRANCH_LINE = '# branch = "crossed"  # left out: open\n'
 """Comment on the branch, which pins state."""
 
 

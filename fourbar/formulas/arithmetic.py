@@ -13,8 +13,8 @@ Number = Any
 """A float, or an array that broadcasts over positions and linkages."""
 PLAIN = (int, np.generic)
 """One truth value or code."""
-NUMPY = (np.ndarray, np.generic)
-DOUBLES = {float, np.float64}
+_NUMPY = (np.ndarray, np.generic)
+_DOUBLES = {float, np.float64}
 U = 2.0**-53
 """Unit round-off of a double."""
 PI_LOW = 1.2246467991473532e-16
@@ -83,8 +83,8 @@ def vector(x: Number, y: Number) -> Number:
     if type(x) is type(y) is float:
         return complex(x, y)
     if not (
-        (type(x) is float or isinstance(x, NUMPY))
-        and (type(y) is float or isinstance(y, NUMPY))
+        (type(x) is float or isinstance(x, _NUMPY))
+        and (type(y) is float or isinstance(y, _NUMPY))
     ):
         return x + 1j * y
     kinds = {
@@ -93,12 +93,12 @@ def vector(x: Number, y: Number) -> Number:
     if (
         not isinstance(x, np.ndarray)
         and not isinstance(y, np.ndarray)
-        and kinds <= DOUBLES
+        and kinds <= _DOUBLES
     ):
         return np.complex128(complex(x, y))
     z = np.empty(
         np.broadcast(x, y).shape,
-        dtype=complex if kinds <= DOUBLES else np.result_type(x, y, np.complex64),
+        dtype=complex if kinds <= _DOUBLES else np.result_type(x, y, np.complex64),
     )
     z.real, z.imag = x, y
     return z[()]

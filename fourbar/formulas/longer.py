@@ -20,9 +20,9 @@ from fourbar.formulas.arithmetic import PI_LOW, Number, split_sum, without_slope
 from fourbar.linkage import copy_with, list_fields
 
 HAS_LONG_DOUBLES = np.finfo(np.longdouble).nmant > np.finfo(np.float64).nmant
-HALF_PI_LOWEST = -1.4973849048591833e-33
+_HALF_PI_LOWEST = -1.4973849048591833e-33
 """pi/2 less the two doubles nearest to it."""
-SPLITTER = 2.0**27 + 1.0
+_SPLITTER = 2.0**27 + 1.0
 """Splits the 53 bits of a double into two halves."""
 TERMS = 27
 """Terms of the series of sine and cosine up to an eighth of a turn. The next ones are
@@ -160,7 +160,7 @@ def _add(x: Any, y: Any) -> Any:
 
 def _halve(x: Any) -> tuple[Any, Any]:
     """Split a double into two of half its bits."""
-    large = SPLITTER * x
+    large = _SPLITTER * x
     high = large - (large - x)
     return high, x - high
 
@@ -211,7 +211,7 @@ def _turn(x: Any) -> tuple[Any, Any]:
     """Compute sine and cosine by their series, of what quarter turns leave."""
     quarters = np.rint(x.high / (0.5 * np.pi))
     rest = x
-    for part in (0.5 * np.pi, 0.5 * PI_LOW, HALF_PI_LOWEST):
+    for part in (0.5 * np.pi, 0.5 * PI_LOW, _HALF_PI_LOWEST):
         rest = rest - _multiply_real(Pair(quarters, 0.0), Pair(np.asarray(part), 0.0))
     square = _multiply_real(rest, rest)
     sums = []

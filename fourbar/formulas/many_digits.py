@@ -19,7 +19,7 @@ from fourbar.linkage import FourBar
 
 DIGITS = 120
 """The angle of a limit position near a change point keeps half of them."""
-RESIDUE = 1e-55
+_RESIDUE = 1e-55
 """Relative part that so many digits leave of a factor which is zero at the limit.
 """
 
@@ -71,7 +71,7 @@ def half_angle(
         least, most = (
             (-TOUCHING * size, 0)
             if offset is None
-            else (-RESIDUE * size, RESIDUE * size)
+            else (-_RESIDUE * size, _RESIDUE * size)
         )
         outer, inner = (
             0 * factor if least <= factor <= most else factor

@@ -30,7 +30,7 @@ MARGIN = math.radians(1.0)
 """Angle that `choose_range` leaves out at each end of an interval. No speeds exist at a
 limit itself.
 """
-NARROW = 4.0
+_NARROW = 4.0
 """Divisor of an interval's width that bounds what `choose_range` leaves out at each
 end.
 """
@@ -235,7 +235,7 @@ def choose_range(
         and (holding - interval[0]) % TURN <= interval[1] - interval[0]
     )
     start, stop = next(held, every[0])
-    margin = min(MARGIN, (stop - start) / NARROW)
+    margin = min(MARGIN, (stop - start) / _NARROW)
     return start + margin, stop - margin
 
 
@@ -301,7 +301,7 @@ def time_ratio(linkage: FourBar) -> float | None:
     return (TURN - delta) / delta
 
 
-BOTH = (1, -1)
+_BOTH = (1, -1)
 
 
 class Circuit(NamedTuple):
@@ -328,8 +328,8 @@ def circuits(linkage: FourBar) -> tuple[Circuit, ...]:
     """
     ranges = find_intervals(linkage)
     if turns_fully(linkage) and not change_points(linkage):
-        return tuple(Circuit(ranges[0], (branch,)) for branch in BOTH)
-    return tuple(Circuit(interval, BOTH) for interval in ranges)
+        return tuple(Circuit(ranges[0], (branch,)) for branch in _BOTH)
+    return tuple(Circuit(interval, _BOTH) for interval in ranges)
 
 
 def find_circuit(
@@ -359,7 +359,7 @@ def find_circuit(
     )
 
 
-GRASHOF = {
+_GRASHOF = {
     1: ("GCCC", "double crank (drag link)"),
     2: ("GCRR", "crank-rocker"),
     3: ("GRCR", "double rocker"),
@@ -370,13 +370,13 @@ against all others.
 """
 CHANGE_POINT = {1: "SCCC", 2: "SCRR", 3: "SRCR", 4: "SRRC"}
 PARALLELOGRAM = "parallelogram"
-NEARLY = 1e-3
+_NEARLY = 1e-3
 """Miss of a change point, over the sum of the lengths, up to which it is reported."""
-DIGITS_STATED = 1e-4
+_DIGITS_STATED = 1e-4
 """Part of the sum of the lengths up to which the last decimal of a length is a
 rounding; a coarser one is meant as it stands.
 """
-EQUALITIES = ((-1, -1, 1, 1), (1, -1, -1, 1), (1, -1, 1, -1))
+_EQUALITIES = ((-1, -1, 1, 1), (1, -1, -1, 1), (1, -1, 1, -1))
 """Signs of ground, input, coupler, output in the sums that vanish at change points. The
 sums are those of E1, and both of E2.
 """
@@ -450,7 +450,7 @@ def classify(linkage: FourBar, within: float = TOUCHING) -> LinkageType:
             f"structure (the {BAR_NAMES[longest]} is as long as the other three)",
         )
     if surplus > 0.0:
-        return found(shortest, *GRASHOF[shortest])
+        return found(shortest, *_GRASHOF[shortest])
     if surplus < 0.0:
         return found(
             4 + longest,
@@ -472,7 +472,7 @@ def classify(linkage: FourBar, within: float = TOUCHING) -> LinkageType:
         )
         return found(13, "S2X", f"kite (equal: {pairs[0]}; {pairs[1]})")
     return found(
-        8 + shortest, CHANGE_POINT[shortest], f"change-point {GRASHOF[shortest][1]}"
+        8 + shortest, CHANGE_POINT[shortest], f"change-point {_GRASHOF[shortest][1]}"
     )
 
 
@@ -503,12 +503,12 @@ def find_miss(linkage: FourBar) -> tuple[float, str] | None:
 
     None: by too much.
     """
-    meant, own = classify(linkage, NEARLY), classify(linkage)
+    meant, own = classify(linkage, _NEARLY), classify(linkage)
     if meant.name == own.name or meant.barker is None or meant.barker < 9:
         return None
-    sums = [abs(math.fsum(map(mul, signs, linkage.lengths))) for signs in EQUALITIES]
+    sums = [abs(math.fsum(map(mul, signs, linkage.lengths))) for signs in _EQUALITIES]
     perimeter = math.fsum(linkage.lengths)
-    return max(gap for gap in sums if gap <= NEARLY * perimeter), meant.name
+    return max(gap for gap in sums if gap <= _NEARLY * perimeter), meant.name
 
 
 def count_equalities(lengths: tuple[float, float, float, float]) -> int:
@@ -517,7 +517,7 @@ def count_equalities(lengths: tuple[float, float, float, float]) -> int:
     Two hold for a parallelogram or a kite, three for a rhombus.
     """
     touching = TOUCHING * math.fsum(lengths)
-    gaps = (abs(math.fsum(map(mul, signs, lengths))) for signs in EQUALITIES)
+    gaps = (abs(math.fsum(map(mul, signs, lengths))) for signs in _EQUALITIES)
     return sum(gap <= touching for gap in gaps)
 
 
@@ -541,13 +541,13 @@ def meet_change_points(
     decimals : half of the last decimals of what was stated, if not the roundings; too
         coarse ones round nothing.
     """
-    largest = DIGITS_STATED * math.fsum(lengths)
+    largest = _DIGITS_STATED * math.fsum(lengths)
     pairs = zip(roundings, decimals or roundings, strict=True)
     fine = [rounding if last <= largest else 0.0 for rounding, last in pairs]
     allowed = math.fsum(fine)
     missed = [
         signs
-        for signs in EQUALITIES
+        for signs in _EQUALITIES
         if abs(math.fsum(map(mul, signs, lengths))) <= allowed
     ]
     touching = TOUCHING * math.fsum(lengths)

@@ -77,8 +77,8 @@ def coefficients(lengths: Loop, position: Position) -> Coefficients:
         (grown + d * (d - a)) * per_e2 - leaning,
     )
     w = (xg - 0.5 * y) * per_e2
-    if is_any(may_turn_fast(lengths)):
-        fast = find_fast_turns(lengths, position)
+    if is_any(_may_turn_fast(lengths)):
+        fast = _find_fast_turns(lengths, position)
         heron = E2 * (d + a) * (d + a) * outer + E1 * (b - c) * (b - c) * (2.0 * grown)
         w = select(fast, -heron * per_root / (x * S + y * position.root), w)
         n, rest = select(fast, 0.5 + w, n), select(fast, 0.5 - w, rest)
@@ -87,12 +87,12 @@ def coefficients(lengths: Loop, position: Position) -> Coefficients:
     return Coefficients(1.0, n - g, n + g, rest + g, 2.0 * g, 0.0, dn - dg, dn + dg)
 
 
-def may_turn_fast(lengths: Loop) -> Number:
+def _may_turn_fast(lengths: Loop) -> Number:
     """Return True if |d^2 - a^2| > FAST e^2 where e is shortest."""
     return lengths.d + lengths.a > FAST * abs(lengths.d - lengths.a)
 
 
-def find_fast_turns(lengths: Loop, position: Position) -> Number:
+def _find_fast_turns(lengths: Loop, position: Position) -> Number:
     """Mark where t and x g/e^2 are large and cancel.
 
     There |d^2 - a^2| > FAST e^2, and x S and y root have the same sign.
@@ -113,9 +113,9 @@ def take_sines_of_rates(lengths: Loop, position: Position, k: Coefficients) -> P
     d sin(theta_3 - theta_1) = c sin(theta_4 - theta_3) (1 - h4).
     """
     d, _, b, c, _, _ = lengths
-    if not is_any(may_turn_fast(lengths)):
+    if not is_any(_may_turn_fast(lengths)):
         return position
-    fast, scale = find_fast_turns(lengths, position), position.sin_mu / d
+    fast, scale = _find_fast_turns(lengths, position), position.sin_mu / d
     u3, u4 = (
         position.u3 * position.u1.conjugate(),
         position.u4 * position.u1.conjugate(),

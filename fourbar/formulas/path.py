@@ -201,7 +201,7 @@ class Path(NamedTuple):
         return (
             (position, k)
             if self.bar == 2
-            else (self.in_order(position), read_from(self.bar, k))
+            else (self.in_order(position), _read_from(self.bar, k))
         )
 
     def in_order(self, position: Position) -> Position:
@@ -354,7 +354,7 @@ def drive_sine_of_triangle(lengths: Loop, position: Position, drive_bar: int) ->
     )
 
 
-def read_from(bar: int, k: Coefficients) -> Coefficients:
+def _read_from(bar: int, k: Coefficients) -> Coefficients:
     """Return the coefficients of the loop read from bar 2, 3 or 4, bars in usual order.
 
     The same exchange leads back.

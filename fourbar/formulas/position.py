@@ -41,11 +41,11 @@ TOUCHING = 4.0 * U
 lengths count as touching: lengths that are computed, as distances of points are, are
 rounded by a few U each.
 """
-VISIBLE = 1e-9
+_VISIBLE = 1e-9
 """Part of a length that is no rounding of it."""
-VISIBLE_AT_A = 1e-11
+_VISIBLE_AT_A = 1e-11
 """The same of d - a: bars 3 and 4 are as much too long or short where A passes O4."""
-TINY_TANGENT = 1e-100
+_TINY_TANGENT = 1e-100
 """Added to the size of tan h. On a change point everything takes the limit to which it
 tends along the assembly.
 """
@@ -175,9 +175,9 @@ def _vanish(
     if not is_any(touching):
         return difference
     for length in lengths:
-        touching = touching & (square <= (VISIBLE * VISIBLE) * (length * length))
+        touching = touching & (square <= (_VISIBLE * _VISIBLE) * (length * length))
     if diagonal is not None:
-        visible = VISIBLE_AT_A * diagonal
+        visible = _VISIBLE_AT_A * diagonal
         touching = touching & (square <= visible * visible)
     return difference - select(touching, without_slopes(difference), 0.0)
 
@@ -213,7 +213,7 @@ def half_angle(
     t = tangent(0.5 * psi)
     collinear = passing.outer if opposite else passing.inner
     if is_any(collinear):
-        t = select(collinear, t + np.copysign(TINY_TANGENT, t), t)
+        t = select(collinear, t + np.copysign(_TINY_TANGENT, t), t)
     kk = 1.0 / (1.0 + t * t)
     sk = t * kk
     ss = t * sk

@@ -17,7 +17,7 @@ from fourbar.mjcf.model import join, require_carriable, write_rounded
 from fourbar.mjcf.plane import LEVEL, Plane
 from fourbar.scene import Scene, require_input
 
-PARENT = {2: 1, 3: 2, 4: 1}
+_PARENT = {2: 1, 3: 2, 4: 1}
 """The bar that carries each bar's first pin."""
 
 
@@ -99,7 +99,7 @@ def assemble(
     return Assembly(turn, foot, numbers, inertia, gravity, dynamics)
 
 
-def write_comment(
+def _write_comment(
     scene: Scene,
     form: str,
     reader: str,
@@ -175,7 +175,7 @@ def write_sdf(
         {"version": "1.9", **({"xmlns:drake": DRAKE} if reader == "drake" else {})},
     )
     at_B = f", joint B {omega_2 + at_A - omega_4!r} rad/s" if reader == "gazebo" else ""
-    for line in write_comment(
+    for line in _write_comment(
         scene, "SDF", reader, assembled, at_B, plane
     ).splitlines():
         root.append(ET.Comment(f" {line} "))
@@ -203,7 +203,7 @@ def write_sdf(
             model,
             pin,
             "revolute",
-            BAR_NAMES[PARENT[number]],
+            BAR_NAMES[_PARENT[number]],
             BAR_NAMES[number],
             dynamics.get(pin, {}),
         )
@@ -313,7 +313,7 @@ def write_usd(
     joints = []
     length = {number: linkage.bar(number).length for number in MOVING_BARS}
     places = {
-        FIRST_PIN[number]: (PARENT[number], number, 0.0) for number in MOVING_BARS
+        FIRST_PIN[number]: (_PARENT[number], number, 0.0) for number in MOVING_BARS
     } | {"B": (4, 3, length[3])}
     for pin, (one, follower, along) in places.items():
         on_one = {
@@ -339,7 +339,7 @@ def write_usd(
         bool physics:excludeFromArticulation = {"true" if pin == "B" else "false"}
     }}
 """)
-    comment = write_comment(scene, "USD", "newton", assembled, plane=plane)
+    comment = _write_comment(scene, "USD", "newton", assembled, plane=plane)
     notes = json.dumps(comment)
     down = plane.turn(x / pull, y / pull) if pull else (0.0, -1.0, 0.0)
     return f"""#usda 1.0

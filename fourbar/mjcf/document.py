@@ -43,15 +43,15 @@ SETTLING = 2.0
 """Time constant with which the servo starts the input from rest, in timesteps. The
 angle of the input lags by as many.
 """
-RELEASED_STEPS = 6280
+_RELEASED_STEPS = 6280
 """Timesteps in the time in which weights and loads would turn the linkage once. It
 holds without a flywheel.
 """
-RELEASED_CLOSURE = 2.0
+_RELEASED_CLOSURE = 2.0
 """Time constant of the closure of a released linkage, in timesteps. Measured: 2 takes
 the least energy out of it.
 """
-STIFF_PAD, SOFT_PAD = 1e-4, 2e-3
+_STIFF_PAD, _SOFT_PAD = 1e-4, 2e-3
 """Pads of `Settings.pad`. Stiff: the closure's softness matters less than 1e-9. Soft: 7
 digits after one iteration.
 """
@@ -321,11 +321,11 @@ def _leave_out_flywheel(scene: Scene, settings: Settings) -> Settings:
     settings = replace(
         settings,
         flywheel=0.0,
-        timestep=settings.timestep or math.tau / (RELEASED_STEPS * speed),
+        timestep=settings.timestep or math.tau / (_RELEASED_STEPS * speed),
     )
     if scene.motion.free is None:
         return settings
-    return replace(settings, pad=None, time_constant_steps=RELEASED_CLOSURE)
+    return replace(settings, pad=None, time_constant_steps=_RELEASED_CLOSURE)
 
 
 def fit_pad(scene: Scene) -> float:
@@ -336,14 +336,14 @@ def fit_pad(scene: Scene) -> float:
     loads).
     """
     _, a, b, c = scene.linkage.lengths
-    least_sag = SOFT_PAD / math.sqrt(
+    least_sag = _SOFT_PAD / math.sqrt(
         (1.0 + compute_load_ratio(scene))
         * max(1.0, compute_mass_ratio(scene.linkage) / LIGHT)
     )
     acceleration = (
         _compute_acceleration_scale(scene) * a / max(b, c)
     )  # of bars 3 and 4, by its size
-    return least_sag if acceleration < QUICK else min(STIFF_PAD, least_sag)
+    return least_sag if acceleration < QUICK else min(_STIFF_PAD, least_sag)
 
 
 def compute_mass_ratio(linkage: FourBar) -> float:
@@ -534,7 +534,7 @@ SIMULATORS = {
     "newton": SINGLE,
 }
 """Simulators that read the file, and the settings that carry the loop best there."""
-OWN_MOTORS = ("genesis", "newton")
+_OWN_MOTORS = ("genesis", "newton")
 """Simulators that put couples on joints themselves. They take none from the controls of
 a file; Genesis takes no actuator at all.
 """
@@ -559,7 +559,7 @@ def write_mjcf_for(
         )
     if drive not in get_args(Drive):
         raise InputError("drive", drive, f"must be one of {', '.join(get_args(Drive))}")
-    if drive == "motor" and simulator in OWN_MOTORS:
+    if drive == "motor" and simulator in _OWN_MOTORS:
         raise InputError(
             "drive",
             drive,
@@ -571,7 +571,7 @@ def write_mjcf_for(
     )
 
 
-PER_METRE = 1.0
+_PER_METRE = 1.0
 """kg/m of the uniform bars."""
 OMEGA = 1.0
 """rad/s of the input."""
@@ -584,7 +584,7 @@ def make_scene(
 
     The input turns at omega (rad/s) from the middle of its range.
     """
-    linkage = uniform(ground, input, coupler, output, per_metre=PER_METRE)
+    linkage = uniform(ground, input, coupler, output, per_metre=_PER_METRE)
     title = f"four-bar {ground!r} {input!r} {coupler!r} {output!r}"
     # half a turn from the ground's line would start a parallelogram in its change point
     quarter = linkage.ground_angle + math.pi / 2.0
@@ -602,7 +602,7 @@ def list_defaults(scene: Scene) -> list[str]:
             f"{n} {x!r}"
             for n, x in zip(BAR_NAMES.values(), scene.linkage.lengths, strict=True)
         ),
-        f"bars: uniform and slender, {PER_METRE:g} kg/m",
+        f"bars: uniform and slender, {_PER_METRE:g} kg/m",
         "branch: open",
         f"omega_2: {scene.motion.omega_2!r} rad/s, alpha_2: 0",
         f"start: theta_2 = {theta_2!r} rad ({math.degrees(theta_2):.6g} deg)",

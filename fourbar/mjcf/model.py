@@ -61,9 +61,9 @@ class Settings:
 
 RECIPE = Settings()
 
-FOVY = 45.0
+_FOVY = 45.0
 """Vertical field of view, deg."""
-ASPECT = 4.0 / 3.0
+_ASPECT = 4.0 / 3.0
 """Narrowest window that shows the whole linkage."""
 MARGIN = 1.15
 """Width and height of the picture over those of the linkage."""
@@ -74,7 +74,7 @@ def write_rounded(*numbers: float) -> str:
     return " ".join(f"{number:.6g}" for number in numbers)
 
 
-class CameraView(NamedTuple):
+class _CameraView(NamedTuple):
     """View of the camera: the box in which pins A and B move."""
 
     x: float
@@ -85,10 +85,10 @@ class CameraView(NamedTuple):
     @property
     def distance(self) -> float:
         """Distance of the camera from the plane, m."""
-        return self.half_height / math.tan(math.radians(0.5 * FOVY))
+        return self.half_height / math.tan(math.radians(0.5 * _FOVY))
 
 
-def compute_frame(linkage: FourBar) -> CameraView:
+def compute_frame(linkage: FourBar) -> _CameraView:
     """Compute the box around the circle of A about O2 and of B about O4.
 
     No position leaves it.
@@ -97,8 +97,8 @@ def compute_frame(linkage: FourBar) -> CameraView:
     x, y = d * math.cos(linkage.ground_angle), d * math.sin(linkage.ground_angle)
     left, right = min(-a, x - c), max(a, x + c)
     low, high = min(-a, y - c), max(a, y + c)
-    half = MARGIN * max(0.5 * (high - low), 0.5 * (right - left) / ASPECT)
-    return CameraView(0.5 * (left + right), 0.5 * (low + high), half)
+    half = MARGIN * max(0.5 * (high - low), 0.5 * (right - left) / _ASPECT)
+    return _CameraView(0.5 * (left + right), 0.5 * (low + high), half)
 
 
 def add_appearance(root: ET.Element, linkage: FourBar) -> None:
@@ -118,7 +118,7 @@ def add_appearance(root: ET.Element, linkage: FourBar) -> None:
         "global",
         azimuth="90",
         elevation="-90",
-        fovy=f"{FOVY:g}",
+        fovy=f"{_FOVY:g}",
         offwidth="1280",
         offheight="960",
     )
@@ -141,14 +141,14 @@ def add_appearance(root: ET.Element, linkage: FourBar) -> None:
     )
 
 
-def add_camera(world: ET.Element, linkage: FourBar) -> None:
+def _add_camera(world: ET.Element, linkage: FourBar) -> None:
     """Add the camera `plane`, and a light at the same place."""
     seen = compute_frame(linkage)
     place = write_rounded(seen.x, seen.y, seen.distance)
     shining = {"diffuse": ".2 .2 .2", "specular": ".1 .1 .1"}  # with the headlight 1
     shining |= {"directional": "true", "castshadow": "false"}
     ET.SubElement(world, "light", shining, name="light", pos=place, dir="0 0 -1")
-    ET.SubElement(world, "camera", name="plane", pos=place, fovy=f"{FOVY:g}")
+    ET.SubElement(world, "camera", name="plane", pos=place, fovy=f"{_FOVY:g}")
 
 
 CYLINDER = "cylinder"
@@ -161,16 +161,16 @@ COLOURS = {
     3: "1 0.5 0.05 1",
     4: "0.17 0.63 0.17 1",
 }
-SLIP_DAMPING = 1e6
+_SLIP_DAMPING = 1e6
 """Damping of dry friction, per timestep: the greater, the slower the slip that it still
 softens. The drive prescribes the slip itself, so it makes nothing stiff; measured, a
 reversal is then as exact as any other position.
 """
-NEVER_NEEDED = ("contact", "limit", "island", "sensor")
+_NEVER_NEEDED = ("contact", "limit", "island", "sensor")
 """Features that a closed loop of bars never uses; without contacts there is no
 midphase, and MuJoCo Warp does not load a file that switches it off.
 """
-THICKNESS = 0.02
+_THICKNESS = 0.02
 """Radius of a bar's capsule, as a part of the longest bar."""
 
 
@@ -186,21 +186,21 @@ def _find_body(root: ET.Element, bar: int) -> ET.Element:
     return body
 
 
-UNCONTROLLED = {"gaintype": "fixed", "gainprm": "0", "biastype": "affine"}
+_UNCONTROLLED = {"gaintype": "fixed", "gainprm": "0", "biastype": "affine"}
 
 
-PASSIVE = {"input": "none", "motorconst": "0", "resistance": "1"}
+_PASSIVE = {"input": "none", "motorconst": "0", "resistance": "1"}
 """A motor without a control and without back-EMF: what is left is its cogging, which
 here does not depend on the angle. To MuJoCo, and so to Gymnasium, it is no control.
 """
 
 
-def make_passive(force: float) -> dict[str, str]:
+def _make_passive(force: float) -> dict[str, str]:
     """Return the attributes of a `dcmotor` that exerts a constant force.
 
     The force is in N, or a factor on the gear of the motor.
     """
-    return {**PASSIVE, "cogging": join(force, 0.0, math.pi / 2.0)}
+    return {**_PASSIVE, "cogging": join(force, 0.0, math.pi / 2.0)}
 
 
 def make_constant_motor(force: float) -> dict[str, str]:
@@ -209,7 +209,7 @@ def make_constant_motor(force: float) -> dict[str, str]:
     There is none if the force is 0.
     """
     return (
-        {**UNCONTROLLED, "joint": "O2", "biasprm": join(force, 0.0, 0.0)}
+        {**_UNCONTROLLED, "joint": "O2", "biasprm": join(force, 0.0, 0.0)}
         if force
         else {}
     )
@@ -220,7 +220,7 @@ def make_servo(gain: float, omega: float) -> dict[str, str]:
 
     Without a control it turns at omega, and there it is idle.
     """
-    return {**UNCONTROLLED, "joint": "O2", "biasprm": join(gain * omega, 0.0, -gain)}
+    return {**_UNCONTROLLED, "joint": "O2", "biasprm": join(gain * omega, 0.0, -gain)}
 
 
 def make_motor(bar: int | None, most: float) -> dict[str, str]:
@@ -239,7 +239,7 @@ def make_motor(bar: int | None, most: float) -> dict[str, str]:
     return {**placed, "ctrlrange": join(-most, most), "ctrllimited": "false"}
 
 
-A_MILLIONTH = 1e-6
+_A_MILLIONTH = 1e-6
 """Least mass of a bar as a fraction of the heaviest one. Simulations hold down to 1e-11
 of it, and forces move by about this part.
 """
@@ -253,7 +253,7 @@ def require_carriable(linkage: FourBar) -> None:
     The error says which mass it carries.
     """
     heaviest = max(linkage.bar(number).mass for number in MOVING_BARS)
-    enough = max(A_MILLIONTH * heaviest, 2.0 * FLOOR) if heaviest else ALONE
+    enough = max(_A_MILLIONTH * heaviest, 2.0 * FLOOR) if heaviest else ALONE
     part = (
         "a millionth of the heaviest bar's"
         if heaviest
@@ -305,7 +305,7 @@ class Model:
         impedance = self.settings.impedance
         self.pin[pin] |= {
             "frictionloss": torque,
-            "solreffriction": (-1.0, -SLIP_DAMPING / self.timestep),
+            "solreffriction": (-1.0, -_SLIP_DAMPING / self.timestep),
             "solimpfriction": (impedance, impedance, 0.001, 0.5, 2.0),
         }
 
@@ -318,7 +318,7 @@ class Model:
     @property
     def radius(self) -> float:
         """Radius of the capsules, m."""
-        return THICKNESS * max(self.linkage.lengths)
+        return _THICKNESS * max(self.linkage.lengths)
 
     @property
     def exerts(self) -> bool:
@@ -344,7 +344,7 @@ class Model:
             **{key: join(*value) for key, value in self.option.items()},
         }
         option = ET.SubElement(root, "option", options)
-        unneeded = list(NEVER_NEEDED)
+        unneeded = list(_NEVER_NEEDED)
         unneeded += [] if self.springs or self.used("stiffness") else ["spring"]
         unneeded += [] if self.used("frictionloss") else ["frictionloss"]
         unneeded += [] if self.used("damping") else ["damper"]
@@ -353,7 +353,7 @@ class Model:
     def add_bodies(self, root: ET.Element, flywheel: float) -> None:
         """Add ground > (input > coupler), output; light and camera face the plane."""
         world = ET.SubElement(root, "worldbody")
-        add_camera(world, self.linkage)
+        _add_camera(world, self.linkage)
         ground = ET.SubElement(world, "body", name="ground")
         ET.SubElement(ground, "inertial", pos="0 0 0", mass="1", diaginertia="1 1 1")
         self._add_capsule(ground, 1, self.linkage.ground, -2.0 * self.radius)
@@ -535,12 +535,12 @@ class Model:
                 assert tendon is not None
                 tendon.set("stiffness", join(spring.stiffness))
                 tendon.set("springlength", "0")
-                preload = make_passive(-spring.slack)
+                preload = _make_passive(-spring.slack)
                 ET.SubElement(actuators, "dcmotor", {**preload, **placed})
                 continue
             tension = join(-spring.slack, 0.0 - spring.stiffness, 0.0)
             ET.SubElement(
-                actuators, "general", {**UNCONTROLLED, **placed}, biasprm=tension
+                actuators, "general", {**_UNCONTROLLED, **placed}, biasprm=tension
             )
         for index, load in enumerate(self.loads, 1):
             fx = fy = 0.0
@@ -559,10 +559,10 @@ class Model:
                 placed["refsite"] = "O2"
             placed["gear"] = join(fx, fy, 0.0, 0.0, 0.0, couple)
             if passive:
-                ET.SubElement(actuators, "dcmotor", {**make_passive(1.0), **placed})
+                ET.SubElement(actuators, "dcmotor", {**_make_passive(1.0), **placed})
                 continue
             ET.SubElement(
-                actuators, "general", {**UNCONTROLLED, **placed}, biasprm="1 0 0"
+                actuators, "general", {**_UNCONTROLLED, **placed}, biasprm="1 0 0"
             )
 
 

@@ -15,7 +15,7 @@ from fourbar.mjcf.model import join
 from fourbar.quantities import Array
 
 Vector = tuple[float, float, float]
-OPPOSITE = 1e-12
+_OPPOSITE = 1e-12
 """Sum of 1 and the tilt's cosine below which the axis points down; x stays x there."""
 
 
@@ -54,7 +54,7 @@ class Plane:
     def quaternion(self) -> tuple[float, float, float, float]:
         """Return the turn from world axes to the frame: (w, x, y, z), of length 1."""
         x, y, z = self.axis
-        if 1.0 + z < OPPOSITE:
+        if 1.0 + z < _OPPOSITE:
             return 0.0, 1.0, 0.0, 0.0
         size = math.sqrt(2.0 * (1.0 + z))
         return 0.5 * size, 0.0 - y / size, x / size, 0.0

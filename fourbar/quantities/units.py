@@ -21,9 +21,9 @@ from fourbar.errors import InputError
 FILE = files("fourbar.quantities").joinpath("units.toml")
 DEFINITIONS: str = tomllib.loads(FILE.read_text(encoding="utf-8"))["definitions"]
 """Unit definitions in the form of the units library."""
-JOINED = re.compile(r"(?<=[A-Za-z])[.-](?=[A-Za-z])")
+_JOINED = re.compile(r"(?<=[A-Za-z])[.-](?=[A-Za-z])")
 """N.mm, lbf-in: a product."""
-SWAPS = (
+_SWAPS = (
     {
         "lb": "lbf",
         "pound": "lbf",
@@ -38,7 +38,7 @@ SWAPS = (
 """Names that stand for each other in ordinary speech. Here a pound is a mass, and the
 angle is a dimension.
 """
-SIGNS = str.maketrans(
+_SIGNS = str.maketrans(
     {
         "⋅": "·",
         "×": "·",
@@ -54,19 +54,21 @@ SIGNS = str.maketrans(
     }
 )
 """Other signs of a product, of inches and feet, and signs like that of a degree."""
-PREFIXED_ANGLE = re.compile(r"(?<![A-Za-z])(?!m|µ|u|grad)[A-Za-zµ]{1,2}rad(?![A-Za-z])")
+_PREFIXED_ANGLE = re.compile(
+    r"(?<![A-Za-z])(?!m|µ|u|grad)[A-Za-zµ]{1,2}rad(?![A-Za-z])"
+)
 """Grad, krad: a prefix before an angle. Nobody means one but milli- and micro-."""
 TURNING = re.compile(r"\s*\b(c?cw|(?:anti|counter)?-?clockwise)$", re.IGNORECASE)
 """A sense of turning after a unit: the sign states it."""
-GLUED = re.compile(r"(kg|g|N)(m|mm|cm)(?=$|[\^²*])")
+_GLUED = re.compile(r"(kg|g|N)(m|mm|cm)(?=$|[\^²*])")
 """kgm^2: a product without a sign between its factors."""
 RAISED = re.compile("[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+")
 DIGITS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
-FRACTION = re.compile(
+_FRACTION = re.compile(
     r"(?:([0-9]{1,6})[ -])?([0-9]{1,6})/([1-9][0-9]{0,5})(?=[ A-Za-z'\"′″])"
 )
 """1/2 or 12 1/2, as inches are written."""
-FEET = re.compile(r"([0-9]{1,6}) ?['′’][ -]?(?=[0-9.][^'′’]*[\"″”]$)")
+_FEET = re.compile(r"([0-9]{1,6}) ?['′’][ -]?(?=[0-9.][^'′’]*[\"″”]$)")
 """The feet of 1'6", 1' 6 1/2" or 1'-6.5"."""
 NUMBER = re.compile(
     r"[+-]?(?:[0-9]{1,100}(?:\.[0-9]{0,100})?|\.[0-9]{1,100})"
@@ -80,7 +82,7 @@ UNIT = re.compile(
 parser, no tower of powers. Names are taken whole (`++`), so that a text which does not
 fit is refused in one pass.
 """
-LONGEST_UNIT = 60
+_LONGEST_UNIT = 60
 UNIT_MISSING = "the unit is missing"
 """Reason of the error for a number alone."""
 
@@ -99,14 +101,14 @@ def to_si(text: str, unit: str) -> float:
     of another dimension than `unit`, and where the number does not fit into a double.
     """
     text = text.strip()
-    feet = FEET.match(text)
+    feet = _FEET.match(text)
     text = text[feet.end() :] if feet else text
-    number_text = FRACTION.match(text) or NUMBER.match(text)
+    number_text = _FRACTION.match(text) or NUMBER.match(text)
     if number_text is None:
         raise UnitError("there is no finite number")
     name = RAISED.sub(
         lambda power: f"^{power[0].translate(DIGITS)}",
-        text[number_text.end() :].translate(SIGNS),
+        text[number_text.end() :].translate(_SIGNS),
     ).strip()
     if name.startswith(","):
         hint = (
@@ -123,7 +125,7 @@ def to_si(text: str, unit: str) -> float:
         raise UnitError(
             f'the sign says how it turns, counter-clockwise is positive: "{plain}"'
         )
-    name = GLUED.sub(r"\1 \2", name)
+    name = _GLUED.sub(r"\1 \2", name)
     wanted, wanted_dimension = _find_factor(unit)
     try:
         factor, dimension = _find_factor(name)
@@ -166,8 +168,8 @@ def write_quantity(quantity: Any) -> Any:
 
 def find_unit(text: object, otherwise: str) -> str:
     """Return the unit that a text has; another one where it has none."""
-    last = FEET.sub("", str(text).strip())  # the inches of 1'6"
-    number_text = FRACTION.match(last) or NUMBER.match(last)
+    last = _FEET.sub("", str(text).strip())  # the inches of 1'6"
+    number_text = _FRACTION.match(last) or NUMBER.match(last)
     unit = last[number_text.end() :].strip() if number_text else ""
     unit = re.sub('[″”"]', "in", re.sub("[′’']", "ft", unit))
     return unit or otherwise
@@ -178,8 +180,8 @@ def find_rounding(text: object, unit: str) -> float:
 
     It is 0 for a number without decimals.
     """
-    last = FEET.sub("", str(text).strip())
-    number_text = None if FRACTION.match(last) else NUMBER.match(last)
+    last = _FEET.sub("", str(text).strip())
+    number_text = None if _FRACTION.match(last) else NUMBER.match(last)
     if number_text is None:
         return 0.0
     digits, _, power = number_text[0].lower().partition("e")
@@ -206,7 +208,7 @@ def _suggest(number: str, name: str, unit: str) -> str:
 
     The unit stated is unknown, or of another dimension than `unit`.
     """
-    if len(name) > LONGEST_UNIT:
+    if len(name) > _LONGEST_UNIT:
         return ""
     names = {
         word.casefold(): word
@@ -222,7 +224,7 @@ def _suggest(number: str, name: str, unit: str) -> str:
     words = re.compile(r"[A-Za-zµμ°_]+")
     swapped = [
         {word: swap.get(word.removesuffix("s"), word) for word in words.findall(name)}
-        for swap in SWAPS
+        for swap in _SWAPS
     ]
     swapped.append(
         {word: word.removesuffix("s").casefold() for word in words.findall(name)}
@@ -262,11 +264,11 @@ def _load_registry() -> Any:
 @cache
 def _find_factor(name: str) -> tuple[Fraction, dict[str, Fraction]]:
     """Return what one of the unit is in base units, and its dimension."""
-    name = JOINED.sub(" ", name.rstrip("."))
-    if len(name) > LONGEST_UNIT or not UNIT.fullmatch(name):
+    name = _JOINED.sub(" ", name.rstrip("."))
+    if len(name) > _LONGEST_UNIT or not UNIT.fullmatch(name):
         raise UnitError("the unit cannot be read")
     registry = _load_registry()
-    if angle := PREFIXED_ANGLE.search(name):
+    if angle := _PREFIXED_ANGLE.search(name):
         raise UnitError(f'the unit "{angle[0]}" is not known')
     try:
         one = registry.Quantity(Fraction(1), registry.parse_units(name)).to_root_units()

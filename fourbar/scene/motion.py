@@ -50,7 +50,7 @@ STEPS = (range(1, MOST_STEPS + 1), f"must be a whole number from 1 to {MOST_STEP
 """Allowed numbers of intervals of any motion, and how an error says so."""
 SPLINES = {"free": "not-a-knot", "rest": "clamped", "periodic": "periodic"}
 """End conditions of a law's spline: none, at rest, or one period of a motion."""
-FEWEST_POINTS = {"free": 4, "rest": 2, "periodic": 3}
+_FEWEST_POINTS = {"free": 4, "rest": 2, "periodic": 3}
 """Number of points that determine the cubic pieces."""
 MOST_POINTS = 100_000
 KINDS = ("cycloidal", "345")
@@ -127,7 +127,7 @@ class Free:
         )
 
 
-def find_bar(key: str, numbers: Mapping[int, tuple[Any, ...]]) -> int | None:
+def _find_bar(key: str, numbers: Mapping[int, tuple[Any, ...]]) -> int | None:
     """Return the bar of which numbers (angle, speed, acceleration) are stated, or None.
 
     Raises InputError for two bars.
@@ -167,7 +167,7 @@ class _OverTime:
         """Number of the bar whose angle the law gives: 2, 3 or 4."""
         angles = {2: self.theta_2, 3: self.theta_3, 4: self.theta_4}
         stated = {bar: (angle, None, 0.0) for bar, angle in angles.items()}
-        return find_bar("motion.law", stated) or 2
+        return _find_bar("motion.law", stated) or 2
 
     def times(self: Any) -> Array:
         """Return the times at which the law is evaluated, (steps + 1,), s."""
@@ -216,10 +216,10 @@ class Law(_OverTime):
         )
         if (
             len(time) != len(angles)
-            or not FEWEST_POINTS[self.ends] <= len(time) <= MOST_POINTS
+            or not _FEWEST_POINTS[self.ends] <= len(time) <= MOST_POINTS
         ):
             allowed = (
-                f"needs {FEWEST_POINTS[self.ends]} to {MOST_POINTS} times and as many"
+                f"needs {_FEWEST_POINTS[self.ends]} to {MOST_POINTS} times and as many"
                 " angles"
             )
             raise InputError(key, (len(time), len(angles)), allowed)
@@ -261,7 +261,7 @@ class Law(_OverTime):
         return theta + mean * (time - t[0]), omega + mean, alpha
 
 
-def compute_law(kind: str, u: Array) -> tuple[Array, Array, Array]:
+def _compute_law(kind: str, u: Array) -> tuple[Array, Array, Array]:
     """Compute a law from 0 to 1 and its two derivatives at u in [0, 1].
 
     Speed and acceleration are 0 at both ends. cycloidal: u - sin(2 pi u)/(2 pi);   345:
@@ -362,7 +362,7 @@ def _part(kind: str, time: Array, duration: float) -> tuple[Array, Array, Array]
     Before and after it the law stands still.
     """
     u = np.clip(time / duration, 0.0, 1.0)
-    place, speed, acceleration = compute_law(kind, u)
+    place, speed, acceleration = _compute_law(kind, u)
     return place, speed / duration, acceleration / (duration * duration)
 
 
@@ -475,7 +475,7 @@ class Motion:
             3: (theta_3, omega_3, alpha_3),
             4: (theta_4, omega_4, alpha_4),
         }
-        stated = find_bar("motion", angles)
+        stated = _find_bar("motion", angles)
         bar = (stated or 2) if law is None else law.bar
         names, numbers = COMMANDS[bar], angles[bar]
         if stroke is not None or side is not None or stroke_speed is not None:

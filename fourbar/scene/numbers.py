@@ -114,7 +114,7 @@ COLUMNS = frozenset(
 """Names that a table or a JSON object has already, and the pins."""
 
 
-THREE_SIGMA = 3.0
+_THREE_SIGMA = 3.0
 """Half width of a normal distribution in a worst case, in standard deviations."""
 LENGTHS = {
     **FourBar.numbers,
@@ -182,4 +182,4 @@ class Tolerance:
     @property
     def reach(self) -> float:
         """The largest change that a worst case counts with."""
-        return THREE_SIGMA * self.width if self.sigma else self.width
+        return _THREE_SIGMA * self.width if self.sigma else self.width

@@ -16,7 +16,7 @@ from fourbar.writing import read_bytes
 LARGEST = 2_000_000
 """Bytes of one picture: a page with three of them still opens quickly."""
 LONGEST_NAME = 200
-RASTER = {b"\x89PNG\r\n\x1a\n": "image/png", b"\xff\xd8\xff": "image/jpeg"}
+_RASTER = {b"\x89PNG\r\n\x1a\n": "image/png", b"\xff\xd8\xff": "image/jpeg"}
 """First bytes of the formats that may be attached. SVG may not, because it can carry
 scripts.
 """
@@ -107,7 +107,7 @@ def encode_picture(key: str, path: str | Path, shown: str | None = None) -> str:
     name = str(path) if shown is None else shown
     content = read_bytes(path, key, LARGEST, shown=name)
     kind = next(
-        (kind for magic, kind in RASTER.items() if content.startswith(magic)), None
+        (kind for magic, kind in _RASTER.items() if content.startswith(magic)), None
     )
     if kind is None:
         raise InputError(key, name, "must be a PNG or JPEG picture")

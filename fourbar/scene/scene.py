@@ -50,7 +50,7 @@ if TYPE_CHECKING:
     from fourbar.effects import ForceDrive, Load, Place
 
 
-A_DRIVE = "a drive is a couple on a bar or a force: state drive_bar or drive"
+_A_DRIVE = "a drive is a couple on a bar or a force: state drive_bar or drive"
 
 
 def load_show(module: str) -> Any:
@@ -137,7 +137,7 @@ class Scene:
             drive.require_motion(self.linkage)
         if self.motion.stroke is not None:
             object.__setattr__(self, "motion", copy(self.motion))
-            bar = find_triangle(self.linkage, drive).bar
+            bar = _find_triangle(self.linkage, drive).bar
             object.__setattr__(self.motion, "bar", bar)
         if len({picture.bar for picture in self.pictures}) < len(self.pictures):
             raise InputError(
@@ -198,7 +198,7 @@ class Scene:
             raise InputError(
                 "drive.bar",
                 self.drive_bar,
-                A_DRIVE,
+                _A_DRIVE,
             )
 
     def with_places(self, change: "Callable[[Place], Place]") -> "Scene":
@@ -409,7 +409,7 @@ def require_input(scene: Scene, what: str) -> None:
         )
 
 
-class Triangle(NamedTuple):
+class _Triangle(NamedTuple):
     """Triangle of a cylinder: pivot of its bar, end on the bar, end on the ground.
 
     With the stroke it gives the angle.
@@ -461,7 +461,7 @@ class Triangle(NamedTuple):
         return theta, sign * rate, sign * growth, condition
 
 
-def find_triangle(linkage: FourBar, drive: "ForceDrive | None") -> Triangle:
+def _find_triangle(linkage: FourBar, drive: "ForceDrive | None") -> _Triangle:
     """Return the triangle of a cylinder between the ground and bar 2 or 4.
 
     Raises InputError for any other drive.
@@ -490,7 +490,7 @@ def find_triangle(linkage: FourBar, drive: "ForceDrive | None") -> Triangle:
         end = polar(fixed.distance, fixed.angle + linkage.ground_angle)
         across = end - polar(linkage.ground, linkage.ground_angle)
         reach, towards = abs(across), angle(across)
-    return Triangle(
+    return _Triangle(
         moving.bar,
         abs(moving.distance),
         reach,
@@ -511,7 +511,7 @@ def default_places(scene: Scene, holding: float | None = None) -> Array:
     """
     if scene.motion.stroke is not None:
         triangle, half = (
-            find_triangle(scene.linkage, scene.settled_drive()),
+            _find_triangle(scene.linkage, scene.settled_drive()),
             0.5 * np.array([MARGIN, np.pi - MARGIN]),
         )
         twice_mean = 2.0 * np.sqrt(triangle.length * triangle.reach)
@@ -534,7 +534,7 @@ def compute_bar_motion(
     """
     if scene.motion.stroke is None:
         return place, speed, acceleration, None
-    return find_triangle(scene.linkage, scene.settled_drive()).turn_bar(
+    return _find_triangle(scene.linkage, scene.settled_drive()).turn_bar(
         place, speed, acceleration, scene.motion.side
     )
 
@@ -552,7 +552,7 @@ def command_stroke(
     lost = None
     if speed is not None:  # what angle, speed and acceleration leave out as doubles
         with np.errstate(all="ignore"):
-            longer = find_triangle(
+            longer = _find_triangle(
                 *change_numbers((scene.linkage, scene.settled_drive()), lengthen)
             )
             *turned, _ = longer.turn_bar(
@@ -589,7 +589,7 @@ def command_at(scene: Scene, places: Array) -> Command:
     """
     motion, bar = scene.motion, scene.motion.bar
     if motion.stroke is not None:
-        triangle = find_triangle(scene.linkage, scene.settled_drive())
+        triangle = _find_triangle(scene.linkage, scene.settled_drive())
         least, most = (
             abs(triangle.length - triangle.reach),
             triangle.length + triangle.reach,

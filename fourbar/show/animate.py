@@ -49,7 +49,7 @@ MAX_ROWS = 1441
 """Positions embedded in a page: a quarter of a degree over a full turn. A finer sweep
 is thinned out evenly.
 """
-WATCHED = (1.5, 60.0)
+_WATCHED = (1.5, 60.0)
 """A motion through time that lasts between these, s, is shown in real time."""
 RATES = tuple(f"{letter}_{bar}" for letter in ("omega", "alpha") for bar in MOVING_BARS)
 CENTRES = ("I13", "I24")
@@ -67,7 +67,7 @@ SCALARS = (
 )
 
 
-STRIP = """<p id="strip" class="hint"></p>
+_STRIP = """<p id="strip" class="hint"></p>
 <p id="type-change" class="warning" role="status" hidden></p>
 """
 """Place of the largest numbers beside the drawing of the workbench."""
@@ -289,7 +289,7 @@ def _choose_rate(duration: float) -> float:
     """
     if duration <= 0.0:
         return 1.0
-    shortest, longest = WATCHED
+    shortest, longest = _WATCHED
     if duration < shortest:
         return float(10.0 ** math.floor(math.log10(duration / shortest)))
     return (
@@ -352,7 +352,7 @@ def _encode_pictures(
 
 
 FORMATS = ("html", "gif", "mp4")
-SCRIPTS = (
+_SCRIPTS = (
     "numbers.js",
     "picture.js",
     "acting.js",
@@ -360,7 +360,7 @@ SCRIPTS = (
     "tolerances.js",
     "page.js",
 )
-LIVE_SCRIPTS = ("fields.js", "drag.js", "edit.js")
+_LIVE_SCRIPTS = ("fields.js", "drag.js", "edit.js")
 """Additional scripts of the workbench."""
 
 
@@ -424,9 +424,9 @@ def write_page(
             folder.joinpath(name).read_text(encoding="utf-8") for name in names
         )
 
-    style, script = asset("page.css"), asset(*SCRIPTS)
+    style, script = asset("page.css"), asset(*_SCRIPTS)
     if live:
-        style, script = style + asset("edit.css"), script + asset(*LIVE_SCRIPTS)
+        style, script = style + asset("edit.css"), script + asset(*_LIVE_SCRIPTS)
     return Template(asset("page.html")).substitute(
         title=html.escape(shorten_text(scene.title, 200) or "Four-bar linkage"),
         source=html.escape(shorten_text(scene.source, 400)),
@@ -437,9 +437,9 @@ def write_page(
         script_hash=_hash_content(script),
         connect=f"connect-src ws://{live.split('/')[2]}; " if live else "",
         panel=asset("edit.html") if live else "",
-        strip=STRIP if live else "",
+        strip=_STRIP if live else "",
         results=asset("bench.html") if live else "",
-        data=embed_json(
+        data=_embed_json(
             collect_page_data(
                 replace(scene, tolerances=()) if live else scene,
                 pictures or {},
@@ -461,7 +461,7 @@ def _hash_content(text: str) -> str:
     ).decode("ascii")
 
 
-def embed_json(value: object) -> str:
+def _embed_json(value: object) -> str:
     """Write JSON that can stand inside a script element, whatever strings it holds."""
     text = json.dumps(value, ensure_ascii=True, allow_nan=False, separators=(",", ":"))
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")

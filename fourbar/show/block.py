@@ -39,15 +39,15 @@ from fourbar.show.units import (
 from fourbar.solution import Conversion, Solution, find_unit_in
 
 WIDTH = 80
-TIED = "\u00a0"
+_TIED = "\u00a0"
 """Stands between a number and its unit until the lines are broken."""
 COLUMN = 12
 """Least width of a column."""
 LABEL = 11
 """Width of what stands before a row."""
-HALF_OF_LAST = 0.5
+_HALF_OF_LAST = 0.5
 """Part of the last digit shown from which on an error bar changes it."""
-FEW_DIGITS = 1e-8
+_FEW_DIGITS = 1e-8
 """Error bar over the value from which on the block says where digits are lost. Half of
 the digits of a double are lost then.
 """
@@ -59,7 +59,7 @@ LOCATED = 1e-6
 """Part of the motion within which the place of a flat maximum is located. A place
 nearer to zero than that is zero.
 """
-NO_ANGLE = 1e-14
+_NO_ANGLE = 1e-14
 """rad; rounding of an angle of a turn."""
 LOST = {2: "3 and 4", 3: "2 and 4", 4: "2 and 3"}
 """Bars that are in line where a command of a bar, or a drive on it, loses digits."""
@@ -110,7 +110,7 @@ class _Block:
         for paragraph in filter(None, paragraphs):
             for line in [*([""] if lines else []), *paragraph]:
                 lines += [line] if len(line) <= WIDTH else _wrap(line)
-        return [line.replace(TIED, " ") for line in lines]
+        return [line.replace(_TIED, " ") for line in lines]
 
     def _write_loads(self, pressure: float | None) -> list[str]:
         """Write the drive, the loads of pins and bars, and remarks.
@@ -178,7 +178,7 @@ class _Block:
         Or with that of the largest of its kind.
         """
         text = write_short(value, unit, self.units, largest, self.digits)
-        return text.replace(" ", TIED)
+        return text.replace(" ", _TIED)
 
     def _place(self, place: float, *, named: bool = True) -> str:
         """Write a place as "theta_2 = 22.8 deg", or without its name."""
@@ -188,10 +188,10 @@ class _Block:
         text = self._value(
             place, self.unit, {"m": self.longest, "s": 1.0}.get(self.unit)
         )
-        return f"{self.symbol}{TIED}={TIED}{text}" if named else text
+        return f"{self.symbol}{_TIED}={_TIED}{text}" if named else text
 
     def _angle(self, angle: float) -> str:
-        return self._value(0.0 if abs(angle) < NO_ANGLE else angle, "rad")
+        return self._value(0.0 if abs(angle) < _NO_ANGLE else angle, "rad")
 
     def _write_head(self) -> list[str]:
         """Write what the linkage is."""
@@ -342,13 +342,13 @@ class _Block:
             return f"from {self._angle(low.value)} to {self._angle(high.value)}"
         places = [self._place(end.place, named=False) for end in (low, high)]
         if self.unit == "rad":  # the unit stands next to it
-            places = [place.split(TIED)[0] for place in places]
+            places = [place.split(_TIED)[0] for place in places]
         width, start, stop = (
             self._angle(angle)
             for angle in (high.value - low.value, low.value, high.value)
         )
         return (
-            f"swings {width}, from {start} ({self.symbol}{TIED}={TIED}{places[0]}) to"
+            f"swings {width}, from {start} ({self.symbol}{_TIED}={_TIED}{places[0]}) to"
             f" {stop} ({places[1]})"
         )
 
@@ -697,7 +697,7 @@ class _Block:
                 if facts.error
                 else "zero"
             )
-            limit = HALF_OF_LAST * 10.0 ** (1 - self.digits) / 10.0
+            limit = _HALF_OF_LAST * 10.0 ** (1 - self.digits) / 10.0
             changed = "none of these" if facts.error < limit else "some"
             lines.append(
                 f"rounding changes {changed} digits (worst error bar {below} of the"
@@ -727,7 +727,7 @@ class _Block:
         largest = np.nanmax(np.abs(drive.values), initial=0.0)
         if self._without_rounding(float(largest)) == 0.0:  # nothing has digits to lose
             return []
-        if not np.nanmax(share, initial=0.0) > FEW_DIGITS:
+        if not np.nanmax(share, initial=0.0) > _FEW_DIGITS:
             return []
         worst = int(np.nanargmax(share))
         digits = max(math.floor(-math.log10(share[worst])), 0)

@@ -15,7 +15,7 @@ STEP = 2e-4
 parabola through three of them meets a limit within the third power, and rounding, which
 grows beside a change point as 1/STEP, is 1e-11 of them.
 """
-NEAR, FAR = (1.0, 2.0, 3.0), (2.0, 4.0, 6.0)
+NEAR, _FAR = (1.0, 2.0, 3.0), (2.0, 4.0, 6.0)
 """Multiples of the step at which each of two parabolas meets the forces of a side."""
 SAME = 1e-6
 """Part of the forces within which four extrapolations are one limit: as is shown."""
@@ -41,7 +41,7 @@ def find_limits(scene: Scene, solution: Solution) -> Solution | None:
         if speed == 0.0:
             return None
         step = STEP / float(speed)
-    multiples = np.array([[sign * m for m in (*NEAR, *FAR)] for sign in (-1.0, 1.0)])
+    multiples = np.array([[sign * m for m in (*NEAR, *_FAR)] for sign in (-1.0, 1.0)])
     places = float(at.places[0]) + step * multiples
     if (
         law is not None

@@ -105,7 +105,7 @@ def _find_number(solution: Solution, name: str) -> tuple[str, Array]:
     stem, axis = name, None
     if name[-2:] in AXES:
         stem, axis = name[:-2], AXES[name[-2:]]
-    quantities = list_quantities(solution)
+    quantities = _list_quantities(solution)
     if stem not in quantities or (axis is not None and is_scalar(stem)):
         close = get_close_matches(name, ["time", *quantities], 1)
         hint = f'did you mean "{close[0]}"? ' if close else ""
@@ -131,7 +131,7 @@ def _find_number(solution: Solution, name: str) -> tuple[str, Array]:
     return find_unit(stem), np.hypot(values[..., 0], values[..., 1])
 
 
-def list_quantities(solution: Solution) -> list[str]:
+def _list_quantities(solution: Solution) -> list[str]:
     """List the quantities that a scene has, those of its points among them.
 
     Derived ones of another drive are left out.
@@ -145,7 +145,7 @@ def list_quantities(solution: Solution) -> list[str]:
 
 def _is_place(solution: Solution, name: str) -> bool:
     """Return True for a point or an instant centre."""
-    known = name in list_quantities(solution)
+    known = name in _list_quantities(solution)
     return known and not is_scalar(name) and find_unit(name) == "m"
 
 

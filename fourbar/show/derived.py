@@ -31,7 +31,7 @@ def derive(solution: Solution, name: str) -> Array | None:
     if DERIVED_NAMES[name].stage == "force" and read_drive(solution).values is None:
         return None
     with np.errstate(all="ignore"):
-        values = COMPUTE[name](solution)
+        values = _COMPUTE[name](solution)
         return np.asarray(np.where(np.isfinite(values), values, np.nan))
 
 
@@ -76,7 +76,7 @@ def _locate_centre(solution: Solution, bars: tuple[int, int]) -> Array:
     return np.where(np.abs(centre.w)[..., None] <= NO_DIGIT_LEFT, np.nan, point)
 
 
-COMPUTE: dict[str, Callable[[Solution], Array]] = {
+_COMPUTE: dict[str, Callable[[Solution], Array]] = {
     "shaking_force": shaking_force,
     "shaking_moment": shaking_moment,
     "transmission": _compute_transmission,

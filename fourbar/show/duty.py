@@ -18,7 +18,7 @@ from fourbar.quantities import COUPLE, LINE, UNITS, DriveNames
 from fourbar.scene import Command, Scene, with_signs
 from fourbar.solution import Array, Solution
 
-SAME_RATE = 1e-9
+_SAME_RATE = 1e-9
 """Difference of two rates of a spline that is round-off, over its largest value. The
 rounding is that of its coefficients.
 """
@@ -224,7 +224,7 @@ def is_once_round(solution: Solution) -> Any:
 def _repeats(rate: Array) -> Any:
     """Return True if a speed or an acceleration ends as it begins."""
     gap = np.abs(rate[..., -1] - rate[..., 0])
-    return gap <= SAME_RATE * np.max(np.abs(rate), axis=-1)
+    return gap <= _SAME_RATE * np.max(np.abs(rate), axis=-1)
 
 
 def _require(solution: Solution, name: str) -> Array:
@@ -341,7 +341,7 @@ def describe_drive(scene: Scene) -> str:
     return f"bar {scene.drive_bar} ({BAR_NAMES[scene.drive_bar]})"
 
 
-class Energies(NamedTuple):
+class _Energies(NamedTuple):
     """Energies at n instants, J."""
 
     kinetic: Array
@@ -352,7 +352,7 @@ class Energies(NamedTuple):
     """
 
 
-def compute_energies(scene: Scene, motion: Solution) -> Energies:
+def compute_energies(scene: Scene, motion: Solution) -> _Energies:
     """Compute the kinetic energy, and the work of each effect and of the loads.
 
         T = sum of m v_G^2/2 + I omega^2/2,
@@ -393,4 +393,4 @@ def compute_energies(scene: Scene, motion: Solution) -> Energies:
             + 0.5 * body.m * dot(v, v)
             + 0.5 * body.I * np.square(state.omega(number))
         )
-    return Energies(kinetic, work)
+    return _Energies(kinetic, work)

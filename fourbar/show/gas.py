@@ -71,7 +71,7 @@ def _measure(scene: Scene, spring: Spring, at: Command) -> Array:
     return np.broadcast_to(np.abs(across), at.places.shape)
 
 
-Stretch = tuple[float | None, float | None]
+_Stretch = tuple[float | None, float | None]
 """Places of the start and of the end; None: the motion begins or ends within."""
 
 
@@ -81,11 +81,11 @@ def _list_stretches(
     spring: Spring,
     end: float,
     beyond: NDArray[np.bool_],
-) -> list[Stretch]:
+) -> list[_Stretch]:
     """List where a spring is beyond one of its ends, from where it is at positions."""
     rows = np.flatnonzero(beyond[1:] != beyond[:-1])
     crossings = _locate_crossings(scene, solution, spring, end, rows)
-    stretches = list[Stretch]()
+    stretches = list[_Stretch]()
     start = None
     for row, place in zip(rows, crossings, strict=True):
         if beyond[row]:
@@ -132,7 +132,7 @@ def _command_between(scene: Scene, at: Command, places: Array) -> Command:
     return Command(places, np.full(places.shape, at.branch[0]), None, 0.0, bar=at.bar)
 
 
-def _write_stretch(solution: Solution, stretch: Stretch, units: Conversion) -> str:
+def _write_stretch(solution: Solution, stretch: _Stretch, units: Conversion) -> str:
     """Write a stretch as "from theta_2 = 61.2 deg on"."""
     start, stop = stretch
     if solution.time is not None:

@@ -16,11 +16,11 @@ from fourbar.show.derived import derive
 from fourbar.show.units import POSITION_DIGITS, choose_unit, drop_rounding, write_cell
 from fourbar.solution import Array, Conversion, Solution, find_values
 
-LABEL, CELL = 15, 15
+LABEL, _CELL = 15, 15
 """Width of a label and of a cell: four of them and a unit are 80 columns."""
-NUMBER_LABEL = 22
+_NUMBER_LABEL = 22
 """Width of the label of a number that stands alone."""
-FORCE_HEADS = {pin: f"{name} at {pin}" for pin, name in PIN_FORCE.items()}
+_FORCE_HEADS = {pin: f"{name} at {pin}" for pin, name in PIN_FORCE.items()}
 
 
 class PositionSheet:
@@ -100,7 +100,7 @@ class PositionSheet:
     def write_pin_forces(self) -> list[str]:
         """Write the pin forces, and the force and the moment on the frame."""
         forces = {
-            FORCE_HEADS[pin]: getattr(self.solution, name)
+            _FORCE_HEADS[pin]: getattr(self.solution, name)
             for pin, name in PIN_FORCE.items()
         }
         shaking = derive(self.solution, "shaking_force")
@@ -152,7 +152,7 @@ class PositionSheet:
         assert values is not None
         label = "mechanical advantage"
         if not np.isfinite(values[0]):
-            return f"{label:<{NUMBER_LABEL}}without a bound: bar 4 stands still"
+            return f"{label:<{_NUMBER_LABEL}}without a bound: bar 4 stands still"
         return self._write_number(label, values, "1", "  (torque of bar 4 to bar 2)")
 
     def _write_force_ratios(self) -> list[str]:
@@ -229,7 +229,7 @@ class PositionSheet:
             factor, name = choose_unit(abs(float(values[0])), unit, self.units)
             name = f" {name}"
         (text,) = _write_numbers(factor * values)
-        return f"{label:<{NUMBER_LABEL}}{text}{name}{after}"
+        return f"{label:<{_NUMBER_LABEL}}{text}{name}{after}"
 
 
 def _say_limits(forces: list[Array]) -> str:
@@ -247,4 +247,4 @@ def _write_numbers(numbers: Array, form: str = f".{POSITION_DIGITS}g") -> list[s
 
 
 def _write_row(label: str, cells: Iterable[str]) -> str:
-    return f"{label:<{LABEL}}{''.join(f'{cell:<{CELL}}' for cell in cells)}".rstrip()
+    return f"{label:<{LABEL}}{''.join(f'{cell:<{_CELL}}' for cell in cells)}".rstrip()

@@ -188,7 +188,7 @@ def _write_angle(angle: float) -> str:
     return f"{_write_degrees(angle)} deg"
 
 
-SENSITIVITY_SCHEMA = "fourbar-sensitivity/1"
+_SENSITIVITY_SCHEMA = "fourbar-sensitivity/1"
 
 
 def list_shown(derivatives: Sensitivity) -> list[str]:
@@ -279,7 +279,7 @@ def write_sensitivity_json(derivatives: Sensitivity) -> str:
     Vectors are [x, y]; null stands for no value.
     """
     return write_object(
-        SENSITIVITY_SCHEMA,
+        _SENSITIVITY_SCHEMA,
         title=derivatives.solution.title,
         drive_bar=derivatives.solution.drive_bar,
         status=derivatives.status,
@@ -297,8 +297,8 @@ def write_sensitivity_json(derivatives: Sensitivity) -> str:
     )
 
 
-EQUILIBRIUM_SCHEMA = "fourbar-equilibrium/1"
-MOVES = {0: "stays", 1: "theta_2 grows", -1: "theta_2 falls"}
+_EQUILIBRIUM_SCHEMA = "fourbar-equilibrium/1"
+_MOVES = {0: "stays", 1: "theta_2 grows", -1: "theta_2 falls"}
 
 
 def write_equilibria(title: str, rest: Equilibria) -> str:
@@ -411,7 +411,7 @@ def _write_holding(rest: Equilibria) -> tuple[list[str], Any]:
         )
     still = np.isin(positions.status_code, (NOT_ASSEMBLED, SINGULAR))
     released = [
-        status if no else MOVES[move]
+        status if no else _MOVES[move]
         for status, no, move in zip(positions.status, still, rest.moves, strict=True)
     ]
     rows = list(zip(*map(write_cells, columns), released, strict=True))[
@@ -456,13 +456,13 @@ def _write_equilibrium(equilibrium: Equilibrium, *, friction: bool) -> list[str]
 def _write_range(ends: tuple[RestPosition, RestPosition]) -> str:
     first, last = ends
     apart = math.remainder(last.theta_2 - first.theta_2, TURN)
-    if first.branch == last.branch and abs(apart) < SAME_PLACE:
+    if first.branch == last.branch and abs(apart) < _SAME_PLACE:
         return "everywhere on its circuit"
     text = f"{_write_degrees(first.theta_2)} to {_write_degrees(last.theta_2)}"
     return text if first.branch == last.branch else f"{text} through a limit"
 
 
-SAME_PLACE = 1e-9
+_SAME_PLACE = 1e-9
 """Angle between the ends of a range, rad, below which it goes round: no friction holds
 within less, and nothing is printed finer than 1e-6 rad.
 """
@@ -476,7 +476,7 @@ def write_equilibria_json(title: str, rest: Equilibria) -> str:
     """Write one object, SI and rad."""
     positions, keys = rest.positions, read_drive(rest.positions).keys
     return write_object(
-        EQUILIBRIUM_SCHEMA,
+        _EQUILIBRIUM_SCHEMA,
         title=title,
         samples=rest.samples,
         equilibria=rest.found,

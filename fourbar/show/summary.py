@@ -38,12 +38,12 @@ ROUNDS = 5
 """Calls of `solve` to locate a reversal or a peak. From steps of 5 degrees a reversal
 is located to 5e-8 degrees, a peak to 1.6e-6 degrees.
 """
-MOST_PEAKS = 6
+_MOST_PEAKS = 6
 """Number of peaks of one quantity that are listed, the highest."""
-BENDING_PEAKS, BENDING_ROUNDS = 3, 3
+_BENDING_PEAKS, _BENDING_ROUNDS = 3, 3
 """The same for bending moments. Only the largest of a bar is shown, with four digits.
 """
-NO_BENDING = 1e-13
+_NO_BENDING = 1e-13
 """Bending moment that is round-off, over the pin forces times the longest bar."""
 GROWING = 1e-3
 """Growth over the last two calls above which a quantity has a pole. It is a part of the
@@ -53,15 +53,15 @@ AT_REST = 1e-12
 """Part of its largest slip below which a pin is at rest at a position."""
 FINE = 7200
 """Positions at which ranges are looked for, by the position formula alone."""
-INSET = 1e-9
+_INSET = 1e-9
 """Part of a range that is left out at its limit positions. These may not assemble as
 doubles.
 """
-END_ROUNDS = 9
+_END_ROUNDS = 9
 """Rounds of cutting the interval in which the assembly ends by 40. They go down to the
 last digits of a double.
 """
-AS_WIDE = 1e-6
+_AS_WIDE = 1e-6
 """Difference below which ranges of angles are equally wide, rad. An end in its last
 digits leaves some 1e-8.
 """
@@ -83,7 +83,7 @@ class Peak(NamedTuple):
     """
 
 
-class BarBending(NamedTuple):
+class _BarBending(NamedTuple):
     """Largest size of the bending moment of a bar, N m."""
 
     peak: Peak
@@ -173,7 +173,7 @@ def locate_between(scene: Scene, solution: Solution) -> Between:
     return Between(solution, _merge(scene, merged, peaks), reversals, growing)
 
 
-def locate_bending(scene: Scene, between: Between) -> dict[int, BarBending]:
+def locate_bending(scene: Scene, between: Between) -> dict[int, _BarBending]:
     """Locate the largest bending moment of each bar, between the positions too.
 
     Only `analyze` and its figure need it. Empty where no position has forces.
@@ -200,12 +200,12 @@ def locate_bending(scene: Scene, between: Between) -> dict[int, BarBending]:
     growing, searched = {str(bar) for bar in MOVING_BARS}, [(solution, find(solution))]
     if _has_between(scene, solution):
         places, growing = _find_largest(
-            scene, solution, list_moments, BENDING_PEAKS, BENDING_ROUNDS
+            scene, solution, list_moments, _BENDING_PEAKS, _BENDING_ROUNDS
         )
         if len(places):
             peaks = _solve_at(scene, places)
             searched.append((peaks, find(peaks)))
-    bending = dict[int, BarBending]()
+    bending = dict[int, _BarBending]()
     for bar in MOVING_BARS:
         grows = str(bar) in growing
         for solution, largest in (
@@ -217,12 +217,12 @@ def locate_bending(scene: Scene, between: Between) -> dict[int, BarBending]:
                 int(np.argmax(np.nan_to_num(np.abs(moment), nan=-1.0))),
             )
             if bar not in bending or peak.value > bending[bar].peak.value:
-                bending[bar] = BarBending(peak, float(x[row]), solution, row, grows)
+                bending[bar] = _BarBending(peak, float(x[row]), solution, row, grows)
     return bending
 
 
 def _list_stresses(
-    scene: Scene, bending: dict[int, BarBending]
+    scene: Scene, bending: dict[int, _BarBending]
 ) -> dict[int, float | None]:
     """List the largest bending stresses.
 
@@ -240,7 +240,7 @@ def _drop_rounding(bending: Bending, size: Array) -> Bending:
 
     A two-force bar has none.
     """
-    moment = np.where(np.abs(bending.moment) <= NO_BENDING * size, 0.0, bending.moment)
+    moment = np.where(np.abs(bending.moment) <= _NO_BENDING * size, 0.0, bending.moment)
     return bending._replace(moment=moment)
 
 
@@ -309,7 +309,7 @@ def _find_largest(
     scene: Scene,
     solution: Solution,
     sizes: Sizes,
-    most: int = MOST_PEAKS,
+    most: int = _MOST_PEAKS,
     rounds: int = ROUNDS,
 ) -> tuple[Array, set[str]]:
     """Find the places of the local maxima of each magnitude.
@@ -416,7 +416,7 @@ def _find_growing(
     return rises | (reached[-1] > (1.0 + GROWING) * beside)
 
 
-class PinLoad(NamedTuple):
+class _PinLoad(NamedTuple):
     """Load of one pin over the positions, N."""
 
     peak: Peak
@@ -454,12 +454,12 @@ class Facts:
     duty: MotorDuty | None
     held: tuple[float, float] | None
     """Least and greatest torque or force while dry friction holds a pin at rest."""
-    pins: dict[str, PinLoad]
+    pins: dict[str, _PinLoad]
     rates: dict[int, tuple[Peak, Peak]]
     """Largest speed and acceleration, signed, of the bars that follow. Empty if no
     speed is stated.
     """
-    bending: dict[int, BarBending]
+    bending: dict[int, _BarBending]
     stresses: dict[int, float | None]
     """Largest bending stress of each bar, Pa; None if its cross-section is not stated.
     """
@@ -629,7 +629,7 @@ def _list_stretches(
     ends: list[float | None] = [None] if closes[0] else []
     for i in np.flatnonzero(closes[1:] != closes[:-1]):
         low, high = places[i], places[i + 1]
-        for _ in range(END_ROUNDS):
+        for _ in range(_END_ROUNDS):
             cut = np.linspace(low, high, CUTS + 1)
             first = int(
                 np.argmax(_solve_at(scene, cut, "position").assembled != closes[i])
@@ -690,7 +690,7 @@ def _find_turns(start: float, stop: float, low: float, high: float) -> int:
 
     def measure(turns: int) -> tuple[int, int]:
         moved = max(high, stop + TURN * turns) - min(low, start + TURN * turns)
-        return round(moved / AS_WIDE), abs(turns)
+        return round(moved / _AS_WIDE), abs(turns)
 
     return min((between - 1, between, between + 1), key=measure)
 
@@ -735,15 +735,15 @@ def _find_peak(solution: Solution, values: Array | None) -> Peak:
     return Peak(float(values[worst]), float(_list_places(solution)[worst]))
 
 
-def _list_pin_loads(solution: Solution, between: Between) -> dict[str, PinLoad]:
+def _list_pin_loads(solution: Solution, between: Between) -> dict[str, _PinLoad]:
     if solution.F12 is None or not np.isfinite(solution.F12).any():
         return {}
-    loads = dict[str, PinLoad]()
+    loads = dict[str, _PinLoad]()
     for pin, name in PIN_FORCE.items():
         bounded = between.bounded(name)
         size = np.hypot(*getattr(bounded, name).T)
         peak = _find_peak(bounded, np.where(np.isfinite(size), size, np.nan))
-        loads[pin] = PinLoad(peak, bearing_load(solution, pin).rms)
+        loads[pin] = _PinLoad(peak, bearing_load(solution, pin).rms)
     return loads
 
 
@@ -760,7 +760,7 @@ def _find_stroke_limits(scene: Scene, solution: Solution) -> tuple[float, float]
     )
     width = high - low
     low = here - ((here - low) % TURN if width < TURN else 0.5 * TURN)
-    angles = np.linspace(low + INSET * width, low + (1.0 - INSET) * width, FINE + 1)
+    angles = np.linspace(low + _INSET * width, low + (1.0 - _INSET) * width, FINE + 1)
     motion = Motion(
         **{f"theta_{positions.bar}": angles},  # type: ignore[arg-type]
         branch=int(positions.branch[first]),

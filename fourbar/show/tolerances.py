@@ -23,7 +23,7 @@ PAGE_SAMPLES = 2048
 """Samples behind the bands of a page. They take seconds, and give a percentile to a
 fiftieth of the deviation.
 """
-MOST_RUNS = 5
+_MOST_RUNS = 5
 """Intervals of theta_2 that one line names."""
 SCHEMA = "fourbar-tolerance/1"
 
@@ -62,7 +62,7 @@ def write_text(spreads: Tolerances, units: Conversion = DEGREES) -> str:
     Above stands what was tried and what the variance of each is due to.
     """
     lines = [
-        *describe_counts(spreads, units),
+        *_describe_counts(spreads, units),
         (
             "each quantity at the position where its first-order worst case (worst) is"
             " largest; sigma is the standard"
@@ -107,7 +107,7 @@ def write_text(spreads: Tolerances, units: Conversion = DEGREES) -> str:
     return write_table(spreads.scene.title, lines, table)
 
 
-def describe_counts(spreads: Tolerances, units: Conversion = DEGREES) -> list[str]:
+def _describe_counts(spreads: Tolerances, units: Conversion = DEGREES) -> list[str]:
     """Say what was tried and what of it has no answer.
 
     It says too where first order and samples part.
@@ -158,7 +158,7 @@ def describe_parted(spreads: Tolerances, part: str, units: Conversion = DEGREES)
         )
         for run in runs
     ]
-    places = ", ".join(ends[:MOST_RUNS]) + (", ..." if len(ends) > MOST_RUNS else "")
+    places = ", ".join(ends[:_MOST_RUNS]) + (", ..." if len(ends) > _MOST_RUNS else "")
     return (
         f"{part}: the samples spread by more than {100.0 * PARTED:g} % more or less"
         f" than first order says at {rows.size} of {len(spreads.theta_2)} positions"
@@ -230,7 +230,7 @@ def collect_tolerances(
             "shares": [short(share, 3) for share in shares],
         }
     return {
-        "lines": describe_counts(spreads),
+        "lines": _describe_counts(spreads),
         "keys": [tolerance.key for tolerance in scene.tolerances],
         "parts": parts,
     }

@@ -15,20 +15,20 @@ from fourbar.linkage import MOVING_BARS
 from fourbar.solution import DEGREES, SI, Array, Conversion, find_unit_in
 
 ALLOWED = 'must be "SI", "imperial" or a list like "mm N N.mm deg rpm"'
-PRESETS = {"si": "", "imperial": "in lbf lbf.in lb deg rpm hp psi"}
+_PRESETS = {"si": "", "imperial": "in lbf lbf.in lb deg rpm hp psi"}
 STATED = ("m", "N", "N m", "kg", "rad", "rad/s", "rad/s^2", "m/s", "m/s^2", "W", "Pa")
 """The SI units for which another one can be stated, each of a dimension of its own."""
 DERIVED = {"m/s": ("m", "{}/s"), "m/s^2": ("m", "{}/s^2"), "J": ("N m", "{}")}
 """Units that follow another one if not stated. Energy follows the unit of torque,
 speeds that of length.
 """
-IMPERIAL = ("in", "inch", "inches", "ft", "foot", "feet")
+_IMPERIAL = ("in", "inch", "inches", "ft", "foot", "feet")
 """Units of lengths.ground with which a scene is shown in imperial units."""
-POUNDS = ("lb", "lbs", "pound", "pounds", "lbm")
+_POUNDS = ("lb", "lbs", "pound", "pounds", "lbm")
 """Names of the pound, a mass; a list that names no force may mean pounds-force."""
-METRIC = ("mm", "cm", "dm", "m")
+_METRIC = ("mm", "cm", "dm", "m")
 """Units of lengths.ground in which lengths are shown as they are stated."""
-ROTATIONS = ("rpm", "rad/s", "deg/s", "rad/s^2", "deg/s^2", "rad/s²", "deg/s²")
+_ROTATIONS = ("rpm", "rad/s", "deg/s", "rad/s^2", "deg/s^2", "rad/s²", "deg/s²")
 """Units of omega and alpha in which rates are shown as they are stated."""
 COMMON: Conversion = {**DEGREES, "rad/s": ("rpm", 30.0 / math.pi)}
 """Units of a summary if no others are asked for. A unit that is left out is the SI unit
@@ -59,7 +59,7 @@ def units(text: str) -> Conversion:
     from fourbar.quantities.units import to_si
 
     stated: dict[str, str] = {}
-    for name in PRESETS.get(text.casefold(), text).replace(",", " ").split():
+    for name in _PRESETS.get(text.casefold(), text).replace(",", " ").split():
         why = {unit: _explain_refusal(name, unit) for unit in STATED}
         unit = next((unit for unit in STATED if not why[unit]), None)
         if unit is None or unit in stated:
@@ -79,7 +79,7 @@ def units(text: str) -> Conversion:
             raise InputError("units", name, f"{reason}; {ALLOWED}")
         stated[unit] = name.replace(".", " ")
     mass = stated.get("kg", "")
-    if mass.casefold() in POUNDS and "N" not in stated:
+    if mass.casefold() in _POUNDS and "N" not in stated:
         reason = "is a mass, and the list names no unit of force"
         raise InputError(
             "units", mass, f"{reason}: write lbf for pounds-force, or both"
@@ -111,7 +111,7 @@ def suit_units(length: str) -> Conversion:
     from fourbar.quantities.units import find_unit
 
     return (
-        units("imperial") if find_unit(length, "m").casefold() in IMPERIAL else COMMON
+        units("imperial") if find_unit(length, "m").casefold() in _IMPERIAL else COMMON
     )
 
 
@@ -136,14 +136,14 @@ def _suit_texts(length: str, rates: tuple[tuple[str, str], ...]) -> Conversion:
     from fourbar.quantities.units import find_unit
 
     name = find_unit(length, "m")
-    if name.casefold() in IMPERIAL:
+    if name.casefold() in _IMPERIAL:
         shown = dict(units("imperial"))
     else:
-        shown = {**COMMON, **(units(name) if name in METRIC else {})}
+        shown = {**COMMON, **(units(name) if name in _METRIC else {})}
     for texts in rates:
         for text, unit in zip(texts, ("rad/s", "rad/s^2"), strict=True):
             stated = find_unit(text, "")
-            if stated in ROTATIONS:
+            if stated in _ROTATIONS:
                 shown |= _suit_rotation(stated, unit)
     return shown
 

@@ -57,7 +57,7 @@ class RestPosition(NamedTuple):
     """+1 or -1; 0 at a limit of theta_2, where the two meet."""
 
 
-def compute_generalised_force(
+def _compute_generalised_force(
     scene: Scene, terms: tuple[Any, ...], state: State
 ) -> Any:
     """Compute Q of loads and effects.
@@ -261,7 +261,7 @@ class CircuitCurve:
     def force(self, points: Array) -> Array:
         """Compute Q of all but dry friction, by the curve's parameter."""
         return np.broadcast_to(
-            compute_generalised_force(self.scene, self.case.terms, self.state(points)),
+            _compute_generalised_force(self.scene, self.case.terms, self.state(points)),
             len(points),
         )
 
@@ -271,7 +271,7 @@ class CircuitCurve:
         psi, mu = (
             Sloped(x, h[None]) for x, h in zip(points.T, (k.h2, k.h43), strict=True)
         )
-        Q = compute_generalised_force(
+        Q = _compute_generalised_force(
             self.scene, self.case.terms, on_curve(self.lengths, self.theta_1, psi, mu)
         )
         return (

@@ -51,7 +51,7 @@ AT_ONCE = 512
 """Positions at a time. Each number is then as many rows as the scene has numbers, and
 stays in the cache.
 """
-HUNDREDTH, DEGREE = 0.01, math.radians(1.0)
+_HUNDREDTH, _DEGREE = 0.01, math.radians(1.0)
 """Change of a number for which its influence is reported. It is relative, or in rad for
 an angle.
 """
@@ -61,7 +61,7 @@ it, jumps with the motion.
 """
 
 
-class Influence(NamedTuple):
+class _Influence(NamedTuple):
     """Largest influence of one number on one quantity.
 
     The number is changed by a hundredth, an angle by a degree.
@@ -166,7 +166,7 @@ class Sensitivity:
             "sensitivity", quantity, "is not known here; known: " + ", ".join(self.by)
         )
 
-    def influences(self, quantity: str) -> list[Influence]:
+    def influences(self, quantity: str) -> list[_Influence]:
         """List by how much the numbers change a quantity, the largest first.
 
         A pin force counts by its magnitude.
@@ -176,7 +176,7 @@ class Sensitivity:
             self.keys.items(), self.numbers.tolist(), strict=True
         ):
             change = (
-                DEGREE if entry.unit == "rad" else HUNDREDTH * abs(number)
+                _DEGREE if entry.unit == "rad" else _HUNDREDTH * abs(number)
             ) * self.of(quantity, key)
             if quantity in PIN_FORCES:
                 with np.errstate(all="ignore"):
@@ -186,7 +186,7 @@ class Sensitivity:
             if np.isfinite(change).any():
                 worst = int(np.nanargmax(np.abs(change)))
                 rows.append(
-                    Influence(
+                    _Influence(
                         key, float(change[worst]), float(self.solution.theta_2[worst])
                     )
                 )
@@ -322,7 +322,7 @@ def sensitivity(scene: Scene) -> Sensitivity:
             if not key.startswith(
                 "motion."
             ):  # what is left out carries the slope of its length too
-                sloped = read_place(seeded, entry.place) + make_unit_slope(number, p)
+                sloped = read_place(seeded, entry.place) + _make_unit_slope(number, p)
                 seeded = replace_place(seeded, entry.place, sloped)
         for start in range(0, len(regular), AT_ONCE):
             index = regular[start : start + AT_ONCE]
@@ -373,7 +373,7 @@ class _SlopedPath(Path):
         return polar(1.0, q)
 
 
-def make_unit_slope(index: int, count: int) -> Sloped:
+def _make_unit_slope(index: int, count: int) -> Sloped:
     """Return zero, with the slope 1 by one of the variables."""
     return Sloped(0.0, np.eye(count)[:, index : index + 1])
 
@@ -398,7 +398,7 @@ def _compute_derivatives(
             stated.angle.shape,
         )[index]
         if key in place:
-            return number + make_unit_slope(place[key], len(keys))
+            return number + _make_unit_slope(place[key], len(keys))
         return Sloped(number, np.zeros((len(keys), 1)))
 
     rates = scene.motion if scene.motion.law is None else stated

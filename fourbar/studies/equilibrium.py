@@ -44,7 +44,7 @@ from fourbar.studies.circuit_curve import (
     transmission,
 )
 
-A_JUMP = 1e-6
+_A_JUMP = 1e-6
 """Fraction of the sum of the absolute terms above which a sign change is a jump. A
 torsion spring wound by half a turn makes Q jump, which is no zero.
 """
@@ -56,9 +56,9 @@ ROUNDING = 1e-6
 """Part of the fastest bar's turn below which the turn of a bar is rounding: where the
 input stands at a limit, an angle of 16 digits leaves its turn some 1e-8.
 """
-A_RANGE = 3
+_A_RANGE = 3
 """Samples in a row where Q is nothing: fewer may be a zero that falls on one."""
-AT_CHANGE_POINT = 1e-4
+_AT_CHANGE_POINT = 1e-4
 """rad; nearer to a change point nothing is decided: the curve crosses itself there."""
 HALVINGS = 60
 """Halvings of the distance between two samples down to its last digits."""
@@ -147,7 +147,7 @@ def equilibrium(scene: Scene) -> Equilibria:
         level = [
             part
             for part in _list_ranges(curve, curve.level, np.empty((0, 2)))
-            if part.samples > A_RANGE
+            if part.samples > _A_RANGE
         ]
         samples = curve.samples()
         zeros = _find_zeros(curve, samples)
@@ -221,7 +221,7 @@ def _describe(
     inertias = inertia(curve.lengths.a, curve.case.bodies, state.position, moving)
     slope, J = along_curve / square, float(np.sum(inertias)) / square
     stability = "undecided"
-    if abs(along_curve) > A_JUMP * size:  # never of NaN
+    if abs(along_curve) > _A_JUMP * size:  # never of NaN
         stability = "stable" if slope < 0.0 else "unstable"
     frequency = None
     if stability == "stable" and J > 0.0:
@@ -317,7 +317,7 @@ def _find_zeros(curve: CircuitCurve, points: Array) -> _Zeros:
     zeros = np.concatenate([at_end.points, touching.points, crossing.points])
     size = np.concatenate([at_end.size, touching.size, crossing.size])
     for point in curve.singular:  # nothing moves there, so that Q vanishes
-        near = np.abs(np.sin(0.5 * (zeros - point))) < AT_CHANGE_POINT
+        near = np.abs(np.sin(0.5 * (zeros - point))) < _AT_CHANGE_POINT
         apart = ~near.all(axis=1)
         zeros, size = zeros[apart], size[apart]
     return _Zeros(zeros, size)
@@ -361,7 +361,7 @@ def _find_sign_changes(curve: CircuitCurve, grid: _Grid) -> _Zeros:
     _, after = bisect(has_sign_of_start, tau, tau + grid.gap[between])
     zeros = curve.in_rows(after, branch)
     size = grid.size[first][between]
-    continuous = np.abs(curve.force(zeros)) <= A_JUMP * size
+    continuous = np.abs(curve.force(zeros)) <= _A_JUMP * size
     return _Zeros(zeros[continuous], size[continuous])
 
 

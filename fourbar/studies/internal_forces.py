@@ -26,7 +26,7 @@ from fourbar.linkage import ENDS, PIN_FORCE, PINS, require_bar, require_numbers
 from fourbar.scene import Scene
 from fourbar.solution import Array, Solution
 
-STATIONS = 41
+_STATIONS = 41
 """Equal stations from pin to pin, where none are given."""
 SAME = 1e-9
 """Part of the bar's length within which two feet are one. A load and the inertia, both
@@ -89,7 +89,7 @@ def internal_forces(
     if solution.theta_2.ndim != 1:
         raise InputError("solution", "a study", "must be of one scene: take one member")
     described = scene.linkage.bar(bar)
-    x = np.linspace(0.0, described.length, STATIONS)
+    x = np.linspace(0.0, described.length, _STATIONS)
     if stations is not None:
         x = np.atleast_1d(
             require_numbers("stations", stations, "must be finite lengths", "m")

@@ -26,7 +26,7 @@ from fourbar.scene.numbers import Tolerance
 
 COMMAND_KEYS = ("motion.theta_2", "motion.theta_3", "motion.theta_4", "motion.stroke")
 """Keys of the commanded angle or stroke."""
-SAME_FOR_ALL = (
+_SAME_FOR_ALL = (
     *(
         "title",
         "source",
@@ -44,7 +44,7 @@ SAME_FOR_ALL = (
 """Parts of keys that name no number. They name a word, a whole number, or what has
 another form in a study.
 """
-BY_MATERIAL = ("density", "section", "diameter")
+_BY_MATERIAL = ("density", "section", "diameter")
 """Numbers of a bar that are varied only where the scene states them."""
 Place = tuple[str | int, ...]
 """Attributes and indices that lead from a scene to one of its numbers."""
@@ -117,7 +117,7 @@ def _list_ends(line: Any, key: str, place: Place) -> dict[str, SceneNumber]:
     """List the entries of both ends of a line between two bars."""
     entries = dict[str, SceneNumber]()
     for name, end in (("from", "start"), ("to", "end")):
-        entries |= list_place(getattr(line, end), f"{key}.{name}", (*place, end))
+        entries |= _list_place(getattr(line, end), f"{key}.{name}", (*place, end))
     return entries
 
 
@@ -125,11 +125,11 @@ def _list_drive(drive: Any) -> dict[str, SceneNumber]:
     """List the entries of a drive that exerts a force."""
     if drive.has_stroke:
         return _list_ends(drive, "drive", ("drive",))
-    place = list_place(drive.place, "drive", ("drive", "place"))
+    place = _list_place(drive.place, "drive", ("drive", "place"))
     return place | {"drive.direction": SceneNumber(("drive", "direction"), "rad")}
 
 
-def list_place(stated: Any, key: str, place: Place) -> dict[str, SceneNumber]:
+def _list_place(stated: Any, key: str, place: Place) -> dict[str, SceneNumber]:
     """List the entries of the form in which a place is stated.
 
     A named point has its entries elsewhere.
@@ -147,7 +147,7 @@ def _list_bar(bar: Bar, number: int) -> dict[str, SceneNumber]:
     Its cross-section is as it is stated; with a density there is no mass.
     """
     entries = _list_numbers(Bar, "", ("linkage", BAR_NAMES[number]))
-    absent = {name for name in BY_MATERIAL if getattr(bar, name) is None}
+    absent = {name for name in _BY_MATERIAL if getattr(bar, name) is None}
     if bar.density is not None:
         absent.add("mass")
     return {
@@ -190,7 +190,7 @@ def list_entries(scene: Scene) -> dict[str, SceneNumber]:
             if getattr(load, str(entry.place[2])) is not None
         }
     for index, point in enumerate(scene.points):
-        entries |= list_place(point, point.key, ("points", index))
+        entries |= _list_place(point, point.key, ("points", index))
     for index, effect in enumerate(scene.effects):
         entries |= _list_effect(effect, f"effects.{effect.key}", ("effects", index))
     return entries
@@ -214,7 +214,7 @@ def refuse_key(key: str, value: object, keys: list[str]) -> InputError:
         return InputError(
             key, value, "is more than one number; vary " + ", ".join(inner)
         )
-    if any(part in SAME_FOR_ALL for part in key.split(".")):
+    if any(part in _SAME_FOR_ALL for part in key.split(".")):
         return InputError(
             key,
             value,
@@ -230,7 +230,7 @@ LEFT_OUT = (
 )
 
 
-def is_left_out(scene: Scene, entry: SceneNumber) -> bool:
+def _is_left_out(scene: Scene, entry: SceneNumber) -> bool:
     """Return True if the scene leaves a number to a uniform bar."""
     if entry.place[0] != "linkage" or len(entry.place) < 3:
         return False
@@ -243,7 +243,7 @@ def find_misfit(scene: Scene, entry: SceneNumber, tolerance: Tolerance) -> str |
 
     Its file and its samples need one.
     """
-    if is_left_out(scene, entry):
+    if _is_left_out(scene, entry):
         return LEFT_OUT
     number = read_place(scene, entry.place)
     if number is None:
@@ -279,7 +279,7 @@ def read_numbers(scene: Scene) -> dict[str, Any]:
     return {
         key: read_place(scene, entry.place)
         for key, entry in list_entries(scene).items()
-        if not is_left_out(scene, entry)
+        if not _is_left_out(scene, entry)
     }
 
 

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from fourbar.errors import LimitError
 
-Rule = Callable[..., tuple[Any, ...]]
+_Rule = Callable[..., tuple[Any, ...]]
 """Partial derivatives of a function by its arguments, from its value and them."""
-RULES: dict[Any, Rule] = {
+_RULES: dict[Any, _Rule] = {
     np.add: lambda z, x, y: (1.0, 1.0),
     np.subtract: lambda z, x, y: (1.0, -1.0),
     np.multiply: lambda z, x, y: (y, x),
@@ -113,11 +113,11 @@ class Sloped(NDArrayOperatorsMixin):
         plain = [take_values(number) for number in inputs]
         if function in STEPS:
             return function(*plain)
-        if function not in RULES:
+        if function not in _RULES:
             raise _refuse(function.__name__)
         values = function(*plain)
         slopes = None
-        for by, number in zip(RULES[function](values, *plain), inputs, strict=True):
+        for by, number in zip(_RULES[function](values, *plain), inputs, strict=True):
             if isinstance(number, Sloped):
                 unchanged = isinstance(by, float) and by == 1.0
                 term = number.slopes if unchanged else by * number.slopes
@@ -140,7 +140,7 @@ class Sloped(NDArrayOperatorsMixin):
 
 def _refuse(name: str) -> LimitError:
     """Return the error for a function that has no rule."""
-    followed = ", ".join(rule.__name__ for rule in (*RULES, *STEPS))
+    followed = ", ".join(rule.__name__ for rule in (*_RULES, *STEPS))
     return LimitError(
         f"derivatives cannot follow numpy.{name}; an effect may use "
         f"absolute, angle, where, {followed}"

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
 SAMPLES = 8192
-MOST_SAMPLES = 10_000_000
+_MOST_SAMPLES = 10_000_000
 BAND = (1.0, 99.0)
 """Percentiles of the band."""
 AT_ONCE = 200_000
@@ -46,7 +46,7 @@ PARTED = 0.1
 share of the larger: the quantity is no longer straight over the tolerances, and a share
 of a variance is that of a straight one.
 """
-NEGLIGIBLE = 1e-9
+_NEGLIGIBLE = 1e-9
 """Share of the quantity's largest value below which a deviation is rounding. It decides
 nothing then.
 """
@@ -84,7 +84,7 @@ class Spread(NamedTuple):
         differ = ~(
             np.abs(self.deviation - self.first_order) <= PARTED * larger
         ) & np.isfinite(self.deviation)
-        return np.asarray(differ & (larger > NEGLIGIBLE * size))
+        return np.asarray(differ & (larger > _NEGLIGIBLE * size))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -220,10 +220,10 @@ def tolerances(
     if (
         isinstance(samples, bool)
         or not isinstance(samples, int)
-        or not 2 <= samples <= MOST_SAMPLES
+        or not 2 <= samples <= _MOST_SAMPLES
     ):
         raise InputError(
-            "samples", samples, f"must be a whole number from 2 to {MOST_SAMPLES}"
+            "samples", samples, f"must be a whole number from 2 to {_MOST_SAMPLES}"
         )
     is_generator = isinstance(seed, np.random.Generator)
     is_whole = isinstance(seed, int) and not isinstance(seed, bool)

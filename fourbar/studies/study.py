@@ -88,7 +88,7 @@ class Study:
                     scene = self.members(rows, columns.stop - columns.start, begins)
                     case = Case.of(scene, commanded.bar).beside(self.scene)
                     case = case._replace(side=side)
-                    positions = take_members(commanded, rows, columns)
+                    positions = _take_members(commanded, rows, columns)
                     # kept until the next block is evaluated, so that its memory is used
                     # again
                     evaluated = evaluate(
@@ -132,7 +132,7 @@ class Study:
         if not scene.counts_turns:
             return scene
         count, n = rows.stop - rows.start, commanded.angle.shape[1]
-        flat = take_members(commanded, rows, slice(0, n)).angle
+        flat = _take_members(commanded, rows, slice(0, n)).angle
         half, _ = Case.of(self.members(rows, n, scene), commanded.bar).half_angle(
             flat, None
         )
@@ -162,7 +162,7 @@ class Study:
             array[self.invalid] = np.nan
 
 
-def take_members(commanded: Command, rows: slice, columns: slice) -> Command:
+def _take_members(commanded: Command, rows: slice, columns: slice) -> Command:
     """Take some positions of some members, one after the other, (k,)."""
     count = columns.stop - columns.start
 

@@ -36,25 +36,25 @@ octave below what serves.
 """
 TIME_CONSTANTS = (3.0, 5.0, 8.0, 12.0, 20.0, 35.0, 60.0, 120.0, 300.0)
 FIRST_ORDER = ("Euler", "implicit", "implicitfast", "discrete")
-FIRST_ORDER_TIME_CONSTANTS = (2.0, 3.0, 6.0, 12.0)
+_FIRST_ORDER_TIME_CONSTANTS = (2.0, 3.0, 6.0, 12.0)
 ROUNDS, STEPS = 15, 400
 LAB = Path(__file__).parent
 TYPES = tuple(kind for kind in DrawnType if kind is not DrawnType.ROCKER_CRANK)
-SPEEDS = (-1.0, 3.0)
+_SPEEDS = (-1.0, 3.0)
 """log10 of rad/s."""
 ERRORS = (-7.0, -2.0)
 """log10 of the required error."""
 WINDOW = 0.8
 """Part of the range of a rocker that is run through: away from its limits."""
-GENTLE = 0.02
+_GENTLE = 0.02
 """Value of |alpha_2|/omega_2^2. Over a turn the speed changes by an eighth and never
 vanishes.
 """
-POSITIONS, DENSER, SEARCHED = 36, 4, 2
+POSITIONS, _DENSER, SEARCHED = 36, 4, 2
 """Intervals of the scene. The answer is judged at a multiple of them, and the search
 decides at another.
 """
-NEEDED_MET, NEEDED_CHEAP, CHEAP = 0.95, 0.80, 3.0
+_NEEDED_MET, _NEEDED_CHEAP, _CHEAP = 0.95, 0.80, 3.0
 
 
 def time_relative_costs(setup: TrialSetup) -> dict[tuple[str, bool], float]:
@@ -64,7 +64,7 @@ def time_relative_costs(setup: TrialSetup) -> dict[tuple[str, bool], float]:
     """
     kinds = [("RK4", True), ("RK4", False), *((name, False) for name in FIRST_ORDER)]
     clocks = {
-        kind: setup.make_clocks(change_kind(kind, make_settings(628.0, 20.0)))[0]
+        kind: setup.make_clocks(_change_kind(kind, make_settings(628.0, 20.0)))[0]
         for kind in kinds
     }
     times = time_in_turns(
@@ -74,7 +74,7 @@ def time_relative_costs(setup: TrialSetup) -> dict[tuple[str, bool], float]:
     return {kind: median(values) / reference for kind, values in times.items()}
 
 
-def change_kind(kind: tuple[str, bool], settings: Settings) -> Settings:
+def _change_kind(kind: tuple[str, bool], settings: Settings) -> Settings:
     """Change the integrator, and leave out the pads where requested."""
     integrator, pads = kind
     return replace(settings, integrator=integrator, pad=settings.pad if pads else None)
@@ -91,7 +91,7 @@ def find_cheapest(
     best: float | None = None
     for kind, ratio in costs.items():
         fourth_order = kind[0] == "RK4"
-        for tc in TIME_CONSTANTS if fourth_order else FIRST_ORDER_TIME_CONSTANTS:
+        for tc in TIME_CONSTANTS if fourth_order else _FIRST_ORDER_TIME_CONSTANTS:
             most = MOST_STEPS if best is None else best / ratio
             if (
                 not fourth_order
@@ -126,7 +126,7 @@ def _serves(
     setup: TrialSetup, kind: tuple[str, bool], tc: float, steps: float, error: float
 ) -> bool:
     per_run = setup.steps(make_settings(1000.0, tc)) / 1000.0
-    trial = setup.try_out(change_kind(kind, make_settings(steps / per_run, tc)))
+    trial = setup.try_out(_change_kind(kind, make_settings(steps / per_run, tc)))
     return judge_trial(setup.scene, trial).worst <= error
 
 
@@ -162,7 +162,7 @@ class AdviceCase:
         """
         if not self.reached:
             return self.met
-        return not self.cost > CHEAP * self.cheapest
+        return not self.cost > _CHEAP * self.cheapest
 
 
 def draw_scene(seed: int, index: int) -> tuple[Scene, float]:
@@ -172,8 +172,8 @@ def draw_scene(seed: int, index: int) -> tuple[Scene, float]:
     """
     scene = draw_random_scene(seed, index, TYPES)
     rng = np.random.default_rng([seed, index, 1])
-    omega = float(rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(*SPEEDS))
-    alpha = float(rng.choice([0.0, omega**2 * rng.uniform(-GENTLE, GENTLE)]))
+    omega = float(rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(*_SPEEDS))
+    alpha = float(rng.choice([0.0, omega**2 * rng.uniform(-_GENTLE, _GENTLE)]))
     sweep = scene.motion.theta_2
     assert isinstance(sweep, Sweep)
     start, stop = sweep.start, sweep.stop
@@ -184,7 +184,7 @@ def draw_scene(seed: int, index: int) -> tuple[Scene, float]:
     return replace(scene, motion=motion), float(10.0 ** rng.uniform(*ERRORS))
 
 
-def make_denser(scene: Scene, times: int) -> Scene:
+def _make_denser(scene: Scene, times: int) -> Scene:
     """Divide the same motion into more positions."""
     sweep = scene.motion.theta_2
     assert isinstance(sweep, Sweep)
@@ -200,7 +200,7 @@ def measure_case(
     """Ask for advice, judge it at denser positions, and search exhaustively."""
     scene, required = draw_scene(seed, index)
     advice = advise(scene, required)
-    dense, searched = make_denser(scene, DENSER), make_denser(scene, SEARCHED)
+    dense, searched = _make_denser(scene, _DENSER), _make_denser(scene, SEARCHED)
     error = judge_trial(
         dense, TrialSetup(dense, command(dense)).try_out(advice.best.settings)
     ).worst
@@ -216,7 +216,7 @@ def measure_case(
     )
 
 
-def compute_wilson(successes: int, n: int) -> float:
+def _compute_wilson(successes: int, n: int) -> float:
     """Compute the lower bound of the Wilson score interval of a proportion, at 95 %."""
     from scipy.stats import binomtest
 
@@ -225,13 +225,13 @@ def compute_wilson(successes: int, n: int) -> float:
     )
 
 
-def find_enough(missed: int) -> int:
+def _find_enough(missed: int) -> int:
     """Find the least number of cases whose bound is the needed one.
 
     A given number of them is not met.
     """
     n = missed + 1
-    while compute_wilson(n - missed, n) < NEEDED_MET:
+    while _compute_wilson(n - missed, n) < _NEEDED_MET:
         n += 1
     return n
 
@@ -296,12 +296,12 @@ def study(count: int, seed: int, out: Path) -> int:
         for case in cases
         if case.reached and case.cheapest == case.cheapest
     )
-    bound = compute_wilson(met, len(cases))
+    bound = _compute_wilson(met, len(cases))
     click.echo(
         f"met: {met} of {len(cases)}, lower Wilson bound {bound:.3f} (needed"
-        f" {NEEDED_MET})"
+        f" {_NEEDED_MET})"
     )
-    if bound < NEEDED_MET and (more := find_enough(len(cases) - met)) > len(cases):
+    if bound < _NEEDED_MET and (more := _find_enough(len(cases) - met)) > len(cases):
         click.echo(
             f"undecided: with {len(cases) - met} not met the bound is reached from"
             f" --count {more} on"
@@ -312,8 +312,8 @@ def study(count: int, seed: int, out: Path) -> int:
     )
     share = cheap / len(cases)
     click.echo(
-        f"within {CHEAP:g} times the cheapest: {cheap} of {len(cases)}, {share:.3f}"
-        f" (needed {NEEDED_CHEAP})"
+        f"within {_CHEAP:g} times the cheapest: {cheap} of {len(cases)}, {share:.3f}"
+        f" (needed {_NEEDED_CHEAP})"
     )
     if ratios:
         median, high = ratios[len(ratios) // 2], ratios[int(0.95 * (len(ratios) - 1))]
@@ -321,4 +321,4 @@ def study(count: int, seed: int, out: Path) -> int:
             f"cost over the cheapest: median {median:.2f}, 95 % below {high:.2f}, most"
             f" {ratios[-1]:.2f}"
         )
-    return 0 if bound >= NEEDED_MET and share >= NEEDED_CHEAP else 1
+    return 0 if bound >= _NEEDED_MET and share >= _NEEDED_CHEAP else 1

@@ -53,39 +53,39 @@ from fourbar_validation.scenes.suites import Random
 Array = NDArray[np.float64]
 
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-WITH_LIMITS = FourBar(0.3, Bar(0.25, 0.2), Bar(0.1, 0.5), Bar(0.22, 0.4))
+_WITH_LIMITS = FourBar(0.3, Bar(0.25, 0.2), Bar(0.1, 0.5), Bar(0.22, 0.4))
 """Linkage whose input swings between limit positions. Each of its positions has to be
 examined.
 """
-THIRTEEN_BATCH = 20_000
+_THIRTEEN_BATCH = 20_000
 """Positions per batch of the 13x13 system. Larger batches are slower per position
 (27 MB of matrices each).
 """
-OVER_POSITIONS = (
+_OVER_POSITIONS = (
     "all unknowns of a position, over the number of positions (1e6 at once at most)"
 )
-OVER_LINKAGES = "all forces of a linkage at one position, over the number of linkages"
+_OVER_LINKAGES = "all forces of a linkage at one position, over the number of linkages"
 SOLVED = 100_000
 """Positions where every array is allocated, and for the error bars. The numbers of
 error bars take ten times as long.
 """
 ALONE = 20
 """Calls of one position each."""
-PER_SCENE = 50_000
+_PER_SCENE = 50_000
 """Positions in whose stead one random scene is judged: twenty of them by default."""
-ALL, ANGLES_ALONE = "formulas, all 11 unknowns", "positions only"
-SYSTEM, FLOOR = "13x13 assembled and solved", "floor: tangent, root, two arctan"
+ALL, _ANGLES_ALONE = "formulas, all 11 unknowns", "positions only"
+_SYSTEM, FLOOR = "13x13 assembled and solved", "floor: tangent, root, two arctan"
 FORCES, BARS, ONE = (
     "solve to forces, points too",
     "solve with error bars",
     "one position to forces",
 )
 JUDGED = "a scene judged by the exact engines"
-ASKED = 200
+_ASKED = 200
 """Positions that an adapter and a plain loop answer."""
 
 
-PLAIN_LOOPS = {
+_PLAIN_LOOPS = {
     "Pinocchio": (
         "pinocchio-inverse",
         Later("fourbar_validation.engines.pinocchio_plain_loop:PinocchioLoop"),
@@ -98,7 +98,7 @@ PLAIN_LOOPS = {
 """Engine, and what makes its plain loop, by its library."""
 
 
-class SpeedLimit(NamedTuple):
+class _SpeedLimit(NamedTuple):
     """Limit of a row of the table, and why.
 
     It is a ratio, which holds with and without AVX-512.
@@ -117,35 +117,35 @@ class SpeedLimit(NamedTuple):
 
 
 LIMITS = {
-    "13x13 / formulas": SpeedLimit(
+    "13x13 / formulas": _SpeedLimit(
         ">=",
         5.0,
         "closed formulas are worth several times the system that they eliminate",
-        SYSTEM,
+        _SYSTEM,
         ALL,
     ),
-    "formulas / positions only": SpeedLimit(
+    "formulas / positions only": _SpeedLimit(
         ">=",
         3.0,
         "who asks for two angles does not pay for nine more unknowns",
         ALL,
-        ANGLES_ALONE,
+        _ANGLES_ALONE,
     ),
-    "positions only / floor": SpeedLimit(
+    "positions only / floor": _SpeedLimit(
         "<=",
         6.0,
         "the rest of two angles is arithmetic on arrays of a block",
-        ANGLES_ALONE,
+        _ANGLES_ALONE,
         FLOOR,
     ),
-    "solve to forces / formulas": SpeedLimit(
+    "solve to forces / formulas": _SpeedLimit(
         "<=",
         2.0,
         "new arrays and the points come on top, no second evaluation",
         FORCES,
         ALL,
     ),
-    "solve with error bars / to forces": SpeedLimit(
+    "solve with error bars / to forces": _SpeedLimit(
         "<=",
         10.0,
         "the same formulas once more, in longer numbers, which the processor takes one"
@@ -153,30 +153,30 @@ LIMITS = {
         BARS,
         FORCES,
     ),
-    "one position / its 13x13": SpeedLimit(
+    "one position / its 13x13": _SpeedLimit(
         "<=",
         6.0,
         "some hundred steps of Python, where the system is a few calls of LAPACK's",
         ONE,
         "13x13 of one position",
     ),
-    "one position with error bars / to forces": SpeedLimit(
+    "one position with error bars / to forces": _SpeedLimit(
         "<=",
         4.5,
         "the same formulas once more, in numbers of NumPy's own",
         "one position with error bars",
         ONE,
     ),
-    "study of linkages / positions": SpeedLimit(
+    "study of linkages / positions": _SpeedLimit(
         "<=", 2.0, "a member is a column of the same arrays as a position"
     ),
-    "growth from 1000 positions on": SpeedLimit(
+    "growth from 1000 positions on": _SpeedLimit(
         "<=", 1.3, "the work is linear in the positions: blocks fit the cache"
     ),
-    "memory beyond the result, MB": SpeedLimit(
+    "memory beyond the result, MB": _SpeedLimit(
         "<=", 50.0, "work space is that of a block, not of the sweep"
     ),
-    "a judged scene / one position": SpeedLimit(
+    "a judged scene / one position": _SpeedLimit(
         "<=",
         350.0,
         "35 ms where a position takes 0.1 ms: two million scenes a night on 20 cores",
@@ -184,14 +184,14 @@ LIMITS = {
         ONE,
     ),
     **{
-        f"{library}'s adapter / a plain loop": SpeedLimit(
+        f"{library}'s adapter / a plain loop": _SpeedLimit(
             "<=",
             2.0,
             "sure assembly and rows by name cost no more than the engine's own calls",
         )
-        for library in PLAIN_LOOPS
+        for library in _PLAIN_LOOPS
     },
-    "import fourbar / import numpy": SpeedLimit(
+    "import fourbar / import numpy": _SpeedLimit(
         "<=", 1.0, "it loads numpy alone, and less than that of its own"
     ),
 }
@@ -237,7 +237,7 @@ def import_cost() -> float:
     return median(float(run.stdout) for run in runs)
 
 
-def measure_memory(n: int) -> float:
+def _measure_memory(n: int) -> float:
     """Measure the MB allocated at the peak beyond arguments and results."""
     command = make_command(n)
     out = allocate(UNKNOWNS, command)
@@ -248,7 +248,7 @@ def measure_memory(n: int) -> float:
     return peak / 1e6
 
 
-def make_floor(theta_2: Array, out: dict[str, Array]) -> Callable[[], object]:
+def _make_floor(theta_2: Array, out: dict[str, Array]) -> Callable[[], object]:
     """Make what no formula for two angles does without, by blocks.
 
     It is a tangent, a square root and two arctangents.
@@ -332,8 +332,8 @@ def bench(positions: int, rounds: int, largest: int, picture: Path | None) -> in
     )
     console.print(make_table(("what", "measured", "needed", ""), rows, title=title))
     for title, times in (
-        (OVER_POSITIONS, measurement.over_positions),
-        (OVER_LINKAGES, measurement.over_linkages),
+        (_OVER_POSITIONS, measurement.over_positions),
+        (_OVER_LINKAGES, measurement.over_linkages),
     ):
         counts = sorted({n for timed in times.values() for n in timed})
         head = ["ns each", *(f"{n:.0e}".replace("e+0", "e") for n in counts)]
@@ -355,19 +355,22 @@ def measure(positions: int, rounds: int, largest: int) -> Measured:
     """Measure the ratios of LIMITS and ns per position, and the times by how many."""
     scene, command = make_example(), make_command(positions)
     limits, swing = (
-        make_example(WITH_LIMITS),
-        make_command(positions, *choose_range(WITH_LIMITS)),
+        make_example(_WITH_LIMITS),
+        make_command(positions, *choose_range(_WITH_LIMITS)),
     )
     everything, angles = allocate(UNKNOWNS, command), allocate(ANGLES, command)
-    batch, solved = min(positions, THIRTEEN_BATCH), make_command(min(positions, SOLVED))
+    batch, solved = (
+        min(positions, _THIRTEEN_BATCH),
+        make_command(min(positions, SOLVED)),
+    )
     bodies, many = make_bodies(scene, make_command(batch)), len(solved.theta_2)
     alone, lone = make_example(theta_2=1.0), make_bodies(scene, make_command(1))
     peers = collect_loops()
     actions: dict[str, tuple[int, Callable[[], object]]] = {
         ALL: (positions, lambda: solve(scene, at=command, out=everything)),
-        ANGLES_ALONE: (positions, lambda: solve(scene, at=command, out=angles)),
-        SYSTEM: (batch, lambda: solve_thirteen(bodies, 2)),
-        FLOOR: (positions, make_floor(command.theta_2, angles)),
+        _ANGLES_ALONE: (positions, lambda: solve(scene, at=command, out=angles)),
+        _SYSTEM: (batch, lambda: solve_thirteen(bodies, 2)),
+        FLOOR: (positions, _make_floor(command.theta_2, angles)),
         "input between limits: all": (
             positions,
             lambda: solve(limits, at=swing, out=everything),
@@ -402,8 +405,8 @@ def measure(positions: int, rounds: int, largest: int) -> Measured:
     cost, most = by_positions["NumPy"], max(by_linkages[STUDY])
     exact = [engine for engine in ENGINES if not engine.through_time]
     if not any(engine.missing() for engine in exact):
-        rows[JUDGED] = 1e9 * time_judging(exact, max(1, positions // PER_SCENE))
-        rows |= compare_adapters(rounds)
+        rows[JUDGED] = 1e9 * _time_judging(exact, max(1, positions // _PER_SCENE))
+        rows |= _compare_adapters(rounds)
     rows |= {
         name: rows[row.of] / rows[row.over]
         for name, row in LIMITS.items()
@@ -414,34 +417,34 @@ def measure(positions: int, rounds: int, largest: int) -> Measured:
             by_linkages[STUDY][most] / by_linkages[POSITIONS][most]
         ),
         "growth from 1000 positions on": max(cost.values()) / cost[min(cost)],
-        "memory beyond the result, MB": measure_memory(min(positions, 1_000_000)),
+        "memory beyond the result, MB": _measure_memory(min(positions, 1_000_000)),
         "import fourbar / import numpy": import_cost(),
     }
     return Measured(rows, by_positions, by_linkages, peers.not_run)
 
 
-def compare_adapters(rounds: int) -> dict[str, float]:
+def _compare_adapters(rounds: int) -> dict[str, float]:
     """Divide the time of each adapter by that of a plain loop.
 
     Both read the same quantities.
     """
-    scene, command = make_example(), make_command(ASKED)
+    scene, command = make_example(), make_command(_ASKED)
     adapters = {engine.name: engine for engine in ENGINES}
     actions: dict[str, Callable[[], object]] = {}
-    for library, (name, make_loop) in PLAIN_LOOPS.items():
+    for library, (name, make_loop) in _PLAIN_LOOPS.items():
         adapter = adapters[name].start()
         actions[f"{library}'s adapter"] = partial(adapter.answer, scene, command)
-        actions[library] = partial(read_plainly, make_loop(scene), command)
+        actions[library] = partial(_read_plainly, make_loop(scene), command)
     times = time_interleaved(actions, rounds)
     return {
         f"{library}'s adapter / a plain loop": (
             times[f"{library}'s adapter"] / times[library]
         )
-        for library in PLAIN_LOOPS
+        for library in _PLAIN_LOOPS
     }
 
 
-def read_plainly(loop: PlainLoop, command: Command) -> list[object]:
+def _read_plainly(loop: PlainLoop, command: Command) -> list[object]:
     """Answer by a plain loop, and read more of each position.
 
     It reads the places, angles, rates and accelerations.
@@ -471,7 +474,7 @@ def read_plainly(loop: PlainLoop, command: Command) -> list[object]:
     return answered
 
 
-def time_judging(engines: list[Engine], scenes: int) -> float:
+def _time_judging(engines: list[Engine], scenes: int) -> float:
     """Time the check of a random scene as `run` does it, nothing drawn.
 
     It is the median CPU time in s.

@@ -99,7 +99,7 @@ class Work(NamedTuple):
 
 
 @dataclass(slots=True)
-class MatrixCell:
+class _MatrixCell:
     """Answer of one engine to one problem."""
 
     letters: str = MISSING
@@ -116,12 +116,12 @@ class MatrixCell:
 
 
 @dataclass(slots=True)
-class MatrixRow:
+class _MatrixRow:
     """One engine in one setting."""
 
     entry: Entry
     hello: dict[str, Any] = field(default_factory=dict)
-    cells: dict[str, MatrixCell] = field(default_factory=dict)
+    cells: dict[str, _MatrixCell] = field(default_factory=dict)
     slopes: list[tuple[str, dict[str, str]]] = field(default_factory=list)
     """Ways of differentiation with their relative errors. They are those of the torque
     and of each of its derivatives.
@@ -169,7 +169,7 @@ class Benchmark:
         self.problems = {
             name: read_problem(PROBLEMS / f"{name}.json") for name in problems
         }
-        self.rows: dict[str, MatrixRow] = {}
+        self.rows: dict[str, _MatrixRow] = {}
 
     def run(self, seconds: float) -> None:
         """Ask every engine every problem, each question within its limit of time."""
@@ -193,10 +193,10 @@ class Benchmark:
                 running.end()
 
     def _leave_out(self, entry: Entry, reason: str) -> None:
-        row = self.rows.setdefault(KIND.sub("", entry.name), MatrixRow(entry))
+        row = self.rows.setdefault(KIND.sub("", entry.name), _MatrixRow(entry))
         for problem in self.problems:
             row.cells.setdefault(
-                problem, MatrixCell(reason=f"not run: {write_one_line(reason)}")
+                problem, _MatrixCell(reason=f"not run: {write_one_line(reason)}")
             )
 
     def _ask_engine(
@@ -206,10 +206,10 @@ class Benchmark:
         way = "" if entry.setting else setting
         joint = ", " if ":" in entry.name else ": "
         label = KIND.sub("", entry.name) + (f"{joint}{way}" if way else "")
-        row = self.rows.setdefault(label, MatrixRow(entry))
+        row = self.rows.setdefault(label, _MatrixRow(entry))
         row.hello = hello
         for name, problem in self.problems.items():
-            cell = MatrixCell(script=entry.adapter or shlex.join(entry.command))
+            cell = _MatrixCell(script=entry.adapter or shlex.join(entry.command))
             lacking = sorted(_list_needs(problem) - set(hello.get("effects", [])))
             if problem["mechanism"] not in hello.get("mechanisms", ["four-bar"]):
                 lacking = [problem["mechanism"]]
@@ -242,7 +242,7 @@ class Benchmark:
 
     def _ask_problem(
         self,
-        row: MatrixRow,
+        row: _MatrixRow,
         setting: str,
         label: str,
         problem: dict[str, Any],
@@ -268,7 +268,7 @@ class Benchmark:
 
     def _take_or_ask(
         self,
-        row: MatrixRow,
+        row: _MatrixRow,
         label: str,
         stem: str,
         stated: dict[str, Any],
@@ -295,7 +295,7 @@ class Benchmark:
         return {**result, "file": file.relative_to(self.out)}
 
     def _judge(
-        self, problem: dict[str, Any], result: dict[str, Any], cell: MatrixCell
+        self, problem: dict[str, Any], result: dict[str, Any], cell: _MatrixCell
     ) -> None:
         """Judge one result; of several timesteps the finest that is answered stands."""
         if "answers" not in result:
@@ -436,8 +436,8 @@ FAMILIES = {
 """Panels of the picture, and what the names of their engines begin with."""
 VERSION = re.compile(r" \d[\d.]*")
 """Version within the name of a row."""
-FAMILY_COLOURS = ("--e1", "--e3", "--e4", "--e2", "--e8", "--e9")
-MARKERS = "os^DvP"
+_FAMILY_COLOURS = ("--e1", "--e3", "--e4", "--e2", "--e8", "--e9")
+_MARKERS = "os^DvP"
 """Markers of the settings of a family, one after the other."""
 
 
@@ -471,7 +471,7 @@ def draw_work_precision(lines: Mapping[str, list[Work]]) -> Any:
     from matplotlib.figure import Figure
 
     present = {find_family(name) for name in lines}
-    colours = dict(zip(FAMILIES, FAMILY_COLOURS, strict=True))
+    colours = dict(zip(FAMILIES, _FAMILY_COLOURS, strict=True))
     shown = [family for family in FAMILIES if family in present]
     rows = math.ceil(len(shown) / 2)
     size = (7.7, 3.1 * rows)
@@ -483,7 +483,7 @@ def draw_work_precision(lines: Mapping[str, list[Work]]) -> Any:
         axes.set_facecolor("none")
         set_frame(axes)
         axes.tick_params(which="both", labelcolor=INK)
-        markers = cycle(MARKERS)
+        markers = cycle(_MARKERS)
         for name, points in lines.items():
             own = find_family(name) == family
             look: dict[str, Any] = {"color": BAND, "linewidth": 0.8, "zorder": 1.5}

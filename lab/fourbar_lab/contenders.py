@@ -35,9 +35,9 @@ Loop = Callable[[Array, Array], None]
 """Writes theta_3, theta_4, omega_3, omega_4, alpha_3, alpha_4, F12, F32, F43, F14 (two
 rows each) and the torque at n angles into an array (15, n).
 """
-SOURCE = Path(__file__).with_name("bench_loop.c")
+_SOURCE = Path(__file__).with_name("bench_loop.c")
 FLAGS = ("-O3", "-march=native")
-LOOKS = (
+_LOOKS = (
     ("#0072B2", "o"),
     ("#D55E00", "s"),
     ("#1a1a1a", "^"),
@@ -51,12 +51,12 @@ is bounded (150 MB).
 """
 SHORTEST = 200_000
 """Positions of one timing: fewer are evaluated as often as makes so many."""
-MOST_LINKAGES = 100_000
+_MOST_LINKAGES = 100_000
 MOST_LOOPED = 1000
 """Linkages that are solved one after the other. Beyond them the cost of one no longer
 changes.
 """
-STUDY, POSITIONS, LOOPED = (
+STUDY, POSITIONS, _LOOPED = (
     "study, NumPy",
     "one linkage, as many positions",
     "one after the other",
@@ -65,7 +65,7 @@ LINKAGE = FourBar(0.3, Bar(0.1, 0.2), Bar(0.25, 0.5), Bar(0.22, 0.4))
 """Crank-rocker a = 0.1, b = 0.25, c = 0.22, d = 0.3 m, uniform bars."""
 
 
-class Peers(NamedTuple):
+class _Peers(NamedTuple):
     """Libraries that can be run here, and the reasons why the others were not run."""
 
     here: dict[str, Loop]
@@ -113,14 +113,14 @@ def time_interleaved(
     }
 
 
-def collect_loops() -> Peers:
+def collect_loops() -> _Peers:
     """Collect the closed formulas by several hands.
 
     Each writes into arrays that exist.
     """
-    loops: dict[str, Loop | str] = {"NumPy": _make_solve_loop(), "C": compile_loop()}
+    loops: dict[str, Loop | str] = {"NumPy": _make_solve_loop(), "C": _compile_loop()}
     reasons = {name: loop for name, loop in loops.items() if isinstance(loop, str)}
-    return Peers(
+    return _Peers(
         {name: loop for name, loop in loops.items() if not isinstance(loop, str)},
         reasons,
     )
@@ -139,7 +139,7 @@ def _make_solve_loop() -> Loop:
     return call
 
 
-def compile_loop() -> Loop | str:
+def _compile_loop() -> Loop | str:
     """Compile the loop; the reason where that fails."""
     compiler = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
     if compiler is None:
@@ -151,7 +151,7 @@ def compile_loop() -> Loop | str:
             *FLAGS,
             "-fPIC",
             "-shared",
-            str(SOURCE),
+            str(_SOURCE),
             "-o",
             str(library),
             "-lm",
@@ -200,7 +200,7 @@ def time_linkages(largest: int, rounds: int) -> Times:
     They are solved as a study, and one after the other.
     """
     scene = make_example(theta_2=1.0)
-    times: Times = {STUDY: {}, POSITIONS: {}, LOOPED: {}}
+    times: Times = {STUDY: {}, POSITIONS: {}, _LOOPED: {}}
 
     def study(lengths: Any) -> None:
         solve(vary(scene, {"lengths.coupler": lengths}))
@@ -212,14 +212,14 @@ def time_linkages(largest: int, rounds: int) -> Times:
             )
             solve(replace(scene, linkage=linkage))
 
-    for m in [10**k for k in range(6) if 10**k <= min(largest, MOST_LINKAGES)]:
+    for m in [10**k for k in range(6) if 10**k <= min(largest, _MOST_LINKAGES)]:
         lengths = np.linspace(0.24, 0.26, m)
         actions: dict[str, Callable[[], object]] = {
             STUDY: partial(study, lengths),
             POSITIONS: partial(solve, scene, at=make_command(m)),
         }
         if m <= MOST_LOOPED:
-            actions[LOOPED] = partial(looped, lengths)
+            actions[_LOOPED] = partial(looped, lengths)
         for name, value in time_interleaved(
             actions, rounds, max(1, MOST_LOOPED // m)
         ).items():
@@ -257,7 +257,7 @@ def draw_bench(over_positions: Times, over_linkages: Times, path: Path) -> None:
 
 
 def _draw_panel(axes: "Axes", times: Times, title: str, over: str) -> None:
-    for (who, timed), (colour, mark) in zip(times.items(), LOOKS, strict=False):
+    for (who, timed), (colour, mark) in zip(times.items(), _LOOKS, strict=False):
         axes.loglog(
             list(timed),
             list(timed.values()),

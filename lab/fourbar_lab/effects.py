@@ -77,13 +77,13 @@ NO_COUNTERPART = {
     if name == "load over theta_2" or (effect is not None and not effect.has_mjcf())
 }
 DEFAULT_FLAGS = "none, MuJoCo's default flags"
-LEFT_ON = "none, {} left on"
+_LEFT_ON = "none, {} left on"
 """One flag of MuJoCo as it is by default, the others as the generated MJCF has them."""
 POSITIONS = 1000
 """Positions of the formulas in one unit of work, as they take arrays."""
 ROUNDS = 31
 """Pairs of runs, first one ahead and then the other."""
-AMOUNTS = {
+_AMOUNTS = {
     "formulas": 40,
     SIMULATION: 1000,
     "mujoco-inverse": 100,
@@ -113,7 +113,7 @@ def make_scene(effect: str, positions: int) -> Scene:
     )
 
 
-def prepare_formulas(effect: str) -> Callable[[int], Any]:
+def _prepare_formulas(effect: str) -> Callable[[int], Any]:
     """Prepare pin forces and torque at POSITIONS positions, a given number of times."""
     scene = make_scene(effect, POSITIONS)
     return lambda amount: [solve(scene, "force") for _ in range(amount)]
@@ -127,21 +127,21 @@ def prepare_simulation(effect: str) -> Callable[[int], Any]:
     if effect == DEFAULT_FLAGS:
         text = re.sub(r"<flag [^>]*/>", "", text)
     elif effect not in EFFECTS:
-        text = text.replace(f' {list_flags()[effect]}="disable"', "")
+        text = text.replace(f' {_list_flags()[effect]}="disable"', "")
     return make_stepper(text)
 
 
 @cache
-def list_flags() -> dict[str, str]:
+def _list_flags() -> dict[str, str]:
     """List the flags that the MJCF of a bare scene switches off.
 
     The key is the name of the workload that leaves one on.
     """
     flags = re.findall(r'(\w+)="disable"', write_mjcf(make_scene("none", 91)))
-    return {LEFT_ON.format(flag): flag for flag in flags}
+    return {_LEFT_ON.format(flag): flag for flag in flags}
 
 
-def prepare_answers(name: str, effect: str) -> Callable[[int], Any]:
+def _prepare_answers(name: str, effect: str) -> Callable[[int], Any]:
     """Prepare the answers of an inverse engine at a given number of positions."""
     adapter = next(engine for engine in ENGINES if engine.name == name).start()
 
@@ -153,10 +153,10 @@ def prepare_answers(name: str, effect: str) -> Callable[[int], Any]:
 
 
 WORKLOADS: dict[str, Callable[[str], Callable[[int], Any]]] = {
-    "formulas": prepare_formulas,
+    "formulas": _prepare_formulas,
     SIMULATION: prepare_simulation,
     **{
-        name: partial(prepare_answers, name)
+        name: partial(_prepare_answers, name)
         for name in ("mujoco-inverse", "pinocchio-inverse")
     },
 }
@@ -183,7 +183,7 @@ def measure(engine: str, effect: str, rounds: int = ROUNDS) -> EffectCost:
 
     Both meet the same disturbances.
     """
-    amount = AMOUNTS[engine]
+    amount = _AMOUNTS[engine]
     works = {
         which: partial(WORKLOADS[engine](name), amount)
         for which, name in enumerate(("none", effect))
@@ -238,7 +238,7 @@ def list_pairs(
     ]
     return chosen + [
         (SIMULATION, name)
-        for name in (DEFAULT_FLAGS, *list_flags())
+        for name in (DEFAULT_FLAGS, *_list_flags())
         if SIMULATION in engines
     ]
 

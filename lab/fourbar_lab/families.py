@@ -40,7 +40,7 @@ from fourbar_validation.scenes.random import (
 )
 
 
-def spread_masses(spread: float) -> Ranges:
+def _spread_masses(spread: float) -> Ranges:
     """Spread masses over decades, one bar of ten without any.
 
     Centres lie anywhere about the bar.
@@ -59,7 +59,7 @@ def spread_masses(spread: float) -> Ranges:
     )
 
 
-EVEN, UNEVEN = spread_masses(0.0), spread_masses(3.0)
+_EVEN, UNEVEN = _spread_masses(0.0), _spread_masses(3.0)
 
 
 def _draw_anywhere(rng: np.random.Generator) -> DrawnLinkage:
@@ -85,7 +85,7 @@ def _draw_near_limit(rng: np.random.Generator) -> DrawnLinkage:
             return (d, a, b, c), command_angle(angle)
 
 
-BESIDE_ROUNDING = 1e-13
+_BESIDE_ROUNDING = 1e-13
 """Least miss of a change point, as a part of a length. By less a linkage has one,
 within the rounding.
 """
@@ -121,7 +121,7 @@ def _draw_near_change_point(rng: np.random.Generator) -> DrawnLinkage:
     distance = float(rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-8, 0))
     if rng.random() < 0.3:
         k, missed = int(rng.integers(0, 4)), 0.1 * distance**2
-        if missed < BESIDE_ROUNDING:
+        if missed < _BESIDE_ROUNDING:
             missed = 0.0
         lengths = tuple(
             v * (1.0 + missed) if i == k else v for i, v in enumerate(lengths)
@@ -140,7 +140,7 @@ def _draw_with_ratios(rng: np.random.Generator) -> DrawnLinkage:
     return lengths, command_angle(angle)
 
 
-ANYWHERE = RandomFamily(_draw_anywhere, EVEN)
+ANYWHERE = RandomFamily(_draw_anywhere, _EVEN)
 
 
 def scales(rng: np.random.Generator) -> Scene:
@@ -188,7 +188,7 @@ def speeds(rng: np.random.Generator) -> Scene:
     return replace(scene, motion=scene.motion.replace(speed=omega, acceleration=alpha))
 
 
-def draw_deviation(rng: np.random.Generator) -> float:
+def _draw_deviation(rng: np.random.Generator) -> float:
     """Draw a relative deviation of 1e-5 to 3e-2, to either side."""
     return float(rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-5.0, math.log10(3e-2)))
 
@@ -240,7 +240,7 @@ def springs(rng: np.random.Generator) -> Scene:
         start,
         end,
         stiffness,
-        max(distance * (1.0 + draw_deviation(rng)) + preload / stiffness, 0.0),
+        max(distance * (1.0 + _draw_deviation(rng)) + preload / stiffness, 0.0),
         preload,
     )
     return replace(scene, effects=(Springs((spring,)),))
@@ -268,7 +268,7 @@ def torsion(rng: np.random.Generator) -> Scene:
         preload = float(rng.uniform(-2.0, 2.0)) * stiffness
     turns = math.tau * float(rng.choice([0, 0, int(rng.integers(-100, 100))]))
     rest = (
-        float(theta[second - 1] - theta[first - 1]) * (1.0 + draw_deviation(rng))
+        float(theta[second - 1] - theta[first - 1]) * (1.0 + _draw_deviation(rng))
         + preload / stiffness
         + turns
     )
@@ -290,7 +290,7 @@ def tables(rng: np.random.Generator) -> Scene:
         -rise
         * before
         * (
-            (1.0 + draw_deviation(rng))
+            (1.0 + _draw_deviation(rng))
             if rng.random() < 0.5
             else float(rng.uniform(-2.0, 2.0))
         )
@@ -379,7 +379,7 @@ def pushes(rng: np.random.Generator) -> Scene:
     return replace(ANYWHERE.draw(rng), drive_bar=None, drive=drive)  # type: ignore[arg-type]
 
 
-def near_pins(rng: np.random.Generator) -> Scene:
+def _near_pins(rng: np.random.Generator) -> Scene:
     """Draw a spring or a cylinder with an end near a pin, or a load there.
 
     The end is at 1e-1 to 1e-11 m from the pin that joins its two bars. The line of the
@@ -429,8 +429,8 @@ def near_pins(rng: np.random.Generator) -> Scene:
 
 FAMILIES: dict[str, Callable[[np.random.Generator], Scene]] = {
     "random": ANYWHERE.draw,
-    "limit": RandomFamily(_draw_near_limit, EVEN).draw,
-    "change_point": RandomFamily(_draw_near_change_point, EVEN).draw,
+    "limit": RandomFamily(_draw_near_limit, _EVEN).draw,
+    "change_point": RandomFamily(_draw_near_change_point, _EVEN).draw,
     "ratios": RandomFamily(_draw_with_ratios, UNEVEN).draw,
     "scales": scales,
     "speeds": speeds,
@@ -440,5 +440,5 @@ FAMILIES: dict[str, Callable[[np.random.Generator], Scene]] = {
     "drives": drives,
     "strokes": strokes,
     "pushes": pushes,
-    "near_pins": near_pins,
+    "near_pins": _near_pins,
 }

@@ -37,8 +37,8 @@ CRANK = FourBar(
     Bar(0.22, 0.4, 0.002, (0.12, -0.2)),
     ground_angle=0.2,
 )
-SLENDER = FourBar(0.3, Bar(0.1, 0.2), Bar(0.25, 0.5), Bar(0.22, 0.4), ground_angle=0.2)
-ROUND_AND_FLAT = FourBar(
+_SLENDER = FourBar(0.3, Bar(0.1, 0.2), Bar(0.25, 0.5), Bar(0.22, 0.4), ground_angle=0.2)
+_ROUND_AND_FLAT = FourBar(
     0.3,
     Bar(0.1, density=7850.0, diameter=0.02),
     Bar(0.25, density=2700.0, section=(0.02, 0.005)),
@@ -51,13 +51,13 @@ LOADS = (
     Load(3, (2.0, -0.4), from_centre=(0.06, 0.5), moment=0.1, frame="bar"),
     Load(2, (1.0, 0.3), from_pin=(0.07, -0.2)),
 )
-WEIGHT = Gravity(9.81, -1.3)
+_WEIGHT = Gravity(9.81, -1.3)
 POINTS = (
     Point("P", 3, (0.1, 0.7)),
     Point("Q", 4, (0.05, -0.3)),
     Point("R", 2, (0.03, 0.2)),
 )
-CRANK_ROCKER = Scene(CRANK, TURN, 2, LOADS, (WEIGHT,), points=POINTS)
+CRANK_ROCKER = Scene(CRANK, TURN, 2, LOADS, (_WEIGHT,), points=POINTS)
 FAULT_SCENES: dict[str, Scene] = {
     "crank-rocker": CRANK_ROCKER,
     "coupler driven": replace(
@@ -118,26 +118,26 @@ FAULT_SCENES: dict[str, Scene] = {
         drive_bar=None,  # type: ignore[arg-type]
         drive=LinearDrive(Place(1, (0.17, -1.1)), Place(3, (0.09, 0.7))),
     ),
-    "slender bars": Scene(SLENDER, TURN),
+    "slender bars": Scene(_SLENDER, TURN),
     "drag link": Scene(uniform(0.08, 0.24, 0.2, 0.26), TURN, 4, effects=(Gravity(),)),
-    "limited": Scene(ROCKER, Motion(Sweep(0.3, 1.4, 22), 3.0), effects=(WEIGHT,)),
+    "limited": Scene(ROCKER, Motion(Sweep(0.3, 1.4, 22), 3.0), effects=(_WEIGHT,)),
     "parallelogram": Scene(
         FourBar(0.3, Bar(0.1, 0.2), Bar(0.3, 0.5), Bar(0.1, 0.4)),
         Motion(Sweep(-1.0, 1.1, 14), 4.0, branch=-1),
-        effects=(WEIGHT,),
+        effects=(_WEIGHT,),
     ),
     "near a limit": Scene(
         ROCKER,
         Motion(limit_positions(ROCKER)[0].theta_2 + np.array([1e-2, 1e-3]), 1.0),
-        effects=(WEIGHT,),
+        effects=(_WEIGHT,),
     ),
     "nearest to a limit": Scene(
         ROCKER,
         Motion(limit_positions(ROCKER)[0].theta_2 + np.array([1e-3, 1e-13]), 1.0),
-        effects=(WEIGHT,),
+        effects=(_WEIGHT,),
     ),
     "a hair from a limit": Scene(
-        ROCKER, Motion(FromLimit(1, 1e-9), 1.0), effects=(WEIGHT,)
+        ROCKER, Motion(FromLimit(1, 1e-9), 1.0), effects=(_WEIGHT,)
     ),
     "positions": Scene(CRANK, Motion(Sweep(0.0, 6.0, 12))),
     "damped": replace(
@@ -182,17 +182,17 @@ FAULT_SCENES: dict[str, Scene] = {
         effects=(Torsion.at(O2=(0.5, 1.0, 0.1)),),
     ),
     "sliding pins": replace(
-        CRANK_ROCKER, effects=(WEIGHT, PinFriction.at(A=(0.2, 0.02), O4=(0.3, 0.03)))
+        CRANK_ROCKER, effects=(_WEIGHT, PinFriction.at(A=(0.2, 0.02), O4=(0.3, 0.03)))
     ),
     "one sliding pin": replace(
-        CRANK_ROCKER, effects=(WEIGHT, PinFriction.at(B=(0.3, 0.03))), drive_bar=4
+        CRANK_ROCKER, effects=(_WEIGHT, PinFriction.at(B=(0.3, 0.03))), drive_bar=4
     ),
     "at rest": Scene(
         CRANK,
         Motion(Sweep(0.1, 6.0, 12), 0.0),
         2,
         LOADS,
-        (WEIGHT, Friction.at(A=0.05, B=0.02), PinFriction.at(O4=(0.2, 0.02))),
+        (_WEIGHT, Friction.at(A=0.05, B=0.02), PinFriction.at(O4=(0.2, 0.02))),
     ),
     "table": replace(
         CRANK_ROCKER,
@@ -218,29 +218,29 @@ FAULT_SCENES: dict[str, Scene] = {
                 "periodic",
             )
         ),
-        effects=(WEIGHT,),
+        effects=(_WEIGHT,),
     ),
     "law at rest": Scene(
         CRANK, Motion(law=Law((0.0, 0.3, 0.7, 1.0), (0.3, 1.0, 2.2, 3.0), 16, "rest"))
     ),
     "rises": Scene(
-        ROUND_AND_FLAT,
+        _ROUND_AND_FLAT,
         Motion(law=Rise("cycloidal", (1.2, 0.4), 0.3, 0.1, 0.3, 0.1, steps=24)),
-        effects=(WEIGHT,),
+        effects=(_WEIGHT,),
     ),
     "3-4-5 rise": Scene(
-        ROUND_AND_FLAT, Motion(law=Rise("345", (1.2, 0.4), 0.3, 0.1, steps=24))
+        _ROUND_AND_FLAT, Motion(law=Rise("345", (1.2, 0.4), 0.3, 0.1, steps=24))
     ),
     "free law": Scene(
         CRANK, Motion(law=Law((0.0, 0.3, 0.7, 1.0, 1.4), (0.3, 1.0, 2.2, 3.0, 3.3), 16))
     ),
-    "released": Scene(CRANK, Motion(1.0, 3.0, free=Free(0.5, 50)), effects=(WEIGHT,)),
+    "released": Scene(CRANK, Motion(1.0, 3.0, free=Free(0.5, 50)), effects=(_WEIGHT,)),
     "released, damped": Scene(
         CRANK,
         Motion(1.0, 3.0, free=Free(0.5, 50)),
         2,
         (Load(4, moment=0.1),),
-        (WEIGHT, Viscous.at(O4=0.01, B=0.003), Friction.at(O2=0.02)),
+        (_WEIGHT, Viscous.at(O4=0.01, B=0.003), Friction.at(O2=0.02)),
     ),
     "released, pushed from G": Scene(
         CRANK,
@@ -290,17 +290,17 @@ FAULT_SCENES: dict[str, Scene] = {
     "held by friction": Scene(
         CRANK,
         Motion(1.0, 0.0, free=Free(0.5, 5)),
-        effects=(WEIGHT, Friction.at(B=0.3, O2=2.0)),
+        effects=(_WEIGHT, Friction.at(B=0.3, O2=2.0)),
     ),
     "held in the end": Scene(
         CRANK,
         Motion(1.0, 3.0, free=Free(1.0, 20)),
-        effects=(WEIGHT, Friction.at(A=0.3, O4=1.0)),
+        effects=(_WEIGHT, Friction.at(A=0.3, O4=1.0)),
     ),
     "from rest against friction": Scene(
         CRANK,
         Motion(1.0, 0.0, free=Free(0.5, 20)),
-        effects=(WEIGHT, Friction.at(A=0.01, O4=0.02)),
+        effects=(_WEIGHT, Friction.at(A=0.01, O4=0.02)),
     ),
     "turning over change points": Scene(
         FourBar(0.3, Bar(0.1, 0.2), Bar(0.3, 0.5), Bar(0.1, 0.4)),
@@ -310,26 +310,26 @@ FAULT_SCENES: dict[str, Scene] = {
     "to full accuracy: short diagonal": Scene(
         uniform(0.859375, 0.853515625, 0.58984375, 0.583984375),
         Motion(np.array([0.0018, 0.01]), 10.0),
-        effects=(WEIGHT,),
+        effects=(_WEIGHT,),
     ),
     "no torque": Scene(
         uniform(0.3, 0.1, 0.3, 0.1),
         Motion(np.array([0.5, 1.0]), 10.0),
         3,
-        effects=(WEIGHT,),
+        effects=(_WEIGHT,),
     ),
-    "derived": Scene(SLENDER, TURN, effects=(WEIGHT,), points=POINTS),
+    "derived": Scene(_SLENDER, TURN, effects=(_WEIGHT,), points=POINTS),
     "derived, limited": Scene(
-        ROCKER, Motion(Sweep(0.3, 1.4, 22), 3.0), effects=(WEIGHT,)
+        ROCKER, Motion(Sweep(0.3, 1.4, 22), 3.0), effects=(_WEIGHT,)
     ),
-    "derived, loaded": Scene(SLENDER, TURN, 2, LOADS, (WEIGHT,)),
+    "derived, loaded": Scene(_SLENDER, TURN, 2, LOADS, (_WEIGHT,)),
     "simulated": Scene(
         CRANK,
         Motion(Sweep(0.1, 6.0, 12), 10.0),
         2,
         LOADS,
         (
-            WEIGHT,
+            _WEIGHT,
             Viscous.at(A=0.002, B=0.003),
             Springs(
                 (Spring(Place(1, (0.2, 0.6)), Place(3, (0.15, -0.4)), 80.0, 0.1, 2.0),)
@@ -364,10 +364,10 @@ FAULT_SCENES: dict[str, Scene] = {
 }
 """Scenes by the name under which an entry of faults.toml tries its fault; scenes called
 "derived" judge what is derived from `solve` too."""
-CAPABILITIES = read_default_suite()
-for index in range(len(CAPABILITIES)):
-    if (name := CAPABILITIES.name(index)) in CAPABILITIES.not_drawn:
+_CAPABILITIES = read_default_suite()
+for index in range(len(_CAPABILITIES)):
+    if (name := _CAPABILITIES.name(index)) in _CAPABILITIES.not_drawn:
         FAULT_SCENES |= {
-            f"{judged}, {name}": CAPABILITIES.scene(index)
+            f"{judged}, {name}": _CAPABILITIES.scene(index)
             for judged in ("simulated", "derived")
         }

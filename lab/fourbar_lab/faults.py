@@ -19,7 +19,7 @@ from fourbar_validation.engines.processes import Ended, run_to_end
 from fourbar_validation.engines.workers import apply_each
 from fourbar_validation.places import CHECKOUT, FORMULAS, PACKAGE
 
-TESTS_FAIL = 1
+_TESTS_FAIL = 1
 """Exit status of pytest where a test fails."""
 TEST_SECONDS = 10.0
 """Processor time within which the tests of what judges must fail, s."""
@@ -29,11 +29,11 @@ SECONDS = 300
 """Time after which a run with a fault is ended, s. That counts as a failure; a run
 takes some three seconds.
 """
-Failing = dict[str, list[str]]
+_Failing = dict[str, list[str]]
 """Rows that fail, by test scene."""
 
 
-def try_faults(numbers: Sequence[int]) -> list[Failing] | str:
+def try_faults(numbers: Sequence[int]) -> list[_Failing] | str:
     """Try the fault of each number in turn, or none.
 
     Return the rows that fail, or why there is no result.
@@ -64,14 +64,14 @@ def try_judging_fault(number: int) -> str | None:
     if done.why:
         return f"it raises: {done.why}"
     outcome = json.loads(done.out.splitlines()[-1])
-    if outcome["status"] != TESTS_FAIL:
+    if outcome["status"] != _TESTS_FAIL:
         return f"the tests end with status {outcome['status']}"
     if outcome["seconds"] > TEST_SECONDS:
         return f"the tests take {outcome['seconds']:.1f} s until one fails"
     return None
 
 
-def explain_survival(entry: dict[str, Any], failing: Failing | str) -> str | None:
+def explain_survival(entry: dict[str, Any], failing: _Failing | str) -> str | None:
     """Say why an entry does not count as caught on each of its test scenes.
 
     None if it does.
@@ -90,7 +90,7 @@ def explain_survival(entry: dict[str, Any], failing: Failing | str) -> str | Non
     return None
 
 
-def try_in_turn(numbers: Sequence[int]) -> list[Failing | str]:
+def try_in_turn(numbers: Sequence[int]) -> list[_Failing | str]:
     """Try faults in one process, which loads the engines once.
 
     If it ends early, each is tried in a process of its own.
@@ -102,7 +102,7 @@ def try_in_turn(numbers: Sequence[int]) -> list[Failing | str]:
     return [rows if isinstance(rows, str) else rows[0] for rows in apart]
 
 
-def try_every_fault(workers: int) -> Iterator[tuple[str, str | None]]:
+def _try_every_fault(workers: int) -> Iterator[tuple[str, str | None]]:
     """Try every fault, first the tree without one.
 
     Return the reason why it survives, or None.
@@ -147,7 +147,7 @@ def command(workers: int) -> int:
 
     results = list(
         track(
-            try_every_fault(workers),
+            _try_every_fault(workers),
             "injecting",
             total=len(read_faults()) + len(read_faults("judging")) + 1,
             console=Console(stderr=True),

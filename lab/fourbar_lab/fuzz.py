@@ -44,17 +44,17 @@ from fourbar_validation.scenes.random import (
 )
 
 POSITIONS = 2
-SIZES = {False: draw_decades(-0.7, 0.7), True: draw_decades(-6.0, 6.0)}
+_SIZES = {False: draw_decades(-0.7, 0.7), True: draw_decades(-6.0, 6.0)}
 """Lengths, masses, speeds and loads: ordinary, adversarial."""
 ORDINARY = Ranges(
     pushed=PUSHED,
-    mass=SIZES[False],
+    mass=_SIZES[False],
     inertia=draw_uniform(0.02, 0.4),
     centre=draw_uniform(-1.0, 2.0),
     centre_angle=draw_chance(0.5, draw_uniform(-3.0, 3.0)),
     load=draw_uniform(-1.0, 1.0),
     without_force=0.2,
-    speed=draw_chance(0.95, SIZES[False]),
+    speed=draw_chance(0.95, _SIZES[False]),
     viscous=0.2,
     friction=0.1,
 )
@@ -62,7 +62,7 @@ RANGES = {
     False: ORDINARY,
     True: replace(
         ORDINARY,
-        mass=draw_chance(0.85, SIZES[True]),
+        mass=draw_chance(0.85, _SIZES[True]),
         inertia=draw_chance(0.85, ORDINARY.inertia),
         centre=draw_product(
             ORDINARY.centre, draw_chance(0.2, draw_decades(0.0, 3.0), 1.0)
@@ -70,8 +70,8 @@ RANGES = {
         ground_angle=lambda rng: float(
             rng.choice([0.0, math.pi, rng.uniform(-3.2, 3.2)])
         ),
-        load=draw_product(ORDINARY.load, SIZES[True]),
-        speed=draw_chance(0.95, SIZES[True]),
+        load=draw_product(ORDINARY.load, _SIZES[True]),
+        speed=draw_chance(0.95, _SIZES[True]),
     ),
 }
 """Distributions from which the scenes are drawn: ordinary, adversarial."""
@@ -84,7 +84,7 @@ DIGITS = (1, 2, 3, 6, 10)
 ROUNDS = 4
 NUMBER = re.compile(r'(?<=")-?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?= )')
 """Pattern of the number of a quantity, before its unit."""
-NEEDED = ("[motion]", "theta_2", "omega_2")
+_NEEDED = ("[motion]", "theta_2", "omega_2")
 """A scene without them has no torque, and fails for another reason."""
 LAB = Path(__file__).parent
 EXACT = tuple(
@@ -121,7 +121,7 @@ def draw_fuzz_scene(seed: int, index: int) -> Scene:
 
 
 def _draw_linkage(hard: bool, rng: np.random.Generator) -> DrawnLinkage:
-    size = SIZES[hard](rng)
+    size = _SIZES[hard](rng)
     lengths = tuple(float(x * size) for x in _draw_lengths(rng, hard))
     return (
         lengths,
@@ -228,7 +228,7 @@ def _list_simpler(lines: list[str], number: int) -> Iterator[list[str]]:
             (i for i in range(until, len(lines)) if lines[i].startswith("[")),
             len(lines),
         )
-    if not line.startswith(NEEDED):
+    if not line.startswith(_NEEDED):
         yield [*lines[:number], *lines[until:]]
     key, _, value = line.partition(" = ")
     entries = (

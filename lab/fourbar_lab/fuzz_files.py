@@ -15,13 +15,13 @@ from fourbar.scene import command
 from fourbar.solving import find_last_stage, solve
 from fourbar_validation.scenes.suites import list_model_files
 
-HANG = 5.0
+_HANG = 5.0
 """Seconds; a scene file takes milliseconds."""
 MOST_POSITIONS = 10_000
 """Positions that a mutated file may ask for here. It may have 10^8 of them, but only
 the reading of it is tried.
 """
-PIECES = (
+_PIECES = (
     *(
         '"',
         "'",
@@ -81,7 +81,7 @@ that other formats would run.
 """
 
 
-def mutate_files(
+def _mutate_files(
     seed: int, indices: Sequence[int], originals: Sequence[str]
 ) -> Iterator[tuple[int, str]]:
     """Mutate scene files; each depends on (seed, index) alone."""
@@ -95,19 +95,21 @@ def mutate_files(
 
 def _mutate(text: str, rng: np.random.Generator, originals: Sequence[str]) -> str:
     if not text:
-        return PIECES[int(rng.integers(len(PIECES)))]
+        return _PIECES[int(rng.integers(len(_PIECES)))]
     start, length = int(rng.integers(len(text))), int(rng.geometric(0.1))
     lines = text.splitlines(keepends=True)
     line = int(rng.integers(len(lines)))
     match int(rng.integers(7)):
         case 0:  # a piece put in
-            return text[:start] + PIECES[int(rng.integers(len(PIECES)))] + text[start:]
+            return (
+                text[:start] + _PIECES[int(rng.integers(len(_PIECES)))] + text[start:]
+            )
         case 1:  # a piece in place of a value
             head, _, _ = lines[line].partition("=")
             return "".join(
                 [
                     *lines[:line],
-                    f"{head}= {PIECES[int(rng.integers(len(PIECES)))]}\n",
+                    f"{head}= {_PIECES[int(rng.integers(len(_PIECES)))]}\n",
                     *lines[line + 1 :],
                 ]
             )
@@ -147,7 +149,7 @@ def try_out(text: str) -> str:
     except Exception as error:
         return f"{type(error).__name__}: {error}"
     took = time.perf_counter() - start
-    return f"took {took:.1f} s" if took > HANG else ""
+    return f"took {took:.1f} s" if took > _HANG else ""
 
 
 @click.command()
@@ -163,7 +165,7 @@ def fuzz_files(count: int, seed: int) -> int:
     originals = [file.read_text(encoding="utf-8") for file in list_model_files()]
     failed = 0
     for index, text in track(
-        mutate_files(seed, range(count), originals), total=count, description="mutants"
+        _mutate_files(seed, range(count), originals), total=count, description="mutants"
     ):
         if what := try_out(text):
             failed += 1

@@ -68,7 +68,7 @@ def _find_file(name: str) -> Path:
     return Path(spec.origin).parent / rest
 
 
-class FaultFinder(importlib.abc.MetaPathFinder):
+class _FaultFinder(importlib.abc.MetaPathFinder):
     """Finds a module that has a fault, and no other."""
 
     def __init__(self, entry: dict[str, Any]) -> None:
@@ -102,7 +102,7 @@ class _Text(importlib.machinery.SourceFileLoader):
         return code
 
 
-def list_failing(names: list[str]) -> dict[str, list[str]]:
+def _list_failing(names: list[str]) -> dict[str, list[str]]:
     """Check test scenes, and list the rows that fail by their names.
 
     A row is "engine quantity: reason".
@@ -125,14 +125,14 @@ def list_failing(names: list[str]) -> dict[str, list[str]]:
     return failing
 
 
-def run_tests(entry: dict[str, Any]) -> dict[str, float]:
+def _run_tests(entry: dict[str, Any]) -> dict[str, float]:
     """Run the quick tests that an entry names, with its fault.
 
     Return pytest's exit status and the processor time, s.
     """
     import pytest
 
-    finder = FaultFinder(entry)
+    finder = _FaultFinder(entry)
     sys.meta_path.insert(0, finder)
     quick = ["-x", "-n", "0", "-p", "no:cacheprovider", "-m", "not slow"]
     status = pytest.main([*quick, entry["tests"]])
@@ -144,10 +144,10 @@ def run_tests(entry: dict[str, Any]) -> dict[str, float]:
 def main() -> None:
     """Inject the fault of each number, check its test scenes, print what fails."""
     if sys.argv[1:2] == ["--tests"]:
-        print(json.dumps(run_tests(read_faults("judging")[int(sys.argv[2])])))
+        print(json.dumps(_run_tests(read_faults("judging")[int(sys.argv[2])])))
         return
     if len(sys.argv) == 1:
-        print(json.dumps(list_failing([])))
+        print(json.dumps(_list_failing([])))
     for number in map(int, sys.argv[1:]):
         for name in [
             name
@@ -158,9 +158,9 @@ def main() -> None:
                 name
             ]  # modules of the previous fault; the engines' libraries stay
         entry = read_faults()[number]
-        finder = FaultFinder(entry)
+        finder = _FaultFinder(entry)
         sys.meta_path.insert(0, finder)
-        failing = list_failing(entry["scenes"])
+        failing = _list_failing(entry["scenes"])
         sys.meta_path.remove(finder)
         if finder.left:
             raise RuntimeError(f"the scenes use no {', '.join(finder.left)}")

@@ -57,7 +57,7 @@ OTHER: dict[type, type] = (
     {a: b for a, b in PAIRS} | {b: a for a, b in PAIRS} | {ast.Pow: ast.Mult}
 )
 """Replacement of each operator."""
-CHANGES = 1e-9
+_CHANGES = 1e-9
 SECONDS = 20
 """Time after which a mutant hangs. The run would be stopped, which is a failure too."""
 LEAST = 0.95
@@ -160,7 +160,7 @@ def _find_function(module: ModuleType, qualified: str) -> FunctionType:
     return function
 
 
-class HangError(Exception):
+class _HangError(Exception):
     """A mutant did not come back."""
 
 
@@ -197,12 +197,12 @@ def compute_numbers(scene: Scene, command: Command) -> dict[str, Any]:
     numbers["status"] = solution.status_code.astype(float)
     return (
         numbers
-        | collect_stated(scene.linkage)
-        | collect_stated_of_motion(scene, command)
+        | _collect_stated(scene.linkage)
+        | _collect_stated_of_motion(scene, command)
     )
 
 
-def collect_stated(linkage: FourBar) -> dict[str, Any]:
+def _collect_stated(linkage: FourBar) -> dict[str, Any]:
     """Collect what the formulas state of a linkage whatever its motion."""
     numbers: dict[str, Any] = {
         "default_range": mobility.choose_range(linkage),
@@ -226,7 +226,7 @@ def collect_stated(linkage: FourBar) -> dict[str, Any]:
     return {name: np.array(value, dtype=float) for name, value in numbers.items()}
 
 
-def collect_stated_of_motion(scene: Scene, command: Command) -> dict[str, Any]:
+def _collect_stated_of_motion(scene: Scene, command: Command) -> dict[str, Any]:
     """Compute how well the positions of a motion transmit."""
     state = state_of(scene.linkage, command.theta_2, command.branch)
     branch = command.branch.astype(float)
@@ -247,7 +247,7 @@ def is_changed(before: dict[str, Any], after: dict[str, Any]) -> bool:
         if new is None or np.shape(old) != np.shape(new):
             return True
         scale = float(np.max(np.abs(old), initial=0.0, where=np.isfinite(old))) or 1.0
-        if not np.allclose(new, old, rtol=0.0, atol=CHANGES * scale, equal_nan=True):
+        if not np.allclose(new, old, rtol=0.0, atol=_CHANGES * scale, equal_nan=True):
             return True
     return False
 
@@ -340,7 +340,7 @@ def command(module: str | None, most: int) -> int:
         )
 
     def alarm(*_: object) -> None:
-        raise HangError
+        raise _HangError
 
     before = signal.signal(signal.SIGALRM, alarm)
     tried, shown = make_baselines(), Console(stderr=True)

@@ -44,7 +44,7 @@ def list_numbers(scene: Scene) -> dict[str, float]:
     }
 
 
-def compute_exact_slopes(scene: Scene) -> tuple[Values, Slopes]:
+def _compute_exact_slopes(scene: Scene) -> tuple[Values, Slopes]:
     """Return every output, and its derivatives and theirs by every number.
 
     They are differences in balls. No output where the loop does not close, no
@@ -110,7 +110,7 @@ def judge_slopes(scene: Scene, tally: Tally, sample: str) -> None:
     """Compare the derivatives at one position with those of the reference."""
     tally.samples += 1
     (values, exact), slopes, numbers = (
-        compute_exact_slopes(scene),
+        _compute_exact_slopes(scene),
         differentiate(scene),
         list_numbers(scene),
     )

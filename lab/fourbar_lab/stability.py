@@ -134,7 +134,7 @@ def run(
     tally = Tally()
     for number in samples:
         rng = np.random.default_rng([seed, list(FAMILIES).index(family), number])
-        scene = feed_back(FAMILIES[family](rng), bar)
+        scene = _feed_back(FAMILIES[family](rng), bar)
         if scene is not None:
             (judge_slopes if derivatives else judge)(scene, tally, f"{family} {number}")
     return tally
@@ -145,7 +145,7 @@ def find_sign(scene: Scene) -> int:
     return int(with_signs(scene.linkage, command(scene)).branch[0])
 
 
-def feed_back(scene: Scene, bar: int) -> Scene | None:
+def _feed_back(scene: Scene, bar: int) -> Scene | None:
     """Command bar 2, 3 or 4 to move as it does under the scene's command.
 
     None if that has no motion.
@@ -153,7 +153,7 @@ def feed_back(scene: Scene, bar: int) -> Scene | None:
     if bar == 2:
         return scene
     solution = solve(scene, "acceleration")
-    theta, omega, alpha, sine = read_commanded(solution, bar)
+    theta, omega, alpha, sine = _read_commanded(solution, bar)
     if solution.status_code[0] != OK or abs(sine) <= NO_DIGIT_LEFT:
         return None
     numbers = {f"theta_{bar}": theta, f"omega_{bar}": omega, f"alpha_{bar}": alpha}
@@ -163,7 +163,7 @@ def feed_back(scene: Scene, bar: int) -> Scene | None:
     return replace(scene, motion=Motion(branch=branch, **numbers))  # type: ignore[arg-type]
 
 
-def read_commanded(solution: Solution, bar: int) -> tuple[float, float, float, float]:
+def _read_commanded(solution: Solution, bar: int) -> tuple[float, float, float, float]:
     """Return angle, speed and acceleration of a bar at the first position.
 
     The sine whose sign its branch is follows.

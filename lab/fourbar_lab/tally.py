@@ -29,7 +29,7 @@ HALF_A_DIGIT = 2.0**-53
 """Half a digit of a result: a smaller error is chance, for no double need be nearer to
 the truth. A bar is called too large only against at least this error.
 """
-UNTOLD = 0.125
+_UNTOLD = 0.125
 """Part of |sin mu| that may be wrong. With it doubles do not tell whether the loop
 closes.
 """
@@ -123,7 +123,7 @@ def compute_ratio(
             1.0,
         )
     wrong = abs(float(error)) if value.rad() < abs(error) else 0.0
-    return float(find_used(wrong, compute_allowed(size, sensitivity))), wrong
+    return float(find_used(wrong, _compute_allowed(size, sensitivity))), wrong
 
 
 def is_untold(sine: Any, sensitivity: float) -> bool:
@@ -131,9 +131,11 @@ def is_untold(sine: Any, sensitivity: float) -> bool:
 
     There may be no derivatives then.
     """
-    return compute_allowed(size := abs(float(sine.mid())), sensitivity) > UNTOLD * size
+    return (
+        _compute_allowed(size := abs(float(sine.mid())), sensitivity) > _UNTOLD * size
+    )
 
 
-def compute_allowed(size: float, sensitivity: float) -> float:
+def _compute_allowed(size: float, sensitivity: float) -> float:
     """Return 8 eps (|y| + sum |x_i dy/dx_i|)."""
     return FACTOR * EPS * (size + sensitivity)

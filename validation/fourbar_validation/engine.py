@@ -25,39 +25,39 @@ from fourbar_validation.engines.guests import NOT_FOUND, adjust_engines, hash_fi
 from fourbar_validation.engines.registry import BALLS, ENGINES, load_further
 from fourbar_validation.report.machine import DISTRIBUTIONS
 
-ALL_BUT_CYLINDER = (
+_ALL_BUT_CYLINDER = (
     *effects.list_kinds(),
     "loads",
     "drive",
 )
 OURS = frozenset(sys.modules)
 """Modules that were imported before those of the engine."""
-Factory = Callable[..., Any]
+_Factory = Callable[..., Any]
 """Function that makes an engine. Its keywords are those of a question's setting, or the
 step of a released motion.
 """
 
 
-class NotFoundError(Exception):
+class _NotFoundError(Exception):
     """Error raised if there is no such engine."""
 
 
-def open_engine(entry: str) -> tuple[Factory, dict[str, Any]]:
+def open_engine(entry: str) -> tuple[_Factory, dict[str, Any]]:
     """Return what makes an engine, and its hello; NotFoundError where there is none."""
     if ":" in entry:
         return _open_class(entry)
     engines = {engine.name: engine for engine in (*ENGINES, *load_further(), BALLS)}
     if entry not in engines:
-        raise NotFoundError(f"must be module:Class, or one of {', '.join(engines)}")
+        raise _NotFoundError(f"must be module:Class, or one of {', '.join(engines)}")
     engine = engines[entry]
     if reason := engine.missing():
-        raise NotFoundError(reason)
+        raise _NotFoundError(reason)
     adapter = engine.start()
     hello = {
         "engine": entry,
         "answers": list(engine.answers),
         "commands": list(getattr(adapter, "commands", ("theta_2",))),
-        "effects": [*ALL_BUT_CYLINDER, "cylinder", "push"],
+        "effects": [*_ALL_BUT_CYLINDER, "cylinder", "push"],
     }
     library = engine.library.removeprefix("py")  # pydrake is of the distribution drake
     try:
@@ -89,7 +89,7 @@ def _apply_setting(engine: Any, setting: dict[str, Any], names: Sequence[str]) -
     )
 
 
-def _open_class(entry: str) -> tuple[Factory, dict[str, Any]]:
+def _open_class(entry: str) -> tuple[_Factory, dict[str, Any]]:
     module, _, name = entry.partition(":")
     if os.getcwd() not in sys.path:
         sys.path.append(os.getcwd())
@@ -97,19 +97,19 @@ def _open_class(entry: str) -> tuple[Factory, dict[str, Any]]:
         served = getattr(import_module(module), name)
     except (ModuleNotFoundError, AttributeError) as error:
         if getattr(error, "name", None) in (module, module.partition(".")[0], name):
-            raise NotFoundError(say_error(error)) from None
+            raise _NotFoundError(say_error(error)) from None
         raise
     hello: dict[str, Any] = {
         "engine": getattr(served, "name", None),
         "answers": getattr(served, "quantities", UNKNOWNS),
         "commands": getattr(served, "commands", ("theta_2",)),
         "effects": [
-            *getattr(served, "effects", ALL_BUT_CYLINDER),
+            *getattr(served, "effects", _ALL_BUT_CYLINDER),
             *(["release"] * hasattr(served, "release")),
         ],
         "tolerance": getattr(served, "tolerance", "equivalence"),
         "version": str(getattr(served, "version", "")),
-        "code": hash_code(module),
+        "code": _hash_code(module),
         "settings": list(getattr(served, "settings", ())),
         "device": getattr(served, "device", ""),
         "made_for": getattr(served, "made_for", ""),
@@ -123,7 +123,7 @@ def _open_class(entry: str) -> tuple[Factory, dict[str, Any]]:
     return make, hello
 
 
-def hash_code(module: str) -> str:
+def _hash_code(module: str) -> str:
     """Hash the modules imported with a class, and the others in its folder.
 
     What is installed is hashed too.
@@ -146,7 +146,7 @@ def hash_code(module: str) -> str:
     )
 
 
-def answer(make: Factory, question: dict[str, Any]) -> dict[str, Any]:
+def answer(make: _Factory, question: dict[str, Any]) -> dict[str, Any]:
     """Answer one question."""
     scene = protocol.scene_from_json(question["scene"])
     if question["ask"] == "release":
@@ -182,7 +182,7 @@ def answer(make: Factory, question: dict[str, Any]) -> dict[str, Any]:
 
 def serve(entry: str, questions: IO[bytes], replies: IO[bytes]) -> None:
     """Answer line by line, until there are no more."""
-    engine: Factory | None = None
+    engine: _Factory | None = None
     for line in questions:
         question = json.loads(line)
         try:
@@ -195,7 +195,7 @@ def serve(entry: str, questions: IO[bytes], replies: IO[bytes]) -> None:
             else:
                 reply = {"error": f"unknown question {question['ask']!r}"}
             text = json.dumps({"id": question["id"], **reply}, allow_nan=False)
-        except NotFoundError:
+        except _NotFoundError:
             raise
         except InputError as error:
             text = json.dumps({"id": question["id"], "error": str(error)})
@@ -212,6 +212,6 @@ if __name__ == "__main__":
         os.dup2(2, 1)  # an engine's prints are no answer
         try:
             serve(" ".join(sys.argv[1:]), questions, replies)
-        except NotFoundError as error:
+        except _NotFoundError as error:
             print(error, file=sys.stderr)
             sys.exit(NOT_FOUND)

@@ -52,12 +52,12 @@ OUTLIER = 3.0
 """... and the multiple of it that a curve must exceed to be clipped."""
 CLIPPED = 1.6
 """A clipped axis ends at this multiple of the ordinary size."""
-Indices = NDArray[np.intp]
-WORKS: tuple[tuple[str, Any], ...] = tuple(
+_Indices = NDArray[np.intp]
+_WORKS: tuple[tuple[str, Any], ...] = tuple(
     (FORCE_COLOURS[name], FORCE_DASHES[name]) for name in PIN_FORCES
 )
-BINDING = re.compile(r" (?==)|(?<==) |(?<=[\d]) (?=[A-Za-zµ])|(?<=N) (?=m\b)")
-POLE_REASON = {2: "bars 3 and 4 collinear", 3: "ω₃ = 0", 4: "ω₄ = 0"}
+_BINDING = re.compile(r" (?==)|(?<==) |(?<=[\d]) (?=[A-Za-zµ])|(?<=N) (?=m\b)")
+_POLE_REASON = {2: "bars 3 and 4 collinear", 3: "ω₃ = 0", 4: "ω₄ = 0"}
 
 
 def draw_axes(axes: "Axes", view: View) -> Array:
@@ -95,12 +95,12 @@ def draw_axes(axes: "Axes", view: View) -> Array:
 
 def note(view: View, text: str) -> None:
     """Say it once in the caption; a number stays on one line with its name and unit."""
-    text = BINDING.sub("\u00a0", text)
+    text = _BINDING.sub("\u00a0", text)
     if text not in view.notes:
         view.notes.append(text)
 
 
-def find_poles(view: View) -> Indices:
+def find_poles(view: View) -> _Indices:
     """Find where the determinant of the drive changes sign.
 
     Each index i stands for positions i and i + 1.
@@ -123,7 +123,7 @@ def find_poles(view: View) -> Indices:
     return np.flatnonzero(sine[:-1] * sine[1:] <= 0.0)
 
 
-def break_at_poles(values: Array, poles: Indices) -> Array:
+def break_at_poles(values: Array, poles: _Indices) -> Array:
     """Copy a curve's values with NaN at the positions next to a pole.
 
     No line then crosses the pole.
@@ -134,7 +134,7 @@ def break_at_poles(values: Array, poles: Indices) -> Array:
 
 
 def plot_between_poles(
-    axes: "Axes", over: Array, values: Array, poles: Indices, **look: Any
+    axes: "Axes", over: Array, values: Array, poles: _Indices, **look: Any
 ) -> None:
     """Plot a curve that no line takes across a pole."""
     axes.plot(break_at_poles(over, poles), break_at_poles(values, poles), **look)
@@ -360,7 +360,7 @@ def _draw_drive(
         )
     if poles.size:
         poles_of = (
-            f"torque on bar {bar} ({POLE_REASON[bar]})"
+            f"torque on bar {bar} ({_POLE_REASON[bar]})"
             if bar
             else "drive's force (its line has no lever)"
         )
@@ -422,7 +422,7 @@ def draw_stroke(axes: "Axes", view: View) -> None:
     axes.set(ylabel=f"stroke ({unit})", title="Stroke of the drive")
 
 
-def list_force_sizes(view: View, names: Iterable[str] = FORCE_COLOURS) -> list[Array]:
+def _list_force_sizes(view: View, names: Iterable[str] = FORCE_COLOURS) -> list[Array]:
     """List the magnitudes of pin forces, of every branch that shares the scales."""
     return [
         np.hypot(*getattr(branch.sweep, name).T)
@@ -435,7 +435,7 @@ def draw_forces(axes: "Axes", view: View) -> None:
     """Draw the magnitudes of the four pin forces."""
     over = draw_axes(axes, view)
     sizes = {name: np.hypot(*getattr(view.sweep, name).T) for name in FORCE_COLOURS}
-    everywhere = list_force_sizes(view)
+    everywhere = _list_force_sizes(view)
     limit = choose_limit(everywhere)
     factor, unit = choose_unit(limit or find_greatest(*everywhere), "N", view.units)
     poles = find_poles(view)
@@ -467,7 +467,7 @@ def draw_energy(axes: "Axes", view: View) -> None:
         over, factor * energies.kinetic, color=INK, lw=2.2, label="kinetic energy"
     )
     for (name, values), (colour, dashes) in zip(
-        energies.work.items(), cycle(WORKS), strict=False
+        energies.work.items(), cycle(_WORKS), strict=False
     ):
         axes.plot(
             over, factor * values, color=colour, ls=dashes, label=name.replace("_", " ")
@@ -482,12 +482,12 @@ def draw_energy(axes: "Axes", view: View) -> None:
     )
 
 
-RECOMMENDED = 40.0
+_RECOMMENDED = 40.0
 """Smallest transmission angle that is usually recommended, deg.
 
 Source: R. L. Norton, Design of Machinery; H. Alt introduced the angle (1932).
 """
-REMARK = 0.34
+_REMARK = 0.34
 """Part that a remark takes along an axis, as a part of its length."""
 
 
@@ -502,16 +502,16 @@ def draw_transmission(axes: "Axes", view: View) -> None:
     assert angle is not None
     mu = np.degrees(angle)
     axes.plot(over, mu, color=INK)
-    axes.axhline(RECOMMENDED, color=MUTED, lw=0.9, ls=(0, (4, 2)))
+    axes.axhline(_RECOMMENDED, color=MUTED, lw=0.9, ls=(0, (4, 2)))
     place = find_free_place(mu)
-    corner = (over[0] + place * (over[-1] - over[0]), RECOMMENDED)
+    corner = (over[0] + place * (over[-1] - over[0]), _RECOMMENDED)
     look: dict[str, Any] = {
         "textcoords": "offset points",
         "ha": "center",
         "size": 7.0,
         "color": MUTED,
     }
-    axes.annotate(f"{RECOMMENDED:g}° recommended", corner, xytext=(0, 2), **look)
+    axes.annotate(f"{_RECOMMENDED:g}° recommended", corner, xytext=(0, 2), **look)
     axes.set(ylim=(0.0, 96.0), yticks=range(0, 91, 15))
     for theta, height, marker, name in _list_marked(view):
         axes.plot(
@@ -536,14 +536,14 @@ def find_free_place(mu: Array) -> float:
 
     It is a part of the axis's length; the remark stands at 40 deg.
     """
-    half = REMARK / 2.0
+    half = _REMARK / 2.0
     best, clearance = 1.0 - half, -1.0
     for place in np.linspace(1.0 - half, half, 25):
         part = mu[
             int((place - half) * len(mu)) : max(1, math.ceil((place + half) * len(mu)))
         ]
         away = np.abs(
-            part[np.isfinite(part)] - RECOMMENDED - 3.0
+            part[np.isfinite(part)] - _RECOMMENDED - 3.0
         )  # the remark stands on the line
         if away.size and away.min() > clearance:
             best, clearance = float(place), float(away.min())
@@ -610,7 +610,7 @@ EVERY = 60.0
 """Dots on a hodograph stand this far apart in the commanded angle, deg ..."""
 MOST_DOTS = 12
 """... or, over time or a stroke, a round number that gives no more than these."""
-LONG_NUMBERS = 2000.0
+_LONG_NUMBERS = 2000.0
 """Smallest number too wide for four of its kind along a radius."""
 
 
@@ -623,7 +623,7 @@ def draw_hodograph(axes: "PolarAxes", view: View, name: str) -> None:
 
     force, look = getattr(view.sweep, name), choose_force_line(name)
     direction, size_here = np.arctan2(force[:, 1], force[:, 0]), np.hypot(*force.T)
-    everywhere = list_force_sizes(view, (name,))
+    everywhere = _list_force_sizes(view, (name,))
     limit = choose_limit(everywhere)
     top = limit or 1.08 * find_greatest(*everywhere) or 1.0
     factor, unit = choose_unit(top, "N", view.units)
@@ -666,7 +666,7 @@ def draw_hodograph(axes: "PolarAxes", view: View, name: str) -> None:
     axes.set_rlim(0.0, factor * top)
     axes.set_thetagrids(range(0, 360, 45))
     axes.tick_params(pad=0.5)
-    many = 4 if factor * top < LONG_NUMBERS else 2
+    many = 4 if factor * top < _LONG_NUMBERS else 2
     ticks = MaxNLocator(many).tick_values(0.0, factor * top)
     axes.set_rticks([tick for tick in ticks if 0.0 < tick < 0.97 * factor * top])
     axes.set_rlabel_position(free)

@@ -35,7 +35,7 @@ from fourbar.solution import Array
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-SYMBOLS = {
+_SYMBOLS = {
     "omega_3/omega_2": "ω₃/ω₂",
     "omega_4/omega_2": "ω₄/ω₂",
     "mechanical_advantage": "T₄/T₂",
@@ -109,9 +109,9 @@ def _draw_ratios(axes: "Axes", view: View, names: dict[int, str]) -> None:
         jumps = np.flatnonzero(values[:-1] * values[1:] < 0.0)
         far = np.minimum(np.abs(values[:-1]), np.abs(values[1:]))[jumps] > 1.0
         poles = jumps[far]
-        curves[SYMBOLS[name]] = values
+        curves[_SYMBOLS[name]] = values
         look = {"color": BAR_COLOURS[bar], "ls": BAR_DASHES[bar]}
-        plot_between_poles(axes, over, values, poles, label=SYMBOLS[name], **look)
+        plot_between_poles(axes, over, values, poles, label=_SYMBOLS[name], **look)
     axes.axhline(0.0, color=INK, lw=0.6, zorder=1)
     clip(axes, view, curves, limit, "Ratio", "1")
 

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure
 
 BRANCHES = ("one", "both")
-Painter = Callable[["SubFigure", View, Labels], None]
+_Painter = Callable[["SubFigure", View, Labels], None]
 
 
 def _draw_overview(figure: "SubFigure", shown: View, labels: Labels) -> None:
@@ -93,11 +93,11 @@ def _draw_points(figure: "SubFigure", shown: View, labels: Labels) -> None:
     curves.draw_point_accelerations(panels["accelerations"], shown)
 
 
-def _draw_single(paint: Callable[[Any, View], None]) -> Painter:
+def _draw_single(paint: Callable[[Any, View], None]) -> _Painter:
     return lambda figure, shown, labels: paint(figure.subplots(), shown)
 
 
-def _draw_rows(*painters: Callable[[Any, View], None]) -> Painter:
+def _draw_rows(*painters: Callable[[Any, View], None]) -> _Painter:
     """Draw panels below each other."""
 
     def paint(figure: "SubFigure", shown: View, labels: Labels) -> None:
@@ -115,7 +115,7 @@ def _draw_hodographs(figure: "SubFigure", shown: View, labels: Labels) -> None:
         curves.draw_hodograph(axes, shown, name)
 
 
-FIGURES: dict[str, tuple[Painter, tuple[float, float], bool]] = {
+FIGURES: dict[str, tuple[_Painter, tuple[float, float], bool]] = {
     "overview": (_draw_overview, (7.7, 9.2), False),
     "linkage": (
         lambda figure, *of: linkage.draw_linkage(figure.subplots(), *of),
@@ -166,7 +166,7 @@ TAKERS = {
 
 def _choose_painter(
     scene: Scene, figure: str, branches: str
-) -> tuple[Painter, tuple[float, float]]:
+) -> tuple[_Painter, tuple[float, float]]:
     """Choose the painter and the size of a figure that the scene can show."""
     for key, value, allowed in (
         ("figure", figure, tuple(FIGURES)),
@@ -269,7 +269,7 @@ def draw(
 
 
 def _compose(
-    painter: Painter, size: tuple[float, float], views: list[View]
+    painter: _Painter, size: tuple[float, float], views: list[View]
 ) -> "Figure":
     """Compose the figure itself, laid out and labelled."""
     from matplotlib.figure import Figure

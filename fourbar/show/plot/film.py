@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FRAMES_PER_SECOND = 25
-MAX_FRAMES = 1500
+_MAX_FRAMES = 1500
 SIZE = (6.4, 5.6)
 DPI = 100
 SWEEP_SECONDS = 6.0
@@ -72,12 +72,12 @@ def write_film(
     is missing.
     """
     if seconds is not None and not (
-        math.isfinite(seconds) and 0.0 < seconds * FRAMES_PER_SECOND <= MAX_FRAMES
+        math.isfinite(seconds) and 0.0 < seconds * FRAMES_PER_SECOND <= _MAX_FRAMES
     ):
         raise InputError(
             "seconds",
             seconds,
-            f"must be more than 0 and at most {MAX_FRAMES // FRAMES_PER_SECOND}",
+            f"must be more than 0 and at most {_MAX_FRAMES // FRAMES_PER_SECOND}",
         )
     with apply_style():
         import matplotlib as mpl
@@ -91,7 +91,7 @@ def write_film(
             seconds = SWEEP_SECONDS
             if shown.time is not None:
                 duration = float(shown.time[-1] - shown.time[0])
-                seconds = min(max(duration, SHORTEST), MAX_FRAMES / FRAMES_PER_SECOND)
+                seconds = min(max(duration, SHORTEST), _MAX_FRAMES / FRAMES_PER_SECOND)
         figure, move = _make_stage(shown, moving)
         order = choose_frames(shown, max(2, round(seconds * FRAMES_PER_SECOND)))
         writer: Any = PillowWriter(fps=FRAMES_PER_SECOND)

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import SubFigure
 
-PANEL, LINE = 3.4, 0.16
+_PANEL, LINE = 3.4, 0.16
 """Heights of a bar's panel and of a line of its couples, inches."""
 WINDOW = 1.3
 """The window is this much wider than what it shows: space for the labels."""
@@ -110,7 +110,7 @@ def list_actions(view: View, bar: int) -> tuple[list[Arrow], list[Couple]]:
     arrows.append(
         Arrow(
             rf"$-m_{bar}\,a_{{G{bar}}}$",
-            take_one(described.to_centre * turned),
+            _take_one(described.to_centre * turned),
             inertia,
             INK,
             True,
@@ -124,7 +124,7 @@ def list_actions(view: View, bar: int) -> tuple[list[Arrow], list[Couple]]:
     ]
 
 
-class Recorder(Actions):
+class _ActionRecorder(Actions):
     """Forces and couples, kept one by one under the name of their source."""
 
     name = ""
@@ -143,7 +143,9 @@ class Recorder(Actions):
         """
         arm = point * self.state.direction(bar) + (0.0j if beyond is None else beyond)
         self.arrows[bar].append(
-            Arrow(self.name.replace("#", str(bar)), take_one(arm), take_one(force), INK)
+            Arrow(
+                self.name.replace("#", str(bar)), _take_one(arm), _take_one(force), INK
+            )
         )
 
     def pull(self, start: Any, end: Any, force: Number) -> None:
@@ -156,7 +158,7 @@ class Recorder(Actions):
     def couple(self, bar: int, moment: Number) -> None:
         """Add a pure couple on a bar."""
         self.turns[bar].append(
-            Couple(self.name.replace("#", str(bar)), take_one(moment).real)
+            Couple(self.name.replace("#", str(bar)), _take_one(moment).real)
         )
 
     def pin_couple(self, pin: str, couple: Number) -> None:
@@ -169,15 +171,15 @@ class Recorder(Actions):
         self.couple(first, -couple)
 
 
-def take_one(vector: Any) -> complex:
+def _take_one(vector: Any) -> complex:
     """Return the one complex number of an array, at the position drawn."""
     return complex(np.ravel(vector)[0])
 
 
-def _record_actions(view: View) -> Recorder:
+def _record_actions(view: View) -> _ActionRecorder:
     """Record what a drive that exerts a force, loads and effects put on the bars."""
     scene, state = view.scene.settled(), view.state()
-    recorder = Recorder(scene, state)
+    recorder = _ActionRecorder(scene, state)
     if scene.drive is not None and scene.motion.free is None:
         recorder.name = "$F$"
         scene.drive.act(recorder, view.here.drive_force)
@@ -210,7 +212,7 @@ def draw_free_bodies(figure: "SubFigure", view: View, labels: Labels) -> None:
         (v, bar, *list_actions(v, bar)) for v in view.alike for bar in MOVING_BARS
     ]  # those of this view first
     panels, below = figure.subplots(
-        2, 3, height_ratios=[PANEL, LINE * max(len(couples) for *_, couples in freed)]
+        2, 3, height_ratios=[_PANEL, LINE * max(len(couples) for *_, couples in freed)]
     )
     biggest = max(
         (abs(arrow.force) for *_, arrows, _ in freed for arrow in arrows), default=0.0
@@ -280,7 +282,7 @@ def draw_internal_forces(figure: "SubFigure", view: View, labels: Labels) -> Non
 def _reach(view: View, bar: int, arrows: list[Arrow], scale: float) -> Points:
     """List every point that a bar's panel has to show, from the bar's first pin, m."""
     described, u = view.scene.linkage.bar(bar), view.state().direction(bar)
-    points = [0.0j, take_one(described.length * u), take_one(described.to_centre * u)]
+    points = [0.0j, _take_one(described.length * u), _take_one(described.to_centre * u)]
     for arrow in arrows:
         points += [arrow.at, arrow.at + scale * arrow.force]
     return np.array([split_components(point) for point in points])
@@ -350,7 +352,7 @@ def _draw_one(
         note(view, f"Too short to draw on bar {bar}: {', '.join(short)}.")
     centre = view.scene.linkage.bar(bar)
     if centre.mass > 0.0:
-        G = take_one(centre.to_centre * view.state().direction(bar))
+        G = _take_one(centre.to_centre * view.state().direction(bar))
         x, y = split_components(G)
         draw_plate(axes, bar, (0.0j, G, along), labels)
         draw_mass_centre(axes, (x, y), 6.0)

@@ -15,11 +15,11 @@ if TYPE_CHECKING:
     from matplotlib.text import Annotation
 
 Point = tuple[float, float]
-Box = tuple[float, float, float, float]
-REACH = (7.0, 11.0, 16.0, 23.0, 32.0, 44.0)
+_Box = tuple[float, float, float, float]
+_REACH = (7.0, 11.0, 16.0, 23.0, 32.0, 44.0)
 """Distances from the point to the label's edge that are tried, typographic points."""
 DIRECTIONS = 16
-LED = 15.0
+_LED = 15.0
 """Distance from which a label is led to its point by a thin line, points. The points
 are typographic.
 """
@@ -111,7 +111,7 @@ class Labels:
             for text in axes.texts
             if text.get_text()
         ]
-        taken: list[tuple[Axes, Box]] = [
+        taken: list[tuple[Axes, _Box]] = [
             (axes, text.get_window_extent(renderer).extents) for axes, text in texts
         ]
         samples: dict[int, list[np.ndarray]] = {}
@@ -161,7 +161,7 @@ class Labels:
             to_data = axes.transData.inverted().transform
             text.set_position(tuple(to_data(centre)))
             edge = np.clip((x, y), *np.reshape(taken[-1][1], (2, 2)))
-            if math.dist(edge, (x, y)) > (LED + label.dots_clear) * per_point:
+            if math.dist(edge, (x, y)) > (_LED + label.dots_clear) * per_point:
                 look: dict[str, Any] = {
                     "scalex": False,
                     "scaley": False,
@@ -175,7 +175,7 @@ class Labels:
                 )
 
 
-STEP, MARK = 3.0, 4.5
+STEP, _MARK = 3.0, 4.5
 """Distance of the points along a line, and radius of a mark, typographic points."""
 RING = np.array(
     [(math.cos(k * math.tau / 12), math.sin(k * math.tau / 12)) for k in range(12)]
@@ -192,7 +192,7 @@ def _sample_line(points: np.ndarray, per_point: float) -> np.ndarray:
         if not (np.all(np.isfinite(p)) and np.all(np.isfinite(q))):
             continue
         if np.array_equal(p, q):
-            pieces.append(p + MARK * per_point * RING)
+            pieces.append(p + _MARK * per_point * RING)
         share = np.linspace(0.0, 1.0, 2 + int(min(np.hypot(*(q - p)) / step, 2000)))
         pieces.append(p + share[:, None] * (q - p))
     return np.concatenate(pieces) if pieces else np.empty((0, 2))
@@ -203,17 +203,17 @@ def _choose_spot(
     away: float,
     half: Point,
     dots: np.ndarray,
-    boxes: list[Box],
+    boxes: list[_Box],
     per_point: float,
     mark: float,
-    inside: Box,
+    inside: _Box,
 ) -> Point:
     """Choose the centre of the label: the candidate that covers least.
 
     Among equal ones the nearest and most outward is taken.
     """
     best, best_cost, edge = point, math.inf, 0.5 * per_point * dots[:, 2]
-    for reach in REACH:
+    for reach in _REACH:
         for k in range(DIRECTIONS):
             angle = away + (k + 1) // 2 * (1 if k % 2 else -1) * math.tau / DIRECTIONS
             cosine, sine = math.cos(angle), math.sin(angle)

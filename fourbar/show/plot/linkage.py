@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
 
 Point = tuple[float, float]
-ON_BAR = 1e-3
+_ON_BAR = 1e-3
 """Part of a bar's length below which a point seems to lie on the bar's line."""
 
 
@@ -104,7 +104,7 @@ def draw_mechanism(
         labels.add(
             Label(
                 axes,
-                write_bar_name(view, number),
+                _write_bar_name(view, number),
                 (0.5 * sum(x), 0.5 * sum(y)),
                 middle,
                 colour,
@@ -195,7 +195,7 @@ def draw_plate(
 
     first, point, last = corners
     along = (point - first) / (last - first)
-    if abs(along.imag) < ON_BAR and -ON_BAR < along.real < 1.0 + ON_BAR:
+    if abs(along.imag) < _ON_BAR and -_ON_BAR < along.real < 1.0 + _ON_BAR:
         return []
     shape, colour = (
         [split_components(corner) for corner in corners],
@@ -253,7 +253,7 @@ def draw_support(axes: "Axes", pin: Point, size: float, labels: Labels) -> None:
         )
 
 
-def write_bar_name(view: View, number: int) -> str:
+def _write_bar_name(view: View, number: int) -> str:
     """Write the number of a bar, with its length where dimensions are wanted."""
     length = write_quantity(view.scene.linkage.lengths[number - 1], "m", view.units)
     return f"{number}: {length}" if view.dimensions else str(number)
@@ -295,7 +295,7 @@ def pin_name(name: str) -> str:
     return f"${name[0]}_{name[1]}$" if len(name) == 2 else f"${name}$"
 
 
-COUPLER_CURVES: tuple[tuple[str, Any], ...] = (
+_COUPLER_CURVES: tuple[tuple[str, Any], ...] = (
     *(
         (colour, "-")
         for colour in ("#0072B2", "#56A0C8", "#D55E00", "#5FA48B", "#007A5A")
@@ -322,7 +322,7 @@ def draw_linkage(
         labels.add(
             Label(
                 axes,
-                write_bar_name(view, 1),
+                _write_bar_name(view, 1),
                 (middle[0], middle[1]),
                 pins["B"],
                 MUTED,
@@ -344,7 +344,7 @@ def draw_linkage(
 def draw_paths(axes: "Axes", view: View, labels: Labels) -> None:
     """Draw what does not move: paths of points, ground line and supports."""
     factor, _, size = scale_of(view)
-    for path, colour, dashes, name in list_paths(view):
+    for path, colour, dashes, name in _list_paths(view):
         scaled = factor * path
         axes.plot(*scaled.T, color=colour, lw=1.0, ls=dashes, zorder=2, label=name)
         labels.keep_off(
@@ -372,7 +372,7 @@ def write_path_legend(axes: "Axes") -> float:
     return pad
 
 
-def list_paths(view: View) -> list[tuple[Array, str, Any, str]]:
+def _list_paths(view: View) -> list[tuple[Array, str, Any, str]]:
     """List paths of A, B, mass centres and the scene's points.
 
     Each is (n, 2) in m, colour, dash, name; the coupler's mid-point stands for a mass
@@ -420,7 +420,7 @@ def draw_coupler_curves(axes: "Axes", view: View, labels: Labels) -> None:
     traced = trace(view)
     for (name, points), (colour, dashes) in zip(
         _list_coupler_points(traced.solution, names),
-        cycle(COUPLER_CURVES),
+        cycle(_COUPLER_CURVES),
         strict=False,
     ):
         lw = 1.8 if name in (*names, "0.5") else 1.1

@@ -17,7 +17,7 @@ from fourbar.solving import solve
 
 STEPS = (1440, 7200, 36_000, 180_000)
 """Steps that are tried until no chord is long, each a multiple of 4."""
-CHORD = 1.0 / 150.0
+_CHORD = 1.0 / 150.0
 """Longest chord of a path, as a part of its extent. No corner is seen in a printed
 figure.
 """
@@ -58,7 +58,7 @@ def trace(view: View) -> Trace:
         at = _list_circuit(view, steps) if circuit else _list_range(view, steps)
         solution = solve(view.scene, "position", at=at)
         followed = [solution.A, solution.B, *solution.points.values()]
-        if all(_longest_chord(points) <= CHORD for points in followed):
+        if all(_longest_chord(points) <= _CHORD for points in followed):
             break
     return Trace(solution, circuit)
 
@@ -99,7 +99,7 @@ def _thin(path: Array) -> Array:
     Gaps and ends stay.
     """
     chords, extent = _measure(path)
-    step = 0.5 * CHORD * extent
+    step = 0.5 * _CHORD * extent
     gap = np.isnan(path).any(axis=1)
     if step == 0.0:
         return path[[0, -1]]

@@ -37,21 +37,21 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import SubFigure
 
-MOST_BANDS = 7
+_MOST_BANDS = 7
 """Torque, four pin forces, and the components of one point; the eighth is for shares.
 """
-MOST_SHARES = 5
+_MOST_SHARES = 5
 """Tolerances that have a colour of their own; the others are drawn together."""
-SHADES = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", FAINT)
-OFF_SCALE = 98.0
+_SHADES = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", FAINT)
+_OFF_SCALE = 98.0
 """Percentile of the half widths beyond which an axis is not stretched. Towards a limit
 they grow without end.
 """
-MOST_NUMBERS = 12
+_MOST_NUMBERS = 12
 """Number of the most influential parameters shown; a chart of more is unreadable."""
-BELOW = 30.0
+_BELOW = 30.0
 """Space that numbers and name of an axis take, typographic points."""
-MOST_PANELS = 6
+_MOST_PANELS = 6
 """Torque, the four pin forces, and a point."""
 
 
@@ -75,7 +75,7 @@ def draw_tolerances(
     with apply_style():
         from matplotlib.figure import Figure
 
-        parts = list_shown_parts(spreads)[:MOST_BANDS]
+        parts = list_shown_parts(spreads)[:_MOST_BANDS]
         columns = (len(parts) + 2) // 2
         figure = Figure(figsize=(2.95 * columns, 5.6), layout="constrained")
         panels = figure.subplots(2, columns, squeeze=False).ravel()
@@ -118,7 +118,7 @@ def _draw_band(axes: "Axes", spreads: Tolerances, part: str, units: Conversion) 
     away = [end - spread.nominal for end in ends]
     sizes = np.abs(np.concatenate([*away, spread.worst]))
     sizes = sizes[np.isfinite(sizes)]
-    most = 1.1 * float(np.percentile(sizes, OFF_SCALE)) if sizes.size else 0.0
+    most = 1.1 * float(np.percentile(sizes, _OFF_SCALE)) if sizes.size else 0.0
     factor, unit = choose_unit(most, find_part_unit(part), units)
     colour = FORCE_COLOURS.get(part.strip("|"), INK)
     axes.fill_between(
@@ -144,18 +144,18 @@ def _draw_shares(
         shares = 100.0 * spread.shares / spread.shares.sum(axis=0)
     order = np.argsort(-np.nan_to_num(shares).sum(axis=1))
     names = [spreads.scene.tolerances[i].key for i in order]
-    rows = [shares[i] for i in order[:MOST_SHARES]]
-    if len(order) > MOST_SHARES:
-        rows.append(shares[order[MOST_SHARES:]].sum(axis=0))
-        names = [*names[:MOST_SHARES], "the others"]
-    axes.stackplot(over, rows, colors=SHADES[: len(rows)], labels=names, lw=0.0)
+    rows = [shares[i] for i in order[:_MOST_SHARES]]
+    if len(order) > _MOST_SHARES:
+        rows.append(shares[order[_MOST_SHARES:]].sum(axis=0))
+        names = [*names[:_MOST_SHARES], "the others"]
+    axes.stackplot(over, rows, colors=_SHADES[: len(rows)], labels=names, lw=0.0)
     axes.set(
         ylim=(0.0, 100.0),
         ylabel="share of the variance (%)",
         title=f"{part}: from which dimension",
     )
     below = offset_copy(
-        axes.transAxes, axes.get_figure(root=True), y=-BELOW, units="points"
+        axes.transAxes, axes.get_figure(root=True), y=-_BELOW, units="points"
     )  # of the axis and its name
     axes.legend(
         loc="upper left",
@@ -169,8 +169,8 @@ def _draw_shares(
 def draw_influences(figure: "SubFigure", shown: View, labels: Labels) -> None:
     """Draw one panel for each quantity over the same rows."""
     derivatives = sensitivity(shown.scene)
-    names = list_shown(derivatives)[:MOST_PANELS]
-    keys = rank_numbers(derivatives, names)[:MOST_NUMBERS][::-1]
+    names = list_shown(derivatives)[:_MOST_PANELS]
+    keys = rank_numbers(derivatives, names)[:_MOST_NUMBERS][::-1]
     panels = figure.subplots(1, len(names), squeeze=False)[0]
     for axes, name in zip(panels, names, strict=True):
         changes = {row.key: abs(row.change) for row in derivatives.influences(name)}

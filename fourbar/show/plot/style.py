@@ -40,7 +40,7 @@ FORCE_DASHES: dict[str, Any] = dict(
         strict=True,
     )
 )
-FORCE_WIDTHS = dict(zip(PIN_FORCES, (2.6, 2.0, 1.6, 1.1), strict=True))
+_FORCE_WIDTHS = dict(zip(PIN_FORCES, (2.6, 2.0, 1.6, 1.1), strict=True))
 """Thick beneath thin: forces that are equal still show all four lines."""
 
 
@@ -49,7 +49,7 @@ def choose_force_line(name: str) -> dict[str, Any]:
     look = {
         "color": FORCE_COLOURS[name],
         "ls": FORCE_DASHES[name],
-        "lw": FORCE_WIDTHS[name],
+        "lw": _FORCE_WIDTHS[name],
     }
     return {**look, "label": write_force_name(name)}
 
@@ -136,7 +136,7 @@ METADATA: dict[str, dict[str, Any]] = {
 """Without a date: the same scene gives the same bytes."""
 
 
-DARK_FORM = b"""<style>
+_DARK_FORM = b"""<style>
 @media (prefers-color-scheme: dark) {
   svg:root { filter: invert(0.92) hue-rotate(180deg) }
 }
@@ -152,7 +152,7 @@ what draws SVG but is no browser does not read it.
 def add_dark_form(svg: bytes) -> bytes:
     """Give an SVG file the form that readers of dark pages see."""
     head, tag, rest = svg.partition(b"<defs>")
-    return head + DARK_FORM + tag + rest
+    return head + _DARK_FORM + tag + rest
 
 
 class Drawing:

@@ -56,7 +56,7 @@ LENGTHS = {"force": 7.0, "moment": 2.6, "drive": 3.2, "flywheel": 4.0, "torsion"
 RING.
 """
 RING = {"viscous": 1.5, "friction": 1.8, "pin_friction": 1.8}
-NAMED_AT = {
+_NAMED_AT = {
     "viscous": -0.4,
     "friction": 0.4,
     "pin_friction": 0.9,
@@ -66,13 +66,13 @@ NAMED_AT = {
 """Angle at which a name stands around its ring, rad. Several names at one pin do not
 meet.
 """
-RING_OF_OTHERS, NAME_OF_OTHERS = 2.1, 1.4
+_RING_OF_OTHERS, _NAME_OF_OTHERS = 2.1, 1.4
 """Ring and name of what acts at pins and is not listed."""
-SMALLEST, SHARE = 0.5, 0.12
+SMALLEST, _SHARE = 0.5, 0.12
 """Least part of its size that a symbol at a pin keeps, and the part of the shortest bar
 there that it may take.
 """
-ARROWS = {"v": ("#0B6E99", "velocity"), "a": ("#B3261E", "acceleration")}
+_ARROWS = {"v": ("#0B6E99", "velocity"), "a": ("#B3261E", "acceleration")}
 LONGEST = 7.0
 """Length of an arrow, in sizes of a support. The largest of the sweep has it; if values
 diverge, all that are as large.
@@ -226,7 +226,7 @@ class Pose(NamedTuple):
         place = ring.index(pin)
         beside = [self.pins[ring[(place + step) % len(ring)]] for step in (-1, 1)]
         shortest = min(abs(pin_beside - self.pins[pin]) for pin_beside in beside)
-        return min(size, max(SMALLEST * size, SHARE * shortest))
+        return min(size, max(SMALLEST * size, _SHARE * shortest))
 
     def point(self, bar: int, z: complex) -> complex:
         """Place a point given in the frame of a bar."""
@@ -242,7 +242,7 @@ class Pose(NamedTuple):
 
 
 @dataclass(slots=True)
-class DrawnSymbol:
+class _DrawnSymbol:
     """Parts of a drawing that one symbol has added."""
 
     artists: list[Any] = field(default_factory=list)
@@ -269,9 +269,9 @@ def place_of(linkage: FourBar, solution: Solution, index: int, factor: float) ->
     return Pose({1: 0.0j, 2: 0.0j, 3: A, 4: O4}, u, pins, factor, angles[2], torque)
 
 
-def draw(axes: "Axes", symbol: Symbol, place: Pose, size: float) -> DrawnSymbol:
+def draw(axes: "Axes", symbol: Symbol, place: Pose, size: float) -> _DrawnSymbol:
     """Draw one symbol at one position; `size` is that of a support."""
-    drawn, colour = DrawnSymbol(text=symbol.name), COLOURS.get(symbol.kind, PIN)
+    drawn, colour = _DrawnSymbol(text=symbol.name), COLOURS.get(symbol.kind, PIN)
     if symbol.kind == "gravity":
         _draw_gravity(axes, symbol, drawn)
     elif symbol.end is not None:
@@ -310,7 +310,7 @@ def draw(axes: "Axes", symbol: Symbol, place: Pose, size: float) -> DrawnSymbol:
     else:
         centre, size = place.pins[symbol.pin], place.small(symbol.pin, size)
         radius = size * (
-            RING.get(symbol.kind) or LENGTHS.get(symbol.kind, RING_OF_OTHERS)
+            RING.get(symbol.kind) or LENGTHS.get(symbol.kind, _RING_OF_OTHERS)
         )
         spiral = symbol.kind == "torsion"
         turned = np.linspace(0.0, (2.5 if spiral else 1.0) * math.tau, 90)
@@ -322,7 +322,7 @@ def draw(axes: "Axes", symbol: Symbol, place: Pose, size: float) -> DrawnSymbol:
             colour,
             2.2 if symbol.kind == "flywheel" else 1.2,
         )
-        drawn.away = cmath.rect(1.0, NAMED_AT.get(symbol.kind, NAME_OF_OTHERS))
+        drawn.away = cmath.rect(1.0, _NAMED_AT.get(symbol.kind, _NAME_OF_OTHERS))
         drawn.label = split_components(centre + radius * drawn.away)
     return drawn
 
@@ -333,7 +333,7 @@ def split_components(z: complex) -> Point:
 
 
 def _draw_line(
-    axes: "Axes", drawn: DrawnSymbol, points: Any, colour: str, width: float
+    axes: "Axes", drawn: _DrawnSymbol, points: Any, colour: str, width: float
 ) -> None:
     x, y = np.real(points), np.imag(points)
     drawn.artists += axes.plot(
@@ -343,7 +343,7 @@ def _draw_line(
 
 
 def _draw_arrow(
-    axes: "Axes", tail: complex, tip: complex, colour: str, drawn: DrawnSymbol
+    axes: "Axes", tail: complex, tip: complex, colour: str, drawn: _DrawnSymbol
 ) -> None:
     from matplotlib.patches import FancyArrowPatch
 
@@ -361,7 +361,7 @@ def _draw_arrow(
 
 
 def _draw_force(
-    axes: "Axes", symbol: Symbol, place: Pose, size: float, drawn: DrawnSymbol
+    axes: "Axes", symbol: Symbol, place: Pose, size: float, drawn: _DrawnSymbol
 ) -> None:
     tail, sign = place.tail(symbol), symbol.sign(place.theta_2)
     if sign == 0.0:
@@ -379,7 +379,7 @@ def _turn(
     radius: float,
     turn: float,
     colour: str,
-    drawn: DrawnSymbol,
+    drawn: _DrawnSymbol,
 ) -> None:
     """Draw an arc with a head, counter-clockwise where turn > 0.
 
@@ -415,7 +415,7 @@ def _draw_zigzag(start: complex, end: complex, width: float) -> Any:
     return np.array([*teeth, start + 0.85 * along, end])
 
 
-def _draw_gravity(axes: "Axes", symbol: Symbol, drawn: DrawnSymbol) -> None:
+def _draw_gravity(axes: "Axes", symbol: Symbol, drawn: _DrawnSymbol) -> None:
     """Draw an arrow in the corner, of no length in the plane."""
     size = abs(symbol.vector)
     if size == 0.0:
@@ -451,7 +451,7 @@ def draw_vectors(
     Returns the function that moves them to another position.
     """
     drawn = []
-    for letter, (colour, label) in ARROWS.items():
+    for letter, (colour, label) in _ARROWS.items():
         sizes = [
             np.hypot(*values.T)
             for values in collect_point_vectors(view.scene, view.sweep, letter).values()

@@ -23,7 +23,7 @@ CLEAR = 0.3
 """Motion and drive condition that the drawn position should have. Next to a pole forces
 dwarf all others.
 """
-LEAD = math.radians(60.0)
+_LEAD = math.radians(60.0)
 """Angle of the drawn position from the start of the longest stretch that assembles,
 rad. In a shorter stretch it is half of the stretch.
 """
@@ -204,7 +204,7 @@ def choose_common_position(scenes: "list[Scene]") -> float | None:
         return None
     sweeps = [solve(scene, at=list_sweep(scene)) for scene in scenes]
     sweeps = [sweep for sweep in sweeps if sweep.assembled.any()]
-    return choose_position(sweeps) if sweeps else None
+    return _choose_position(sweeps) if sweeps else None
 
 
 def describe_change_points(motion: Solution) -> str:
@@ -248,7 +248,7 @@ def make_view(scene: Scene, position: float | None = None) -> View:
     if position is None:
         position = find_drawn_place(scene)
     if position is None:
-        position = choose_position([sweep])
+        position = _choose_position([sweep])
     here = solve(scene, at=command_at(scene, np.array([position])))
     shown = View(scene, sweep, here)
     if not shown.here.assembled[0]:
@@ -290,7 +290,7 @@ def _view_motion(scene: Scene, position: float | None) -> View:
     return shown
 
 
-def choose_position(sweeps: "list[Solution]") -> float:
+def _choose_position(sweeps: "list[Solution]") -> float:
     """Choose a position that shows the bars apart, the same for all sweeps.
 
     It is a well-conditioned one if there is any.
@@ -300,7 +300,7 @@ def choose_position(sweeps: "list[Solution]") -> float:
     ).reshape(-1, 2)
     run = slice(*ends[int(np.argmax(ends[:, 1] - ends[:, 0]))])
     places = sweeps[0].at.places[run]
-    lead = LEAD if sweeps[0].at.stroke is None else math.inf
+    lead = _LEAD if sweeps[0].at.stroke is None else math.inf
     quality = np.full(len(places), np.inf)
     for sweep in sweeps:
         for condition in (sweep.condition, sweep.drive_condition):

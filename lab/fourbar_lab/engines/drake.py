@@ -36,7 +36,7 @@ from fourbar_validation.engines.loaded import Pair
 from fourbar_validation.engines.loop import Exact
 from fourbar_validation.engines.tree import Tree
 
-BY_SPEEDS = JacobianWrtVariable.kV
+_BY_SPEEDS = JacobianWrtVariable.kV
 UP = (0.0, 0.0, 1.0)
 
 
@@ -56,7 +56,7 @@ def find_refusal(scene: Scene) -> str:
     return ""
 
 
-class DrakeTree(Tree):
+class _DrakeTree(Tree):
     """The open tree, built from the description."""
 
     def __init__(self, scene: Scene) -> None:
@@ -112,7 +112,7 @@ class DrakeTree(Tree):
         arguments = (*self.local[name], self.world, self.world)
         return np.asarray(
             self.plant.CalcJacobianTranslationalVelocity(
-                self.context, BY_SPEEDS, *arguments
+                self.context, _BY_SPEEDS, *arguments
             )[:2]
         )
 
@@ -120,9 +120,9 @@ class DrakeTree(Tree):
         """Return the last row of the angular velocity's Jacobian."""
         arguments = (self.body[bar].body_frame(), self.world, self.world)
         return np.array(
-            self.plant.CalcJacobianAngularVelocity(self.context, BY_SPEEDS, *arguments)[
-                2
-            ]
+            self.plant.CalcJacobianAngularVelocity(
+                self.context, _BY_SPEEDS, *arguments
+            )[2]
         )
 
     def set_motion(self, v: Array, a: Array) -> None:
@@ -136,7 +136,7 @@ class DrakeTree(Tree):
     def _accelerate(self, name: str) -> Array:
         arguments = (*self.local[name], self.world, self.world)
         bias = self.plant.CalcBiasTranslationalAcceleration(
-            self.context, BY_SPEEDS, *arguments
+            self.context, _BY_SPEEDS, *arguments
         )
         return np.asarray(self.point_jacobian(name) @ self.a + bias[:2, 0])
 
@@ -187,7 +187,7 @@ class DrakeTree(Tree):
         }
 
 
-DrakeInverse = partial(Exact, "drake-inverse", DrakeTree)
+DrakeInverse = partial(Exact, "drake-inverse", _DrakeTree)
 
 
 def _make_spatial(wrench: Sequence[float]) -> Any:

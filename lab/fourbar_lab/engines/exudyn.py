@@ -53,7 +53,7 @@ from fourbar_validation.engines.loop import Exact
 
 SIZE = 9
 """Coordinates, and constraints."""
-B_ROWS, OTHER_ROWS = [4, 5], [0, 1, 2, 3, 6, 7]
+_B_ROWS, _OTHER_ROWS = [4, 5], [0, 1, 2, 3, 6, 7]
 """Rows of pin B and of the others among the constraints. They are in the order of
 `JOINTS`, the drive last.
 """
@@ -161,7 +161,7 @@ class ExudynBars(Loaded):
         self.state.SetODE2Coordinates(coordinates)
         jacobian, gap = self._read_constraint_jacobian(), self._read_constraint_gap()
         coordinates[self.shifts] = np.linalg.solve(
-            jacobian[OTHER_ROWS][:, self.shifts], -gap[OTHER_ROWS]
+            jacobian[_OTHER_ROWS][:, self.shifts], -gap[_OTHER_ROWS]
         )
         self.state.SetODE2Coordinates(coordinates)
         self.q, self.jacobians = coordinates, jacobian
@@ -185,7 +185,7 @@ class ExudynBars(Loaded):
 
     def gap(self) -> tuple[float, float]:
         """Return B on bar 3 minus B on bar 4, from the constraint of pin B."""
-        x, y = self._read_constraint_gap()[B_ROWS].tolist()
+        x, y = self._read_constraint_gap()[_B_ROWS].tolist()
         return x, y
 
     def jacobian(self) -> Array:
@@ -195,8 +195,8 @@ class ExudynBars(Loaded):
         """
         turns, pins, b = (
             list(self.turn.values()),
-            self.jacobians[OTHER_ROWS],
-            self.jacobians[B_ROWS],
+            self.jacobians[_OTHER_ROWS],
+            self.jacobians[_B_ROWS],
         )
         shifts = np.linalg.solve(pins[:, self.shifts], -pins[:, turns])
         by_angle = b[:, turns] + b[:, self.shifts] @ shifts

@@ -34,7 +34,7 @@ from fourbar_validation.engines.loop import Exact
 
 ZERO = (0.0, 0.0, 0.0)
 """Zero vector."""
-PER_COORDINATE = {
+_PER_COORDINATE = {
     2: np.array([1.0, 0.0, 0.0]),
     3: np.array([0.0, 1.0, 1.0]),
     4: np.array([0.0, 1.0, 0.0]),
@@ -48,7 +48,7 @@ LEAST_CONDITIONED = 1e-11
 """Ratio at which Simbody 4.6 drops a constraint as dependent. Measured: 5e-12 to 7e-12,
 at 1000 positions near limits of 40 linkages.
 """
-TIME_IS_ALPHA = (1.0 / 6.0, 0.0, 0.0, 0.0)
+_TIME_IS_ALPHA = (1.0 / 6.0, 0.0, 0.0, 0.0)
 """Motion t^3/6 prescribed for bar 2 or 4. Its second derivative is the time, set to the
 bar's acceleration.
 """
@@ -76,7 +76,7 @@ def find_refusal(scene: Scene) -> str:
     )
 
 
-class OpenSimBars(Loaded):
+class _OpenSimBars(Loaded):
     """The bars, built from the description."""
 
     own = (
@@ -94,13 +94,13 @@ class OpenSimBars(Loaded):
         linkage = scene.linkage
         self.model = model = osim.Model()
         self.ready(scene, list_acting(scene, self))
-        model.setGravity(make_vec(*self.field))
+        model.setGravity(_make_vec(*self.field))
         self.body = {1: model.getGround()}
         self.part = {part.bar: part for part in list_parts(linkage)}
         for bar, part in self.part.items():
             about_z = osim.Inertia(*[part.inertia] * 3, *ZERO)
             self.body[bar] = osim.Body(
-                f"bar{bar}", part.mass, make_vec(*part.centre), about_z
+                f"bar{bar}", part.mass, _make_vec(*part.centre), about_z
             )
             model.addBody(self.body[bar])
         self.local = {
@@ -122,7 +122,7 @@ class OpenSimBars(Loaded):
             ),
         }
         self.pin_a = osim.PointConstraint(
-            self.body[2], make_vec(self.length[2]), self.body[3], make_vec()
+            self.body[2], _make_vec(self.length[2]), self.body[3], _make_vec()
         )
         self.pin_a.set_isEnforced(
             False
@@ -130,7 +130,7 @@ class OpenSimBars(Loaded):
         model.addConstraint(self.pin_a)
         for pin in TURNING.values():
             self.joint[pin].updCoordinate().setPrescribedFunction(
-                osim.PolynomialFunction(make_vector(TIME_IS_ALPHA))
+                osim.PolynomialFunction(make_vector(_TIME_IS_ALPHA))
             )
             self.joint[pin].updCoordinate().setDefaultIsPrescribed(pin == "O2")
         self.commanded = 2
@@ -159,11 +159,11 @@ class OpenSimBars(Loaded):
         joint = osim.PinJoint(
             name,
             self.body[parent],
-            make_vec(*on_parent),
-            make_vec(),
+            _make_vec(*on_parent),
+            _make_vec(),
             self.body[child],
-            make_vec(*on_child),
-            make_vec(),
+            _make_vec(*on_child),
+            _make_vec(),
         )
         self.model.addJoint(joint)
         return joint
@@ -202,7 +202,7 @@ class OpenSimBars(Loaded):
         bar, place = self.local[name]
         return np.array(
             self.body[bar]
-            .findStationLocationInGround(self.state, make_vec(*place))
+            .findStationLocationInGround(self.state, _make_vec(*place))
             .to_numpy()[:2]
         )
 
@@ -226,7 +226,10 @@ class OpenSimBars(Loaded):
     def _compute_station_jacobian(self, name: str) -> Array:
         (bar, place), matrix = self.local[name], osim.Matrix()
         self.matter.calcStationJacobian(
-            self.state, self.body[bar].getMobilizedBodyIndex(), make_vec(*place), matrix
+            self.state,
+            self.body[bar].getMobilizedBodyIndex(),
+            _make_vec(*place),
+            matrix,
         )
         return np.array(matrix.to_numpy())[:2]
 
@@ -266,7 +269,7 @@ class OpenSimBars(Loaded):
     def _drive_column(self) -> Array:
         """Return the generalized forces of the drive per N m or N, (3,)."""
         if self.force_drive is None:
-            return PER_COORDINATE[self.drive_bar]
+            return _PER_COORDINATE[self.drive_bar]
         rate = sum(
             sense
             * (
@@ -307,7 +310,7 @@ class OpenSimBars(Loaded):
         for name, point in ON_BARS.items():
             bar, place = self.local[point]
             drift = self.matter.calcBiasForStationJacobian(
-                self.state, self.body[bar].getMobilizedBodyIndex(), make_vec(*place)
+                self.state, self.body[bar].getMobilizedBodyIndex(), _make_vec(*place)
             )
             values[f"a_{name}"] = self._compute_station_jacobian(
                 point
@@ -377,7 +380,7 @@ class OpenSimBars(Loaded):
 
     def alpha(self, bar: int) -> float:
         """Read it from the accelerations of the coordinates."""
-        return float(PER_COORDINATE[bar] @ self.a)
+        return float(_PER_COORDINATE[bar] @ self.a)
 
     def _read_reaction(self, pin: str) -> Array:
         return np.array(
@@ -410,11 +413,11 @@ class OpenSimBars(Loaded):
 
 
 OpenSimConstraints = partial(
-    Exact, "opensim-constraints", OpenSimBars, ("theta_2", "theta_4", "stroke")
+    Exact, "opensim-constraints", _OpenSimBars, ("theta_2", "theta_4", "stroke")
 )
 
 
-def make_vec(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Any:
+def _make_vec(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Any:
     """Make a vector of three components."""
     return osim.Vec3(float(x), float(y), float(z))
 

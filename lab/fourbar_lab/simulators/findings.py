@@ -23,7 +23,7 @@ FIELDS = ("Engine", "With", "Expected", "Found", "Since", "Until", "Reported")
 """Fields of a script's docstring, after its first sentence. Engine: the name for pip,
 in brackets what is imported.
 """
-LOOK = (
+_LOOK = (
     "import importlib.metadata, importlib.util as u, sys; u.find_spec({0!r}) or"
     " sys.exit(1)"
 )
@@ -50,10 +50,10 @@ class Reproduction:
 
     def run(self, python: str | Path, seconds: float) -> str:
         """Run the script: "holds", "fixed" or why it could not run."""
-        return read_outcome(run_to_end([python, self.script], seconds=seconds))
+        return _read_outcome(run_to_end([python, self.script], seconds=seconds))
 
 
-def read_outcome(done: Ended) -> str:
+def _read_outcome(done: Ended) -> str:
     """Return what a script's end says; a traceback is no "fixed"."""
     if not done.failed:
         return "holds"
@@ -83,7 +83,7 @@ def find_interpreter(finding: Reproduction) -> tuple[str, str] | None:
     name, module = finding.engine
     for python in _list_interpreters(name):
         look = (
-            f"{LOOK.format(module)}; print(importlib.metadata.version({name!r}),"
+            f"{_LOOK.format(module)}; print(importlib.metadata.version({name!r}),"
             " sys.version.split()[0])"
         )
         done = run_to_end([python, "-c", look])
@@ -110,7 +110,7 @@ def _list_interpreters(name: str) -> Iterator[str]:
                 click.echo(str(error), err=True)
 
 
-def run_findings(
+def _run_findings(
     findings: list[Reproduction], seconds: float
 ) -> list[tuple[Reproduction, str]]:
     """Run each finding where its engine is: what came of it, in words."""
@@ -154,7 +154,7 @@ def command(scripts: tuple[Path, ...], time_limit: float) -> None:
                 str(finding.script),
                 "has no line 'Engine: NAME (MODULE)' in its docstring",
             )
-    outcomes = run_findings(chosen, time_limit)
+    outcomes = _run_findings(chosen, time_limit)
     for finding, state in outcomes:
         click.echo(f"{finding.script.name}: {state}")
     if all(state.startswith("not run") for _, state in outcomes):

@@ -34,11 +34,11 @@ LIGHT = replace(RECIPE, flywheel=30.0)
 keep no digits, and solvers that end at a part of all momentum leave the loop to itself
 beside it.
 """
-LEADS = tuple(np.pi / 2.0**power for power in range(1, 6))
+_LEADS = tuple(np.pi / 2.0**power for power in range(1, 6))
 """Angle by which a run begins before its first position, rad. Where the linkage closes
 there, its closure settles.
 """
-FROM_TOGGLE = 0.1
+_FROM_TOGGLE = 0.1
 """Least |sin(theta_4 - theta_3)| on the way to the first position."""
 
 
@@ -152,7 +152,7 @@ class Simulator:
         setting = f"{self.setting}, {how}"
         try:
             if steps is None:
-                refuse_what_no_simulator_holds(scene, command)
+                _refuse_what_no_simulator_holds(scene, command)
                 readings = self.states(scene)
             else:
                 led, course = lay_out(scene, command, steps)
@@ -198,7 +198,7 @@ class Simulator:
         )
 
 
-def refuse_what_no_simulator_holds(scene: Scene, command: Command) -> None:
+def _refuse_what_no_simulator_holds(scene: Scene, command: Command) -> None:
     """Raise LimitError for a motion other than omega_2 on one branch, and for loads."""
     speed, acceleration = list_speeds(command)
     steady = (
@@ -218,13 +218,13 @@ def lay_out(scene: Scene, command: Command, steps: int) -> tuple[Scene, Course]:
 
     The scene's motion begins before them, so that it settles.
     """
-    refuse_what_no_simulator_holds(scene, command)
+    _refuse_what_no_simulator_holds(scene, command)
     sense = math.copysign(1.0, scene.motion.omega_2 or 0.0)
     first = float((sense * command.theta_2).min()) * sense
     lead = next(
         (
             lead
-            for lead in LEADS
+            for lead in _LEADS
             if _closes(scene, np.linspace(first - sense * lead, first, 50))
         ),
         0.0,
@@ -253,7 +253,7 @@ def _closes(scene: Scene, theta_2: Array) -> bool:
     )
     return bool(
         closed.assembled.all()
-        and np.abs(np.sin(closed.theta[1] - closed.theta[0])).min() > FROM_TOGGLE
+        and np.abs(np.sin(closed.theta[1] - closed.theta[0])).min() > _FROM_TOGGLE
     )
 
 

@@ -26,7 +26,7 @@ from fourbar_validation.engines.loop import Assembler
 from fourbar_validation.engines.mujoco.closed_loop import ClosedLoop, open_model
 from fourbar_validation.engines.mujoco.drives import remove_attributes
 
-BY_DEFAULT = {
+_BY_DEFAULT = {
     "option": ("integrator", "solver", "tolerance", "iterations"),
     "equality/connect": ("solref", "solimp"),
 }
@@ -44,7 +44,7 @@ def text(scene: Scene, steps: int, simulator: str | None, **settings: Any) -> st
         SIMULATORS[reader], timestep=find_timestep(scene, steps), **settings
     )
     written = write_mjcf(scene, changed, reader, start=start(scene))
-    return written if simulator is not None else remove_attributes(written, BY_DEFAULT)
+    return written if simulator is not None else remove_attributes(written, _BY_DEFAULT)
 
 
 def reading(

@@ -26,7 +26,7 @@ from fourbar_validation.engines.mujoco.closed_loop import open_model
 
 NUMBERS = ("body_mass", "body_inertia", "body_ipos", "site_pos", "dof_armature")
 """Fields of a model that change with a bar's length or mass, or with theta_2."""
-ON_GPU = warp.get_preferred_device().is_cuda
+_ON_GPU = warp.get_preferred_device().is_cuda
 
 
 class MujocoWarp(Simulator):
@@ -44,7 +44,7 @@ class MujocoWarp(Simulator):
         "forward once": (1, 1),
         **(
             {f"forward twice, {worlds} worlds": (2, worlds) for worlds in (64, 4096)}
-            if ON_GPU
+            if _ON_GPU
             else {}
         ),
     }
@@ -66,7 +66,7 @@ class MujocoWarp(Simulator):
                 mjw.step(theirs, state)
             warp.synchronize()
 
-        clock = time.perf_counter if ON_GPU else time.process_time
+        clock = time.perf_counter if _ON_GPU else time.process_time
         readings = run_through(
             scene,
             course,

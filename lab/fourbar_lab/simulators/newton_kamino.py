@@ -29,7 +29,7 @@ from fourbar_validation.compare.answer import Array
 from fourbar_validation.engines.description import rotate
 
 TOLERANCES = ("primal_tolerance", "dual_tolerance", "compl_tolerance")
-PARENTS = {"O2": None, "A": 0, "O4": None, "B": 2}
+_PARENTS = {"O2": None, "A": 0, "O4": None, "B": 2}
 """Body on which each joint's axes are fixed, in the order of the joints. None: the
 ground.
 """
@@ -100,7 +100,7 @@ class NewtonKamino(Simulator):
                 .reshape(4, 5)[:, 1:3]
             )
             forces = {}
-            for row, (pin, parent) in zip(rows, PARENTS.items(), strict=True):
+            for row, (pin, parent) in zip(rows, _PARENTS.items(), strict=True):
                 forces[pin] = np.array(
                     rotate(laid[pin] + (0.0 if parent is None else theta[parent]), *row)
                 )

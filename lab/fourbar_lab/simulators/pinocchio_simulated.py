@@ -26,19 +26,19 @@ from fourbar_lab.simulators.motion import (
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.engines.pinocchio import ClosedTree, PinocchioTree, make_step
 
-SOFTNESS_STEPS = 30.0
+_SOFTNESS_STEPS = 30.0
 """Time constant of Baumgarte's stabilisation, in steps of RK4."""
 PROXIMAL = 1e-10
 """Added to the diagonal of the Delassus matrix, as in Pinocchio's example: one of
 its three rows depends on the rest.
 """
-ACCURATE = 1e-10
+_ACCURATE = 1e-10
 """Accuracy asked of the impulse solvers, absolute and relative. It replaces the
 example's 1e-6.
 """
 
 
-class LoopConstrained(ClosedTree):
+class _LoopConstrained(ClosedTree):
     """The same closure solved by lcaba.
 
     It is the loop-constrained articulated body algorithm.
@@ -71,7 +71,7 @@ class LoopConstrained(ClosedTree):
         )
 
 
-class Impulses:
+class _Impulses:
     """A PointAnchorConstraintModel whose impulse over a step ADMM or PGS finds.
 
     Source: Pinocchio 4.1, examples of its ADMM solver.
@@ -101,7 +101,7 @@ class Impulses:
             "absolute_complementarity",
             "relative_complementarity",
         ):
-            setattr(self.settings, f"{kind}_tol", ACCURATE)
+            setattr(self.settings, f"{kind}_tol", _ACCURATE)
 
     def step(self, q: Array, v: Array) -> tuple[Array, Array]:
         """Compute the speeds a step later, and F43 in the mean of the step."""
@@ -148,7 +148,7 @@ class PinocchioSolvers(Simulator):
     )
     settings: ClassVar[dict[str, Any]] = {
         "constraintDynamics": ClosedTree,
-        "lcaba": LoopConstrained,
+        "lcaba": _LoopConstrained,
         "ADMM": "ADMM",
         "PGS": "PGS",
     }
@@ -163,10 +163,10 @@ class PinocchioSolvers(Simulator):
         )
         if isinstance(solver, str):
             return _run_by_impulses(
-                scene, course, Impulses(tree, course.timestep, solver)
+                scene, course, _Impulses(tree, course.timestep, solver)
             )
         q, v, inertia = np.array(begin.qpos), np.array(begin.qvel), size_flywheel(scene)
-        loop = solver(tree, SOFTNESS_STEPS * course.timestep)
+        loop = solver(tree, _SOFTNESS_STEPS * course.timestep)
 
         def advance(steps: int) -> tuple[Array, Array]:
             nonlocal q, v
@@ -196,7 +196,7 @@ class PinocchioSolvers(Simulator):
         if isinstance(solver, str):
             raise LimitError("an impulse solver has no single states")
         tree, readings, inertia = PinocchioTree(scene), Readings(), size_flywheel(scene)
-        loop = solver(tree, SOFTNESS_STEPS * find_timestep(scene, STEPS))
+        loop = solver(tree, _SOFTNESS_STEPS * find_timestep(scene, STEPS))
         tree.model.armature = np.array([inertia, 0.0, 0.0])
         for theta_2 in list_positions(scene).theta_2.tolist():
             state = loop.start(
@@ -207,7 +207,7 @@ class PinocchioSolvers(Simulator):
         return readings
 
 
-def _run_by_impulses(scene: Scene, course: Course, loop: Impulses) -> Readings:
+def _run_by_impulses(scene: Scene, course: Course, loop: _Impulses) -> Readings:
     begin, inertia = start(scene), size_flywheel(scene, LIGHT)
     q, v = np.array(begin.qpos), np.array(begin.qvel)
 

@@ -34,12 +34,12 @@ CONVENTIONS = (
     " be, besides the rounding of its last digit; of a vector, its Euclidean norm. The"
     " rest is the protocol's: docs/protocol.md."
 )
-ARCHIVE = "fourbar-problems-1.0"
+_ARCHIVE = "fourbar-problems-1.0"
 PROMISED = 1e-9
 """Error of a released motion in 5 s, rad. test_free_motion_reference.py holds it;
 beyond them it is in proportion.
 """
-PROMISED_FOR = 5.0
+_PROMISED_FOR = 5.0
 """s."""
 
 
@@ -104,7 +104,7 @@ def _answer_released(solution: Solution) -> tuple[dict[str, Any], dict[str, Any]
         and alpha is not None
         and solution.force_error is not None
     )
-    angle = PROMISED * max(1.0, float(time[-1] - time[0]) / PROMISED_FOR)
+    angle = PROMISED * max(1.0, float(time[-1] - time[0]) / _PROMISED_FOR)
     late, n = angle / float(np.abs(omega).max()), len(time)
     answers: dict[str, Any] = {
         name: getattr(solution, name) for name in ("theta_2", "omega_2", *PIN_FORCES)
@@ -156,7 +156,7 @@ def command(archive: Path | None) -> None:
     """Write the problems of models/problems and their answers as JSON."""
     checkout = find_checkout("problems")
     if archive is not None:
-        write_archive(checkout, archive)
+        _write_archive(checkout, archive)
         click.echo(f"wrote {archive}")
         return
     for name in list_problems():
@@ -166,7 +166,7 @@ def command(archive: Path | None) -> None:
         click.echo(f"wrote {name}.json")
 
 
-def write_archive(checkout: Path, archive: Path) -> None:
+def _write_archive(checkout: Path, archive: Path) -> None:
     """Pack the problems with their page, figures, schema, licence and citation.
 
     The bytes are the same each time.
@@ -185,7 +185,7 @@ def write_archive(checkout: Path, archive: Path) -> None:
     with ZipFile(archive, "w", ZIP_DEFLATED) as packed:
         for file in files:
             entry = ZipInfo(
-                f"{ARCHIVE}/{file.relative_to(checkout)}",
+                f"{_ARCHIVE}/{file.relative_to(checkout)}",
                 date_time=(1980, 1, 1, 0, 0, 0),
             )
             entry.compress_type = ZIP_DEFLATED

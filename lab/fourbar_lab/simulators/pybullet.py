@@ -22,11 +22,11 @@ from fourbar_lab.simulators.motion import (
 )
 from fourbar_validation.engines.description import list_parts, rotate
 
-STRONG = 1e9
+_STRONG = 1e9
 """N and N m that constraint and motor may exert: no limit."""
 
 
-def write_urdf(scene: Scene) -> str:
+def _write_urdf(scene: Scene) -> str:
     """Build the tree: bars 2 and 3 in series, bar 4 on the ground.
 
     Each link's frame lies in its mass centre.
@@ -71,7 +71,7 @@ class PyBullet(Simulator):
         begin = start(scene)
         client = bullet.connect(bullet.DIRECT)
         try:
-            with write_temp(write_urdf(scene), "four_bar.urdf") as file:
+            with write_temp(_write_urdf(scene), "four_bar.urdf") as file:
                 flags = bullet.URDF_USE_INERTIA_FROM_FILE
                 body = bullet.loadURDF(
                     file, useFixedBase=True, flags=flags, physicsClientId=client
@@ -92,7 +92,7 @@ class PyBullet(Simulator):
                 )
                 bullet.enableJointForceTorqueSensor(body, joint, True)
             bullet.changeDynamics(body, -1, linearDamping=0.0, angularDamping=0.0)
-            drive = {"targetVelocity": begin.qvel[0], "force": STRONG}
+            drive = {"targetVelocity": begin.qvel[0], "force": _STRONG}
             bullet.setJointMotorControl2(body, 0, bullet.VELOCITY_CONTROL, **drive)
             _, three, four = list_parts(scene.linkage)
             frames = [
@@ -103,7 +103,7 @@ class PyBullet(Simulator):
             ball = bullet.createConstraint(
                 body, 1, body, 2, bullet.JOINT_POINT2POINT, none, *frames
             )
-            bullet.changeConstraint(ball, maxForce=STRONG)
+            bullet.changeConstraint(ball, maxForce=_STRONG)
 
             def advance(steps: int) -> list[Any]:
                 for _ in range(steps - 1):

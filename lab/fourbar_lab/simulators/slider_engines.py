@@ -38,7 +38,7 @@ class SliderBar(NamedTuple):
     centre: tuple[float, float]
 
 
-class CutLoop(Protocol):
+class _CutLoop(Protocol):
     """Interface of an engine to the tree.
 
     Its joints turn the crank and the rod and move the slider.
@@ -100,7 +100,7 @@ def _direct(size: float, angle: float) -> Array:
     return size * np.array([math.cos(angle), math.sin(angle)])
 
 
-def answer(make: Callable[..., CutLoop], question: dict[str, Any]) -> dict[str, Any]:
+def answer(make: Callable[..., _CutLoop], question: dict[str, Any]) -> dict[str, Any]:
     """Answer the positions of a question."""
     scene, command = question["scene"], question["command"]
     tree = make(*describe(scene))

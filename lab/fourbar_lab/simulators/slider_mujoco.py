@@ -10,12 +10,12 @@ from fourbar_lab.simulators.slider_engines import SliderBar
 from fourbar_validation.compare.answer import Array
 
 VERSION = mujoco.__version__
-NO_INERTIA = 1e-12
+_NO_INERTIA = 1e-12
 """Inertia of the slider, which does not turn, kg m^2. MuJoCo holds no body without any.
 """
 
 
-class MujocoSlider:
+class _MujocoSlider:
     """The tree, with sites at the rod's end and the slider."""
 
     def __init__(
@@ -107,7 +107,7 @@ class MujocoSlider:
 
 def _write_inertial(body: SliderBar) -> str:
     x, y = body.centre
-    inertia = body.inertia or NO_INERTIA
+    inertia = body.inertia or _NO_INERTIA
     return (
         f'<inertial pos="{x!r} {y!r} 0" mass="{body.mass!r}"'
         f' diaginertia="{inertia!r} {inertia!r} {inertia!r}"/>'

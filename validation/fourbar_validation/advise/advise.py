@@ -55,24 +55,24 @@ MARGIN = 0.7
 """Part of the required error within which the run must stay. Elsewhere the error may be
 larger.
 """
-CLOSE_ENOUGH = 1.15
+_CLOSE_ENOUGH = 1.15
 """Ratio at which the search stops. It is that of the least steps that serve to the most
 that do not.
 """
 BETWEEN = 180
 """Intervals of the sweep at which a run is read at least."""
-MOST_TRIALS = 24
+_MOST_TRIALS = 24
 MOST_STEPS = 16_000
 """Most steps of one run, a fifth of a second. An error that needs more steps counts as
 not reachable.
 """
 ROBOTS = (".xml", ".mjcf")
 """Suffixes of a robot's file."""
-LEAST_GAIN = 0.8
+_LEAST_GAIN = 0.8
 """More steps that leave the error above this part of what it was have met a floor."""
 ROUNDS, TIMED_STEPS, TIMED_READINGS = 5, 200, 30
 """Timings of each kind of step, and what is timed at once."""
-CHEAPER = 0.97
+_CHEAPER = 0.97
 """Part of the work below which a kind of step counts as cheaper. Less is the noise of
 its timing.
 """
@@ -139,7 +139,7 @@ class Attempt:
 
 
 @dataclass(frozen=True, slots=True)
-class Advice:
+class _Advice:
     """Settings that reach a required error, or the most accurate ones tried."""
 
     required: float
@@ -187,7 +187,7 @@ class Advice:
         )
 
 
-def advise(scene: Scene, error: float, setup: TrialSetup | None = None) -> Advice:
+def advise(scene: Scene, error: float, setup: TrialSetup | None = None) -> _Advice:
     """Search the number of steps, and the time constant, by runs of the scene.
 
     The time constant is searched around what the law says.
@@ -227,7 +227,7 @@ class _CheapestSearch:
         self.reading_cost = 0.0
         """CPU time of a reading, in steps as those of `Attempt.step_cost`."""
 
-    def advice(self) -> Advice:
+    def advice(self) -> _Advice:
         """Find the cheapest that serves.
 
         By bisection in steps, then with shorter and longer time constants, then by
@@ -243,7 +243,7 @@ class _CheapestSearch:
             self._try_kinds()
         served = self._list_served()
         best = min(served, key=self._work) if served else _find_nearest(self.attempts)
-        return Advice(self.error, best, tuple(self.attempts), bool(served))
+        return _Advice(self.error, best, tuple(self.attempts), bool(served))
 
     def _work(self, attempt: Attempt) -> float:
         """Return the CPU time of a run with its readings, in steps."""
@@ -259,21 +259,21 @@ class _CheapestSearch:
         costs = self._time_kinds(settings)
         for name in sorted(KINDS, key=costs.__getitem__):
             cheapest = min(map(self._work, self._list_served()))
-            left = CHEAPER * cheapest - start.readings * self.reading_cost
+            left = _CHEAPER * cheapest - start.readings * self.reading_cost
             part = left / (costs[name] * start.steps)
             # with fewer steps than positions each step has a reading
             both = costs[name] + self.reading_cost
-            part = max(part, CHEAPER * cheapest / (both * start.steps))
+            part = max(part, _CHEAPER * cheapest / (both * start.steps))
             if name not in FIRST_ORDER:
                 # of the same order: what serves needs no fewer steps by much
                 part = min(part, 1.0)
             n = settings.steps_per_revolution * part
             tc = settings.time_constant_steps
-            if n < FEWEST_STEPS or part < 1.0 / CLOSE_ENOUGH:
+            if n < FEWEST_STEPS or part < 1.0 / _CLOSE_ENOUGH:
                 continue
             kind, cost = KINDS[name], costs[name]
             if self._serves(self._try(n, tc, kind, cost)):
-                self._bisect(tc, n / CLOSE_ENOUGH, serves=n, kind=kind, cost=cost)
+                self._bisect(tc, n / _CLOSE_ENOUGH, serves=n, kind=kind, cost=cost)
 
     def _time_kinds(self, settings: Settings) -> dict[str, float]:
         """Time a step of each kind, and a reading, in steps of the settings.
@@ -302,9 +302,9 @@ class _CheapestSearch:
             self._bisect(tc, _find_nearest(self.attempts).settings.steps_per_revolution)
             return
         fewest = min(served, key=lambda a: (a.steps, a.errors.worst))
-        n = fewest.settings.steps_per_revolution / CLOSE_ENOUGH
+        n = fewest.settings.steps_per_revolution / _CLOSE_ENOUGH
         if n >= FEWEST_STEPS and self._serves(self._try(n, tc)):
-            self._bisect(tc, n / CLOSE_ENOUGH, serves=n)
+            self._bisect(tc, n / _CLOSE_ENOUGH, serves=n)
 
     def _bisect(
         self,
@@ -317,13 +317,13 @@ class _CheapestSearch:
         """Narrow down the least steps per revolution at one time constant."""
         fails: float | None = None
         last: Attempt | None = None
-        for _ in range(MOST_TRIALS):
+        for _ in range(_MOST_TRIALS):
             attempt = self._try(n, tc, kind, cost)
             ratio = attempt.errors.worst / (MARGIN * self.error)
             step = ratio ** (1.0 / ORDER) if ratio < float("inf") else 2.0
             if self._serves(attempt):
                 serves = n
-                ahead = n * min(max(step, 0.4), 1.0 / CLOSE_ENOUGH)
+                ahead = n * min(max(step, 0.4), 1.0 / _CLOSE_ENOUGH)
             else:
                 if (
                     last is not None
@@ -332,11 +332,11 @@ class _CheapestSearch:
                 ):
                     return
                 fails, last = n, attempt
-                ahead = n * min(max(step, CLOSE_ENOUGH), 3.0)
+                ahead = n * min(max(step, _CLOSE_ENOUGH), 3.0)
                 if attempt.steps >= MOST_STEPS:
                     return
             if serves is not None and fails is not None:
-                if serves / fails <= CLOSE_ENOUGH:
+                if serves / fails <= _CLOSE_ENOUGH:
                     return
                 ahead = (serves * fails) ** 0.5
             if serves is not None and serves <= FEWEST_STEPS:
@@ -348,7 +348,7 @@ class _CheapestSearch:
         worst = after.errors.worst
         return (
             worst < 1e-2
-            and worst > LEAST_GAIN * before.errors.worst
+            and worst > _LEAST_GAIN * before.errors.worst
             and after.steps > 1.3 * before.steps
         )
 
@@ -395,7 +395,7 @@ def _find_nearest(attempts: Sequence[Attempt]) -> Attempt:
     return min(attempts, key=lambda a: a.errors.worst)
 
 
-def advise_robot(
+def _advise_robot(
     files: tuple[Path, ...], options: MeasureOptions, assets: Path | None
 ) -> int:
     """Print what to type into a robot's file for an error; return the exit status."""
@@ -457,7 +457,7 @@ def command(
         if output is not None or len(scenes) > 2:
             raise click.UsageError("of a robot: [SCENE] FILE.xml, without -o")
         options = read_measure_options(loop, wanted, robot)
-        return advise_robot(scenes, options, robot["assets"])
+        return _advise_robot(scenes, options, robot["assets"])
     if loop or any(robot.values()):
         raise click.UsageError("the options of a robot need a FILE.xml")
     from fourbar.files import load

@@ -31,7 +31,7 @@ MATTERS = 2.0
 """Growth of the error below which a setting does not matter. The setting is changed by
 a factor of two, or lost.
 """
-SPLINE = 7
+_SPLINE = 7
 """Degree of the curve through what was read at the steps. Its error falls faster with
 the steps than that of RK4.
 """
@@ -39,7 +39,7 @@ IN_LINE = 0.3
 """Least |sin(theta_4 - theta_3)| at which the timestep does not feel bars 3 and 4.
 Below it they speed up too much.
 """
-MUJOCO_TOLERANCE = 1e-8
+_MUJOCO_TOLERANCE = 1e-8
 """MuJoCo's own default."""
 
 
@@ -80,11 +80,11 @@ def judge_trial(scene: Scene, trial: Trial) -> WorstErrors:
         return NO_ANSWER
     errors = [compute_errors(scene, trial.at, trial.quantities)]
     for samples, steps in trial.segments:
-        errors += compute_errors_between(scene, trial, samples, steps)
+        errors += _compute_errors_between(scene, trial, samples, steps)
     return WorstErrors(*map(max, zip(*errors, strict=True)))
 
 
-def compute_errors_between(
+def _compute_errors_between(
     scene: Scene, trial: Trial, samples: slice, steps: int
 ) -> Iterator[WorstErrors]:
     """Compute errors between the steps of a segment, by a spline.
@@ -149,7 +149,7 @@ def _compute_stretch(
     """Compute errors at some places of the splines through what was read."""
     from scipy.interpolate import make_interp_spline
 
-    degree = min(SPLINE, len(theta_2) - 1)
+    degree = min(_SPLINE, len(theta_2) - 1)
     curves = {
         name: make_interp_spline(theta_2, values, degree)(places)
         for name, values in read.items()
@@ -238,10 +238,10 @@ def _describe_changes(
             lambda *_: _find_yielding(scene, "without pads the closure"),
         )
     if settings.tolerance == 0.0:
-        loose = replace(settings, tolerance=MUJOCO_TOLERANCE)
+        loose = replace(settings, tolerance=_MUJOCO_TOLERANCE)
         yield (
             "the solver's tolerance",
-            f"at MuJoCo's own {MUJOCO_TOLERANCE:g}",
+            f"at MuJoCo's own {_MUJOCO_TOLERANCE:g}",
             loose,
             lambda *_: (
                 "MuJoCo divides it by the inertia of the flywheel, next to which the"

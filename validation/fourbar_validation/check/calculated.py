@@ -32,7 +32,7 @@ Values = dict[str, Array]
 """Numbers that a mistake leads to, by quantity; others stay right."""
 PAIRS = {"F12": (1, 2), "F32": (3, 2), "F43": (4, 3), "F14": (1, 4)}
 """Bar that exerts each pin force, and bar on which it acts."""
-CHAINS = {"B": ((2, 3), (4,)), "A": ((2,), (4, 3)), "O4": ((2, 3, 4),)}
+_CHAINS = {"B": ((2, 3), (4,)), "A": ((2,), (4, 3)), "O4": ((2, 3, 4),)}
 """Pins at which a loop is cut into a tree, the commonest first: the chains of bars that
 are left, each from the ground on.
 """
@@ -44,14 +44,14 @@ MuJoCo's inverse dynamics of a loop; 2e-8 was seen.
 """
 
 
-LATE = {
+_LATE = {
     "one step late: numbers of the position before": 1,
     "one step early: numbers of the position after": -1,
 }
 """Mistakes in time, and by how many positions the numbers are late."""
 
 
-class BarWrenches(NamedTuple):
+class _BarWrenches(NamedTuple):
     """Bars at n positions, and what their pins and the drive must give them."""
 
     arms: dict[int, Array]
@@ -65,7 +65,7 @@ class BarWrenches(NamedTuple):
 
     def changed(
         self, bar: int, p: Array | float = 0.0, q: Array | float = 0.0
-    ) -> "BarWrenches":
+    ) -> "_BarWrenches":
         """Return the wrenches with more force and moment needed by one bar."""
         return self._replace(
             p={**self.p, bar: self.p[bar] + p}, q={**self.q, bar: self.q[bar] + q}
@@ -130,7 +130,7 @@ class BarWrenches(NamedTuple):
         A = self.bars[2]
         B = A + self.bars[3]
         first_pins = {2: np.zeros_like(A), 3: A, 4: B - self.bars[4]}
-        chain = next(chain for chain in CHAINS[pin] if self.drive_bar in chain)
+        chain = next(chain for chain in _CHAINS[pin] if self.drive_bar in chain)
         place = chain.index(self.drive_bar)
         joint = first_pins[self.drive_bar]
         if (pin, self.drive_bar) in (("A", 3), ("O4", 4)):
@@ -147,7 +147,7 @@ def cross(u: Array, v: Array) -> Array:
     return np.asarray(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
 
 
-def turn_by_quarter(v: Array) -> Array:
+def _turn_by_quarter(v: Array) -> Array:
     """Turn vectors, (n, 2), by 90 deg."""
     return np.stack((-v[:, 1], v[:, 0]), axis=1)
 
@@ -159,7 +159,7 @@ def turn(v: Array, angle: Array) -> Array:
     return np.stack((cosine * x - sine * y, sine * x + cosine * y), axis=1)
 
 
-def find_wrenches(scene: Scene, right: Solution) -> BarWrenches:
+def find_wrenches(scene: Scene, right: Solution) -> _BarWrenches:
     """Compute what each bar needs of its pins, from the right forces."""
     theta_1 = scene.linkage.ground_angle
     O4 = scene.linkage.ground * np.array([[np.cos(theta_1), np.sin(theta_1)]])
@@ -176,15 +176,15 @@ def find_wrenches(scene: Scene, right: Solution) -> BarWrenches:
         p[bar] = at_first + at_second
         q[bar] = cross(first[bar] - G, at_first) + cross(second[bar] - G, at_second)
     q[scene.drive_bar] = q[scene.drive_bar] + np.asarray(right.torque)
-    return BarWrenches(arms, bars, p, q, scene.drive_bar)
+    return _BarWrenches(arms, bars, p, q, scene.drive_bar)
 
 
 @dataclass(frozen=True)
-class Calculation:
+class _Calculation:
     """A judge's right numbers, as wrenches of free bodies."""
 
     judge: Judge
-    wrenches: BarWrenches
+    wrenches: _BarWrenches
 
     @property
     def right(self) -> Solution:
@@ -202,7 +202,7 @@ class Calculation:
         yield from self._arms_of_loads()
 
     def _open_tree(self) -> Iterator[Mistake]:
-        trees = {pin: self.wrenches.cut(pin) for pin in CHAINS}
+        trees = {pin: self.wrenches.cut(pin) for pin in _CHAINS}
         how = "the loop force is 0, as from mj_inverse or rnea of a loop"
         for pin, values in trees.items():
             text = f"forces and torque of the open tree, cut at {pin}: {how}"
@@ -255,7 +255,7 @@ class Calculation:
         for bar in (3, 4):
             alpha = gain * getattr(right, f"omega_{bar}")
             more = alpha - getattr(right, f"alpha_{bar}")
-            a = more[:, None] * turn_by_quarter(wrenches.arms[bar])
+            a = more[:, None] * _turn_by_quarter(wrenches.arms[bar])
             wrenches, a_G = self._accelerate(wrenches, bar, a, more)
             moved |= {f"alpha_{bar}": alpha, **a_G}
         text = "(dJ/dt) v is missing in the accelerations of the loop"
@@ -272,7 +272,7 @@ class Calculation:
             )
             arm = self.wrenches.arms[bar]
             centripetal[bar] = -(omega**2)[:, None] * arm
-            tangential[bar] = alpha[:, None] * turn_by_quarter(arm)
+            tangential[bar] = alpha[:, None] * _turn_by_quarter(arm)
         parts = {
             "-omega^2 r is missing in a_G": (centripetal, -1.0),
             "-omega^2 r has the wrong sign in a_G": (centripetal, -2.0),
@@ -293,8 +293,8 @@ class Calculation:
             yield from _state_with_forces(text, moved, wrenches)
 
     def _accelerate(
-        self, wrenches: BarWrenches, bar: int, a: Array, alpha: Array | float = 0.0
-    ) -> tuple[BarWrenches, Values]:
+        self, wrenches: _BarWrenches, bar: int, a: Array, alpha: Array | float = 0.0
+    ) -> tuple[_BarWrenches, Values]:
         """Return the wrenches and a_G of a bar under an added acceleration.
 
         `a` and `alpha` are added to its acceleration.
@@ -361,7 +361,7 @@ def find_miscalculated(judge: Judge) -> Iterator[Mistake]:
         with np.errstate(all="ignore"), suppress(FourBarError):
             # a scene without one of its loads may be none
             wrenches = find_wrenches(scene, judge.right)
-            mistakes.extend(Calculation(judge, wrenches).mistakes())
+            mistakes.extend(_Calculation(judge, wrenches).mistakes())
         yield from mistakes
     if judge.stage == "force":
         yield from _find_impulses(judge)
@@ -379,7 +379,7 @@ def _state(
 
 
 def _state_with_forces(
-    text: str, moved: Values, wrenches: BarWrenches
+    text: str, moved: Values, wrenches: _BarWrenches
 ) -> Iterator[Mistake]:
     """State a mistake in accelerations.
 
@@ -425,7 +425,7 @@ def _find_late(judge: Judge) -> Iterator[Mistake]:
     if n < ENOUGH + 1:
         return
     of_forces: Callable[[str], bool] = (*FORCES, *PIN_FORCES).__contains__
-    for text, step in LATE.items():
+    for text, step in _LATE.items():
         rows = np.clip(np.arange(n) - step, 0, n - 1)
         edge = 0 if step == 1 else n - 1
         for what, applies in (("", bool), (" (forces alone)", of_forces)):

@@ -106,7 +106,7 @@ class Judgement:
                 if finding.quantity == quantity and finding.judged
             ]
             if allowed:
-                digits = count_digits(max(allowed))
+                digits = _count_digits(max(allowed))
                 fewest.setdefault(digits, []).append(quantity)
         if len(fewest) == 1:
             (digits,) = fewest
@@ -126,12 +126,12 @@ class Judgement:
         return explained >= {finding.quantity for finding in self.differing}
 
 
-def count_digits(allowed: float) -> int:
+def _count_digits(allowed: float) -> int:
     """Count the digits that an allowed relative error leaves to compare by."""
     return max(0, math.floor(-math.log10(max(allowed, EPS))))
 
 
-def require_information(judge: Judge) -> None:
+def _require_information(judge: Judge) -> None:
     """Refuse a column that is printed so coarsely that every number would agree."""
     for key in judge.table.values:
         mask = judge.where(key)
@@ -162,7 +162,7 @@ def judge_table(
     to it too.
     """
     judge = Judge(scene, table, tolerance)
-    require_information(judge)
+    _require_information(judge)
     findings = judge.findings()
     differing_quantities = {
         finding.quantity
@@ -263,7 +263,7 @@ def _list_cases(judgement: Judgement, name: str) -> Iterator[JunitCase]:
 SHOWN = 3
 
 
-def write_extent(explanation: Explanation) -> str:
+def _write_extent(explanation: Explanation) -> str:
     """Write how far a mistake explains what differs."""
     if explanation.complete:
         return "explains everything that differs: " + ", ".join(explanation.quantities)
@@ -386,11 +386,11 @@ def show(judgement: Judgement, table: TheirTable, name: str) -> None:
             (
                 str(each.line),
                 f"{math.degrees(each.theta_2):.7g}",
-                *write_in_their_unit(each, table),
+                *_write_in_their_unit(each, table),
                 f"{each.error:.1e}",
                 f"{each.allowed:.1e}",
             )
-            for each in choose_worst(differing)
+            for each in _choose_worst(differing)
         ]
         console.print(
             make_table(head, rows, title=title, show_edge=False, padding=(0, 1, 0, 0))
@@ -407,7 +407,7 @@ def show(judgement: Judgement, table: TheirTable, name: str) -> None:
         )
     for explanation in judgement.explanations:
         console.print(
-            f"looks like: {escape(explanation.text)} ({write_extent(explanation)})"
+            f"looks like: {escape(explanation.text)} ({_write_extent(explanation)})"
         )
     if differing and not any(
         explanation.complete for explanation in judgement.explanations
@@ -421,7 +421,7 @@ def show(judgement: Judgement, table: TheirTable, name: str) -> None:
     console.print(f"[bold]{judgement.sentence()}[/]")
 
 
-def choose_worst(differing: list[Discrepancy]) -> list[Discrepancy]:
+def _choose_worst(differing: list[Discrepancy]) -> list[Discrepancy]:
     """Choose the largest differences of each quantity, the worst quantity first."""
     by_quantity: dict[str, list[Discrepancy]] = {}
     for finding in sorted(differing, key=lambda f: -f.error):
@@ -431,7 +431,7 @@ def choose_worst(differing: list[Discrepancy]) -> list[Discrepancy]:
     ]
 
 
-def write_in_their_unit(finding: Discrepancy, table: TheirTable) -> tuple[str, ...]:
+def _write_in_their_unit(finding: Discrepancy, table: TheirTable) -> tuple[str, ...]:
     """Write the quantity with the unit of their column, and both numbers in it.
 
     They have the digits that set them apart.

@@ -17,17 +17,17 @@ from fourbar_validation.engines.description import ModelEntry, Value
 
 SAME = 1e-12
 """Relative difference of a number that is computed in another order of operations."""
-SAME_SOFTNESS = 1e-9
+_SAME_SOFTNESS = 1e-9
 """Relative difference that is round-off. It follows from the places of both bodies in
 the world, which cost digits.
 """
-TENFOLD = 1e-9
+_TENFOLD = 1e-9
 """Relative distance from a power of ten at which a ratio is called one."""
 ONE_SIDED = ("loads.", "tendons.", "actuators.")
 """Entries that a file may lack: what is missing on one side is a difference."""
 NOTHING: dict[str, Value] = {".force": (0.0, 0.0), ".couple": 0.0}
 """Value of a load that is missing."""
-REMARKS = tomllib.loads(
+_REMARKS = tomllib.loads(
     Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
 )["remarks"]
 """Part of a key, and what a difference there does; the first that fits."""
@@ -187,7 +187,7 @@ def _is_same(key: str, ours: Value | None, theirs: Value | None, length: float) 
         )
     placed = any(part in key for part in ("centre", "plane", ".point", ".path"))
     floor = length if placed else 1.0 if key.startswith(("gravity", "loads")) else 0.0
-    same = SAME_SOFTNESS if key == "closure.softness" else SAME
+    same = _SAME_SOFTNESS if key == "closure.softness" else SAME
     return bool(
         np.all(
             np.abs(first - second)
@@ -197,13 +197,13 @@ def _is_same(key: str, ours: Value | None, theirs: Value | None, length: float) 
 
 
 def _remark(key: str, ours: Value | None, theirs: Value | None) -> str:
-    remark = next((text for part, text in REMARKS.items() if part in key), "")
+    remark = next((text for part, text in _REMARKS.items() if part in key), "")
     if isinstance(ours, float) and isinstance(theirs, float) and ours * theirs > 0.0:
         power = math.log10(abs(theirs)) - math.log10(abs(ours))
         if (
             not key.startswith("option")
             and round(power)
-            and abs(power - round(power)) <= TENFOLD
+            and abs(power - round(power)) <= _TENFOLD
         ):
             return f"10^{round(power)} times: units? {remark}"
     return str(remark)

@@ -32,7 +32,7 @@ CARRIED = 2.0
 """Factor on what is allowed. A fitted number carries the rounding of the numbers it was
 fitted to.
 """
-FACTORS = {
+_FACTORS = {
     0.5: "halved",
     2.0: "doubled",
     1e4: "in kg cm^2 taken for kg m^2",
@@ -48,7 +48,7 @@ PLAIN = 1e-2
 """Relative distance within which a fitted number is tried as a plain one."""
 GRID = 72
 """Offsets of the crank angle that are tried before one is fitted, 5 deg apart."""
-TRIED = 37
+_TRIED = 37
 """Rows by which the offsets are tried."""
 NEWTON = 12
 """Steps of the fit; it is quadratic, and starts within 5 deg."""
@@ -220,13 +220,15 @@ def _try_factors(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
             if not VANISHING < factor < math.inf or factor == 1.0:
                 continue
             plain = (
-                next((f for f in FACTORS if abs(factor / f - 1.0) < PLAIN), None)
+                next((f for f in _FACTORS if abs(factor / f - 1.0) < PLAIN), None)
                 if word == inertia[0]
                 else None
             )
             for f in (factor,) if plain is None else (plain, factor):
                 wrong = solve(scaled(f), "force", at=judge.at)
-                what = f"{FACTORS[f]}" if f == plain else f"{f:.6g} times ours (fitted)"
+                what = (
+                    f"{_FACTORS[f]}" if f == plain else f"{f:.6g} times ours (fitted)"
+                )
                 yield Mistake(
                     f"{name} {what}",
                     lambda quantity, right, wrong=wrong: getattr(wrong, quantity, None),  # type: ignore[misc]
@@ -278,7 +280,7 @@ def _try_offset(judge: Judge) -> Iterator[Mistake]:
     """
     keys = [key for key in judge.table.values if judge.size(key).any()]
     rows = np.unique(
-        np.linspace(0, len(judge.at.theta_2) - 1, TRIED).round().astype(int)
+        np.linspace(0, len(judge.at.theta_2) - 1, _TRIED).round().astype(int)
     )
 
     def residuals(offsets: Array, rows: NDArray[np.int_]) -> Array:

@@ -33,8 +33,8 @@ from fourbar_validation.compare.tolerance import (
 
 Mask = NDArray[np.bool_]
 
-OWN_MOTION = ("omega_2", "alpha_2")
-AS_PRINTED = 4.0 * EPS
+_OWN_MOTION = ("omega_2", "alpha_2")
+_AS_PRINTED = 4.0 * EPS
 """Relative difference of a position that went to degrees and back."""
 
 
@@ -103,7 +103,7 @@ class Judge:
         self.scene, self.tolerance = scene, tolerance
         self.at = make_command(scene, table) if at is None else at
         moves_itself = at is None and _moves_itself(scene, table)
-        command_names = OWN_MOTION if moves_itself else ()
+        command_names = _OWN_MOTION if moves_itself else ()
         self.table = replace(
             table,
             values={
@@ -291,7 +291,7 @@ def make_command(scene: Scene, table: TheirTable) -> Command:
         )
     theta_2 = table.theta_2
     if base.theta_2.shape == theta_2.shape and np.allclose(
-        base.theta_2, theta_2, rtol=AS_PRINTED, atol=0.0
+        base.theta_2, theta_2, rtol=_AS_PRINTED, atol=0.0
     ):
         return base
     if scene.motion.law is not None:

@@ -26,7 +26,7 @@ from fourbar_validation.scenes.hard_families import list_moving, replace_bars
 
 RPM = np.pi / 30.0
 """rad/s of one rev/min."""
-GRAVITY_TURNED = {
+_GRAVITY_TURNED = {
     "reversed": np.pi,
     "turned by 90 deg": np.pi / 2.0,
     "turned by -90 deg": -np.pi / 2.0,
@@ -42,7 +42,7 @@ brings every row that differs nearer.
 
 def list_hypotheses(scene: Scene, command: Command) -> Iterator[Mistake]:
     """List every mistake that can be made on this scene, the simplest first."""
-    for text, change, applies in COLUMN_MISTAKES:
+    for text, change, applies in _COLUMN_MISTAKES:
         yield Mistake(text, partial(_change_column, change, applies), whole=False)
     for bar in (2, 3):
         yield Mistake(
@@ -199,7 +199,7 @@ def _change_gravity(scene: Scene) -> Iterator[tuple[str, Scene]]:
         )
         return
     yield "gravity is missing", replace(scene, effects=others)
-    for text, angle in GRAVITY_TURNED.items():
+    for text, angle in _GRAVITY_TURNED.items():
         turned = (replace(effect, angle=effect.angle + angle) for effect in gravity)
         yield f"gravity is {text}", replace(scene, effects=(*others, *turned))
 
@@ -238,10 +238,10 @@ def _change_loads(scene: Scene) -> Iterator[tuple[str, Scene]]:
 
 def _change_bars(scene: Scene) -> Iterator[tuple[str, Scene]]:
     for name, bar in list_moving(scene):
-        for text, change in BAR_MISTAKES:
+        for text, change in _BAR_MISTAKES:
             if (changed := change(bar)) is not None:
                 yield f"{name}: {text}", replace_bars(scene, **{name: changed})
-    for text, change in BAR_MISTAKES:
+    for text, change in _BAR_MISTAKES:
         changed_bars = {}
         for name, bar in list_moving(scene):
             if (changed := change(bar)) is not None:
@@ -275,7 +275,7 @@ def _mirror(bar: Bar) -> Bar | None:
     return replace(bar, centre=(r, -phi)) if bar.mass and r and np.sin(phi) else None
 
 
-BAR_MISTAKES: tuple[tuple[str, Callable[[Bar], Bar | None]], ...] = (
+_BAR_MISTAKES: tuple[tuple[str, Callable[[Bar], Bar | None]], ...] = (
     ("mass centre measured from the wrong pin", _measure_from_other_pin),
     (
         "mass centre taken at mid-bar",
@@ -308,7 +308,7 @@ def _is_angle(quantity: str) -> bool:
     return quantity.startswith("theta")
 
 
-COLUMN_MISTAKES: tuple[
+_COLUMN_MISTAKES: tuple[
     tuple[str, Callable[[Array], Array], Callable[[str], bool]], ...
 ] = (
     ("sign reversed, or F_ij given for F_ji", np.negative, lambda quantity: True),

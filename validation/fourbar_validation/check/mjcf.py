@@ -65,14 +65,14 @@ from fourbar_validation.robots.options import (
 from fourbar_validation.robots.report import report_measurement
 from fourbar_validation.scenes.suites import read_scene_files
 
-ABOUT_COSTS = (
+_ABOUT_COSTS = (
     "cost: what this one entry adds to the error of the file itself, if it is a"
     " setting, a weld, contacts, a range or a motor; of the others what it adds, as in"
     " the file, to the error of the generated one. Of torque and pin forces the one"
     " that grows most. A dash: this entry cannot be set by itself, or the file holds"
     " what it is held to"
 )
-ADVICE = (
+_ADVICE = (
     "What to type into the file for an error E, if its settings are the cause: "
     "fourbar-validation advise SCENE FILE.xml --error E"
 )
@@ -81,16 +81,18 @@ JUDGED = tuple(name for name in UNKNOWNS if name not in ("alpha_3", "alpha_4"))
 for an instant; what that does to the torque and the pin forces is judged there.
 """
 HEADINGS = ("quantity", "theirs", "generated", "allowed", "verdict")
-EXAMINE = "fourbar_validation.engines.mujoco.theirs:examine"
-CHANGED = "fourbar_validation.engines.mujoco.theirs:examine_changed"
-MENDED = "fourbar_validation.engines.mujoco.theirs:examine_mended"
+_EXAMINE = "fourbar_validation.engines.mujoco.theirs:examine"
+_CHANGED = "fourbar_validation.engines.mujoco.theirs:examine_changed"
+_MENDED = "fourbar_validation.engines.mujoco.theirs:examine_mended"
 SOFTNESS = "fourbar_validation.engines.mujoco.theirs:predict_softness"
-BY_STIFFEST = "as what MuJoCo's stiffest constraint (solimp 0.9999) leaves in this file"
+_BY_STIFFEST = (
+    "as what MuJoCo's stiffest constraint (solimp 0.9999) leaves in this file"
+)
 """Method by which the error of a file is predicted that nobody holds to another."""
 
 
 @dataclass(frozen=True, slots=True)
-class CostOfModel:
+class _CostOfModel:
     """One quantity by one method: the error of their file, and of the generated one."""
 
     row: Row
@@ -122,7 +124,7 @@ class ModelReport:
 
     differences: list[Difference]
     """Differences, the dearest first."""
-    costs: list[CostOfModel]
+    costs: list[_CostOfModel]
     notes: list[str]
 
     def methods(self) -> list[str]:
@@ -161,7 +163,7 @@ class ModelReport:
                 f"stiffest (solimp 0.9999) leaves {left} of {softest.quantity} in it."
             )
         if self.counts[FAILS]:
-            yield ADVICE
+            yield _ADVICE
 
     @property
     def counts(self) -> Counts:
@@ -169,7 +171,7 @@ class ModelReport:
         return Counts(cost.row for cost in self.costs)
 
 
-def read_names(pairs: tuple[str, ...]) -> dict[str, str]:
+def _read_names(pairs: tuple[str, ...]) -> dict[str, str]:
     """Read ROLE=NAME pairs of the command line."""
     allowed = ("input", "coupler", "output", "B3", "B4")
     names = {}
@@ -205,8 +207,8 @@ def examine_model(
     file = read_robot(mjcf, assets)
     with examine_guarded(mjcf) as examined:
         generated, theirs = (
-            examined(EXAMINE, scene, None, {}),
-            examined(EXAMINE, scene, file, dict(names)),
+            examined(_EXAMINE, scene, None, {}),
+            examined(_EXAMINE, scene, file, dict(names)),
         )
         ours = {
             (row.engine, row.quantity): row.error
@@ -218,7 +220,7 @@ def examine_model(
             softness = examined(SOFTNESS, scene, file, theirs.names)
             rows = _list_rows(name, scene, theirs.answers, tolerance, softness)
         costs = [
-            CostOfModel(row, ours.get((row.engine, row.quantity), math.nan))
+            _CostOfModel(row, ours.get((row.engine, row.quantity), math.nan))
             for row in rows
         ]
         differences = find_differences(generated.described, theirs.described)
@@ -250,7 +252,9 @@ def _price(
     hold into theirs.
     """
     of_mechanism = [one for one in differences if not is_setting(one.key)]
-    answered = examined(CHANGED, scene, [(one.key, one.theirs) for one in of_mechanism])
+    answered = examined(
+        _CHANGED, scene, [(one.key, one.theirs) for one in of_mechanism]
+    )
     unchanged, *changed = (
         _list_rows(name, scene, answers or [], tolerance) for answers in answered
     )
@@ -262,7 +266,7 @@ def _price(
         priced.setdefault(one.key, one)
     left = [one for one in priced.values() if one.cost is None]
     changes = [(one.key, one.generated) for one in left]
-    answered = examined(MENDED, scene, file, theirs.names, changes)
+    answered = examined(_MENDED, scene, file, theirs.names, changes)
     for one, answers in zip(left, answered, strict=True):
         if answers is not None:
             mended = _list_rows(name, scene, answers, tolerance)
@@ -287,7 +291,7 @@ def _list_rows(
 
     held = Demands(tolerance, JUDGED)
     if softness:
-        held = held._replace(predicted=predicted, method=f", {BY_STIFFEST}")
+        held = held._replace(predicted=predicted, method=f", {_BY_STIFFEST}")
     rows = []
     for answer in answers:
         formulas = solve(scene, "force", at=answer.at)
@@ -309,7 +313,7 @@ def show(report: ModelReport, mjcf: Path, out: Path) -> None:
             f"{escape(make_plain(mjcf.name))} against the generated MJCF, the dearest"
             " difference first"
         )
-        console.print(f"[dim]{ABOUT_COSTS}[/]\n")
+        console.print(f"[dim]{_ABOUT_COSTS}[/]\n")
     for difference in report.differences:
         console.print(
             f"{difference.price:>16}  {escape(make_plain(difference.line()))}"
@@ -348,7 +352,7 @@ def write_markdown(report: ModelReport, mjcf: Path) -> str:
     what = {
         "report": report,
         "mjcf": mjcf.name,
-        "about": ABOUT_COSTS,
+        "about": _ABOUT_COSTS,
         "headings": ("method", *HEADINGS),
     }
     what |= {"differences": [difference.cells() for difference in report.differences]}
@@ -440,7 +444,7 @@ def command(
         report_measurement(measurement, theirs, out)
         worst = max(map(find_worst, measurement.loops))
         return int(wanted is not None and not worst <= wanted)
-    examined = examine_model(name, scene, theirs, read_names(names), wanted, assets)
+    examined = examine_model(name, scene, theirs, _read_names(names), wanted, assets)
     show(examined, theirs, out)
     return examined.counts.status
 

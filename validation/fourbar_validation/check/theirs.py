@@ -31,7 +31,7 @@ from fourbar_validation.compare.tolerance import EPS
 
 Array = NDArray[np.float64]
 
-DECIMALS = 4
+_DECIMALS = 4
 """Decimals of a position that somebody chose, like 12.5 deg or 0.25 rad. 0.1745 rad is
 one that was rounded.
 """
@@ -44,10 +44,10 @@ NOT_JUDGED = {
     **dict.fromkeys(("status", "branch", "drive_bar"), "stated by the scene"),
 }
 """Columns of `fourbar analyze --csv` that are no answer, and why."""
-BLANK = "blank"
-COMMENT = ("#", "%", "//")
+_BLANK = "blank"
+_COMMENT = ("#", "%", "//")
 """Beginnings of a line that is a comment."""
-OTHER_NAMES = {
+_OTHER_NAMES = {
     **dict.fromkeys(("t2", "t3", "t4", "moment", "drehmoment"), "torque"),
     **dict.fromkeys(
         ("antriebsmoment", "motortorque", "inputtorque", "cranktorque"), "torque"
@@ -62,7 +62,7 @@ OTHER_NAMES = {
 """Names that other programs and languages use, in small letters. They have no spaces
 and underscores.
 """
-MAY_MEAN = (
+_MAY_MEAN = (
     ("theta", "theta_2"),
     ("omega", "omega_2"),
     ("alpha", "alpha_2"),
@@ -100,15 +100,15 @@ OTHER_UNITS = {
 """Units that may be taken for each SI unit. The SI unit is one if the file announced
 another unit.
 """
-THOUSANDS = re.compile(r"[-+]?\d{1,3}(?:[ ,'\u2019\u00a0\u202f]\d{3})+(?:\.\d+)?")
-GERMAN_THOUSANDS = re.compile(r"[-+]?\d{1,3}(?:\.\d{3})+,\d+")
-TWO_TURNS = 4.0 * math.pi
+_THOUSANDS = re.compile(r"[-+]?\d{1,3}(?:[ ,'\u2019\u00a0\u202f]\d{3})+(?:\.\d+)?")
+_GERMAN_THOUSANDS = re.compile(r"[-+]?\d{1,3}(?:\.\d{3})+,\d+")
+_TWO_TURNS = 4.0 * math.pi
 """Angles beyond this many rad, all of them multiples of half a one, are degrees."""
-MOST_DEGREES = 1e6
+_MOST_DEGREES = 1e6
 """Beyond this no angle is meant."""
 LARGEST_FILE = 64 * 2**20
 """Bytes; a table larger than this is not a hand-made comparison."""
-HEADING = re.compile(
+_HEADING = re.compile(
     r"\|?(?P<name>\w[\w ]*?)\|?\s*"
     r"(?:\[(?P<square>[^\]]*)\]|\((?P<round>.*)\))?"
     r"(?P<letter>_[xy])?"
@@ -241,7 +241,7 @@ def read_table(path: Path) -> TheirTable:
     units = {name: unit for name, unit in columns.values()}
     notes = _read_degrees(numbers, halves, units, headings, columns)
     left_out |= {
-        headings[index]: BLANK
+        headings[index]: _BLANK
         for index, (name, _) in columns.items()
         if np.isnan(numbers[name]).all()
     }
@@ -314,7 +314,7 @@ def _read_degrees(
     heading = next(headings[i] for i, (name, _) in columns.items() if name == "theta_2")
     bare = not re.search(r"[\[(]", heading) and units["theta_2"].text == "rad"
     largest = float(np.abs(values).max())
-    if not bare or not TWO_TURNS < largest < MOST_DEGREES:
+    if not bare or not _TWO_TURNS < largest < _MOST_DEGREES:
         return ()
     if np.any(np.abs(2.0 * values - np.round(2.0 * values)) > 1e-9):
         return ()
@@ -354,10 +354,10 @@ def _find_rounding(halves: Array, unit: Unit) -> Array:
     For a cell whose zeros were left off it is that of the column.
     """
     least = halves.min()
-    if least > 0.5 * unit.factor * 10.0**-DECIMALS * (1.0 + EPS):
+    if least > 0.5 * unit.factor * 10.0**-_DECIMALS * (1.0 + EPS):
         return np.zeros_like(halves)
     return np.where(
-        halves <= 0.5 * unit.factor * 10.0 ** (1 - DECIMALS) * (1.0 + EPS),
+        halves <= 0.5 * unit.factor * 10.0 ** (1 - _DECIMALS) * (1.0 + EPS),
         halves,
         least,
     )
@@ -396,7 +396,7 @@ def _remove_comments(text: str) -> str:
     The last one before the numbers may be the header.
     """
     lines = text.splitlines()
-    of_comment = [line.lstrip().startswith(COMMENT) for line in lines]
+    of_comment = [line.lstrip().startswith(_COMMENT) for line in lines]
     first = next(
         (i for i, line in enumerate(lines) if line.strip() and not of_comment[i]), 0
     )
@@ -413,7 +413,7 @@ def _remove_comments(text: str) -> str:
 def _read_comma(cell: str) -> str:
     """Read a decimal comma, with points between thousands, as a decimal point."""
     text = cell.strip()
-    if GERMAN_THOUSANDS.fullmatch(text):
+    if _GERMAN_THOUSANDS.fullmatch(text):
         text = text.replace(".", "")
     return text.replace(",", ".")
 
@@ -427,7 +427,7 @@ def _find_name(name: str) -> str:
     spelled = {one.lower().replace("_", ""): one for one in known}
     for letter in "xy":
         spelled |= {f"{one.lower()}{letter}": f"{one}_{letter}" for one in VECTORS}
-    return spelled.get(plain, OTHER_NAMES.get(plain, name))
+    return spelled.get(plain, _OTHER_NAMES.get(plain, name))
 
 
 def _spell(name: str) -> str:
@@ -439,7 +439,7 @@ def _spell(name: str) -> str:
 def _suggest(name: str) -> str:
     """Say what a column may be renamed to; an empty string where nothing is like it."""
     plain = _spell(name)
-    for pattern, meaning in MAY_MEAN:
+    for pattern, meaning in _MAY_MEAN:
         if match := re.fullmatch(pattern, plain):
             return f"rename it if it is {match.expand(meaning)}"
     return ""
@@ -467,7 +467,7 @@ def _read_columns(
     left_out: dict[str, str] = {}
     renamings: dict[str, str] = {}
     for index, heading in enumerate(headings):
-        match = HEADING.fullmatch(heading.strip())
+        match = _HEADING.fullmatch(heading.strip())
         name = match["name"] + (match["letter"] or "") if match else heading.strip()
         name = _find_name(name)
         quantity = (
@@ -520,7 +520,7 @@ def _read_number(path: Path, place: str, cell: str) -> tuple[float, float]:
     It is NaN for a blank.
     """
     text = cell.strip().replace("\N{MINUS SIGN}", "-")
-    if THOUSANDS.fullmatch(text):
+    if _THOUSANDS.fullmatch(text):
         text = re.sub(r"[ ,'\u2019\u00a0\u202f]", "", text)
     if not text:
         return math.nan, math.nan

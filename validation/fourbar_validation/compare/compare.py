@@ -76,7 +76,7 @@ varied within its rounding; elsewhere it is NaN.
 Scales = dict[str, tuple[Array, Array]]
 """Size and condition of each quantity at each position."""
 
-OF_THE_FORMULAS = (
+_OF_THE_FORMULAS = (
     *DRY_FRICTION_QUANTITIES,
     *PIN_LOAD_QUANTITIES,
     COUPLE.error,
@@ -88,12 +88,12 @@ OF_THE_FORMULAS = (
 its residual, error bars, a product.
 """
 COMPARED_QUANTITIES = tuple(
-    name for name in STAGE_OF if name not in (*OF_THE_FORMULAS, *LINE_QUANTITIES)
+    name for name in STAGE_OF if name not in (*_OF_THE_FORMULAS, *LINE_QUANTITIES)
 )
 """Quantities that are compared with an exact engine. These are all that is printed of a
 position.
 """
-OF_THE_LINE = {
+_OF_THE_LINE = {
     "stroke": "sin_mu",
     "drive_line": "sin_mu",
     "stroke_speed": "v_B",
@@ -102,10 +102,10 @@ OF_THE_LINE = {
 """Quantities of a drive that exerts a force; each is compared if the quantity it maps
 to is compared or the engine answers it.
 """
-OF_FORCES = (*FORCES, *DRY_FRICTION_QUANTITIES)
-MOST_UNDECIDED = 0.5
+_OF_FORCES = (*FORCES, *DRY_FRICTION_QUANTITIES)
+_MOST_UNDECIDED = 0.5
 """Share of the numbers of a scene that are undecided, beyond which it does not hold."""
-SLOW_DRIVE = 0.1
+_SLOW_DRIVE = 0.1
 """Part of the drive's greatest speed above which a simulation's forces are judged. The
 torque on bar 3 or 4, the force of a cylinder and the pin forces have poles where the
 speed of the drive vanishes.
@@ -211,7 +211,7 @@ class Comparison:
         if self.scene.drive is not None:
             names |= {
                 line
-                for line, quantity in OF_THE_LINE.items()
+                for line, quantity in _OF_THE_LINE.items()
                 if quantity in names or line in answer.quantities
             }
         judged = self._compare([name for name in STAGE_OF if name in names])
@@ -228,7 +228,7 @@ class Comparison:
                     self._who,
                     "undecided",
                     (numbers - decided) / numbers,
-                    MOST_UNDECIDED,
+                    _MOST_UNDECIDED,
                     reason,
                 )
             )
@@ -290,7 +290,7 @@ class Comparison:
 
     def _may_reverse(self, quantity: str) -> bool:
         """Return whether a quantity may have two values where friction reverses."""
-        return quantity in OF_FORCES or (
+        return quantity in _OF_FORCES or (
             quantity == "drive_condition"
             and any(effect.loaded_pins for effect in self.scene.effects)
         )
@@ -404,7 +404,7 @@ class Comparison:
         errors = self._measure(due)
         beyond = errors.mask & ~(errors.error <= errors.allowed)
         agrees = np.asarray(~beyond.any(axis=1) & errors.decidable.any(axis=1))
-        worst_used = find_worst_used(errors)
+        worst_used = _find_worst_used(errors)
         for i, one in enumerate(due):
             of_one = errors.select(i)
             if agrees[i]:
@@ -544,11 +544,11 @@ class Errors(NamedTuple):
             tolerance=self.tolerance,
         )
 
-    def agreeing(self, position: int) -> "WorstPosition":
+    def agreeing(self, position: int) -> "_WorstPosition":
         """Give the verdict where no error of the quantity is beyond the allowed one."""
         decided = int(np.count_nonzero(self.decidable))
         why = self.tolerance.explain(self.condition[position]) + self.notes
-        return WorstPosition(position, AGREES, why, self.allowed[position], decided)
+        return _WorstPosition(position, AGREES, why, self.allowed[position], decided)
 
     @property
     def beyond(self) -> Mask:
@@ -571,7 +571,7 @@ class Errors(NamedTuple):
         return notes
 
 
-class WorstPosition(NamedTuple):
+class _WorstPosition(NamedTuple):
     """Verdict on a quantity, and the position where its error is worst."""
 
     position: int
@@ -582,7 +582,7 @@ class WorstPosition(NamedTuple):
     """Number of positions that have a verdict."""
 
 
-def find_worst_used(errors: Errors) -> NDArray[np.intp]:
+def _find_worst_used(errors: Errors) -> NDArray[np.intp]:
     """Find where the error of each quantity uses most of what is allowed."""
     used = find_used(errors.error, errors.allowed)
     return np.asarray(np.argmax(np.where(errors.decidable, used, -1.0), axis=-1))
@@ -590,7 +590,7 @@ def find_worst_used(errors: Errors) -> NDArray[np.intp]:
 
 def judge_errors(
     errors: Errors, predicted: Array | None, method: str = ""
-) -> WorstPosition:
+) -> _WorstPosition:
     """Judge errors by the allowed error.
 
     Larger ones are judged by TIMES_PREDICTED times the predicted one. An error that is
@@ -601,9 +601,9 @@ def judge_errors(
     if not (errors.decidable | beyond).any():
         index = int(np.flatnonzero(errors.mask)[0])
         why = f"eps/condition = {EPS / errors.condition[index]:.1e}"
-        return WorstPosition(index, UNDECIDED, why, errors.allowed[index], 0)
+        return _WorstPosition(index, UNDECIDED, why, errors.allowed[index], 0)
     if not beyond.any():
-        return errors.agreeing(int(find_worst_used(errors)))
+        return errors.agreeing(int(_find_worst_used(errors)))
     expected = np.zeros_like(errors.error) if predicted is None else predicted
     bound = np.maximum(errors.allowed, TIMES_PREDICTED * expected)
     used = find_used(errors.error, bound)
@@ -627,7 +627,7 @@ def judge_errors(
         verdict = FAILS
         why = f"{error:.1e} where {foreseen:.1e} was predicted{method}"
     decided = int(np.count_nonzero(errors.decidable & ~lost))
-    return WorstPosition(index, verdict, why + errors.notes, bound[index], decided)
+    return _WorstPosition(index, verdict, why + errors.notes, bound[index], decided)
 
 
 def _mark_stated(quantity: str, formulas: Solution, ours: Array) -> Mask:
@@ -636,7 +636,7 @@ def _mark_stated(quantity: str, formulas: Solution, ours: Array) -> Mask:
     After an overflow these are the quantities computed before it.
     """
     code = formulas.status_code
-    if quantity in OF_FORCES:
+    if quantity in _OF_FORCES:
         # A jam at rest concerns the motion that would begin, so its forces are stated.
         # Forces with several solutions are not: an engine may find another one, or not
         # converge.
@@ -679,4 +679,4 @@ def mark_turning(speed: Array) -> Mask:
     Its torque and the pin forces are not near a pole there.
     """
     fast = np.abs(np.nan_to_num(speed))
-    return np.asarray(fast > SLOW_DRIVE * fast.max())
+    return np.asarray(fast > _SLOW_DRIVE * fast.max())

@@ -25,7 +25,7 @@ AGREES, DEGRADED, UNDECIDED, REFUSES, FAILS = (
 VERDICTS = (AGREES, DEGRADED, UNDECIDED, REFUSES, FAILS)
 """Verdicts from the best to the worst."""
 HOLDING_VERDICTS = (AGREES, DEGRADED)
-COMPARED_VERDICTS = (*HOLDING_VERDICTS, FAILS)
+_COMPARED_VERDICTS = (*HOLDING_VERDICTS, FAILS)
 """Verdicts of comparisons that took place. In the others no digit is left to decide by,
 or the engine declared a limit.
 """
@@ -174,7 +174,7 @@ class Row:
     @property
     def compared(self) -> bool:
         """Return whether anything was compared."""
-        return self.verdict in COMPARED_VERDICTS
+        return self.verdict in _COMPARED_VERDICTS
 
     @property
     def failed(self) -> bool:
@@ -240,22 +240,22 @@ def make_plain(text: str) -> str:
     )
 
 
-FORMULA = ("=", "+", "-", "@")
+_FORMULA = ("=", "+", "-", "@")
 """Characters that a spreadsheet takes for the beginning of a formula."""
 
 
-def write_cell_text(cell: str) -> str:
+def _write_cell_text(cell: str) -> str:
     """Write a cell that stays text in a spreadsheet.
 
     An apostrophe stands before what begins a formula.
     """
-    return f"'{cell}" if cell.startswith(FORMULA) and len(cell) > 1 else cell
+    return f"'{cell}" if cell.startswith(_FORMULA) and len(cell) > 1 else cell
 
 
 def read_cell_text(cell: str) -> str:
-    """Give back what `write_cell_text` was given."""
+    """Give back what `_write_cell_text` was given."""
     return (
-        cell[1:] if cell.startswith(tuple("'" + first for first in FORMULA)) else cell
+        cell[1:] if cell.startswith(tuple("'" + first for first in _FORMULA)) else cell
     )
 
 
@@ -290,7 +290,7 @@ def write_csv(columns: Sequence[str], rows: Iterable[Iterable[object]]) -> str:
     writer = csv.writer(text, lineterminator="\n")
     writer.writerows([columns] if columns else [])
     writer.writerows(
-        [write_cell_text(cell) if isinstance(cell, str) else cell for cell in row]
+        [_write_cell_text(cell) if isinstance(cell, str) else cell for cell in row]
         for row in rows
     )
     return text.getvalue()
@@ -311,7 +311,7 @@ def write_results(rows: Iterable[Row], path: Path) -> None:
     write_text(path, write_rows(rows))
 
 
-WORDING = {
+_WORDING = {
     AGREES: ("agrees", "agree"),
     DEGRADED: ("degraded as predicted", "degraded as predicted"),
     FAILS: ("fails", "fail"),
@@ -358,7 +358,7 @@ class Counts:
     @property
     def compared(self) -> int:
         """Comparisons that were made."""
-        return sum(self[verdict] for verdict in COMPARED_VERDICTS)
+        return sum(self[verdict] for verdict in _COMPARED_VERDICTS)
 
     @property
     def nothing(self) -> bool:
@@ -412,7 +412,7 @@ class Counts:
         if self.nothing:
             held = [f"{total} of the formulas' own identities hold"] if total else []
         else:
-            held = self._write_worded(COMPARED_VERDICTS)
+            held = self._write_worded(_COMPARED_VERDICTS)
         apart = self._write_worded((UNDECIDED, REFUSES))
         if apart and not self.nothing:
             apart[0] = "not compared: " + apart[0]
@@ -431,7 +431,7 @@ class Counts:
 
     def _write_worded(self, verdicts: Iterable[str]) -> list[str]:
         return [
-            f"{self[verdict]} {WORDING[verdict][self[verdict] != 1]}"
+            f"{self[verdict]} {_WORDING[verdict][self[verdict] != 1]}"
             for verdict in verdicts
             if self[verdict]
         ]

@@ -93,7 +93,7 @@ class Sizes:
         judged by another's scale.
         """
         unit = UNITS[quantity]
-        key = quantity if unit in OF_EACH_BAR else f"{unit} {_choose_bars(quantity)}"
+        key = quantity if unit in _OF_EACH_BAR else f"{unit} {_choose_bars(quantity)}"
         if key not in self._sums:
             with np.errstate(divide="ignore", invalid="ignore"):
                 terms = TERMS[unit](quantity, self)
@@ -106,7 +106,7 @@ def scale_of(quantity: str, scene: Scene, formulas: Solution, values: Array) -> 
     return Sizes(scene, formulas).scale(quantity, values)
 
 
-OF_EACH_BAR = ("rad/s", "rad/s^2")
+_OF_EACH_BAR = ("rad/s", "rad/s^2")
 """Units of quantities whose sums of terms differ from bar to bar."""
 
 
@@ -200,17 +200,17 @@ def _sum_forces(_: str, sizes: Sizes) -> Array:
 
 def _sum_torques(_: str, sizes: Sizes) -> Array:
     longest = max(sizes.scene.linkage.lengths[1:])
-    return np.asarray(longest * sizes.sum_terms(A_FORCE))
+    return np.asarray(longest * sizes.sum_terms(_A_FORCE))
 
 
 def _sum_powers(_: str, sizes: Sizes) -> Array:
     if sizes.scene.drive is not None:
-        return np.asarray(sizes.sum_terms(A_FORCE) * sizes.sum_terms(A_VELOCITY))
+        return np.asarray(sizes.sum_terms(_A_FORCE) * sizes.sum_terms(_A_VELOCITY))
     speed = getattr(sizes.formulas, f"omega_{sizes.scene.drive_bar}")
     return np.asarray(sizes.sum_terms(COUPLE.value) * np.abs(speed))
 
 
-A_FORCE, A_VELOCITY = "F12", "v_B"
+_A_FORCE, _A_VELOCITY = "F12", "v_B"
 """Quantities of their units to which every bar contributes."""
 TERMS: dict[str, Callable[[str, Sizes], Array]] = {
     "rad": _return_one,
@@ -260,7 +260,7 @@ def _sum_force_terms(scene: Scene, formulas: Solution) -> Array:
     return total
 
 
-SIZED_BY = ("omega_3", "omega_4", "alpha_3", "alpha_4", "a_G2", "a_G3", "a_G4")
+_SIZED_BY = ("omega_3", "omega_4", "alpha_3", "alpha_4", "a_G2", "a_G3", "a_G4")
 """Quantities from which the size of a force is computed. A reference without them has
 none.
 """
@@ -397,7 +397,7 @@ def take_smallest_scales(
         return scales
     reference = theirs.formulas
     if reference.omega_2 is not None and any(
-        getattr(reference, name) is None for name in SIZED_BY
+        getattr(reference, name) is None for name in _SIZED_BY
     ):
         return scales
     answered = {

@@ -148,7 +148,7 @@ def hold_simulated(error: float, why: str) -> ErrorBound:
     )
 
 
-OF_DIRECTION = frozenset(("drive_line", "stroke_speed", "drive_condition"))
+_OF_DIRECTION = frozenset(("drive_line", "stroke_speed", "drive_condition"))
 """Quantities that, like every force, follow from the direction of the force that
 drives: the places of its ends are rounded as the lengths are, and the direction by that
 over the stroke.
@@ -191,7 +191,7 @@ def find_condition(quantity: str, linkage: FourBar, formulas: Solution) -> Array
         )
     condition = find_lever(linkage, bar) * s ** POWER[unit]
     if formulas.stroke is not None and (
-        quantity in OF_DIRECTION or unit in ("N", "N m", "W")
+        quantity in _OF_DIRECTION or unit in ("N", "N m", "W")
     ):
         condition = condition * np.minimum(formulas.stroke / max(linkage.lengths), 1.0)
     if unit in ("N", "N m", "W"):

@@ -12,7 +12,7 @@ from fourbar_validation.cost.study import EXACT, FORMULAS, STEPPED, CostPoint
 
 DEFAULT = "MuJoCo's defaults"
 """Label of the point that a new user gets."""
-DEFAULT_LADDER = "Euler, MuJoCo's defaults"
+_DEFAULT_LADDER = "Euler, MuJoCo's defaults"
 FOUR_DIGITS, SIX_DIGITS = 1e-4, 1e-6
 DIGITS = {FOUR_DIGITS: "Four digits", SIX_DIGITS: "Six digits"}
 NAMES = {"torque": "driving torque", "force": "worst pin force"}
@@ -51,7 +51,7 @@ def find_default(curves: Curves) -> CostPoint | None:
     return next(points, None)
 
 
-def write_time(point: CostPoint) -> str:
+def _write_time(point: CostPoint) -> str:
     """Write the time of a simulated second, and of a revolution."""
     second, revolution = point.seconds_per_second, point.seconds_per_revolution
     return f"{1e3 * second:.2g} ms ({1e3 * revolution:.2g} ms a revolution)"
@@ -87,7 +87,7 @@ def _write_digits(curves: Curves) -> Iterator[str]:
         if point is None:
             yield f"{DIGITS[error]} {what}: no setting that was tried reaches them."
         else:
-            yield f"{DIGITS[error]} {what}: {write_time(point)} by {point.name}."
+            yield f"{DIGITS[error]} {what}: {_write_time(point)} by {point.name}."
 
 
 def _write_defaults(curves: Curves) -> Iterator[str]:
@@ -99,12 +99,12 @@ def _write_defaults(curves: Curves) -> Iterator[str]:
         return
     errors = point.errors
     text = (
-        f"MuJoCo's defaults (Euler, 2 ms): {write_time(point)} for an error of"
+        f"MuJoCo's defaults (Euler, 2 ms): {_write_time(point)} for an error of"
         f" {write_short(errors.torque)} in the torque, {write_short(errors.force)} in"
         " the worst pin force"
     )
     floors = [
-        find_floor(curves.get(DEFAULT_LADDER, ()), quantity)
+        find_floor(curves.get(_DEFAULT_LADDER, ()), quantity)
         for quantity in ("torque", "F12", "F32", "F43", "F14")
     ]
     if None not in floors:
@@ -128,9 +128,8 @@ def _write_exact(curves: Curves) -> Iterator[str]:
         if exact:
             cheapest = min(exact, key=lambda point: point.seconds_per_second)
             error = write_short(cheapest.errors.worst)
-            yield (
-                f"{what}: {write_time(cheapest)}, error {error}, by {cheapest.setting}."
-            )
+            time = _write_time(cheapest)
+            yield f"{what}: {time}, error {error}, by {cheapest.setting}."
 
 
 def _write_laws(laws: Sequence[ErrorLaw]) -> str:

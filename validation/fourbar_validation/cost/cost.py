@@ -29,8 +29,8 @@ from fourbar_validation.report.templating import render
 from fourbar_validation.report.terminal import make_table
 from fourbar_validation.scenes.suites import read_scene_files
 
-DEFAULT_SCENES = (MODELS / "crank_rocker.toml",)
-WANTED = (1e-3, 1e-6)
+_DEFAULT_SCENES = (MODELS / "crank_rocker.toml",)
+_WANTED = (1e-3, 1e-6)
 """Errors whose price the table of several scenes has."""
 HEAD = ("setting", "error", "ms per simulated second", "ms a revolution")
 
@@ -59,7 +59,7 @@ def cost(scenes: tuple[Path, ...], out: Path, verbose: bool) -> int:
     from rich.console import Console
     from rich.progress import track
 
-    files = read_scene_files(scenes or DEFAULT_SCENES)
+    files = read_scene_files(scenes or _DEFAULT_SCENES)
     fitted: list[ErrorLaw] = []
     rows: list[tuple[str, ...]] = []
     for index in range(len(files)):
@@ -84,14 +84,14 @@ def cost(scenes: tuple[Path, ...], out: Path, verbose: bool) -> int:
         click.echo(write_subtitle(scene, title))
         click.echo("\n".join(conclusion))
         if verbose:
-            print_details(study, curves, laws)
+            _print_details(study, curves, laws)
         click.echo(f"Pictures, laws and every point: {out / name / 'cost.md'}")
         held = sum(law.holds for law in laws if law.decided)
         matters = influences and influences[0].times >= MATTERS
         rows.append(
             (
                 name,
-                *(write_price(curves, error) for error in WANTED),
+                *(_write_price(curves, error) for error in _WANTED),
                 f"{held} of {sum(law.decided for law in laws)}",
                 influences[0].setting if matters else "none by itself",
             )
@@ -99,7 +99,7 @@ def cost(scenes: tuple[Path, ...], out: Path, verbose: bool) -> int:
     if len(rows) > 1:
         head = (
             "scene",
-            *(f"ms for {error:g}" for error in WANTED),
+            *(f"ms for {error:g}" for error in _WANTED),
             "laws hold",
             "matters most",
         )
@@ -109,7 +109,7 @@ def cost(scenes: tuple[Path, ...], out: Path, verbose: bool) -> int:
     return HOLDS if fitted and all(law.holds for law in fitted) else FAILED
 
 
-def print_details(
+def _print_details(
     study: CostStudy,
     curves: Mapping[str, Sequence[CostPoint]],
     laws: Sequence[ErrorLaw],
@@ -169,7 +169,7 @@ def write_subtitle(scene: Scene, title: str) -> str:
     return f"{title}{omega}{', ' + ' and '.join(acting) if acting else ''}"
 
 
-def write_price(curves: Mapping[str, Sequence[CostPoint]], error: float) -> str:
+def _write_price(curves: Mapping[str, Sequence[CostPoint]], error: float) -> str:
     """Write the least ms of a simulated second within an error.
 
     A dash stands where nothing reaches it.

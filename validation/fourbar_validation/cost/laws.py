@@ -18,7 +18,7 @@ FLOORED = 0.8
 """Part of an error from which on it has met its floor. Twice the steps leave that part
 or more.
 """
-ABOVE_FLOOR = 3.0
+_ABOVE_FLOOR = 3.0
 """Points within this factor of the floor carry part of it and are not fitted."""
 WITHIN = 0.35
 """An exponent may miss the expected one by this much, or by twice its own uncertainty:
@@ -27,19 +27,19 @@ by about a quarter.
 """
 FEWEST = 3
 """Points of a fit."""
-JUMP = 10.0
+_JUMP = 10.0
 """An error so many times larger than at either of the two coarser settings is no part
 of a law, where it has met no floor: between neighbours of a ladder the laws here change
 it by 10 or less, and downwards.
 """
-MIXES = 1.0 / 30.0
+_MIXES = 1.0 / 30.0
 """Part of the least error from which on a rest flattens a slope. The rest does not
 depend on the setting.
 """
-FIRST_ORDER, FOURTH_ORDER = 1.0, 4.0
-EXPECTED_ORDER = dict.fromkeys(
+FIRST_ORDER, _FOURTH_ORDER = 1.0, 4.0
+_EXPECTED_ORDER = dict.fromkeys(
     ("Euler", "implicit", "implicitfast", "discrete"), FIRST_ORDER
-) | {"RK4": FOURTH_ORDER}
+) | {"RK4": _FOURTH_ORDER}
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +64,7 @@ class ErrorLaw:
     def mixed(self) -> bool:
         """Return whether a part that the setting does not change flattens the slope."""
         return (
-            self.constant > MIXES
+            self.constant > _MIXES
             and self.points >= FEWEST
             and self.exponent < self.expected - WITHIN
         )
@@ -152,7 +152,9 @@ def find_floor(points: Sequence[CostPoint], quantity: str) -> float | None:
     return float(errors[-1])  # before it two sources may cancel: a dip is not a floor
 
 
-def find_steps_at_floor(points: Sequence[CostPoint], quantity: str) -> CostPoint | None:
+def _find_steps_at_floor(
+    points: Sequence[CostPoint], quantity: str
+) -> CostPoint | None:
     """Find the first point of a ladder from which its error stays near its last."""
     floor = find_floor(points, quantity)
     if floor is None:
@@ -186,7 +188,7 @@ def find_jumps(points: Sequence[CostPoint], quantity: str) -> list[CostPoint]:
         )
         # two sources that cancel make a dip, and its far side is no jump; a motion that
         # is lost again is one
-        if before[-1] < TOO_LARGE and not value <= JUMP * (
+        if before[-1] < TOO_LARGE and not value <= _JUMP * (
             max(before) if value < TOO_LARGE else before[-1]
         ):
             jumps.append(point)
@@ -207,7 +209,7 @@ def fit_laws(curves: Mapping[str, Sequence[CostPoint]]) -> list[ErrorLaw]:
         ("sag at 0.1 rad/s in (1-d)", curves.get("sag d, slow", ()), 1.0),
         ("MuJoCo at one state in (1-d)/d", one_state, 1.0),
     ]
-    for integrator, order in EXPECTED_ORDER.items():
+    for integrator, order in _EXPECTED_ORDER.items():
         points, name = (
             curves.get(f"{integrator}, tc held", ()),
             f"order of {integrator} in the timestep",
@@ -251,7 +253,7 @@ def _fit_law(
     leaps = tuple(
         _measure_leap(p, ordered, quantity) for p in find_jumps(ordered, quantity)
     )
-    used = [p for p in ordered if ABOVE_FLOOR * least < _read(p, quantity) < TOO_LARGE]
+    used = [p for p in ordered if _ABOVE_FLOOR * least < _read(p, quantity) < TOO_LARGE]
     if len(used) < FEWEST:
         return ErrorLaw(name, quantity, math.nan, math.inf, expected, len(used), leaps)
     x = [1.0 / p.setting_value if by_steps else p.setting_value for p in used]
@@ -302,9 +304,9 @@ def _fit_stiff(curves: Mapping[str, Sequence[CostPoint]], quantity: str) -> Erro
     }
     name = "floor of RK4 in tc/h"
     if len(floors) < FEWEST:
-        return ErrorLaw(name, quantity, math.nan, math.inf, -FOURTH_ORDER, len(floors))
+        return ErrorLaw(name, quantity, math.nan, math.inf, -_FOURTH_ORDER, len(floors))
     slope, sigma = fit(list(floors), list(floors.values()))
-    return ErrorLaw(name, quantity, slope, sigma, -FOURTH_ORDER, len(floors))
+    return ErrorLaw(name, quantity, slope, sigma, -_FOURTH_ORDER, len(floors))
 
 
 def list_warnings(curves: Mapping[str, Sequence[CostPoint]]) -> list[str]:
@@ -360,7 +362,7 @@ def _describe_floor(ladder: Sequence[CostPoint], quantity: str) -> str:
     It says too where the error was less on the way.
     """
     floor = find_floor(ladder, quantity)
-    first = find_steps_at_floor(ladder, quantity)
+    first = _find_steps_at_floor(ladder, quantity)
     assert floor is not None and first is not None
     text = f"{floor:.1e} from {first.steps_per_revolution:.0f} steps a revolution on"
     least = min(ladder, key=lambda point: _read(point, quantity))

@@ -34,7 +34,7 @@ Curves = Mapping[str, Sequence[CostPoint]]
 INK, SOFT, GRID, BAND, PAPER = (
     LIGHT[f"--{name}"] for name in ("ink", "soft", "grid", "under", "paper")
 )
-BLUE, GREEN, ORANGE, PINK, VIOLET = (LIGHT[f"--e{n}"] for n in range(1, 6))
+_BLUE, _GREEN, _ORANGE, _PINK, _VIOLET = (LIGHT[f"--e{n}"] for n in range(1, 6))
 
 
 class Look(NamedTuple):
@@ -49,49 +49,51 @@ class Look(NamedTuple):
     dashes: Any = "solid"
 
 
-DASHED, DOTTED, LONG = (0, (4, 2)), (0, (1, 1.5)), (0, (7, 2, 1.5, 2))
+_DASHED, _DOTTED, LONG = (0, (4, 2)), (0, (1, 1.5)), (0, (7, 2, 1.5, 2))
 INTEGRATORS = {
-    "Euler": Look("Euler, tc held", ORANGE, "s", DASHED),
-    "implicitfast": Look("implicitfast, tc held", PINK, "v", DOTTED),
-    "discrete": Look("discrete, tc held", GREEN, "D", LONG),
-    "RK4": Look("RK4, tc held", BLUE, "o"),
+    "Euler": Look("Euler, tc held", _ORANGE, "s", _DASHED),
+    "implicitfast": Look("implicitfast, tc held", _PINK, "v", _DOTTED),
+    "discrete": Look("discrete, tc held", _GREEN, "D", LONG),
+    "RK4": Look("RK4, tc held", _BLUE, "o"),
 }
 METHODS = {
-    "Euler, defaults": Look("Euler, MuJoCo's defaults", ORANGE, "s", DASHED),
-    "RK4, defaults": Look("RK4, MuJoCo's defaults", PINK, "D", DOTTED),
-    "Euler, stiff closure": Look("Euler, tc held", GREEN, "v", LONG),
-    "RK4, no pads": Look("RK4, no pads, tc = 10 steps", VIOLET, "P", (0, (5, 1))),
-    "advised": Look("recommended", BLUE, "o"),
+    "Euler, defaults": Look("Euler, MuJoCo's defaults", _ORANGE, "s", _DASHED),
+    "RK4, defaults": Look("RK4, MuJoCo's defaults", _PINK, "D", _DOTTED),
+    "Euler, stiff closure": Look("Euler, tc held", _GREEN, "v", LONG),
+    "RK4, no pads": Look("RK4, no pads, tc = 10 steps", _VIOLET, "P", (0, (5, 1))),
+    "advised": Look("recommended", _BLUE, "o"),
 }
 TIMESTEPS = {
-    "tc = 3 steps": Look("RK4, pads, tc = 3 steps", ORANGE, "s", DASHED),
-    "tc = 10 steps": Look("RK4, pads, tc = 10 steps", PINK, "D", DOTTED),
-    "tc = 30 steps": Look("RK4, pads, tc = 30 steps", GREEN, "v", LONG),
-    "tc = 100 steps": Look("RK4, pads, tc = 100 steps", VIOLET, "P", (0, (5, 1))),
-    "tc a quarter turn": Look("RK4, tc held", BLUE, "o"),
+    "tc = 3 steps": Look("RK4, pads, tc = 3 steps", _ORANGE, "s", _DASHED),
+    "tc = 10 steps": Look("RK4, pads, tc = 10 steps", _PINK, "D", _DOTTED),
+    "tc = 30 steps": Look("RK4, pads, tc = 30 steps", _GREEN, "v", LONG),
+    "tc = 100 steps": Look("RK4, pads, tc = 100 steps", _VIOLET, "P", (0, (5, 1))),
+    "tc a quarter turn": Look("RK4, tc held", _BLUE, "o"),
 }
 SOFTNESS = {
-    "at the scene's speed": Look("softness d", BLUE, "o"),
-    "at 0.1 rad/s": Look("sag d, slow", ORANGE, "s", DASHED),
-    "at 0.1 rad/s, nothing acts": Look("sag d, slow, nothing acts", GREEN, "^", DOTTED),
+    "at the scene's speed": Look("softness d", _BLUE, "o"),
+    "at 0.1 rad/s": Look("sag d, slow", _ORANGE, "s", _DASHED),
+    "at 0.1 rad/s, nothing acts": Look(
+        "sag d, slow, nothing acts", _GREEN, "^", _DOTTED
+    ),
 }
 SOLVERS = {
-    "Newton": Look("tolerance, Newton", BLUE, "o"),
-    "PGS": Look("tolerance, PGS", ORANGE, "s", DASHED),
-    "CG": Look("tolerance, CG", GREEN, "^", DOTTED),
+    "Newton": Look("tolerance, Newton", _BLUE, "o"),
+    "PGS": Look("tolerance, PGS", _ORANGE, "s", _DASHED),
+    "CG": Look("tolerance, CG", _GREEN, "^", _DOTTED),
 }
 LARGEST = 10.0
 """Largest error over the timestep that is drawn in its place. A larger one, and one
 without end, is drawn at the upper edge.
 """
-LOWEST = 1e-17
+_LOWEST = 1e-17
 """Bottom of the picture; fifty digits lie far below and are not drawn."""
 NONE = 1e-18
 """Place on the logarithmic axis at which a tolerance of 0 is drawn."""
 WIDTH = 5.0
 """Width of a picture, in: on a screen of 360 px its texts are still 9 px high."""
 TEXT = 9.5
-NEAR_FRONT = 1.1
+_NEAR_FRONT = 1.1
 """Time over that of the cheapest within which an advised setting is one of them."""
 
 
@@ -113,11 +115,11 @@ def make_pictures(curves: Curves, title: str) -> dict[str, Any]:
     makers: dict[str, tuple[str, Callable[[], Any]]] = {
         "timestep": (
             "RK4, pads, tc = 10 steps",
-            lambda: draw_timestep(curves, title),
+            lambda: _draw_timestep(curves, title),
         ),
-        "integrator": ("RK4, tc held", lambda: draw_integrator(curves, title)),
-        "softness": ("softness d", lambda: draw_softness(curves, title)),
-        "solver": ("tolerance, Newton", lambda: draw_solver(curves, title)),
+        "integrator": ("RK4, tc held", lambda: _draw_integrator(curves, title)),
+        "softness": ("softness d", lambda: _draw_softness(curves, title)),
+        "solver": ("tolerance, Newton", lambda: _draw_solver(curves, title)),
         "orders": ("RK4, tc held", lambda: draw_orders(curves, title)),
     }
     made = {
@@ -130,7 +132,7 @@ def make_pictures(curves: Curves, title: str) -> dict[str, Any]:
     return made
 
 
-def draw_line(
+def _draw_line(
     axes: Any, x: Sequence[float], y: Sequence[float], label: str, look: Look
 ) -> None:
     """Draw a curve in its colour, with its marker and line."""
@@ -212,27 +214,27 @@ def draw_work_precision(curves: Curves, quantity: str, title: str) -> Any:
     for name, look in METHODS.items():
         label = name
         if look.curve == "recommended":
-            most = measure_distance(curves, quantity)
-            label += "" if most <= NEAR_FRONT else f", up to {most:.1f} times as long"
+            most = _measure_distance(curves, quantity)
+            label += "" if most <= _NEAR_FRONT else f", up to {most:.1f} times as long"
         row = [
             point
             for point in curves.get(look.curve, ())
             if getattr(point.errors, quantity) < LARGEST
         ]
         if row:
-            draw_line(axes, *_locate(row, quantity), label, look)
+            _draw_line(axes, *_locate(row, quantity), label, look)
             places = zip(*_locate(row, quantity), strict=True)
             labels.keep_off(axes, *places, width=1.8)
     default = find_default(curves)
     if default is not None and getattr(default.errors, quantity) < LARGEST:
         place = _locate([default], quantity)
-        axes.plot(*place, marker="*", ms=16, color=ORANGE, mec=INK, mew=0.8, zorder=5)
+        axes.plot(*place, marker="*", ms=16, color=_ORANGE, mec=INK, mew=0.8, zorder=5)
         _name(labels, axes, default, quantity, "Euler, 2 ms")
     for point in (point for row in curves.values() for point in row):
         _mark_exact(labels, axes, point, quantity)
     axes.set_ylabel(f"error of the {NAMES[quantity]}, of its scale", labelpad=1.0)
     set_axes(axes)
-    axes.set_ylim(LOWEST / 4.0, 3.0)
+    axes.set_ylim(_LOWEST / 4.0, 3.0)
     low, high = axes.get_xlim()
     axes.set_xlim(low / 1.2, high * 1.5)
     _name_time(axes, front)
@@ -247,7 +249,7 @@ def _locate(
 
     What lies below the picture is put at its edge.
     """
-    errors = [max(getattr(point.errors, quantity), LOWEST) for point in points]
+    errors = [max(getattr(point.errors, quantity), _LOWEST) for point in points]
     return [1e3 * point.seconds_per_second for point in points], errors
 
 
@@ -271,11 +273,11 @@ def _name(
 
 def _mark_exact(labels: Labels, axes: Any, point: CostPoint, quantity: str) -> None:
     """Mark a method that answers each position by itself."""
-    marks = {EXACT: ("h", GREEN), FORMULAS: ("*", INK)}
+    marks = {EXACT: ("h", _GREEN), FORMULAS: ("*", INK)}
     value = getattr(point.errors, quantity)
     if point.kind == STEPPED or not math.isfinite(point.seconds_per_second):
         return
-    if not LOWEST <= value < LARGEST:
+    if not _LOWEST <= value < LARGEST:
         return
     marker, colour = marks[point.kind]
     axes.plot(
@@ -323,7 +325,7 @@ def write_statement(curves: Curves, quantity: str) -> str:
     return ";\n".join(parts) or f"Error of the {NAMES[quantity]} against its cost"
 
 
-def measure_distance(curves: Curves, quantity: str) -> float:
+def _measure_distance(curves: Curves, quantity: str) -> float:
     """Return the greatest time of an advised setting over that of the front.
 
     The error is the same.
@@ -360,7 +362,7 @@ def _draw_worst(
         )
         x = [abscissa(point) for point in row]
         y = [point.at_steps.worst for point in row]
-        draw_line(axes, x, y, label, look)
+        _draw_line(axes, x, y, label, look)
     axes.set_ylabel("worst error of torque and pin forces")
 
 
@@ -380,7 +382,7 @@ def _draw_single(
     return figure, axes
 
 
-def draw_timestep(curves: Curves, title: str) -> Any:
+def _draw_timestep(curves: Curves, title: str) -> Any:
     """Draw RK4 with time constants of several lengths over the timestep."""
     figure, _ = _draw_single(
         curves,
@@ -393,7 +395,7 @@ def draw_timestep(curves: Curves, title: str) -> Any:
     return figure
 
 
-def draw_integrator(curves: Curves, title: str) -> Any:
+def _draw_integrator(curves: Curves, title: str) -> Any:
     """Draw each integrator over the timestep.
 
     Slopes of first and fourth order are drawn too.
@@ -411,7 +413,7 @@ def draw_integrator(curves: Curves, title: str) -> Any:
     return figure
 
 
-def draw_softness(curves: Curves, title: str) -> Any:
+def _draw_softness(curves: Curves, title: str) -> Any:
     """Draw the error over what the impedance lacks to 1."""
     figure, axes = _draw_single(
         curves,
@@ -426,7 +428,7 @@ def draw_softness(curves: Curves, title: str) -> Any:
     return figure
 
 
-def draw_solver(curves: Curves, title: str) -> Any:
+def _draw_solver(curves: Curves, title: str) -> Any:
     """Draw each solver over its tolerance."""
     figure, axes = _draw_single(
         curves,
@@ -455,7 +457,7 @@ def _draw_slope(axes: Any, exponent: float, x: float, y: float, name: str) -> No
     )
 
 
-def draw_over_timestep(axes: Any, curves: Curves, quantity: str) -> None:
+def _draw_over_timestep(axes: Any, curves: Curves, quantity: str) -> None:
     """Draw one quantity's error over the timestep, by integrator.
 
     Its jumps are ringed.
@@ -466,7 +468,7 @@ def draw_over_timestep(axes: Any, curves: Curves, quantity: str) -> None:
             point.setting_value: min(getattr(point.at_steps, quantity), LARGEST)
             for point in row
         }
-        draw_line(axes, [1.0 / n for n in errors], list(errors.values()), label, look)
+        _draw_line(axes, [1.0 / n for n in errors], list(errors.values()), label, look)
         leaps = [point.setting_value for point in find_jumps(row, quantity)]
         axes.plot(
             [1.0 / n for n in leaps],
@@ -491,7 +493,7 @@ def draw_orders(curves: Curves, title: str) -> Any:
     )
     flat = panels.ravel()
     for axes, quantity in zip(flat, QUANTITIES, strict=False):
-        draw_over_timestep(axes, curves, quantity)
+        _draw_over_timestep(axes, curves, quantity)
         set_axes(axes)
         axes.get_legend().remove()
         axes.set_ylim(1e-12, 2.0 * LARGEST)

@@ -15,26 +15,26 @@ from fourbar_validation.engines.mujoco.closed_loop import ClosedLoop
 from fourbar_validation.engines.mujoco.trial import FLYWHEEL, Build
 
 STEPS = (20, 40, 80, 160, 320, 640, 1280, 2560)
-MORE_STEPS = (*STEPS, 5120, 10240)
+_MORE_STEPS = (*STEPS, 5120, 10240)
 """Steps per revolution; a first-order integrator needs more."""
 MIDDLE = 640
 """Steps per revolution where a setting other than the timestep changes."""
-IMPEDANCES = (0.9, 0.97, 0.99, 0.997, 0.999, 0.9997, 0.9999)
+_IMPEDANCES = (0.9, 0.97, 0.99, 0.997, 0.999, 0.9997, 0.9999)
 TIME_CONSTANTS = (3.0, 5.0, 10.0, 20.0, 40.0, 80.0)
-SAGGING_CONSTANTS = (3.0, 4.0, 5.0, 7.0, 10.0)
+_SAGGING_CONSTANTS = (3.0, 4.0, 5.0, 7.0, 10.0)
 """Steps of the time constant: longer ones follow the load through a turn too late."""
-SAGGING = 0.999
+_SAGGING = 0.999
 """Impedance at which a slow linkage sags well above the truncation."""
-MANY_STEPS = 10240
+_MANY_STEPS = 10240
 """Steps per revolution at which a time constant of ten steps is too short to sag."""
 TOLERANCES = (0.0, 1e-16, 1e-14, 1e-12, 1e-10, 1e-8, 1e-6)
-REGULARISATIONS = (1.0, 1e-2, 1e-4, 1e-6, 1e-8)
-PADS = (None, 1e-1, 1e-2, 1e-3, 1e-4)
+_REGULARISATIONS = (1.0, 1e-2, 1e-4, 1e-6, 1e-8)
+_PADS = (None, 1e-1, 1e-2, 1e-3, 1e-4)
 SLOW = 0.1
 """rad/s at which gravity and loads outweigh inertia, and the loop sags under them."""
 DEFAULT_TIMESTEP = 0.002
 """s, of MuJoCo."""
-PART_OF_TURN = 0.25
+_PART_OF_TURN = 0.25
 """Time constant, as a part of a revolution, that stays the same while the timestep
 changes.
 """
@@ -94,7 +94,7 @@ def trace(
     return Curve(name, tuple(spots))
 
 
-def trace_steps(
+def _trace_steps(
     name: str,
     settings: Settings,
     closure: Build | None = None,
@@ -124,12 +124,12 @@ def design_curves(scene: Scene) -> list[Curve]:
     ]
     for suffix, tc, held in (
         ("pads, tc = 10 steps", 10.0, None),
-        ("tc held", 20.0, PART_OF_TURN),
+        ("tc held", 20.0, _PART_OF_TURN),
     ):
         for name in INTEGRATORS:
             settings = replace(BEST, integrator=name, time_constant_steps=tc)
             curves.append(
-                trace_steps(
+                _trace_steps(
                     f"{name}, {suffix}",
                     settings,
                     steps=_choose_ladder(name),
@@ -138,11 +138,11 @@ def design_curves(scene: Scene) -> list[Curve]:
             )
     for tc in (3.0, 30.0, 100.0):
         curves.append(
-            trace_steps(
+            _trace_steps(
                 f"RK4, pads, tc = {tc:g} steps", replace(BEST, time_constant_steps=tc)
             )
         )
-    curves.append(trace_steps("RK4, no pads, tc = 10 steps", PLAIN))
+    curves.append(_trace_steps("RK4, no pads, tc = 10 steps", PLAIN))
     curves += [*_vary_softness(), *_vary_sag(), *_vary_tolerance()]
     return curves + (_vary_drives() if scene.motion.alpha_2 == 0.0 else [])
 
@@ -151,7 +151,7 @@ PLAIN = replace(BEST, pad=None, time_constant_steps=10.0)
 
 
 def _choose_ladder(integrator: str) -> tuple[int, ...]:
-    return STEPS if integrator == "RK4" else MORE_STEPS
+    return STEPS if integrator == "RK4" else _MORE_STEPS
 
 
 def _vary_default_closure(integrator: str, speed: float) -> Curve:
@@ -160,7 +160,7 @@ def _vary_default_closure(integrator: str, speed: float) -> Curve:
     A new user gets these.
     """
     settings = replace(BEST, integrator=integrator, pad=None)
-    curve = trace_steps(
+    curve = _trace_steps(
         f"{integrator}, MuJoCo's defaults",
         settings,
         drives.restore_defaults,
@@ -189,7 +189,7 @@ def _vary_softness() -> list[Curve]:
             replace(BEST, pad=f),
             x=f or 1.0,
         )
-        for f in PADS
+        for f in _PADS
     )
     edited = (
         Spot(
@@ -198,7 +198,7 @@ def _vary_softness() -> list[Curve]:
             partial(_soften, factor),
             x=factor,
         )
-        for factor in REGULARISATIONS
+        for factor in _REGULARISATIONS
     )
     by_tc = trace(
         "softness tc",
@@ -220,7 +220,7 @@ def _soften(factor: float, text: str, _: float) -> ClosedLoop:
 
 def _list_impedances() -> tuple[Spot, ...]:
     return tuple(
-        Spot(f"d = {d:g}", replace(PLAIN, impedance=d), x=1.0 - d) for d in IMPEDANCES
+        Spot(f"d = {d:g}", replace(PLAIN, impedance=d), x=1.0 - d) for d in _IMPEDANCES
     )
 
 
@@ -232,13 +232,13 @@ def _vary_sag() -> list[Curve]:
     by_tc = trace(
         "sag tc, slow",
         "tc = {:g} steps",
-        SAGGING_CONSTANTS,
-        lambda tc: replace(PLAIN, impedance=SAGGING, time_constant_steps=tc),
+        _SAGGING_CONSTANTS,
+        lambda tc: replace(PLAIN, impedance=_SAGGING, time_constant_steps=tc),
     )
     short = Spot(
-        f"{MANY_STEPS} steps a revolution",
-        replace(PLAIN, impedance=SAGGING, steps_per_revolution=MANY_STEPS),
-        x=MANY_STEPS,
+        f"{_MANY_STEPS} steps a revolution",
+        replace(PLAIN, impedance=_SAGGING, steps_per_revolution=_MANY_STEPS),
+        x=_MANY_STEPS,
     )
     return [
         Curve("sag d, slow", _list_impedances(), slow=True),
@@ -269,7 +269,7 @@ def _vary_drives() -> list[Curve]:
     light = replace(BEST, flywheel=1.0)
     fast = replace(light, integrator="implicitfast", time_constant_steps=3.0)
     curves = [
-        trace_steps(f"RK4, flywheel {f:g}", replace(BEST, flywheel=f))
+        _trace_steps(f"RK4, flywheel {f:g}", replace(BEST, flywheel=f))
         for f in (1e2, 1e4, 1e6, 1e8)
     ]
     tried: list[tuple[str, Build]] = [
@@ -282,6 +282,6 @@ def _vary_drives() -> list[Curve]:
     ]
     for name, drive in tried:
         explicit = name.endswith("RK4")
-        settings, steps = (light, STEPS) if explicit else (fast, MORE_STEPS)
-        curves.append(trace_steps(name, settings, drive=drive, steps=steps))
+        settings, steps = (light, STEPS) if explicit else (fast, _MORE_STEPS)
+        curves.append(_trace_steps(name, settings, drive=drive, steps=steps))
     return curves

@@ -145,7 +145,7 @@ def _collect_place(
     return {distance: pair[0], angle: pair[1]}
 
 
-def place_from_pin(
+def _place_from_pin(
     stated: Place,
     distance: Ball,
     angle: Ball,
@@ -187,7 +187,7 @@ def closure(x: Values, branch: int) -> tuple[Complex, Complex, Complex] | None:
         D = d e^{i theta_1} - b e^{i theta_3} of bars 2 and 4,
         D = d e^{i theta_1} + c e^{i theta_4} of bars 3 and 2, bar 2 reversed.
     """
-    bar, d = find_commanded(x), x["d"]
+    bar, d = _find_commanded(x), x["d"]
     held, b, c = {2: ("a", "b", "c"), 3: ("b", "a", "c"), 4: ("c", "b", "a")}[bar]
     held, b, c, side = x[held], x[b], x[c], 1 if bar == 4 else -1
     w = polar(arb(1), x[f"theta_{bar}"])
@@ -212,12 +212,12 @@ def closure(x: Values, branch: int) -> tuple[Complex, Complex, Complex] | None:
     )
 
 
-def find_commanded(x: Values) -> int:
+def _find_commanded(x: Values) -> int:
     """Return the bar whose angle is among the inputs."""
     return next(bar for bar in MOVING_BARS if f"theta_{bar}" in x)
 
 
-def solve_linear(rows: list[list[Ball]], right: list[Ball]) -> list[Ball]:
+def _solve_linear(rows: list[list[Ball]], right: list[Ball]) -> list[Ball]:
     """Solve a linear system rigorously.
 
     Raises ZeroDivisionError where it is singular to working precision.
@@ -231,12 +231,12 @@ def compute_outputs(scene: Scene, branch: int, inputs: Values) -> Values | None:
 
     Vectors are name_x, name_y; None if the loop does not close.
     """
-    x = turn_by_stroke(scene, inputs) if "stroke" in inputs else inputs
+    x = _turn_by_stroke(scene, inputs) if "stroke" in inputs else inputs
     directions = None if x is None else closure(x, branch)
     if x is None or directions is None:
         return None
     w = dict(zip(MOVING_BARS, directions, strict=True))
-    commanded = find_commanded(x)
+    commanded = _find_commanded(x)
     sines = {2: wedge(w[3], w[4]), 3: wedge(w[2], w[4]), 4: wedge(w[2], w[3])}
     y: Values = {
         f"theta_{bar}": w[bar].arg()
@@ -252,7 +252,7 @@ def compute_outputs(scene: Scene, branch: int, inputs: Values) -> Values | None:
     y |= {f"omega_{bar}": bars.omega[bar] for bar in MOVING_BARS}
     y |= {f"alpha_{bar}": bars.alpha[bar] for bar in MOVING_BARS}
     _put(y, bars.points())
-    line = find_line(scene, x, bars) if scene.drive else None
+    line = _find_line(scene, x, bars) if scene.drive else None
     if line is None:
         drive, y["drive_condition"], speed = (
             "torque",
@@ -262,7 +262,7 @@ def compute_outputs(scene: Scene, branch: int, inputs: Values) -> Values | None:
     else:
         drive, y["drive_condition"] = (
             "drive_force",
-            compute_condition(line, x, bars.tip[2], sines),
+            _compute_condition(line, x, bars.tip[2], sines),
         )
         speed = line.speed({1: acb(0), **bars.v_pin}, {1: arb(0), **bars.omega})
         y["stroke_speed"] = speed
@@ -281,7 +281,7 @@ def compute_outputs(scene: Scene, branch: int, inputs: Values) -> Values | None:
     return y
 
 
-class BallBars(NamedTuple):
+class _BallBars(NamedTuple):
     """Bars 2, 3 and 4 in motion at one position.
 
     They have directions, rates, and vectors of the plane.
@@ -332,7 +332,7 @@ class BallBars(NamedTuple):
         return points
 
 
-def _move(x: Values, w: dict[int, Complex], commanded: int) -> BallBars:
+def _move(x: Values, w: dict[int, Complex], commanded: int) -> _BallBars:
     """Move the bars: two linear systems of the differentiated loop."""
     a, b, c, zero = x["a"], x["b"], x["c"], acb(0)
     side = {2: a * w[2], 3: b * w[3], 4: -c * w[4]}  # sides of the loop
@@ -348,7 +348,7 @@ def _move(x: Values, w: dict[int, Complex], commanded: int) -> BallBars:
             acb(0, 1) * side[second],
             total - acb(0, stated) * side[commanded],
         )
-        solved = solve_linear(
+        solved = _solve_linear(
             [[u.real, v.real], [u.imag, v.imag]], [rest.real, rest.imag]
         )
         return {commanded: stated, **dict(zip((first, second), solved, strict=True))}
@@ -362,13 +362,13 @@ def _move(x: Values, w: dict[int, Complex], commanded: int) -> BallBars:
     centre = {bar: w[bar] * polar(x[f"r{bar}"], x[f"phi{bar}"]) for bar in MOVING_BARS}
     v_A, a_A = acb(0, omega[2]) * tip[2], acb(-omega[2] * omega[2], alpha[2]) * tip[2]
     at_rest = {2: zero, 4: zero}
-    return BallBars(
+    return _BallBars(
         w, omega, alpha, tip, first_pin, centre, at_rest | {3: v_A}, at_rest | {3: a_A}
     )
 
 
 def _sum_acting(
-    scene: Scene, x: Values, bars: BallBars
+    scene: Scene, x: Values, bars: _BallBars
 ) -> tuple[dict[int, Complex], dict[int, Ball]]:
     """Sum what acts on each bar: a force, and a moment about the mass centre."""
     w, first_pin, centre = bars.directions(x), bars.first_pin, bars.centre
@@ -395,7 +395,7 @@ def _sum_acting(
             assert load.place is not None
             stated = find_stated(scene, load.place)
             at = x[f"at_{k}"], x[f"at_angle_{k}"]
-            arm = place_from_pin(stated, *at, w, centre) - centre[load.bar]
+            arm = _place_from_pin(stated, *at, w, centre) - centre[load.bar]
         force[load.bar] += factor * f
         moment[load.bar] += factor * wedge(arm, f)
     for effect in scene.effects:
@@ -415,7 +415,7 @@ def _sum_acting(
                 start, end = spring.start.bar, spring.end.bar
                 ends = ((spring.start, "start"), (spring.end, "end"))
                 arms = [
-                    place_from_pin(
+                    _place_from_pin(
                         find_stated(scene, place),
                         x[f"{name}_{k}"],
                         x[f"{name}_angle_{k}"],
@@ -460,7 +460,7 @@ def _sum_acting(
 
 def _solve_thirteen(
     x: Values,
-    bars: BallBars,
+    bars: _BallBars,
     force: dict[int, Complex],
     moment: dict[int, Ball],
     drives: dict[int, tuple[Ball, Ball, Ball]],
@@ -500,7 +500,7 @@ def _solve_thirteen(
     for row, (i, j) in enumerate(((2, 4), (3, 5), (6, 8), (7, 9)), start=9):
         matrix[row][i] = matrix[row][j] = arb(1)
         constants.append(arb(0))
-    solved = solve_linear(matrix, constants)
+    solved = _solve_linear(matrix, constants)
     columns = {"F12": 0, "F32": 1, "F43": 3, "F14": 5}
     return {
         name: acb(solved[2 * k], solved[2 * k + 1]) for name, k in columns.items()
@@ -546,7 +546,7 @@ def _interpolate_factor(table: Table, theta_2: Ball, x: Values, k: int) -> Ball:
     return first + (last - first) * (angle - start) / (stop - start)
 
 
-def turn_by_stroke(scene: Scene, x: Values) -> Values | None:
+def _turn_by_stroke(scene: Scene, x: Values) -> Values | None:
     """Add angle, speed and acceleration of the bar that a stroke turns.
 
     None if the triangle stays open.
@@ -563,7 +563,7 @@ def turn_by_stroke(scene: Scene, x: Values) -> Values | None:
     centre = {bar: polar(x[f"r{bar}"], x[f"phi{bar}"])}
     at_zero = {bar: acb(1)}
     at = x[on_bar], x[f"{on_bar}_angle"]
-    held = place_from_pin(stated, *at, at_zero, centre)
+    held = _place_from_pin(stated, *at, at_zero, centre)
     fixed = polar(x[on_ground], x[f"{on_ground}_angle"] + x["theta_1"])
     if bar == 4:
         fixed -= polar(x["d"], x["theta_1"])
@@ -586,7 +586,7 @@ def turn_by_stroke(scene: Scene, x: Values) -> Values | None:
     return x | turned | {f"alpha_{bar}": side * growth, "lever": lever}
 
 
-class BallLine(NamedTuple):
+class _BallLine(NamedTuple):
     """Line of the drive between its two points, at one position of the linkage."""
 
     stroke: Ball | None
@@ -614,7 +614,7 @@ class BallLine(NamedTuple):
         return force.real, force.imag, wedge(self.arms[bar] - centre, force)
 
 
-def find_line(scene: Scene, x: Values, bars_in_motion: BallBars) -> BallLine:
+def _find_line(scene: Scene, x: Values, bars_in_motion: _BallBars) -> _BallLine:
     """Find the line of a drive from the directions and first pins of all bars.
 
     The ground's are among them.
@@ -623,7 +623,7 @@ def find_line(scene: Scene, x: Values, bars_in_motion: BallBars) -> BallLine:
     assert drive is not None
     w, centre = bars_in_motion.directions(x), bars_in_motion.centre
     arms = {
-        place.bar: place_from_pin(
+        place.bar: _place_from_pin(
             find_stated(scene, place), x[name], x[f"{name}_angle"], w, centre
         )
         for (_, place), name in zip(drive.ends, ENDS, strict=False)
@@ -632,17 +632,17 @@ def find_line(scene: Scene, x: Values, bars_in_motion: BallBars) -> BallLine:
         unit = polar(arb(1), x["direction"])
         if drive.frame == "bar":
             unit = unit * w[drive.place.bar]
-        return BallLine(None, unit, arms, {drive.place.bar: 1})
+        return _BallLine(None, unit, arms, {drive.place.bar: 1})
     bars = [place.bar for _, place in drive.ends]
     start, end = (first_pin[k] + arms[k] for k in bars)
     stroke = abs(end - start)
-    return BallLine(
+    return _BallLine(
         stroke, (end - start) / stroke, arms, dict(zip(bars, (-1, 1), strict=True))
     )
 
 
-def compute_condition(
-    line: BallLine, x: Values, tip: Complex, sines: dict[int, Ball]
+def _compute_condition(
+    line: _BallLine, x: Values, tip: Complex, sines: dict[int, Ball]
 ) -> Ball:
     """Compute |P|/L.
 

@@ -39,7 +39,7 @@ the ends of bars 2 and 4.
 """
 ON_BARS = {"A": "end2", "B": "end4", "G2": "G2", "G3": "G3", "G4": "G4"}
 """Points whose accelerations are answered, each as a point of a bar."""
-TELLS = 2.0**-53
+_TELLS = 2.0**-53
 """Least component of a direction that is not what the angle's rounding leaves of zero.
 """
 SHARED = "the description, what is commanded and the branch"
@@ -93,8 +93,8 @@ def rotate_by(
 def find_field(gravity: Gravity) -> tuple[float, float]:
     """Return (g_x, g_y), m/s^2; the angle counts from +x, counter-clockwise."""
     x, y = math.cos(gravity.angle), math.sin(gravity.angle)
-    return gravity.magnitude * (x if abs(x) > TELLS else 0.0), gravity.magnitude * (
-        y if abs(y) > TELLS else 0.0
+    return gravity.magnitude * (x if abs(x) > _TELLS else 0.0), gravity.magnitude * (
+        y if abs(y) > _TELLS else 0.0
     )
 
 

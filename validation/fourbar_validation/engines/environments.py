@@ -27,10 +27,10 @@ from fourbar_validation.engines.registry import FOLDERS, Engine
 FILE = "engines.toml"
 LARGEST_FILE = 10**6
 """Bytes."""
-CACHE = (
+_CACHE = (
     Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "fourbar-engines"
 )
-KEPT_FIELDS = (
+_KEPT_FIELDS = (
     "tolerance",
     "answers",
     "positions",
@@ -41,7 +41,7 @@ KEPT_FIELDS = (
     "stated",
 )
 """Fields of an engine that an adapter of ours keeps in every environment."""
-DONE = "installed"
+_DONE = "installed"
 """File in the folder of an environment that is complete."""
 
 
@@ -127,7 +127,7 @@ def _read_entry(file: Path, table: object) -> Entry:
     return Entry(**stated)
 
 
-def make_environment(entry: Entry, cache: Path = CACHE) -> str:
+def make_environment(entry: Entry, cache: Path = _CACHE) -> str:
     """Return the interpreter of an engine's environment, which is made once.
 
     Raises DependencyError if pip fails. Engines with the same requirements share it.
@@ -153,7 +153,7 @@ def make_environment(entry: Entry, cache: Path = CACHE) -> str:
     inside = folder / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
     cache.mkdir(parents=True, exist_ok=True)
     with FileLock(f"{folder}.lock"):
-        if not (folder / DONE).is_file():
+        if not (folder / _DONE).is_file():
             pip = [
                 sys.executable,
                 "-m",
@@ -181,7 +181,7 @@ def make_environment(entry: Entry, cache: Path = CACHE) -> str:
                 write_text(
                     site / "zz_of_the_harness.pth", "".join(lines)
                 )  # read after all others
-            (folder / DONE).touch()
+            (folder / _DONE).touch()
     return str(inside)
 
 
@@ -213,7 +213,7 @@ def start_engine(
     program = prepare_program(entry, seconds)
     (guest,) = name_guests([(entry.adapter or entry.name, entry.name, program)], taken)
     if like is not None:
-        guest = replace(guest, **{name: getattr(like, name) for name in KEPT_FIELDS})
+        guest = replace(guest, **{name: getattr(like, name) for name in _KEPT_FIELDS})
     setting: dict[str, Any] = {}
     if entry.setting:
         setting["name"] = entry.setting

@@ -53,17 +53,17 @@ BLOCK = 4096
 """Positions solved at once. At 1.4 kB a matrix, and some four of them at a time, they
 are 22 MB.
 """
-FRICTION_STAGES = 16
+_FRICTION_STAGES = 16
 """Stages in which friction grows to its full coefficient. Each is the start of the
 next.
 """
-FRICTION_STEPS = 60
+_FRICTION_STEPS = 60
 """Newton's steps in a stage; where it converges it needs a tenth of them."""
-FRICTION_SETTLED = 8.0 * 2.0**-52
+_FRICTION_SETTLED = 8.0 * 2.0**-52
 """Residual of a friction couple's equation that counts as rounding. It is over the sum
 of its terms.
 """
-FRICTION_STARTS = 100
+_FRICTION_STARTS = 100
 """Starts from which other solutions are sought, over six decades of couples."""
 APART = 1e-6
 """Relative difference below which two solutions are one."""
@@ -309,7 +309,7 @@ def balance(scene: Scene, motion: BodyMotion) -> tuple[Array, float, Array | flo
     from_jamming: Array | float = 1.0
     if len(arms):
         couples = continue_couples(loads[..., 0], loads[..., 1:], arms)
-        from_jamming = compute_distance_from_jamming(
+        from_jamming = _compute_distance_from_jamming(
             loads[..., 0], loads[..., 1:], arms, couples
         )
         total = total + (unknowns[..., 1:] * couples[:, None, :]).sum(axis=-1)
@@ -372,7 +372,7 @@ def _count_at_position(F: Complex, C: Complex, k: Array) -> int:
         return 0
     if np.abs(np.linalg.eigvals(k[:, None] * np.abs(C))).max() < 1.0:
         return 1
-    rng, n = np.random.default_rng(0), FRICTION_STARTS
+    rng, n = np.random.default_rng(0), _FRICTION_STARTS
     size = float((k * np.abs(F)).max()) or 1.0
     x = (
         size
@@ -482,9 +482,9 @@ def continue_couples(F: Complex, C: Complex, k: Array) -> Array:
         np.isfinite(F).all(axis=1) & np.isfinite(C).all(axis=(1, 2))
     )
     x[remaining] = 0.0
-    for stage in range(1, FRICTION_STAGES + 1):
+    for stage in range(1, _FRICTION_STAGES + 1):
         x[remaining], settled, det = _solve_couples(
-            F[remaining], C[remaining], k * (stage / FRICTION_STAGES), x[remaining]
+            F[remaining], C[remaining], k * (stage / _FRICTION_STAGES), x[remaining]
         )
         # without friction the determinant is 1; a change of its sign means that the
         # branch has turned back
@@ -494,7 +494,7 @@ def continue_couples(F: Complex, C: Complex, k: Array) -> Array:
     return x
 
 
-def compute_distance_from_jamming(F: Complex, C: Complex, k: Array, x: Array) -> Array:
+def _compute_distance_from_jamming(F: Complex, C: Complex, k: Array, x: Array) -> Array:
     """Compute the least singular value of the Jacobian, at most 1, (n,).
 
     The equations are those of `continue_couples`.
@@ -529,13 +529,13 @@ def _solve_couples(
 
     Return also where it converged, and the Jacobian's determinant.
     """
-    for _ in range(FRICTION_STEPS):
+    for _ in range(_FRICTION_STEPS):
         size, matrix = _compute_friction_jacobian(F, C, k, x)
         gap, terms = (
             k * size - x,
             k * (np.abs(F) + (np.abs(C) * x[:, None, :]).sum(axis=-1)),
         )
-        settled = (np.abs(gap) <= FRICTION_SETTLED * terms).all(axis=1)
+        settled = (np.abs(gap) <= _FRICTION_SETTLED * terms).all(axis=1)
         step = solve_system(matrix, gap[..., None])[0][..., 0]
         moving = ~settled & np.isfinite(step).all(axis=1)
         if not moving.any():

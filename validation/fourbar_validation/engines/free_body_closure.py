@@ -180,7 +180,7 @@ def cross(u: Any, v: Any) -> Any:
     return (np.conj(u) * v).imag
 
 
-STROKE_HALVINGS = 80
+_STROKE_HALVINGS = 80
 """Number of times half a turn is halved: beyond the last digit of an angle."""
 
 
@@ -218,7 +218,7 @@ def find_angle(
         return np.asarray(arm * np.exp(1j * theta) - ground)
 
     low, high = np.zeros(len(command.stroke)), np.full(len(command.stroke), np.pi)
-    for _ in range(STROKE_HALVINGS):
+    for _ in range(_STROKE_HALVINGS):
         middle = 0.5 * (low + high)
         short = np.abs(across(towards + sense * middle)) < command.stroke
         low, high = np.where(short, middle, low), np.where(short, high, middle)

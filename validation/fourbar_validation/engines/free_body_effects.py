@@ -65,13 +65,13 @@ class BodyMotion(NamedTuple):
         begins = self.beginning[j] - self.beginning[i]
         begins[
             np.abs(begins)
-            < TURNS_AS_ONE * (np.abs(self.beginning[j]) + np.abs(self.beginning[i]))
+            < _TURNS_AS_ONE * (np.abs(self.beginning[j]) + np.abs(self.beginning[i]))
         ] = 0.0
         at_rest = np.logical_and.reduce([self.omega[bar] == 0.0 for bar in MOVING_BARS])
         return np.where(at_rest, np.sign(begins), np.sign(slip))
 
 
-TURNS_AS_ONE = 64.0 * 2.0**-52
+_TURNS_AS_ONE = 64.0 * 2.0**-52
 """Two bars whose speeds differ by less than this part of them turn as one."""
 
 
@@ -108,7 +108,7 @@ class BodyWrenches:
         self.couple(i, -couple)
 
 
-MEET = 16.0 * 2.0**-52
+_MEET = 16.0 * 2.0**-52
 """Part of the lengths below which two points lie in one. The lengths are those by which
 they are reached.
 """
@@ -182,7 +182,7 @@ def _apply_springs(effect: Any, motion: BodyMotion, wrenches: BodyWrenches) -> N
                 + abs(spring.start.distance)
                 + abs(spring.end.distance)
             )
-            distance = np.where(np.abs(across) <= MEET * reach, np.nan, np.abs(across))
+            distance = np.where(np.abs(across) <= _MEET * reach, np.nan, np.abs(across))
             pull = (
                 (spring.preload + spring.stiffness * (distance - spring.length))
                 / distance

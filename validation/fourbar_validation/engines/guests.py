@@ -102,7 +102,7 @@ def read_guests(
     Raises InputError if there is no such program or class.
     """
     return name_guests(
-        [(entry, "", make_program(entry, seconds)) for entry in entries], known
+        [(entry, "", _make_program(entry, seconds)) for entry in entries], known
     )
 
 
@@ -176,7 +176,7 @@ def list_numbers(engines: Iterable[Engine]) -> dict[str, int]:
     return {guest.name: guest.number for guest in engines if isinstance(guest, Guest)}
 
 
-def make_program(entry: str, seconds: float | None = None) -> Program:
+def _make_program(entry: str, seconds: float | None = None) -> Program:
     """Make the program of "module:Class" or a command line.
 
     Raises InputError if there is none.
@@ -242,12 +242,12 @@ def ask_hello(program: Program) -> Hello:
     """Start a program, read its hello and end it."""
     running = Running(program)
     try:
-        return read_hello(running.ask_again(HELLO, 0))
+        return _read_hello(running.ask_again(HELLO, 0))
     finally:
         running.end()
 
 
-def read_hello(data: dict[str, Any]) -> Hello:
+def _read_hello(data: dict[str, Any]) -> Hello:
     """Check the hello of an engine; InputError names what is wrong."""
 
     def texts(
@@ -323,7 +323,7 @@ def _read_tolerance(stated: Any) -> ErrorBound:
     return ErrorBound(STATED, reason, error, conditioned=False)
 
 
-def find_needs(scene: Scene) -> list[str]:
+def _find_needs(scene: Scene) -> list[str]:
     """List what a scene asks of an engine, in the words of hello's `effects`."""
     needs = [effect.key for effect in scene.effects]
     needs += ["loads"] * bool(scene.loads)
@@ -362,7 +362,7 @@ class GuestClient:
 
     def answer(self, scene: Scene, command: Command) -> Answer:
         """Return the answer of the guest; EngineError where it fails."""
-        if refusal := self._explain_refusal(find_needs(scene)):
+        if refusal := self._explain_refusal(_find_needs(scene)):
             return Answer(self.name, "exact", refusal=refusal)
         data = {
             "ask": "answer",
@@ -379,7 +379,7 @@ class GuestClient:
 
     def release(self, scene: Scene, times: Array) -> ReleasedAnswer:
         """Return the released motion as the guest integrates it."""
-        if refusal := self._explain_refusal(["release", *find_needs(scene)]):
+        if refusal := self._explain_refusal(["release", *_find_needs(scene)]):
             return ReleasedAnswer.refused(self.name, "-", refusal)
         data = {
             "ask": "release",
@@ -412,7 +412,7 @@ class GuestClient:
         return running.ask_again(question, positions, self._greet)
 
     def _greet(self, ask: Ask) -> None:
-        if read_hello(ask(HELLO, 0)) != self._hello:
+        if _read_hello(ask(HELLO, 0)) != self._hello:
             raise EngineError("the engine's hello changed after a restart")
 
 

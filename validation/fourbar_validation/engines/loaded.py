@@ -39,7 +39,7 @@ ROUNDED = 1e-11
 """Relative change that is rounding once it no longer falls. It holds near a pole of the
 torque too.
 """
-DIVERGED = 1e100
+_DIVERGED = 1e100
 """Load, N, that only passes running away from each other reach."""
 Pair = tuple[float, float]
 """A vector of the plane: plain numbers. An array of two costs more than its arithmetic.
@@ -270,7 +270,7 @@ class Loaded(EngineBars, Protocol):
             # once down to the rounding of a pass, the change falls no further
             if change <= REPEATED * most or before <= change <= ROUNDED * most:
                 return forces
-            if not most < DIVERGED:
+            if not most < _DIVERGED:
                 break
             before, self.pin_loads = change, loads
             forces = balanced()
@@ -301,7 +301,7 @@ class Loaded(EngineBars, Protocol):
                     float(np.abs(settled_loads - loads).max()),
                 )
                 if (
-                    not most < DIVERGED
+                    not most < _DIVERGED
                     or change <= REPEATED * most
                     or before <= change <= ROUNDED * most
                 ):

@@ -40,8 +40,8 @@ from fourbar_validation.engines.free_body_closure import (
 )
 from fourbar_validation.engines.loaded import Assembled, EngineBars, Values
 
-START_ANGLES = np.radians(STARTS).tolist()
-SHORTEST_STEP = 2.0**-40
+_START_ANGLES = np.radians(STARTS).tolist()
+_SHORTEST_STEP = 2.0**-40
 """A step halved this often moves nothing that a gap above the rounding could tell."""
 NOT_ANSWERED = frozenset(
     (
@@ -67,7 +67,7 @@ of the lengths.
 """
 Angles = tuple[float, float, float]
 """Turns of bar 2 at O2, of bar 3 against bar 2 at A, of bar 4 at O4, rad."""
-CLOSING = {2: (3, 4), 3: (2, 4), 4: (3, 2)}
+_CLOSING = {2: (3, 4), 3: (2, 4), 4: (3, 2)}
 """The two bars that close the loop, by the commanded bar. In this order the sine
 between them is the branch's, and they stand on the diagonal between their free ends as
 bars 3 and 4 do from A to O4; bar 2 from A back to O2.
@@ -88,7 +88,7 @@ class Assembler:
             4: points["B4"] - points["O4"],
         }
         self.ground, self.along = points["O4"], along[bar]
-        self.near, self.far = (abs(along[other]) for other in CLOSING[bar])
+        self.near, self.far = (abs(along[other]) for other in _CLOSING[bar])
         lengths = abs(self.ground), abs(self.along), self.near, self.far
         self.closed = ROUNDING * sum(lengths)
 
@@ -112,7 +112,7 @@ class Assembler:
             _compute_triangle_angle(e, near, far),
             _compute_triangle_angle(e, far, near),
         )
-        for alpha, beta in (triangle, *START_ANGLES):
+        for alpha, beta in (triangle, *_START_ANGLES):
             first, second = phi + branch * alpha, phi + math.pi - branch * beta
             around = {
                 2: (theta, first, second),
@@ -125,7 +125,7 @@ class Assembler:
                 math.remainder(theta_3 - theta_2, math.tau),
                 math.remainder(theta_4, math.tau),
             )
-            assembled = close_gap(self.tree, q, branch, closed, bar)
+            assembled = _close_gap(self.tree, q, branch, closed, bar)
             if assembled is not None:
                 return assembled
         if max(e - (near + far), abs(near - far) - e) < -closed:
@@ -145,7 +145,7 @@ def _compute_triangle_angle(e: float, near: float, far: float) -> float:
     return 2.0 * math.atan2(math.sqrt(max(above, 0.0)), math.sqrt(max(below, 0.0)))
 
 
-def close_gap(
+def _close_gap(
     tree: Assembled, q: Angles, branch: int, closed: float, bar: int = 2
 ) -> Angles | None:
     """Close the gap with a bar held, never leaving the branch.
@@ -193,7 +193,7 @@ def close_gap(
             ):
                 break
             part /= 2.0
-            if size <= closed or part < SHORTEST_STEP:
+            if size <= closed or part < _SHORTEST_STEP:
                 tree.place(q)
                 return q if size <= closed else None
         q, state = trial, trial_state

@@ -29,7 +29,7 @@ from fourbar_validation.engines.tree import put_back, solve_closed, solve_multip
 
 MOST_STEPS = 20
 """Newton's steps of one position; from its neighbour two or three are enough."""
-SQUARES_AWAY = 1e-7
+_SQUARES_AWAY = 1e-7
 """A step (rad) after which Newton's method, which squares it, is at round-off."""
 
 
@@ -95,7 +95,7 @@ class PlainLoop:
             second = (c * x - a * y) / determinant
             q[1] += first
             q[2] += second
-            converged = abs(first) + abs(second) < SQUARES_AWAY
+            converged = abs(first) + abs(second) < _SQUARES_AWAY
         raise LimitError("Newton's method did not close the loop")
 
     def look(self, q: Array) -> tuple[float, float, Array]:

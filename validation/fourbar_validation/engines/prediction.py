@@ -55,7 +55,7 @@ def predict_from_data(
     scene: Scene, command: Command, quantity: str, mask: Mask | None = None
 ) -> Array:
     """Predict for a derivation that works in angles and lengths themselves."""
-    return predict_error(scene, command, quantity, 0.0, mask)
+    return _predict_error(scene, command, quantity, 0.0, mask)
 
 
 def predict_in_world_axes(
@@ -65,7 +65,7 @@ def predict_in_world_axes(
 
     Pinocchio's frame Jacobians do so.
     """
-    return predict_error(scene, command, quantity, sum_lengths(scene.linkage), mask)
+    return _predict_error(scene, command, quantity, sum_lengths(scene.linkage), mask)
 
 
 def predict_about_mass_centre(
@@ -79,7 +79,7 @@ def predict_about_mass_centre(
     furthest = max(
         abs(find_centre(scene.linkage.bar(number))[0]) for number in MOVING_BARS
     )
-    return predict_error(
+    return _predict_error(
         scene,
         command,
         quantity,
@@ -102,7 +102,7 @@ def predict_for_any_method(
     return np.asarray(np.maximum.reduce(errors))
 
 
-def predict_error(
+def _predict_error(
     scene: Scene,
     command: Command,
     quantity: str,

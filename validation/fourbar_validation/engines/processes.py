@@ -91,7 +91,7 @@ def run_to_end(
     )
 
 
-SAYS_WHY = (
+_SAYS_WHY = (
     re.compile(
         r"^\s*(Caused by: |Exception in thread |Uncaught )?"
         r"(\w+[.:/])*\w*(Error|Exception)\b.*: *\S"
@@ -110,7 +110,7 @@ what Node, Java or a shell print is a version or a place in a file."""
 def find_reason(errors: str) -> str:
     """Return the line of a program's standard error that says why it ended, if any."""
     lines = [line for line in errors.splitlines() if line.strip()]
-    for pattern in SAYS_WHY:
+    for pattern in _SAYS_WHY:
         for line in reversed(lines):
             if pattern.search(line):
                 return line.strip()
@@ -130,21 +130,21 @@ def keep_output() -> None:
     if not _file:
         _file.append(tempfile.TemporaryFile(buffering=0))  # noqa: SIM115 - as long as the process
         sys.stdout = sys.stderr = None
-    take_printed()
+    _take_printed()
 
 
 @contextmanager
 def keep_printed(outputs: dict[str, str], engine: str) -> Iterator[None]:
     """Add what is printed meanwhile to the outputs, under the name of the engine."""
-    take_printed()
+    _take_printed()
     try:
         yield
     finally:
-        if text := take_printed():
+        if text := _take_printed():
             outputs[engine] = outputs.get(engine, "") + text
 
 
-def print_kept(data: bytes) -> None:
+def _print_kept(data: bytes) -> None:
     """Add what a program outside printed to what this process keeps.
 
     Nothing is added if it keeps none.
@@ -153,7 +153,7 @@ def print_kept(data: bytes) -> None:
         _file[0].write(data)
 
 
-def take_printed() -> str:
+def _take_printed() -> str:
     """Take what was printed since the last call, as plain text.
 
     It is empty if this process does not keep it.
@@ -205,17 +205,17 @@ SECONDS, SECONDS_PER_POSITION = 60.0, 0.03
 """Time for a question and for each of its positions if no limit is stated, s. It is ten
 times what a position takes with all engines.
 """
-LONGEST_LINE, BYTES_PER_POSITION = 10**6, 10**4
+LONGEST_LINE, _BYTES_PER_POSITION = 10**6, 10**4
 """Bytes of an answer: ten times as many as all quantities take."""
 MOST_ERRORS = 10**8
 """Bytes that a program may write to its standard error for one answer."""
-KILLED = (-9, 137)
+_KILLED = (-9, 137)
 """Exit status of a program that was killed: its own, or its shell's."""
 ENDING = 5.0
 """Seconds for a program that is told to end; then it is killed."""
-Message = dict[str, Any]
+_Message = dict[str, Any]
 """A question or an answer, as an object of JSON."""
-Ask = Callable[[Message, int], Message]
+Ask = Callable[[_Message, int], _Message]
 """Function that asks a question about a number of positions."""
 
 
@@ -258,10 +258,10 @@ class Running:
 
     def ask_again(
         self,
-        question: Message,
+        question: _Message,
         positions: int,
         greet: Callable[[Ask], None] | None = None,
-    ) -> Message:
+    ) -> _Message:
         """Ask, and ask once more a program that was killed; one that fails is ended.
 
         `greet` asks what a program that is started must be asked first, and raises
@@ -275,10 +275,10 @@ class Running:
 
     def _greet_and_ask(
         self,
-        question: Message,
+        question: _Message,
         positions: int,
         greet: Callable[[Ask], None] | None,
-    ) -> Message:
+    ) -> _Message:
         try:
             if greet is not None and self._process is None:
                 greet(self._ask)
@@ -287,7 +287,7 @@ class Running:
             self.end()
             raise
 
-    def _ask(self, question: Message, positions: int) -> Message:
+    def _ask(self, question: _Message, positions: int) -> _Message:
         """Send a question and return the object that answers it.
 
         The object may say why it has no answer.
@@ -301,7 +301,7 @@ class Running:
         )
         seconds, most = (
             self.program.limit(positions),
-            LONGEST_LINE + BYTES_PER_POSITION * positions,
+            LONGEST_LINE + _BYTES_PER_POSITION * positions,
         )
         answered = threading.Event()
         watch = threading.Thread(
@@ -324,7 +324,7 @@ class Running:
             answered.set()
             self._take_errors()
 
-    def _read(self, reply: bytes) -> Message:
+    def _read(self, reply: bytes) -> _Message:
         """Read a line; EngineError where it is not the answer that was asked for."""
         said = write_one_line(reply[:KEPT].decode(errors="backslashreplace"))
         try:
@@ -386,7 +386,7 @@ class Running:
         It is kept as what this process prints.
         """
         text = b"" if self._errors is None else _take_written(self._errors)
-        print_kept(text)
+        _print_kept(text)
         return text
 
     def _find_end(
@@ -403,7 +403,7 @@ class Running:
             return EngineError("closed its standard output")
         reason = find_reason(self._take_errors().decode(errors="backslashreplace"))
         said = f": {write_one_line(reason)}" if reason else ""
-        if status in KILLED:
+        if status in _KILLED:
             return _KilledError(f"was killed{said}")
         how = f"exit status {status}" if status >= 0 else f"ended by signal {-status}"
         return EngineError(how + " in the middle of a line" * bool(reply) + said)
@@ -439,7 +439,7 @@ def _signal(process: "subprocess.Popen[bytes]", name: str) -> None:
         process.terminate()
 
 
-def _make_object(pairs: list[tuple[str, Any]]) -> Message:
+def _make_object(pairs: list[tuple[str, Any]]) -> _Message:
     data = dict(pairs)
     if len(data) < len(pairs):
         raise ValueError("a key stands twice")

@@ -30,13 +30,13 @@ from fourbar_validation.compare.rows import write_one_line
 
 PROTOCOL = 3
 """Number of the contract; a change that an engine must know of raises it."""
-FURTHEST = 0.1
+_FURTHEST = 0.1
 """rad, and part of the greatest speed and acceleration: a motion that ends further from
 the command than this answers another question.
 """
 TABLES = ("lengths", "bars", "drive", "loads", "effects")
 KINDS_OF_COMMAND = (*COMMANDS.values(), STROKE_COMMAND)
-OF_RELEASED = ("theta_2", "omega_2", "energy", "terms")
+_OF_RELEASED = ("theta_2", "omega_2", "energy", "terms")
 
 
 class _Numbers(Reader):
@@ -530,7 +530,7 @@ def require_near(made: Command, command: Command) -> None:
         else 1.0
     )
     sizes = (1.0, speed, speed**2 + acceleration)
-    allowances = (FURTHEST, FURTHEST + faster - 1.0, FURTHEST + faster**2 - 1.0)
+    allowances = (_FURTHEST, _FURTHEST + faster - 1.0, _FURTHEST + faster**2 - 1.0)
     names = ("angle", "speed", "acceleration")
     for key, name, size, most in zip(
         COMMANDS[command.bar], names, sizes, allowances, strict=True
@@ -608,7 +608,7 @@ def released_to_json(released: ReleasedAnswer) -> dict[str, Any]:
     """Write a released motion as an engine integrated it."""
     if released.refusal is not None:
         return {"refusal": released.refusal, "setting": released.setting}
-    answers = {name: _write_array(getattr(released, name)) for name in OF_RELEASED}
+    answers = {name: _write_array(getattr(released, name)) for name in _OF_RELEASED}
     return {"answers": answers, "setting": released.setting}
 
 
@@ -620,6 +620,6 @@ def released_from_json(engine: str, n: int, data: Any) -> ReleasedAnswer:
         return ReleasedAnswer.refused(engine, setting, _read_reason(data["refusal"]))
     answers = dict(_read_object("answers", data))
     theta, omega, energy, terms = (
-        _read_values("answers", name, answers.get(name), n) for name in OF_RELEASED
+        _read_values("answers", name, answers.get(name), n) for name in _OF_RELEASED
     )
     return ReleasedAnswer(engine, setting, theta, omega, energy, terms)

@@ -120,7 +120,7 @@ EXTRA = {"mujoco": "validation", "pinocchio": "validation", "flint": "validation
 """Extra that brings the module of an engine. Others are installed by the name of their
 package.
 """
-PACKAGE_OF = {"pydrake": "drake"}
+_PACKAGE_OF = {"pydrake": "drake"}
 """Module of an engine: its package, where that has another name."""
 
 
@@ -133,7 +133,7 @@ def find_missing(library: str) -> str | None:
         import_module(library)
     except ModuleNotFoundError as error:
         if error.name == library:
-            package = f"pip install {PACKAGE_OF.get(library, library)}"
+            package = f"pip install {_PACKAGE_OF.get(library, library)}"
             return (
                 f"{library} is not installed:"
                 f" {say_install(EXTRA[library]) if library in EXTRA else package}"
@@ -151,7 +151,7 @@ def _find_broken(library: str, error: BaseException) -> str:
     return f"{library} is installed, but does not load: {say_error(error)}"
 
 
-ONE_BY_ONE = (
+_ONE_BY_ONE = (
     "each position by itself, in Python: Newton on its own gap, its own speeds and"
     " accelerations, then inverse dynamics with the loop's multipliers: pin forces and"
     " torque"
@@ -169,7 +169,7 @@ WORK = {
             "opensim-constraints",
             "drake-inverse",
         ),
-        ONE_BY_ONE,
+        _ONE_BY_ONE,
     ),
     "mujoco-simulated": (
         "one motion: every position assembled, the model compiled, Runge-Kutta steps"
@@ -188,7 +188,7 @@ WORK = {
 """Work of each engine, by its name. The times that are compared are not for the same
 work.
 """
-OF_A_POSITION = tuple(
+_OF_A_POSITION = tuple(
     name for name in COMPARED_QUANTITIES if STAGE_OF[name] == "position"
 )
 
@@ -243,7 +243,7 @@ ENGINES = (
         FreeBody,
         EQUIVALENCE,
         (*COMPARED_QUANTITIES, *DRY_FRICTION_QUANTITIES),
-        positions=OF_A_POSITION,
+        positions=_OF_A_POSITION,
         predictor=predict_from_data,
     ),
 )
@@ -254,7 +254,7 @@ BALLS = Engine(
 )
 
 
-ANY_METHOD = ", by a method in world axes or about the mass centres"
+_ANY_METHOD = ", by a method in world axes or about the mass centres"
 """Words of a reason on an error predicted for an engine of an unknown method."""
 
 
@@ -332,7 +332,7 @@ def make_demands(
     nearby = None if formulas is None else make_nearby(engine, scene, command, formulas)
     method = ""
     if engine.predictor is predict_for_any_method:
-        method = ANY_METHOD
+        method = _ANY_METHOD
     return Demands(
         engine.tolerance,
         engine.answers,

@@ -23,7 +23,7 @@ HARNESS, LAB, FILE, GUEST = "harness", "lab", "engines.toml", "--guest"
 
 
 @dataclass(frozen=True, slots=True)
-class Listed:
+class _Listed:
     """A line of the table."""
 
     source: str
@@ -37,7 +37,7 @@ def fill_table(
     seconds: float | None = None,
     *,
     balls: bool = False,
-) -> dict[str, Listed]:
+) -> dict[str, _Listed]:
     """Fill the table of engines, by name; the first to bear a name keeps it.
 
     Parameters
@@ -49,14 +49,14 @@ def fill_table(
     """
     ours = [BALLS] * balls + list(ENGINES)
     by_source = {HARNESS: ours, LAB: list(load_further())}
-    table: dict[str, Listed] = {}
+    table: dict[str, _Listed] = {}
     for source, engines in by_source.items():
         for engine in engines:
-            table[engine.name] = Listed(source, partial(_ready, engine))
+            table[engine.name] = _Listed(source, partial(_ready, engine))
     for guest in read_guests(guests, list(table), seconds):
-        table[guest.name] = Listed(GUEST, partial(_ready, guest))
+        table[guest.name] = _Listed(GUEST, partial(_ready, guest))
     for name, entry in read_engines(folders).items():
-        table.setdefault(name, Listed(FILE, partial(_start, entry, seconds)))
+        table.setdefault(name, _Listed(FILE, partial(_start, entry, seconds)))
     return table
 
 
@@ -71,7 +71,7 @@ def _start(entry: Entry, seconds: float | None, taken: Collection[str]) -> Engin
 
 
 def choose_engines(
-    names: str | None, table: dict[str, Listed] | None = None
+    names: str | None, table: dict[str, _Listed] | None = None
 ) -> tuple[Engine, ...]:
     """Choose the engines named in a comma-separated list, and every guest.
 
@@ -97,7 +97,7 @@ def choose_engines(
     return tuple(chosen)
 
 
-def _read_names(text: str, table: dict[str, Listed]) -> list[str]:
+def _read_names(text: str, table: dict[str, _Listed]) -> list[str]:
     names = [name.strip() for name in text.split(",") if name.strip()]
     for name in names or [text]:
         if name not in table:

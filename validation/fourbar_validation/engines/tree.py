@@ -33,14 +33,14 @@ from fourbar_validation.engines.loaded import (
 
 if TYPE_CHECKING:
     from fourbar.effects.place import Place
-OPEN_AT_B = [(name, point) for name, point in POINTS.items() if name != "A2"]
+_OPEN_AT_B = [(name, point) for name, point in POINTS.items() if name != "A2"]
 """Names of points where bars 2 and 3 share pin A, and of the points of the bars."""
-ACCELERATIONS = [f"a_{name}" for name in ON_BARS]
+_ACCELERATIONS = [f"a_{name}" for name in ON_BARS]
 AT_REST = np.zeros(3)
 """Speeds or accelerations of the coordinates, where they are zero."""
-BORNE = {2: (2,), 3: (3, 2), 4: (4,)}
+_BORNE = {2: (2,), 3: (3, 2), 4: (4,)}
 """Bars whose first pins carry what acts on a bar of the open tree."""
-OMEGAS, ALPHAS = (
+_OMEGAS, _ALPHAS = (
     tuple(f"{name}_{bar}" for bar in MOVING_BARS) for name in ("omega", "alpha")
 )
 
@@ -114,7 +114,7 @@ class Tree(Loaded, Protocol):
 
     def positions(self) -> dict[str, Pair]:
         """Locate the points of the bars."""
-        return {name: self.locate(point) for name, point in OPEN_AT_B}
+        return {name: self.locate(point) for name, point in _OPEN_AT_B}
 
     def velocity(self, bar: int) -> float:
         """Return the angular velocity of a bar, rad/s."""
@@ -190,10 +190,10 @@ class Tree(Loaded, Protocol):
             return {}
         self.moving(v, a)
         values: Values = dict(
-            zip(ACCELERATIONS, self.accelerations(ON_BARS.values()), strict=True)
+            zip(_ACCELERATIONS, self.accelerations(ON_BARS.values()), strict=True)
         )
-        values |= zip(OMEGAS, (self.rows @ v).tolist(), strict=True)
-        values |= zip(ALPHAS, (self.rows @ a).tolist(), strict=True)
+        values |= zip(_OMEGAS, (self.rows @ v).tolist(), strict=True)
+        values |= zip(_ALPHAS, (self.rows @ a).tolist(), strict=True)
         solve = partial(solve_multipliers, jacobian, self.drive_column())
 
         def balanced() -> dict[str, Any]:
@@ -223,7 +223,7 @@ def carry(on: dict[int, Pair], bar: int, x: float, y: float) -> None:
 
     The ground takes none.
     """
-    for bearer in BORNE.get(bar, ()):
+    for bearer in _BORNE.get(bar, ()):
         f_x, f_y = on[bearer]
         on[bearer] = f_x - x, f_y - y
 
@@ -240,12 +240,12 @@ def put_back(on: dict[int, Pair], x: float, y: float) -> dict[str, Pair]:
     return {"F12": on[2], "F32": (-x, -y), "F14": on[4]}
 
 
-BAR_2 = np.array([1.0, 0.0, 0.0])
+_BAR_2 = np.array([1.0, 0.0, 0.0])
 """Derivative of its rotation by the coordinates."""
 
 
 def solve_closed(
-    jacobian: Array, rate: float, turn: Array = BAR_2, x: float = 0.0, y: float = 0.0
+    jacobian: Array, rate: float, turn: Array = _BAR_2, x: float = 0.0, y: float = 0.0
 ) -> Array:
     """Solve J rates + (x, y) = 0, turn . rates = rate.
 

@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 
 SECONDS = 60.0
 """A scene takes 0.05 to 3 s; what takes longer than this hangs."""
-IN_FLIGHT = 4
+_IN_FLIGHT = 4
 """Chunks submitted per worker. It is always busy then, and the memory stays bounded."""
-LOCKED = 10.0
+_LOCKED = 10.0
 """Seconds for which a worker waits for the pipe that all workers share.
 
 A worker that is killed while it reads or writes there leaves the pipe locked for good:
@@ -33,7 +33,7 @@ Chunk = tuple[int, Sequence[Any]]
 """Number and items."""
 Attempt = Callable[[Any], Any]
 """Do one item by itself: its result, or the exception that it ended with."""
-Instead = Callable[[Any, BaseException, Attempt], Any]
+_Instead = Callable[[Any, BaseException, Attempt], Any]
 """Make the result of an item that failed: item, exception, how to try another one."""
 
 
@@ -49,7 +49,7 @@ def prepare_worker(_: object = None) -> None:
     """
     from pebble import CONSTS
 
-    CONSTS.channel_lock_timeout = LOCKED
+    CONSTS.channel_lock_timeout = _LOCKED
     bound_memory()
     keep_output()
 
@@ -95,7 +95,7 @@ class Tasks:
         return task.result() if error is None else error
 
     def outcomes(
-        self, items: Sequence[Any], tasks: "Sequence[Future[Any]]", instead: Instead
+        self, items: Sequence[Any], tasks: "Sequence[Future[Any]]", instead: _Instead
     ) -> list[Any]:
         """Return the results of items in order.
 
@@ -139,7 +139,7 @@ def apply_over_processes(
     workers: int,
     *,
     seconds: float | None,
-    instead: Instead,
+    instead: _Instead,
 ) -> Iterator[tuple[int, list[Any]]]:
     """Apply the function to each item of the chunks, over processes; chunks in order.
 
@@ -164,7 +164,7 @@ def apply_over_processes(
         try:
             for number, items in chunks:
                 in_flight.append((number, items, [tasks.submit(one) for one in items]))
-                if len(in_flight) > IN_FLIGHT * workers:
+                if len(in_flight) > _IN_FLIGHT * workers:
                     yield finish(*in_flight.popleft())
             for chunk in in_flight:
                 yield finish(*chunk)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 VERDICTS = ("rounded", "truncated", "differs")
 
 
-class Erratum(NamedTuple):
+class _Erratum(NamedTuple):
     """One error of a source."""
 
     id: str
@@ -27,7 +27,7 @@ class Erratum(NamedTuple):
 LISTED = tomllib.loads(
     (Path(__file__).parent / "errata.toml").read_text(encoding="utf-8")
 )["erratum"]
-ERRATA = {entry["id"]: Erratum(**entry) for entry in LISTED}
+ERRATA = {entry["id"]: _Erratum(**entry) for entry in LISTED}
 """The errata of the sources, as data: `errata.toml` says what each field is."""
 
 

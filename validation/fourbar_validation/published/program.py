@@ -244,8 +244,8 @@ def round_off(
     return dict(zip(UNKNOWNS, map(float, len(UNKNOWNS) * EPS * moved), strict=True))
 
 
-PRINTED_INERTIAS = (0.2924725333, 0.1075266667)
-TYPED_INERTIAS = (0.292472, 0.107526)
+_PRINTED_INERTIAS = (0.2924725333, 0.1075266667)
+_TYPED_INERTIAS = (0.292472, 0.107526)
 """I_G3, I_G4 of the manual's table and of section 5.7, kg cm^2. They are solved back
 from the printed unknowns.
 """
@@ -256,8 +256,8 @@ STEPS: tuple[tuple[str, ProgramErrors, tuple[float, float] | None], ...] = (
     ("2", ProgramErrors(True, True, True), None),
     ("4", ProgramErrors(True, True, True, True), None),
     ("5", ProgramErrors(True, True, True, True, True), None),
-    ("manual", ProgramErrors(True, True, True, True, True), PRINTED_INERTIAS),
-    ("5b", ProgramErrors(True, True, True, True, True), TYPED_INERTIAS),
+    ("manual", ProgramErrors(True, True, True, True, True), _PRINTED_INERTIAS),
+    ("5b", ProgramErrors(True, True, True, True, True), _TYPED_INERTIAS),
 )
 """The errata in the order in which they are made, from right to published."""
 

@@ -19,11 +19,11 @@ from fourbar_validation.published.figures import PublishedFigure
 
 SCENES = MODELS / "textbook"
 ANSWERS = Path(__file__).parent / "textbook.toml"
-SHEET = Path(__file__).parent / "data" / "maple.json"
+_SHEET = Path(__file__).parent / "data" / "maple.json"
 AXES = {"_x": 0, "_y": 1}
 
 
-class TextbookAnswer(NamedTuple):
+class _TextbookAnswer(NamedTuple):
     """A printed answer."""
 
     scene: str
@@ -34,10 +34,10 @@ class TextbookAnswer(NamedTuple):
     note: str = ""
 
 
-def list_answers() -> list[TextbookAnswer]:
+def list_answers() -> list[_TextbookAnswer]:
     """List all of them."""
     return [
-        TextbookAnswer(**entry)
+        _TextbookAnswer(**entry)
         for entry in tomllib.loads(ANSWERS.read_text(encoding="utf-8"))["answer"]
     ]
 
@@ -89,7 +89,7 @@ def compare_maple() -> Iterator[PublishedFigure]:
 
     The constant of its real equation is computed too.
     """
-    sheet = json.loads(SHEET.read_text(encoding="utf-8"))
+    sheet = json.loads(_SHEET.read_text(encoding="utf-8"))
     a, b, c, d = (float(sheet["inputs"][name]) for name in "abcd")
     theta_2 = math.pi / 3.0
     linkage = fourbar.FourBar(d, fourbar.Bar(a), fourbar.Bar(b), fourbar.Bar(c))

@@ -43,7 +43,7 @@ from fourbar_validation.published.program import (
     to_ours,
 )
 
-ANGLE_NOISE = 4e-15
+_ANGLE_NOISE = 4e-15
 """Four steps of a double near 360 deg, rad. The program carries such angles, where a
 step is 5.7e-14 deg = 1e-15 rad.
 """
@@ -54,11 +54,11 @@ def list_thesis_figures() -> Iterator[PublishedFigure]:
     """List every published figure of the thesis."""
     k = Kinematics()
     yield from list_positions()
-    yield from list_half_angle_constants()
-    yield from list_limits()
-    yield from list_simulation_window()
+    yield from _list_half_angle_constants()
+    yield from _list_limits()
+    yield from _list_simulation_window()
     yield from list_kinematics(k)
-    yield from list_constants(k)
+    yield from _list_constants(k)
     yield from list_unknowns()
 
 
@@ -95,7 +95,7 @@ def list_positions() -> Iterator[PublishedFigure]:
                 )
 
 
-def list_half_angle_constants() -> Iterator[PublishedFigure]:
+def _list_half_angle_constants() -> Iterator[PublishedFigure]:
     """List section 2.4 at theta_2 = 90 deg.
 
     k1 cos + k2 sin + k3 + e^2 = 0, A t^2 + B t + C = 0, t = tan(theta/2).
@@ -134,7 +134,7 @@ def list_half_angle_constants() -> Iterator[PublishedFigure]:
             )
 
 
-def list_simulation_window() -> Iterator[PublishedFigure]:
+def _list_simulation_window() -> Iterator[PublishedFigure]:
     """List the manual's window: angles e1..e4 in rad and deg, of theta_2 = 0."""
     s = compute_motion(np.array([0.0]))
     theta_3, theta_4 = float(s.theta_3[0]), to_ours(float(s.theta_4[0]))
@@ -161,7 +161,7 @@ def list_simulation_window() -> Iterator[PublishedFigure]:
             )
 
 
-def list_limits() -> Iterator[PublishedFigure]:
+def _list_limits() -> Iterator[PublishedFigure]:
     """List table 3.2: cosines whose existence decides, and limit positions.
 
     The limit positions are those that do exist.
@@ -210,7 +210,7 @@ def cut(value: float, decimals: int) -> float:
     return math.trunc(value * 10.0**decimals) / 10.0**decimals
 
 
-def compute_cut_arm(k: Kinematics, decimals: int) -> float:
+def _compute_cut_arm(k: Kinematics, decimals: int) -> float:
     """Compute y of R23 with theta_3 cut to some decimals of a degree.
 
     It is erratum 12.
@@ -218,7 +218,7 @@ def compute_cut_arm(k: Kinematics, decimals: int) -> float:
     return -CENTRE[3] * math.sin(math.radians(cut(to_degrees(k.theta_3), decimals)))
 
 
-def compute_our_kinematics(k: Kinematics) -> dict[str, float]:
+def _compute_our_kinematics(k: Kinematics) -> dict[str, float]:
     """Compute ours by the names of section 4.12 and of the manual's table.
 
     A alpha_3 + B alpha_4 = C and D alpha_3 + E alpha_4 = F.
@@ -258,7 +258,7 @@ def compute_our_kinematics(k: Kinematics) -> dict[str, float]:
     return {key: float(value) for key, value in values.items()}
 
 
-def list_slips(k: Kinematics) -> dict[str, tuple[tuple[str, ...], float]]:
+def _list_slips(k: Kinematics) -> dict[str, tuple[tuple[str, ...], float]]:
     """List the figures that the errata touch, with the value that these lead to."""
     x, y = k.a_G[3][0] + k.slip, k.a_G[3][1]
     return {
@@ -272,10 +272,10 @@ def list_slips(k: Kinematics) -> dict[str, tuple[tuple[str, ...], float]]:
 
 def list_kinematics(k: Kinematics) -> Iterator[PublishedFigure]:
     """List section 4.12, and the manual's table of the program's 17 digits."""
-    ours, slips = compute_our_kinematics(k), list_slips(k)
+    ours, slips = _compute_our_kinematics(k), _list_slips(k)
     by_hand = {
-        "R23_j": (("12",), compute_cut_arm(k, 6)),
-        "R43_j": (("12",), -compute_cut_arm(k, 6)),
+        "R23_j": (("12",), _compute_cut_arm(k, 6)),
+        "R43_j": (("12",), -_compute_cut_arm(k, 6)),
     }
     for name, text in read_printed()["published"]["section_4_12_hand"].items():
         errata, made = {**slips, **by_hand}.get(name, ((), None))
@@ -294,11 +294,11 @@ def list_kinematics(k: Kinematics) -> Iterator[PublishedFigure]:
             ours[name],
             errata,
             made,
-            ANGLE_NOISE * size,
+            _ANGLE_NOISE * size,
         )
 
 
-def list_constants(k: Kinematics) -> Iterator[PublishedFigure]:
+def _list_constants(k: Kinematics) -> Iterator[PublishedFigure]:
     """List section 5.7: inertias, right sides and moment arms.
 
     They belong to the 13 equations; the matrix is as printed.
@@ -345,8 +345,8 @@ def list_constants(k: Kinematics) -> Iterator[PublishedFigure]:
             x, y = k.arms[pin]
             ours[f"k{bar}_{2 * pair + 1}"], ours[f"k{bar}_{2 * pair + 2}"] = -y, x
     for number, sign in ((1, -1.0), (3, 1.0)):
-        slips[f"k3_{number}"] = (("12",), sign * compute_cut_arm(k, 6))
-        slips[f"k3_{number}_in_eq_5_6"] = (("12",), sign * compute_cut_arm(k, 8))
+        slips[f"k3_{number}"] = (("12",), sign * _compute_cut_arm(k, 6))
+        slips[f"k3_{number}_in_eq_5_6"] = (("12",), sign * _compute_cut_arm(k, 8))
     ours |= {f"k3_{number}_in_eq_5_6": ours[f"k3_{number}"] for number in (1, 2, 3, 4)}
     by_hand: dict[str, tuple[tuple[str, ...], float | None]] = {
         **slips,

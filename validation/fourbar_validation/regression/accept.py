@@ -129,11 +129,11 @@ FORMS: dict[str, Callable[[Differences], str]] = {
     "junit": render.write_junit,
 }
 """Forms in which the differences can be written, besides the text that is printed."""
-FORM_NAMES = {"markdown": "Markdown", "html": "HTML", "junit": "JUnit"}
+_FORM_NAMES = {"markdown": "Markdown", "html": "HTML", "junit": "JUnit"}
 """Names of these forms in help texts."""
 NAMED = 50
 """Names of a column that a message lists."""
-CHOICES = {"only": "scene", "engines": "engine", "quantity": "quantity"}
+_CHOICES = {"only": "scene", "engines": "engine", "quantity": "quantity"}
 """Option, and the column that it chooses by."""
 
 
@@ -147,16 +147,16 @@ def add_output_options(junit: str = "") -> Callable[[Command], Command]:
         for form in reversed(FORMS):
             path = click.Path(path_type=Path, dir_okay=False)
             end = junit if form == "junit" else ""
-            text = f"Write the differences as {FORM_NAMES[form]} too{end}."
+            text = f"Write the differences as {_FORM_NAMES[form]} too{end}."
             command = click.option(f"--{form}", type=path, help=text)(command)
         return command
 
     return add
 
 
-def add_choosing_options(command: Command) -> Command:
+def _add_choosing_options(command: Command) -> Command:
     """Add the options --only, --engines and --quantity."""
-    for option, column in reversed(CHOICES.items()):
+    for option, column in reversed(_CHOICES.items()):
         text = f"These alone, comma-separated: names of column {column}."
         command = click.option(f"--{option}", metavar="NAMES", help=text)(command)
     return command
@@ -227,7 +227,7 @@ def _is_chosen(
             continue
         names = {name.strip() for name in text.split(",") if name.strip()}
         missing, offered = set(names), set[str]()
-        for word in words(CHOICES[option]):
+        for word in words(_CHOICES[option]):
             missing.discard(word)
             if len(offered) < NAMED:
                 offered.add(word)
@@ -240,7 +240,7 @@ def _is_chosen(
             if option == "only"
             else set()
         )
-        wanted[CHOICES[option]] = names | both
+        wanted[_CHOICES[option]] = names | both
     return lambda row: all(
         getattr(row, column) in names for column, names in wanted.items()
     )
@@ -249,7 +249,7 @@ def _is_chosen(
 @click.command()
 @click.argument("old")
 @click.argument("new", type=click.Path(path_type=Path))
-@add_choosing_options
+@_add_choosing_options
 @add_output_options()
 def compare(
     old: str,

@@ -12,7 +12,7 @@ ROUND_OFF = K
 compiler, another order of summation. A move beyond it is a change of the numbers
 themselves.
 """
-NOTICEABLE = 1.25
+_NOTICEABLE = 1.25
 """An error that is not round-off has changed where it grew or shrank by this factor."""
 
 
@@ -128,11 +128,11 @@ def _choose_kind(old: Row, new: Row, round_off: float) -> Kind:
         return Kind.SAME
     if abs(new.error - old.error) <= round_off:
         return Kind.ROUND_OFF
-    if new.error > NOTICEABLE * old.error or math.isnan(new.error):
+    if new.error > _NOTICEABLE * old.error or math.isnan(new.error):
         within = (
-            new.passed and new.error <= NOTICEABLE * old.allowed
+            new.passed and new.error <= _NOTICEABLE * old.allowed
         )  # an allowance that was widened holds nothing
         return Kind.GREW if within else Kind.WORSE
-    if old.error > NOTICEABLE * new.error:
+    if old.error > _NOTICEABLE * new.error:
         return Kind.BETTER
     return Kind.SAME

@@ -46,7 +46,7 @@ ONE_SIDED = (
 )
 """Kinds of rows that only one run has."""
 T = TypeVar("T")
-ByScene = Iterable[tuple[str, Sequence[T]]]
+_ByScene = Iterable[tuple[str, Sequence[T]]]
 """Items of one scene after the other, in ascending order of the scenes' names."""
 
 
@@ -242,8 +242,8 @@ def _say_why_not_compared(change: Change, old: Row, new: Row) -> str:
 
 
 def compare_runs(
-    old: tuple[About, ByScene[Row]],
-    new: tuple[About, ByScene[Row]],
+    old: tuple[About, _ByScene[Row]],
+    new: tuple[About, _ByScene[Row]],
     engines: set[str],
     kept: int = KEPT,
 ) -> Differences:
@@ -286,7 +286,7 @@ def compare_runs(
     return differences
 
 
-def _rename_scenes(scenes: ByScene[T], names: Mapping[str, str]) -> ByScene[T]:
+def _rename_scenes(scenes: _ByScene[T], names: Mapping[str, str]) -> _ByScene[T]:
     """Return the old run's scenes under the new run's names.
 
     Nothing is held in memory if none differs.
@@ -300,7 +300,7 @@ def _rename_scenes(scenes: ByScene[T], names: Mapping[str, str]) -> ByScene[T]:
 
 
 def _merge_scenes(
-    old: ByScene[T], new: ByScene[T]
+    old: _ByScene[T], new: _ByScene[T]
 ) -> Iterator[tuple[str, Sequence[T], Sequence[T]]]:
     """Yield each scene that either run has, with what both have of it.
 
@@ -317,7 +317,7 @@ def _merge_scenes(
 
 
 def _require_order(
-    run: str, scenes: ByScene[T]
+    run: str, scenes: _ByScene[T]
 ) -> Iterator[tuple[str, str, Sequence[T]]]:
     last = None
     for scene, rows in scenes:

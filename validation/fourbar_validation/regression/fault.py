@@ -71,7 +71,7 @@ class Fault:
         groups: dict[tuple[str, Kind, str], list[Change]] = {}
         for change in changes:
             groups.setdefault(
-                (change.key[1], change.kind, find_cause(change)), []
+                (change.key[1], change.kind, _find_cause(change)), []
             ).append(change)
         for key, some in groups.items():
             if key not in self._groups and len(self._groups) >= MOST_CAUSES:
@@ -138,7 +138,7 @@ def _is_compared_exactly(row: Row | None) -> bool:
     )
 
 
-def find_cause(change: Change) -> str:
+def _find_cause(change: Change) -> str:
     """Take the reason without its numbers: one cause has one text in all scenes."""
     if (
         change.kind in (Kind.VERDICT_WORSE, Kind.VERDICT_BETTER, Kind.NEW_FAILURE)

@@ -316,7 +316,7 @@ def _open_described(record: Path, table: Path, key: str) -> Recorded:
     try:
         kept = json.loads(record.read_text(encoding="utf-8"))
         stated = kept.pop("sha256", None)
-        about, tables = make_record(kept), kept.get("tables")
+        about, tables = _make_record(kept), kept.get("tables")
     except (AttributeError, KeyError, TypeError, ValueError, RecursionError):
         raise InputError(key, str(record), "is not a record written by `run`") from None
     if stated is None and tables is None:
@@ -327,7 +327,7 @@ def _open_described(record: Path, table: Path, key: str) -> Recorded:
     return Recorded(about, table, True, key)
 
 
-def make_record(kept: dict[str, Any]) -> About:
+def _make_record(kept: dict[str, Any]) -> About:
     """Make the record of what a file says of a run; its words are somebody's text."""
     versions, settings = (_make_plain(kept[name]) for name in ("versions", "settings"))
     scenes = {

@@ -60,7 +60,7 @@ def write_verdict(diff: Differences) -> str:
     return f"{head}{moved}. New run: {diff.counts.sentence()}"
 
 
-def write_line(change: Change) -> str:
+def _write_line(change: Change) -> str:
     """Write one change in one line of text."""
     name = " / ".join(part for part in change.key if part)
     if change.old is None:
@@ -120,12 +120,12 @@ def _group_rows(diff: Differences) -> tuple[list[Group], list[str]]:
 def _list_worst(diff: Differences, kind: Kind) -> list[str]:
     """List the worst rows of a kind; say how many more there are."""
     more = diff.kinds[kind] - ROWS
-    return [write_line(change) for change in diff.of(kind)[:ROWS]] + (
+    return [_write_line(change) for change in diff.of(kind)[:ROWS]] + (
         [f"and {more} more"] if more > 0 else []
     )
 
 
-def list_other_questions(diff: Differences) -> list[tuple[str, list[str]]]:
+def _list_other_questions(diff: Differences) -> list[tuple[str, list[str]]]:
     """List what is another question or was not run, under its headings."""
     parts = {
         "Weaker rules": [str(weakening) for weakening in diff.weakened],
@@ -199,7 +199,7 @@ def _render(
     ]
     what = {
         "verdict": write_verdict(diff),
-        "questions": list_other_questions(diff),
+        "questions": _list_other_questions(diff),
         "more": more,
         "headings": HEADINGS,
     }
@@ -222,9 +222,9 @@ def _list_cases(diff: Differences) -> Iterator[JunitCase]:
         scene, engine, setting, quantity = change.key
         name, kind = (scene, f"{scene}.{engine} {setting}", quantity), change.kind.value
         if change.regression or (change.new is not None and change.new.failed):
-            yield JunitCase(*name, "failure", kind, write_line(change))
+            yield JunitCase(*name, "failure", kind, _write_line(change))
         elif change.new is None:
-            yield JunitCase(*name, "skipped", kind, write_line(change))
+            yield JunitCase(*name, "skipped", kind, _write_line(change))
         elif not change.new.compared:
             yield JunitCase(
                 *name, "skipped", kind, f"{change.new.verdict}: {change.new.reason}"

@@ -24,15 +24,15 @@ from fourbar_validation.engines.registry import Engine
 
 Rules = dict[str, dict[str, str]]
 """What stands under each name, as entries of text."""
-FACTOR, CLASS, REASON, CONDITIONED = "factor", "class", "reason", "over the condition"
-PREDICTED, ANSWERS, BOUNDARY, IN_TIME = (
+FACTOR, CLASS, _REASON, _CONDITIONED = "factor", "class", "reason", "over the condition"
+_PREDICTED, ANSWERS, _BOUNDARY, _IN_TIME = (
     "prediction",
     "answers",
     "boundary",
     "through time",
 )
-YES, NO = "yes", "no"
-LOOSER = 1.0 + 1e-9
+_YES, NO = "yes", "no"
+_LOOSER = 1.0 + 1e-9
 """Factor by which a number of a rule has grown if it is another one."""
 NOTABLE = 10.0
 """Growth of a row's allowance that is printed. The worst position moves with the
@@ -54,13 +54,13 @@ def list_rules(engines: Iterable[Engine]) -> Rules:
     for engine in engines:
         predicted = engine.predictor is not None or engine.residuals
         rules[engine.name] = _describe(engine.tolerance) | {
-            PREDICTED: YES if predicted else NO,
+            _PREDICTED: _YES if predicted else NO,
             ANSWERS: ", ".join(sorted(engine.answers)),
         }
     for limit in LIMITS:
         rules[f"limit of {limit.engine}: {limit.name}"] = {
-            BOUNDARY: repr(limit.boundary),
-            REASON: limit.reason,
+            _BOUNDARY: repr(limit.boundary),
+            _REASON: limit.reason,
         }
     return rules
 
@@ -69,9 +69,9 @@ def _describe(bound: ErrorBound) -> dict[str, str]:
     return {
         CLASS: bound.name,
         FACTOR: repr(bound.factor),
-        CONDITIONED: YES if bound.conditioned else NO,
-        IN_TIME: YES if bound.in_time else NO,
-        REASON: bound.reason,
+        _CONDITIONED: _YES if bound.conditioned else NO,
+        _IN_TIME: _YES if bound.in_time else NO,
+        _REASON: bound.reason,
     }
 
 
@@ -107,11 +107,11 @@ def list_weakened(old: Mapping[str, Mapping[str, str]], new: Rules) -> list[Weak
 def _is_weaker(what: str, old: Mapping[str, str], new: Mapping[str, str]) -> bool:
     """Return whether an entry that differs makes its rule weaker."""
     if what == FACTOR:
-        return _number(new[what]) > LOOSER * _number(old[what])
-    if what in (CLASS, REASON) and FACTOR in old and FACTOR in new:
-        return not _number(new[FACTOR]) * LOOSER < _number(old[FACTOR])
-    if what in (CONDITIONED, PREDICTED, IN_TIME):
-        return new[what] == YES
+        return _number(new[what]) > _LOOSER * _number(old[what])
+    if what in (CLASS, _REASON) and FACTOR in old and FACTOR in new:
+        return not _number(new[FACTOR]) * _LOOSER < _number(old[FACTOR])
+    if what in (_CONDITIONED, _PREDICTED, _IN_TIME):
+        return new[what] == _YES
     if what == ANSWERS:
         return bool(set(old[what].split(", ")) - set(new[what].split(", ")))
     return True

@@ -15,11 +15,11 @@ from fourbar_validation.scenes.suites import Suite
 
 Description = Mapping[str, str]
 
-MOST_DESCRIBED = 2000
+_MOST_DESCRIBED = 2000
 """Scenes that a record describes, one or two kB each. Random linkages follow from their
 seed.
 """
-NO_QUESTION = ("title", "source", "pictures")
+_NO_QUESTION = ("title", "source", "pictures")
 """Entries of a scene file that change no number."""
 WHERE = ("motion.theta_2", "motion.free.steps", "motion.law.steps")
 """Entries that say at which positions the same question is put."""
@@ -30,7 +30,7 @@ def describe_scenes(suite: Suite) -> dict[str, dict[str, str]]:
 
     None of a suite of more than MOST_DESCRIBED is described.
     """
-    if len(suite) > MOST_DESCRIBED:
+    if len(suite) > _MOST_DESCRIBED:
         return {}
     return {
         suite.name(index): describe_changes(suite.scene(index))
@@ -49,7 +49,8 @@ def describe_changes(scene: Scene) -> dict[str, str]:
         return {"scene": repr(scene)}
     return dict(
         _flatten(
-            "", {key: value for key, value in entries.items() if key not in NO_QUESTION}
+            "",
+            {key: value for key, value in entries.items() if key not in _NO_QUESTION},
         )
     )
 

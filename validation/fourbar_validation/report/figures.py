@@ -48,7 +48,7 @@ another.
 """
 STRETCHES = 24
 """Stretches of a sweep; the error shown in each is its largest."""
-PLOT_COLOURS = {
+_PLOT_COLOURS = {
     **{
         "#1a1a1a": "--ink",
         "#6b6b6b": "--soft",
@@ -59,9 +59,9 @@ PLOT_COLOURS = {
     **{"#007a5a": "--e2", "#d55e00": "--e3", "#8a3b78": "--e4"},
 }
 """Colours of `fourbar plot`, and the page's own that take their place."""
-MOTION_AND_FORCE = ("theta_4", "F32")
+_MOTION_AND_FORCE = ("theta_4", "F32")
 """Quantities shown of a released linkage, whose torque is mere rounding."""
-SUBSCRIPT = str.maketrans("234", "₂₃₄")
+_SUBSCRIPT = str.maketrans("234", "₂₃₄")
 
 
 def draw_scene_figure(record: Record) -> str | None:
@@ -101,7 +101,7 @@ def _draw_linkage(name: str, scene: Scene, solution: Solution) -> str:
         axes.set_title(axes.get_title(loc="left"), pad=22.0)
         labels.settle(figure)
         svg = write_svg(figure, f"{name} linkage")
-    for light, variable in PLOT_COLOURS.items():
+    for light, variable in _PLOT_COLOURS.items():
         svg = svg.replace(light, f"var({variable})")
     return svg.replace("<svg", '<svg class="linkage"', 1)
 
@@ -119,15 +119,15 @@ def _draw_answers(record: Record, solution: Solution) -> str:
     drive = COUPLE.value if solution.drive is None else LINE.value
     shown = ANGLES
     if solution.F32 is not None:
-        shown = (drive, find_largest_force(solution))
+        shown = (drive, _find_largest_force(solution))
     if record.scene is not None and record.scene.motion.free is not None:
-        shown = MOTION_AND_FORCE
+        shown = _MOTION_AND_FORCE
     return "".join(
         _draw_picture(quantity, record, solution, answers) for quantity in shown
     )
 
 
-def find_largest_force(solution: Solution) -> str:
+def _find_largest_force(solution: Solution) -> str:
     """Name the pin whose force is the largest over the positions that have a value."""
     good = solution.status_code == OK
     return max(
@@ -322,8 +322,8 @@ def _label(quantity: str, solution: Solution) -> str:
     if quantity == LINE.value:
         return "F (N)"
     if quantity == "torque":
-        return f"T{solution.drive_bar} (N m)".translate(SUBSCRIPT)
-    name = quantity.replace("theta_", "θ").translate(SUBSCRIPT)
+        return f"T{solution.drive_bar} (N m)".translate(_SUBSCRIPT)
+    name = quantity.replace("theta_", "θ").translate(_SUBSCRIPT)
     return f"{name} (°)" if quantity in ANGLES else f"|{quantity}| (N)"
 
 

@@ -37,14 +37,14 @@ from fourbar_validation.scenes.hard_families import (
     set_angles,
 )
 
-DISTANCES = np.logspace(-1, -12, 23)
+_DISTANCES = np.logspace(-1, -12, 23)
 """rad from the singular position."""
 INK = "#777777"
 """Grey that reads on white and on black."""
 FLOOR = 1e-17
 """Differences of exactly zero are drawn here."""
 SHOWN = ("torque", "F32")
-SIMULATED_FROM = 3e-3
+_SIMULATED_FROM = 3e-3
 """rad; nearer than this the simulation refuses."""
 
 
@@ -63,18 +63,18 @@ def list_approaches() -> list[Approach]:
     (limit, stretched), *_ = find_collinear_3_4(rocker)
     (pole, branch), *_ = find_collinear_2_3(crank)
     lengths, _, (_, half_turn) = CHANGE_POINTS["parallelogram"]
-    near = DISTANCES[DISTANCES >= 0.99e-8]
+    near = _DISTANCES[_DISTANCES >= 0.99e-8]
     inward = -1.0 if stretched else 1.0
     return [
         Approach(
             "toggle: bars 3, 4 collinear",
-            set_angles(dress(rocker, 1), limit + inward * DISTANCES),
-            DISTANCES,
+            set_angles(dress(rocker, 1), limit + inward * _DISTANCES),
+            _DISTANCES,
         ),
         Approach(
             "pole of T4: omega_4 = 0",
-            set_angles(dress(crank), pole + DISTANCES, branch, drive_bar=4),
-            DISTANCES,
+            set_angles(dress(crank), pole + _DISTANCES, branch, drive_bar=4),
+            _DISTANCES,
         ),
         # on the branch that crosses: the one that stays parallel is regular
         Approach(
@@ -98,8 +98,8 @@ def list_errors(
             command.theta_2[-1] - command.theta_2[0]
         )
         command = Command(
-            command.theta_2[-psi > SIMULATED_FROM],
-            command.branch[-psi > SIMULATED_FROM],
+            command.theta_2[-psi > _SIMULATED_FROM],
+            command.branch[-psi > _SIMULATED_FROM],
             *command[2:4],
         )
     answer: Answer = engine.start().answer(scene, command)

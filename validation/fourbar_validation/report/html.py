@@ -40,7 +40,7 @@ ORDER = (*UNKNOWNS, "torque_inertia", LINE.value, f"{LINE.value}_inertia")
 """Quantities in the order of the computation; others follow by name."""
 
 
-class Cell(NamedTuple):
+class _Cell(NamedTuple):
     """One comparison and the line of results.csv where it stands."""
 
     line: int
@@ -97,16 +97,16 @@ class Section:
 
 
 @dataclass(frozen=True, slots=True)
-class SceneView:
+class _SceneView:
     """Data of one scene that the page shows."""
 
     scene: Record
-    cells: list[Cell]
+    cells: list[_Cell]
     engines: list[str]
     quantities: list[str]
-    by_place: dict[tuple[str, str], Cell]
+    by_place: dict[tuple[str, str], _Cell]
     """(quantity, engine): the comparison that used most of its allowance."""
-    worst: dict[str, Cell]
+    worst: dict[str, _Cell]
     """engine: its comparison that used most."""
     picture: str | None
     """Base64 of a PNG of the MJCF."""
@@ -210,10 +210,10 @@ def write_markdown(summary: Summary) -> str:
 
 def _make_view(
     scene: Record, first_line: int, pictures: Mapping[str, str]
-) -> SceneView:
+) -> _SceneView:
     rows = sort_rows(scene.rows)
     cells = [
-        Cell(line, *row_and_share)
+        _Cell(line, *row_and_share)
         for line, row_and_share in enumerate(
             zip(rows, compute_shares(rows), strict=True), first_line
         )
@@ -233,7 +233,7 @@ def _make_view(
         names.difference(ORDER)
     )
     engines = _list_engines(cell.row for cell in cells)
-    return SceneView(
+    return _SceneView(
         scene, cells, engines, quantities, by_place, worst, pictures.get(scene.name)
     )
 

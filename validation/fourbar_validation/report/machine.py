@@ -28,7 +28,7 @@ CODE = (".py", ".toml")
 """Endings of the files that numbers come from. Templates and accepted states change
 none.
 """
-BUILT = (".so", ".pyd", ".dylib", ".py")
+_BUILT = (".so", ".pyd", ".dylib", ".py")
 """Endings of the files of an engine that decide its numbers. Others hold where and when
 it was installed.
 """
@@ -164,5 +164,5 @@ def build(package: str) -> str:
         lines = (distribution(package).read_text("RECORD") or "").splitlines()
     except PackageNotFoundError:
         return ""
-    files = sorted(line for line in lines if line.partition(",")[0].endswith(BUILT))
+    files = sorted(line for line in lines if line.partition(",")[0].endswith(_BUILT))
     return hashlib.sha256("\n".join(files).encode()).hexdigest()[:16] if files else ""

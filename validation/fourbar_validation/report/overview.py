@@ -44,7 +44,7 @@ NAMES = {
     "ball-arithmetic": "320-bit balls",
 }
 """Names of engines as people write them, with the place of the version."""
-MOST_KINDS = 500
+_MOST_KINDS = 500
 """Causes that are told apart; further ones are one."""
 OTHERS = "other causes"
 NO_ANSWER = "no answer: "
@@ -53,7 +53,7 @@ SMALL = 1e-5
 """Largest relative error of an engine that lacks digits, not an equation. It is over a
 quantity's scale.
 """
-LIMIT, NO_VALUE, NO_DIGITS, DOES_NOT_APPLY = (
+LIMIT, _NO_VALUE, NO_DIGITS, _DOES_NOT_APPLY = (
     "at declared limits of an engine",
     "where the formulas state no value",
     "with no digit left to decide by",
@@ -63,7 +63,7 @@ LIMIT, NO_VALUE, NO_DIGITS, DOES_NOT_APPLY = (
 
 
 @dataclass(slots=True)
-class OverviewCell:
+class _OverviewCell:
     """Worst row of an engine in one group of quantities."""
 
     row: Row | None = None
@@ -99,8 +99,8 @@ class OverviewLine:
 
     engine: str
     name: str
-    columns: dict[str, OverviewCell] = field(
-        default_factory=lambda: {group: OverviewCell() for group in GROUPS}
+    columns: dict[str, _OverviewCell] = field(
+        default_factory=lambda: {group: _OverviewCell() for group in GROUPS}
     )
     compared: int = 0
     failed: int = 0
@@ -124,7 +124,7 @@ class Cause:
     @property
     def place(self) -> str:
         """Return the scene and the position where it is worst."""
-        return name_place(self.worst)
+        return _name_place(self.worst)
 
     def __str__(self) -> str:
         count = f"{self.scenes} scene{'s' if self.scenes > 1 else ''}"
@@ -140,13 +140,13 @@ class _Kind:
     used: float
 
 
-def name_place(row: Row) -> str:
+def _name_place(row: Row) -> str:
     """Write the scene of a row and its position."""
     where = "" if math.isnan(row.theta_2) else f" {math.degrees(row.theta_2):.4g} deg"
     return f"{row.scene}{where}"
 
 
-def find_group(row: Row) -> str | None:
+def _find_group(row: Row) -> str | None:
     """Find the column of an engine's row; None for what is no error of a quantity."""
     name = row.quantity
     if name in DRIVES or name.removesuffix("_inertia") in DRIVES:
@@ -182,7 +182,7 @@ class Overview:
         refused = {row.reason for row in scene.rows if row.verdict == REFUSES}
         for line in scene.left_out:
             if line.partition(": ")[2] not in refused:
-                self.not_compared[DOES_NOT_APPLY] += 1
+                self.not_compared[_DOES_NOT_APPLY] += 1
         for row in scene.rows:
             self._add_row(row)
         self._add_agreement(scene.rows)
@@ -195,7 +195,7 @@ class Overview:
 
     def _add_row(self, row: Row) -> None:
         if row.verdict == REFUSES:
-            self.not_compared[LIMIT if row.quantity == "all" else NO_VALUE] += 1
+            self.not_compared[LIMIT if row.quantity == "all" else _NO_VALUE] += 1
         elif row.verdict == UNDECIDED:
             self.not_compared[NO_DIGITS] += 1
         if row.engine in OWN_ENGINES:
@@ -206,7 +206,7 @@ class Overview:
         line.compared += row.compared
         line.failed += row.failed
         line.answered |= row.compared and row.quantity != "all"
-        group = find_group(row)
+        group = _find_group(row)
         if row.compared and group is not None:
             line.columns[group].add(row, float(find_used(row.error, row.allowed)))
 
@@ -235,8 +235,8 @@ class Overview:
         for engine, rows in failing.items():
             used = [float(find_used(row.error, row.allowed)) for row in rows]
             worst = rows[used.index(max(used))]
-            key = (engine, tuple(name_causes(scene, engine, rows)))
-            if key not in self._kinds and len(self._kinds) >= MOST_KINDS:
+            key = (engine, tuple(_name_causes(scene, engine, rows)))
+            if key not in self._kinds and len(self._kinds) >= _MOST_KINDS:
                 key = (engine, (OTHERS,))
             kind = self._kinds.setdefault(key, _Kind(0, worst, -1.0))
             kind.scenes += 1
@@ -358,7 +358,7 @@ def _take_reason(row: Row) -> str:
     return write_one_line(row.reason.partition("; what it printed")[0])
 
 
-def name_causes(scene: Record, engine: str, rows: Sequence[Row]) -> list[str]:
+def _name_causes(scene: Record, engine: str, rows: Sequence[Row]) -> list[str]:
     """Name the mistakes that explain the failing rows of an engine in a scene.
 
     If there are none, say what fails.
@@ -373,7 +373,7 @@ def name_causes(scene: Record, engine: str, rows: Sequence[Row]) -> list[str]:
         return [
             f"{', '.join(names[:3])} {'does' if len(names) == 1 else 'do'} not hold"
         ]
-    groups = {find_group(row) or row.quantity for row in rows}
+    groups = {_find_group(row) or row.quantity for row in rows}
     missing = sorted({row.quantity for row in rows if math.isnan(row.error)})
     if missing and len(missing) == len({row.quantity for row in rows}):
         return [f"no number for {', '.join(missing[:4])}"]

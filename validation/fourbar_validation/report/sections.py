@@ -13,9 +13,9 @@ from fourbar_validation.compare.rows import VERDICTS, Counts, Row
 from fourbar_validation.report.html import Section, SectionFigure
 from fourbar_validation.scenes.hard_families import FAMILIES
 
-HARD, COST = "hard", "cost"
+HARD, _COST = "hard", "cost"
 """Folders of the hard cases and of the study, in OUT."""
-ALT = (
+_ALT = (
     "Error of each engine over the distance to a toggle, a pole of T4 and a change"
     " point"
 )
@@ -24,10 +24,10 @@ CAPTION = (
     " position. Dotted: the law K eps/condition. Band: what rounding was computed to do"
     " there, up to ten times that; above it a row fails."
 )
-MUST = (
+_MUST = (
     "each family of singular and extreme linkages must come out as its statement says. "
 )
-PICTURES = {
+_PICTURES = {
     "work-precision-torque.svg": (
         "Error of the driving torque over the CPU time of a simulated second"
     ),
@@ -61,9 +61,9 @@ def collect_sections(hard: Iterable[Row] | None, out: Path) -> list[Section]:
         section = collect_hard_cases(read_columns(results))
         links = [(f"{HARD}/report.html",) * 2]
         sections.append(
-            replace(section, text=f"From the run in {HARD}/: {MUST}", links=links)
+            replace(section, text=f"From the run in {HARD}/: {_MUST}", links=links)
         )
-    folders = sorted(path.parent for path in (out / COST).glob("*/cost.csv"))
+    folders = sorted(path.parent for path in (out / _COST).glob("*/cost.csv"))
     return [*sections, *(_read_study(folder) for folder in folders[:MOST])]
 
 
@@ -91,11 +91,11 @@ def collect_hard_cases(rows: Iterable[Row], picture: str | None = None) -> Secti
         if scenes[family.name]
     ]
     headings = ("family", "scenes", *VERDICTS, "verdict", "what must happen")
-    figures = [SectionFigure(ALT, CAPTION, svg=picture)] if picture else []
+    figures = [SectionFigure(_ALT, CAPTION, svg=picture)] if picture else []
     return Section(
         HARD,
         "Hard cases",
-        MUST.capitalize(),
+        _MUST.capitalize(),
         headings,
         table,
         figures,
@@ -139,7 +139,7 @@ def find_family(scene: str) -> str | None:
 
 def _read_study(folder: Path) -> Section:
     figures = []
-    for name, alt in PICTURES.items():
+    for name, alt in _PICTURES.items():
         picture = folder / name
         if picture.is_file() and picture.stat().st_size <= LARGEST:
             data = base64.b64encode(picture.read_bytes()).decode("ascii")
@@ -148,11 +148,13 @@ def _read_study(folder: Path) -> Section:
             )
     text = (
         f"What each digit of {folder.name} costs, from the study in"
-        f" {COST}/{folder.name}/. Times are those of torque and pin forces at the"
+        f" {_COST}/{folder.name}/. Times are those of torque and pin forces at the"
         " scene's positions: of MuJoCo with the reading of the forces, of an exact"
         " engine in a plain loop that also assembles. "
     )
-    links = [(name, f"{COST}/{folder.name}/{name}") for name in ("cost.md", "cost.csv")]
+    links = [
+        (name, f"{_COST}/{folder.name}/{name}") for name in ("cost.md", "cost.csv")
+    ]
     return Section(
         f"cost-{folder.name}",
         f"The study of {folder.name}",

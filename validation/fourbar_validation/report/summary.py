@@ -36,7 +36,7 @@ from fourbar_validation.report.record import Record
 from fourbar_validation.report.words import NUMBER
 
 T = TypeVar("T")
-ALLOWANCE = attrgetter("allowed")
+_ALLOWANCE = attrgetter("allowed")
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +54,7 @@ class Worst:
 
 
 @dataclass(slots=True)
-class EngineLine:
+class _EngineLine:
     """All that one independent engine, or our own consistency, answered.
 
     It has its counts and its worst row.
@@ -99,12 +99,12 @@ PICTURED = 24
 """Scenes with pictures, if fewer fail. Drawing one takes ten times as long as judging
 it by an exact engine.
 """
-WORST_SHOWN = 80
-LOOSEST_SHOWN = 5
-ORDERS_SHOWN = 20
-FAILURES_KEPT = 1000
+_WORST_SHOWN = 80
+_LOOSEST_SHOWN = 5
+_ORDERS_SHOWN = 20
+_FAILURES_KEPT = 1000
 """Lines of a table at the most; everything is in results.csv."""
-TIMED = 1000
+_TIMED = 1000
 STATEMENT = (
     f"K = {K:g} for every exact comparison; where eps/condition > {NOTHING_TO_TELL:g}"
     " the row is undecided. Errors are relative to the largest magnitude over the"
@@ -148,7 +148,7 @@ class Summary:
         """Version that each guest states of itself, nothing where it states none."""
         self.missing: Sequence[tuple[str, str]] = ()
         """(engine, why it could not run here)."""
-        self._engines: dict[str, EngineLine] = {}
+        self._engines: dict[str, _EngineLine] = {}
         self._refusals: Counter[tuple[str, str]] = Counter()
         self._first_reason: dict[tuple[str, str], str] = {}
         self._worst: list[Worst] = []
@@ -165,14 +165,14 @@ class Summary:
         self.counts.add_scene(scene.rows)
         self.overview.add(scene)
         bad = [row for row in scene.rows if row.failed]
-        self.failures += bad[: FAILURES_KEPT - len(self.failures)]
+        self.failures += bad[: _FAILURES_KEPT - len(self.failures)]
         for row, used in zip(scene.rows, compute_shares(scene.rows), strict=True):
             name = OWN if row.engine in OWN_ENGINES else row.engine
-            self._engines.setdefault(name, EngineLine(name)).add(row, used)
+            self._engines.setdefault(name, _EngineLine(name)).add(row, used)
         compared, loose = _count_compared(scene.rows)
         self.pairs, self.loose = self.pairs + compared, self.loose + len(loose)
         self._loosest = _keep_largest(
-            LOOSEST_SHOWN, [*self._loosest, *loose], ALLOWANCE
+            _LOOSEST_SHOWN, [*self._loosest, *loose], _ALLOWANCE
         )
         for engine, reason in sorted(_list_left_out(scene)):
             kind = (engine, NUMBER.sub("#", reason))
@@ -181,7 +181,7 @@ class Summary:
         worst = _find_worst(scene.rows)
         self.judged += len(worst)
         self._worst = _keep_largest(
-            WORST_SHOWN, [*self._worst, *worst], lambda w: w.used
+            _WORST_SHOWN, [*self._worst, *worst], lambda w: w.used
         )
         for row in scene.rows:
             if row.reason.startswith(EQUIVALENCE.cause) and math.isfinite(row.error):
@@ -211,7 +211,7 @@ class Summary:
         refused = {row.engine for row in scene.rows if row.verdict == REFUSES}
         for timing in scene.timings:
             times = self._times.setdefault(timing.engine, [])
-            if timing.engine not in refused and len(times) < TIMED:
+            if timing.engine not in refused and len(times) < _TIMED:
                 ratio = timing.seconds / scene.timings[0].seconds
                 times.append((1e6 * timing.seconds / timing.positions, ratio))
 
@@ -222,7 +222,7 @@ class Summary:
             if "observed_order" in evidence
         ]
         self._orders = _keep_largest(
-            ORDERS_SHOWN, [*self._orders, *orders], _find_lowest
+            _ORDERS_SHOWN, [*self._orders, *orders], _find_lowest
         )
 
     @property
@@ -281,7 +281,7 @@ class Summary:
         """
         if not self.loose:
             return ""
-        worst = nlargest(LOOSEST_SHOWN, self._loosest, key=ALLOWANCE)
+        worst = nlargest(_LOOSEST_SHOWN, self._loosest, key=_ALLOWANCE)
         examples = ", ".join(
             f"{row.quantity} of {row.scene} (allowed {row.allowed:.1e})"
             for row in worst
@@ -302,7 +302,7 @@ class Summary:
         return self.counts.status == HOLDS and not self.missing
 
     @property
-    def engines(self) -> list[EngineLine]:
+    def engines(self) -> list[_EngineLine]:
         """Return every independent engine by name, then our own consistency."""
         versions = {name.lower(): version for name, version in self.versions.items()}
         for line in self._engines.values():
@@ -326,8 +326,8 @@ class Summary:
 
         Of more than WORST_SHOWN they are those that used most, in that order.
         """
-        if self.judged > WORST_SHOWN:
-            return nlargest(WORST_SHOWN, self._worst, key=lambda w: w.used)
+        if self.judged > _WORST_SHOWN:
+            return nlargest(_WORST_SHOWN, self._worst, key=lambda w: w.used)
         return sorted(
             self._worst, key=lambda w: (w.row.scene, w.row.engine, w.row.setting)
         )
@@ -350,11 +350,11 @@ class Summary:
 
         They are at most ORDERS_SHOWN, lowest first.
         """
-        few = len(self._orders) <= ORDERS_SHOWN
+        few = len(self._orders) <= _ORDERS_SHOWN
         return (
             self._orders
             if few
-            else nlargest(ORDERS_SHOWN, self._orders, key=_find_lowest)
+            else nlargest(_ORDERS_SHOWN, self._orders, key=_find_lowest)
         )
 
     @property
@@ -434,7 +434,7 @@ def _count_compared(rows: Sequence[Row]) -> tuple[int, list[Row]]:
         for rows_of_one in by_quantity.values()
         if all(row.verdict == DEGRADED for row in rows_of_one)
     ]
-    return len(by_quantity), [min(rows_of_one, key=ALLOWANCE) for rows_of_one in loose]
+    return len(by_quantity), [min(rows_of_one, key=_ALLOWANCE) for rows_of_one in loose]
 
 
 def _find_worst(rows: Sequence[Row]) -> list[Worst]:

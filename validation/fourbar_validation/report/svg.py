@@ -19,7 +19,7 @@ LIGHT: dict[str, str] = dict(
     re.findall(r"(--[\w-]+): light-dark\((#\w+),", PAGE.read_text(encoding="utf-8"))
 )
 """Colours of a light page by the names of their custom properties."""
-DARK: dict[str, str] = dict(
+_DARK: dict[str, str] = dict(
     re.findall(
         r"(--[\w-]+): light-dark\(#\w+, (#\w+)\)", PAGE.read_text(encoding="utf-8")
     )
@@ -28,7 +28,7 @@ DARK: dict[str, str] = dict(
 INK, SOFT, GRID, BAND, ALLOWED, PAPER = (
     LIGHT[f"--{name}"] for name in ("ink", "soft", "grid", "under", "allowed", "paper")
 )
-BLACK = "#000000"
+_BLACK = "#000000"
 """Colour of matplotlib's own; in a page it is the ink."""
 
 
@@ -58,7 +58,7 @@ class Style(NamedTuple):
         }
 
 
-STYLES = {
+_STYLES = {
     "pinocchio-inverse": Style("--e1", "o", "○"),
     "mujoco-inverse": Style("--e2", "s", "□"),
     "mujoco-simulated": Style("--e3", "^", "△", simulated=True),
@@ -80,18 +80,18 @@ FLOOR = EPS / 16.0
 LONG_NUMBER = re.compile(r"(\d+\.\d)\d+")
 COORDINATES = re.compile(r' (?:d|x|y|transform|points)="[^"]*"')
 STYLE = re.compile(r' style="([^"]*)"')
-BETWEEN_TAGS = re.compile(r">\s+<")
+_BETWEEN_TAGS = re.compile(r">\s+<")
 METADATA = re.compile(r"<metadata>.*?</metadata>", re.DOTALL)
-GROUP_NAME = re.compile(r'<g id="[^"]*"')
+_GROUP_NAME = re.compile(r'<g id="[^"]*"')
 
 
 def choose_style(engine: str) -> Style:
     """Choose the style of an engine.
 
-    One that is not named in `STYLES` has the next of `OTHERS`.
+    One that is not named in `_STYLES` has the next of `OTHERS`.
     """
     return (
-        STYLES.get(engine)
+        _STYLES.get(engine)
         or OTHERS[NUMBERS.setdefault(engine, len(NUMBERS)) % len(OTHERS)]
     )
 
@@ -110,7 +110,7 @@ def write_svg(figure: Any, salt: str) -> str:
 
     `salt`: keeps the ids of two figures in one page apart.
     """
-    return shrink_svg(draw_svg(figure, salt))
+    return _shrink_svg(_draw_svg(figure, salt))
 
 
 def write_alone(figure: Any, salt: str) -> str:
@@ -118,16 +118,16 @@ def write_alone(figure: Any, salt: str) -> str:
 
     Its paper is light or dark as the reader's pages are.
     """
-    svg = shrink_svg(draw_svg(figure, salt, transparent=False))
+    svg = _shrink_svg(_draw_svg(figure, salt, transparent=False))
     light, dark = (
         "".join(f"{name}:{value};" for name, value in colours.items())
-        for colours in (LIGHT, DARK)
+        for colours in (LIGHT, _DARK)
     )
     rules = f"svg{{{light}}}@media(prefers-color-scheme:dark){{svg{{{dark}}}}}"
     return svg.replace("<style>", f"<style>{rules}", 1)
 
 
-def draw_svg(figure: Any, salt: str, *, transparent: bool = True) -> str:
+def _draw_svg(figure: Any, salt: str, *, transparent: bool = True) -> str:
     """Draw the figure as matplotlib does, an SVG that stands by itself."""
     import matplotlib
 
@@ -150,12 +150,12 @@ def draw_svg(figure: Any, salt: str, *, transparent: bool = True) -> str:
     return svg[svg.index("<svg") :]
 
 
-def shrink_svg(svg: str) -> str:
+def _shrink_svg(svg: str) -> str:
     """Make the SVG smaller, and take the colours of the page around it."""
     svg = METADATA.sub("", svg)
     svg = COORDINATES.sub(lambda match: LONG_NUMBER.sub(r"\1", match.group()), svg)
-    svg = GROUP_NAME.sub("<g", BETWEEN_TAGS.sub("><", svg))
-    for variable, colour in (("--ink", BLACK), *LIGHT.items()):
+    svg = _GROUP_NAME.sub("<g", _BETWEEN_TAGS.sub("><", svg))
+    for variable, colour in (("--ink", _BLACK), *LIGHT.items()):
         svg = svg.replace(colour, f"var({variable})")
     return _name_styles(svg)
 

@@ -15,13 +15,13 @@ from fourbar_validation.report.templating import write_number
 if TYPE_CHECKING:
     from rich.table import Table
 
-NARROWEST = 80
+_NARROWEST = 80
 """Least columns of the table. A narrower terminal breaks its lines, where rich would
 cut its numbers.
 """
 MOST_CAUSES = 18
 """Causes of failures that are printed, one line each; the report has all."""
-MOST_NOTES = 10
+_MOST_NOTES = 10
 """Lines beneath the table."""
 
 
@@ -35,7 +35,7 @@ def print_table(summary: Summary, out: Path, *, verbose: bool = False) -> None:
     from rich.markup import escape
 
     console = Console()
-    wide = Console(width=max(console.width, NARROWEST))
+    wide = Console(width=max(console.width, _NARROWEST))
     colour = "green" if summary.good else "red"
     console.print(f"[bold {colour}]{escape(clean_line(summary.headline))}[/]")
     wide.print(_make_overview(summary))
@@ -46,7 +46,7 @@ def print_table(summary: Summary, out: Path, *, verbose: bool = False) -> None:
         console.print(
             f"and {len(causes) - MOST_CAUSES} more causes; the report has them"
         )
-    for note in summary.overview.notes[:MOST_NOTES]:
+    for note in summary.overview.notes[:_MOST_NOTES]:
         console.print(escape(clean_line(note)))
     for engine, reason in summary.missing:
         console.print(f"[bold red]Not run:[/] {escape(engine)}: {escape(reason)}")

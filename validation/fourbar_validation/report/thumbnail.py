@@ -14,7 +14,7 @@ from fourbar_validation.compare.tolerance import Array
 from fourbar_validation.report.record import Record
 from fourbar_validation.report.svg import choose_style
 
-HEIGHT, LINKAGE, CURVE, EDGE = 76.0, 96.0, 150.0, 6.0
+HEIGHT, LINKAGE, _CURVE, EDGE = 76.0, 96.0, 150.0, 6.0
 """Sizes in pixels: height, widths of both pictures, and their margin."""
 MOST_POINTS = 120
 """Points of a curve."""
@@ -29,7 +29,7 @@ def draw_thumbnail(record: Record) -> str | None:
     solution, scene = record.solution, record.scene
     if scene is None or solution is None or not np.any(solution.status_code == OK):
         return None
-    width = LINKAGE + CURVE
+    width = LINKAGE + _CURVE
     return (
         f'<svg viewBox="0 0 {width:g} {HEIGHT:g}" width="{width:g}" '
         f'height="{HEIGHT:g}" aria-hidden="true">'
@@ -72,7 +72,7 @@ def _draw_curve(record: Record, solution: Solution) -> str:
     span = max(float(high - low), 1e-300)
 
     def place(values: Array) -> tuple[Array, Array]:
-        x = LINKAGE + EDGE + (CURVE - 2.0 * EDGE) * np.linspace(0.0, 1.0, len(values))
+        x = LINKAGE + EDGE + (_CURVE - 2.0 * EDGE) * np.linspace(0.0, 1.0, len(values))
         height = np.clip((values - low) / span, -0.1, 1.1)
         return x, HEIGHT - 2.0 * EDGE - (HEIGHT - 4.0 * EDGE) * height
 

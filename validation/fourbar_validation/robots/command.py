@@ -31,10 +31,10 @@ from fourbar_validation.robots.options import (
 ROUND_OFF = 1e-12
 """m or deg; less is printed as 0."""
 SCENE = "fourbar_validation.engines.mujoco.robots.scene:read_loop_scene"
-LIST = "fourbar_validation.engines.mujoco.robots.closures:list_closures"
+_LIST = "fourbar_validation.engines.mujoco.robots.closures:list_closures"
 
 
-def write_closure(closure: RobotClosure) -> str:
+def _write_closure(closure: RobotClosure) -> str:
     """Write what is known of a closure in one line."""
     parts = [f"{closure.name}: {closure.kind}"]
     if closure.loop is None:
@@ -60,10 +60,10 @@ def _join(numbers: tuple[float, ...]) -> str:
     return " ".join(f"{number:.6g}" for number in numbers)
 
 
-def show_report(report: RobotReport) -> None:
+def _show_report(report: RobotReport) -> None:
     """Print a line for each closure, and what was done to the file and its pose."""
     for closure in report.closures:
-        click.echo(write_closure(closure))
+        click.echo(_write_closure(closure))
     if not report.closures:
         click.echo("The file has no equality: no loop is closed in it.")
     for closure in report.closures:
@@ -74,7 +74,7 @@ def show_report(report: RobotReport) -> None:
         click.echo(make_plain(f"note: {note}"))
 
 
-def write_scene(made: LoopScene) -> str:
+def _write_scene(made: LoopScene) -> str:
     """Write a scene file from a loop.
 
     Its comments say where it is from and what it leaves out.
@@ -122,11 +122,11 @@ def command(
         if out is not None:
             made: LoopScene = examined(SCENE, file, options, loop, omega)
         else:
-            report: RobotReport = examined(LIST, file, options, loop)
+            report: RobotReport = examined(_LIST, file, options, loop)
     if out is None:
-        show_report(report)
+        _show_report(report)
         return
-    write_text(out, write_scene(made))
+    write_text(out, _write_scene(made))
     for line in [*made.parts, *made.remarks, *made.notes]:
         click.echo(make_plain(line))
     click.echo(make_plain(f"written to {out}"))

@@ -20,12 +20,12 @@ LARGEST_TEXT = 16 * 2**20
 """Bytes of a file and its includes; a humanoid takes half a million."""
 LARGEST_ASSETS = 512 * 2**20
 """Bytes of all meshes."""
-DEEPEST = 100
+_DEEPEST = 100
 """Nested elements; the readers of XML recurse."""
 MOST_INCLUDES = 200
-HINGES = 3
+_HINGES = 3
 """Joints of a four-bar whose fourth pin is an equality."""
-REACHING_OUT = (
+_REACHING_OUT = (
     "extension",
     "plugin",
     "attach",
@@ -35,13 +35,13 @@ REACHING_OUT = (
     "flex",
 )
 """Elements that load plugins or models, or make deformable bodies."""
-FOR_THE_EYE = ("texture", "skin", "layer")
+_FOR_THE_EYE = ("texture", "skin", "layer")
 """Elements that are dropped; so is every attribute `texture`."""
 FOLDERS = ("assetdir", "meshdir", "texturedir")
 """Attributes of <compiler> that name folders of assets; the later ones go first."""
 OUTSIDE = ("file", "directory", "content_type")
 """Attributes that name files."""
-COUNTS = (
+_COUNTS = (
     "iterations",
     "ls_iterations",
     "noslip_iterations",
@@ -49,7 +49,7 @@ COUNTS = (
     "sdf_iterations",
     "sdf_initpoints",
 )
-MOST_ITERATIONS = 1000
+_MOST_ITERATIONS = 1000
 """Upper limit of each count in <option>, ten times the greatest of MuJoCo's defaults:
 MuJoCo already steps while it compiles, and with a tolerance of 0 nothing else may stop
 a solver.
@@ -78,7 +78,7 @@ def is_four_bar_alone(file: RobotFile) -> bool:
         for element in world.iter()
         if element.tag in ("joint", "freejoint")
     ]
-    return len(joints) <= HINGES
+    return len(joints) <= _HINGES
 
 
 @dataclass
@@ -132,9 +132,9 @@ class _RobotReading:
         try:
             for event, _ in parsed:
                 depth += 1 if event == "start" else -1
-                if depth > DEEPEST:
+                if depth > _DEEPEST:
                     raise self._refuse(
-                        path.name, f"nests its elements deeper than {DEEPEST}"
+                        path.name, f"nests its elements deeper than {_DEEPEST}"
                     )
         except (ET.ParseError, ValueError) as error:
             raise self._refuse(path.name, f"is no XML: {error}") from None
@@ -143,8 +143,8 @@ class _RobotReading:
 
     def _expand(self, element: ET.Element, inside: Path, depth: int) -> None:
         """Put the contents of each included file in the place of <include>."""
-        if depth > DEEPEST:
-            raise self._refuse(self.path.name, f"is nested deeper than {DEEPEST}")
+        if depth > _DEEPEST:
+            raise self._refuse(self.path.name, f"is nested deeper than {_DEEPEST}")
         for place, child in reversed(list(enumerate(element))):
             if child.tag != "include":
                 self._expand(child, inside, depth + 1)
@@ -240,7 +240,7 @@ class _RobotReading:
         for parent in root.iter():
             for child in list(parent):
                 field_of_heights = child.tag == "hfield" or "hfield" in child.attrib
-                if child.tag in FOR_THE_EYE or field_of_heights:
+                if child.tag in _FOR_THE_EYE or field_of_heights:
                     parent.remove(child)
                     dropped = dropped or field_of_heights
             parent.attrib.pop("texture", None)
@@ -249,21 +249,21 @@ class _RobotReading:
 
     def _screen(self, element: ET.Element) -> None:
         """Refuse what reaches beyond the files that were read, or may never end."""
-        if element.tag in REACHING_OUT:
+        if element.tag in _REACHING_OUT:
             raise self._refuse(
                 f"<{element.tag}>",
                 "is not read here: save the model as MuJoCo compiles it "
                 "(mj_saveLastXML) and give that file",
             )
         for name in element.attrib:
-            if element.tag == "option" and name in COUNTS:
+            if element.tag == "option" and name in _COUNTS:
                 count = element.attrib[name].strip()
                 whole = re.fullmatch("[0-9]{1,9}", count)
-                if not whole or int(count) > MOST_ITERATIONS:
+                if not whole or int(count) > _MOST_ITERATIONS:
                     raise self._refuse(
                         f'<option {name}="{count}">',
-                        f"must be a whole number up to {MOST_ITERATIONS}: MuJoCo might "
-                        "never come back",
+                        f"must be a whole number up to {_MOST_ITERATIONS}: MuJoCo "
+                        "might never come back",
                     )
             if name.startswith(OUTSIDE) and element.tag != "mesh":
                 raise self._refuse(

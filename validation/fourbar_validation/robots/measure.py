@@ -30,18 +30,18 @@ from fourbar_validation.robots.files import read_robot
 from fourbar_validation.robots.guard import examine_guarded
 from fourbar_validation.robots.options import read_pose, read_speed
 
-MEASURE = "fourbar_validation.engines.mujoco.robots.measure:measure_loops"
+_MEASURE = "fourbar_validation.engines.mujoco.robots.measure:measure_loops"
 LIMIT = 600.0
 """s; a busy machine takes several times the two minutes of an idle one."""
 STATES, THROUGH_TIME = "single states", "through time"
-SLIP = 1e-9
+_SLIP = 1e-9
 """Part of the speeds below which a pin with dry friction is at rest. It may then rub
 either way.
 """
 
 
 @dataclass(frozen=True, slots=True)
-class InsideError:
+class _InsideError:
     """Worst error of one quantity of a loop by one method."""
 
     method: str
@@ -78,11 +78,11 @@ def measure_robot(
     """Measure the loops of a robot's file in a guarded process."""
     file = read_robot(path, assets)
     with examine_guarded(path, LIMIT) as examined:
-        measurement: RobotMeasurement = examined(MEASURE, file, options, scene)
+        measurement: RobotMeasurement = examined(_MEASURE, file, options, scene)
     return measurement
 
 
-def list_errors(loop: LoopMeasurement) -> list[InsideError]:
+def list_errors(loop: LoopMeasurement) -> list[_InsideError]:
     """List the worst errors of torque and pin forces, by method.
 
     They are against the formulas.
@@ -105,7 +105,7 @@ def find_left_out(loop: LoopMeasurement) -> float:
 
 def _compare(
     method: str, loop: LoopMeasurement, answer: InsideAnswer
-) -> Iterator[InsideError]:
+) -> Iterator[_InsideError]:
     """Compare an answer with the formulas at its own theta_2, omega_2 and alpha_2.
 
     Where dry friction reverses the forces on both sides of the jump are right, and
@@ -121,7 +121,7 @@ def _compare(
     )
     formulas = solve(loop.scene, "force", at=commanded)
     judged = formulas.status_code == OK
-    reversing = mark_reversing(loop.scene, formulas, SLIP)
+    reversing = mark_reversing(loop.scene, formulas, _SLIP)
     for name in QUANTITIES:
         ours = np.asarray(getattr(formulas, name))
         theirs = np.array([row.soft.values()[name] for row in rows])
@@ -133,7 +133,7 @@ def _compare(
         worst = int(np.argmax(sizes))
         largest = float(np.max(measure_sizes(ours)[judged], initial=0.0))
         error = math.inf if answer.lost else float(sizes[worst])
-        yield InsideError(method, name, error, largest, rows[worst].joint)
+        yield _InsideError(method, name, error, largest, rows[worst].joint)
 
 
 def _turn(vectors: Array, angle: float) -> Array:
@@ -147,7 +147,7 @@ def find_worst(loop: LoopMeasurement) -> float:
     return max(error.part for error in list_errors(loop))
 
 
-def read_torque(text: str | None) -> float | None:
+def _read_torque(text: str | None) -> float | None:
     """Read the value of `torque_option`, N m."""
     if text is None:
         return None
@@ -176,6 +176,6 @@ def read_measure_options(
         read_pose(robot["pose"], robot["key"], robot["hold"], robot["drive"]),
         loop,
         read_speed(robot["speed"]),
-        read_torque(robot.get("torque")),
+        _read_torque(robot.get("torque")),
         wanted,
     )

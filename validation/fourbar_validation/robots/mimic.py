@@ -32,14 +32,14 @@ FEWEST = 6
 fitted by least squares with an error to tell.
 """
 HEADINGS = ("degree", "fit", "angle, deg", "ratio", "polycoef")
-FITS = ("least squares", "smallest largest error")
+_FITS = ("least squares", "smallest largest error")
 """Names of the fits of `MimicReport.squares` and `MimicReport.fitted`."""
 ROW = "{:6}  {:22}  {:>10}  {:>8}  {}"
 """Format of a row under HEADINGS."""
 
 
 @dataclass(frozen=True, slots=True)
-class MimicError:
+class _MimicError:
     """Largest errors of a polynomial over the motion."""
 
     coefficients: tuple[float, ...]
@@ -51,13 +51,13 @@ class MimicError:
 
 
 @dataclass(frozen=True, slots=True)
-class MimicReport:
+class _MimicReport:
     """Losses of the polynomial of a file, and of others."""
 
     equality: JointEquality
     swing: tuple[float, float]
     """First and last theta_2 of the motion, rad."""
-    file: MimicError
+    file: _MimicError
     """Angle counted from the position of the loop at the zero of the file."""
     shifted: float
     """Largest error of the angle with the constant of least squares, rad. It replaces
@@ -65,15 +65,15 @@ class MimicReport:
     """
     centred: float
     """Largest error of the angle with the constant that makes it smallest, rad."""
-    squares: tuple[MimicError, ...]
+    squares: tuple[_MimicError, ...]
     """Polynomials of DEGREES by least squares over the positions of the scene."""
-    fitted: tuple[MimicError, ...]
+    fitted: tuple[_MimicError, ...]
     """Polynomials of DEGREES with the smallest largest error of the angle."""
 
 
 def measure_mimic(
     path: Path, joint: str, scene: Scene, assets: Path | None = None
-) -> MimicReport:
+) -> _MimicReport:
     """Hold the polynomial of a joint against the loop of a scene over its motion.
 
     The leader's zero is the theta_2 at which the file has the input, and the follower's
@@ -115,7 +115,7 @@ def measure_mimic(
     stated = np.searchsorted(theta_2, positions)
     squares = (fit_squares(x[stated], turned[stated], degree) for degree in DEGREES)
     fitted = (fit_minimax(x, turned, degree) for degree in DEGREES)
-    return MimicReport(
+    return _MimicReport(
         equality,
         (low, high),
         own,
@@ -160,12 +160,12 @@ def _follow(scene: Scene, theta_2: Array, branch: int) -> tuple[Array, Array]:
 
 def _measure(
     coefficients: tuple[float, ...], x: Array, turned: Array, ratio: Array
-) -> MimicError:
+) -> _MimicError:
     """Measure the largest errors of a polynomial."""
     polynomial = np.polynomial.Polynomial(coefficients)
     angle = float(np.abs(polynomial(x) - turned).max())
     speed = float(np.abs(polynomial.deriv()(x) - ratio).max())
-    return MimicError(tuple(coefficients), angle, speed)
+    return _MimicError(tuple(coefficients), angle, speed)
 
 
 def fit_squares(x: Array, y: Array, degree: int) -> tuple[float, ...]:
@@ -203,7 +203,7 @@ def fit_minimax(x: Array, y: Array, degree: int) -> tuple[float, ...]:
     return tuple(coefficients.tolist())
 
 
-def show_mimic(report: MimicReport) -> None:
+def show_mimic(report: _MimicReport) -> None:
     """Print what the polynomial of the file loses, and the best of each degree."""
     equality, own = report.equality, report.file
     low, high = (f"{math.degrees(angle):.6g}" for angle in report.swing)
@@ -220,7 +220,7 @@ def show_mimic(report: MimicReport) -> None:
     )
     _say(ROW.format(*HEADINGS))
     for degree, *errors in zip(DEGREES, report.squares, report.fitted, strict=True):
-        for fit, error in zip(FITS, errors, strict=True):
+        for fit, error in zip(_FITS, errors, strict=True):
             missing = max(DEGREES) - degree
             polycoef = _write((*error.coefficients, *[0.0] * missing))
             ratio = f"{error.ratio:.4g}"

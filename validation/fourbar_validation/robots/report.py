@@ -30,7 +30,7 @@ from fourbar_validation.robots.measure import (
 )
 
 ERRORS = ("method", "quantity", "error", "of its largest", "at")
-SETTINGS = ("changed alone", "single states", "through time", "cost")
+_SETTINGS = ("changed alone", "single states", "through time", "cost")
 ROUND_OFF = 1e-8
 """Difference of two exact answers that the digits of the scene make. It is over the
 largest torque and pin forces.
@@ -160,7 +160,7 @@ def describe_advice(advice: SettingsAdvice) -> Iterator[Block]:
             f"{1e6 * best.seconds_per_step:.3g} us a step"
         )
     rows = [_write_tried(one) for one in (before, *advice.alone)]
-    yield TextTable(SETTINGS, rows)
+    yield TextTable(_SETTINGS, rows)
 
 
 def _write_tried(tried: TriedSettings) -> tuple[str, ...]:

@@ -56,13 +56,13 @@ from fourbar_validation.run.question import Question, select_positions, spread_e
 
 STAGES = ("omega_3", "alpha_3", COUPLE.value, LINE.value)
 """One quantity of each stage that a position may lack."""
-LARGE = 1e75
+_LARGE = 1e75
 """Size of numbers beyond which they, or their squares, may overflow. A product of four
 is 1e300.
 """
-OfSome = Callable[[NDArray[np.intp]], Array]
+_OfSome = Callable[[NDArray[np.intp]], Array]
 """A number of each of some positions."""
-IN_ONE_LINE = 32.0 * 2.0**-53
+_IN_ONE_LINE = 32.0 * 2.0**-53
 """|sin(theta_4 - theta_3)| at which bars 3 and 4 may count as collinear. Their
 directions are rounded by that.
 """
@@ -285,7 +285,7 @@ def check_status(question: Question) -> Iterator[Row]:
         yield Row.unmeasured(question.name, FORMULAS, "exact", "status", FAILS, what)
 
 
-def _solve_exactly(question: Question) -> tuple[OfSome | None, OfSome | None]:
+def _solve_exactly(question: Question) -> tuple[_OfSome | None, _OfSome | None]:
     """Give the sine between bars 3 and 4 in many digits, at some positions.
 
     The number of solutions that friction has is given too.
@@ -316,8 +316,8 @@ def _solve_exactly(question: Question) -> tuple[OfSome | None, OfSome | None]:
 def compare_status(
     question: Question,
     reference: Solution,
-    sines: OfSome | None = None,
-    solutions: OfSome | None = None,
+    sines: _OfSome | None = None,
+    solutions: _OfSome | None = None,
 ) -> Row:
     """Count where one of the formulas and `reference` alone has a value.
 
@@ -352,7 +352,7 @@ def compare_status(
         moves = np.isfinite(np.hstack([a for a in accelerations if a is not None])).all(
             axis=1
         )
-        in_line = reference.drive_condition < IN_ONE_LINE
+        in_line = reference.drive_condition < _IN_ONE_LINE
         differ |= (formulas.status_code == OVERFLOW) & moves & in_line
         differ |= np.isin(formulas.status_code, (NO_TORQUE, NO_LEVER)) & (
             reference.drive_condition > NEAR
@@ -370,7 +370,7 @@ def compare_status(
         in_line = np.isin(formulas.status_code[near], (SINGULAR, CHANGE_POINT))
         differ[near] |= (formulas.status_code[near] == NOT_ASSEMBLED) == closes
         differ[near] |= closes & np.where(
-            in_line, sine > IN_ONE_LINE, sine < 1.0 / 16.0 * IN_ONE_LINE
+            in_line, sine > _IN_ONE_LINE, sine < 1.0 / 16.0 * _IN_ONE_LINE
         )
     if solutions is not None and len(
         many := np.flatnonzero(formulas.status_code == SEVERAL)[:SAMPLE]
@@ -401,10 +401,11 @@ def _mark_large(scene: Scene, reference: Solution) -> Mask:
     """Mark where numbers are so large that the formulas may have to give up, (n,)."""
     large = np.full(
         len(reference),
-        max(scene.linkage.lengths) > LARGE or min(scene.linkage.lengths) < 1.0 / LARGE,
+        max(scene.linkage.lengths) > _LARGE
+        or min(scene.linkage.lengths) < 1.0 / _LARGE,
     )
     for name in ("omega_2", "alpha_2", *STAGES, "F12", "F43"):
         values = getattr(reference, name)
         if values is not None:
-            large |= magnitude(values) > LARGE
+            large |= magnitude(values) > _LARGE
     return np.asarray(large)

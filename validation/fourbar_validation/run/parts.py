@@ -22,7 +22,7 @@ from fourbar_validation.run.request import (
 from fourbar_validation.run.run import open_store, write_outcome
 from fourbar_validation.run.store import Store
 
-MOST_NAMED = 5
+_MOST_NAMED = 5
 """Parts that a message names; further ones are counted."""
 
 
@@ -38,7 +38,7 @@ def judge_part(
         plan.judge(store, part, progress)
 
 
-class Gathered:
+class _Gathered:
     """Finished tasks of one run that lie in several folders."""
 
     def __init__(self, plan: Plan, folders: Sequence[Path], parts: int) -> None:
@@ -68,12 +68,12 @@ class Gathered:
             return
         numbers = sorted({chunk % self._parts + 1 for chunk in missing})
         named = [f"--part {number}/{self._parts}" for number in numbers]
-        further = len(named) - MOST_NAMED
-        words = ", ".join(named[:MOST_NAMED]) + (
+        further = len(named) - _MOST_NAMED
+        words = ", ".join(named[:_MOST_NAMED]) + (
             f" and {further} more" if further > 0 else ""
         )
         why = f"{len(missing)} of {len(chunks)} tasks are missing: run {words} again"
-        raise InputError("DIR", "; ".join(self._damaged[:MOST_NAMED]) or None, why)
+        raise InputError("DIR", "; ".join(self._damaged[:_MOST_NAMED]) or None, why)
 
     def read(self, chunk: int) -> list[Any]:
         """Read the results of a task."""
@@ -97,7 +97,7 @@ def collect(
             str(out),
             "holds parts of a run: name it among the folders and choose another",
         )
-    gathered = Gathered(plan, folders, parts)
+    gathered = _Gathered(plan, folders, parts)
     with open_store(plan, out) as store:
         summary = write_outcome(plan, gathered.read, out, progress)
         store.finish()

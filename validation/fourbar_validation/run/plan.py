@@ -30,7 +30,7 @@ CHUNK = {True: 1, False: 20}
 """Scenes per task. It is one if something is simulated or drawn (a second each), else
 twenty (a second together).
 """
-MOST_PARTS = 10_000
+_MOST_PARTS = 10_000
 """Files that a run keeps while it goes on. Of a million scenes a hundred stand in each.
 """
 JUDGING, COLLECTING, DRAWING = "judging", "collecting", "drawing"
@@ -129,7 +129,7 @@ class Plan:
         count = len(self.suite)
         simulated = any(engine.through_time for engine in self.engines)
         least = CHUNK[self.draw_at_once or simulated]
-        size = max(least, math.ceil(count / MOST_PARTS))
+        size = max(least, math.ceil(count / _MOST_PARTS))
         return [
             range(start, min(start + size, count)) for start in range(0, count, size)
         ]

@@ -83,7 +83,7 @@ def judge_job(job: Job) -> Record:
     )
 
 
-def judge_by_engine(
+def _judge_by_engine(
     job: Job, _: BaseException, attempt: worker_processes.Attempt
 ) -> Record:
     """Judge a scene that broke down one engine at a time.
@@ -127,5 +127,5 @@ def judge_chunks(
     A job that takes longer than `limit` (s) hangs.
     """
     return worker_processes.apply_over_processes(
-        judge_job, chunks, workers, seconds=limit, instead=judge_by_engine
+        judge_job, chunks, workers, seconds=limit, instead=_judge_by_engine
     )

@@ -59,7 +59,7 @@ nearest to a rest are added.
 """
 BARS = 10.0
 """Error bars: 2 in 100 million normal errors exceed ten of them."""
-ROUNDED_SOMEWHERE = 20
+_ROUNDED_SOMEWHERE = 20
 """Positions with loaded friction of which one at least leaves a residual. By rounding
 half of them do.
 """
@@ -359,7 +359,7 @@ def check_residual(question: Question) -> Iterator[Row]:
     row = question.row(
         "friction_residual", error, K * EPS, reason, theta_2=solution.theta_2
     )
-    if np.count_nonzero(sliding) >= ROUNDED_SOMEWHERE and not residual[sliding].any():
+    if np.count_nonzero(sliding) >= _ROUNDED_SOMEWHERE and not residual[sliding].any():
         row = replace(
             row, verdict=FAILS, reason="not even rounding is left at any position"
         )

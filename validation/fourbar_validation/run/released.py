@@ -77,7 +77,7 @@ that by its duration, so 5 s is the unit.
 UNIT = 5.0
 
 
-class Pendulum(NamedTuple):
+class _Pendulum(NamedTuple):
     """A parallelogram that stays parallel is a pendulum: J phi'' = W sin phi.
 
     phi is from the upright.
@@ -114,7 +114,7 @@ class Pendulum(NamedTuple):
         )
 
 
-def make_pendulum(scene: Scene) -> Pendulum | None:
+def make_pendulum(scene: Scene) -> _Pendulum | None:
     """Give the pendulum that the scene is, or None.
 
     It must turn over.
@@ -146,7 +146,7 @@ def make_pendulum(scene: Scene) -> Pendulum | None:
         J += mass * a * a if number == 3 else find_inertia(bar) + mass * r * r
         W += mass * down.magnitude * (a if number == 3 else r)
     phi_0 = float(np.asarray(scene.motion.theta_2)) - math.pi / 2
-    pendulum = Pendulum(J, W, phi_0, scene.motion.omega_2)
+    pendulum = _Pendulum(J, W, phi_0, scene.motion.omega_2)
     over_the_top = scene.motion.omega_2**2 > 2.0 * W / J * (1.0 - math.cos(phi_0))
     return pendulum if over_the_top else None
 

@@ -28,7 +28,7 @@ from fourbar_validation.scenes.suites import (
 )
 
 ALL_TYPES = ",".join(kind.value for kind in DrawnType)
-EXCLUDED = (
+_EXCLUDED = (
     ("random", "scenes", "judges random linkages; leave out the scene files"),
     ("suite", "scenes", "has its own scenes; leave out scene files and --random"),
     ("suite", "random", "has its own scenes; leave out scene files and --random"),
@@ -36,11 +36,11 @@ EXCLUDED = (
 """Option, what it cannot be combined with, and why."""
 HARD = "hard"
 """Name of the suite of hard cases."""
-OF_RANDOM = ("seed", "type")
+_OF_RANDOM = ("seed", "type")
 """Options that say which random linkages are drawn."""
-OF_A_REPORT = ("against", *FORMS)
+_OF_A_REPORT = ("against", *FORMS)
 """Options of the verdict, which a part has none of."""
-REQUEST = "request.json"
+_REQUEST = "request.json"
 """File beside a part that says what was asked for, so that parts can be collected."""
 KEPT = (
     *("scenes", "engines", "error", "suite", "random", "seed", "type"),
@@ -86,20 +86,20 @@ class Request:
 
         Files that cannot be written are refused too.
         """
-        for option, excluded, why in EXCLUDED:
+        for option, excluded, why in _EXCLUDED:
             if getattr(self, option) is not None and getattr(self, excluded) not in (
                 None,
                 (),
             ):
                 raise InputError(f"--{option}", getattr(self, option), why)
-        for option in OF_RANDOM:
+        for option in _OF_RANDOM:
             if getattr(self, option) is not None and self.random is None:
                 raise InputError(
                     f"--{option}",
                     getattr(self, option),
                     "is of random linkages; say --random N too",
                 )
-        for option in OF_A_REPORT if self.part is not None else ():
+        for option in _OF_A_REPORT if self.part is not None else ():
             if (value := getattr(self, option)) is not None:
                 why = "is of a report: leave it out, and collect the parts first"
                 raise InputError(f"--{option}", str(value), why)
@@ -137,9 +137,9 @@ def make_plan(request: Request, files: Files | None = None) -> Plan:
 
     `files`: the scenes as a part kept them.
     """
-    suite = select_scenes(request) if files is None else files
+    suite = _select_scenes(request) if files is None else files
     engines = select_engines(request)
-    present, missing = find_askable(engines, by_name=request.engines is not None)
+    present, missing = _find_askable(engines, by_name=request.engines is not None)
     return Plan(suite, present, request.options, missing)
 
 
@@ -152,7 +152,7 @@ def keep_request(request: Request, part: RunPart, suite: Suite, out: Path) -> No
     kept: dict[str, Any] = {"parts": part.of, "asked": asked}
     if isinstance(suite, Files):
         kept["files"] = asdict(suite) | {"not_drawn": sorted(suite.not_drawn)}
-    write_text(out / REQUEST, json.dumps(kept, default=str) + "\n")
+    write_text(out / _REQUEST, json.dumps(kept, default=str) + "\n")
 
 
 def read_request(folder: Path) -> tuple[int, Request, Files | None]:
@@ -161,7 +161,7 @@ def read_request(folder: Path) -> tuple[int, Request, Files | None]:
     The scene files are read too; InputError without them.
     """
     try:
-        kept = json.loads((folder / REQUEST).read_text(encoding="utf-8"))
+        kept = json.loads((folder / _REQUEST).read_text(encoding="utf-8"))
         asked = kept["asked"]
         asked |= {
             "scenes": tuple(map(Path, asked["scenes"])),
@@ -180,17 +180,17 @@ def read_request(folder: Path) -> tuple[int, Request, Files | None]:
 
 def forget_request(folder: Path) -> None:
     """Remove what was kept beside parts, once their results are written."""
-    (folder / REQUEST).unlink(missing_ok=True)
+    (folder / _REQUEST).unlink(missing_ok=True)
 
 
-def select_scenes(request: Request) -> Suite:
+def _select_scenes(request: Request) -> Suite:
     """Select the scenes."""
     if request.suite == HARD:
         return Hard()
     if request.suite is not None:
         return read_suite(Path(request.suite))
     if request.random is not None:
-        types = read_linkage_types(request.type or ALL_TYPES)
+        types = _read_linkage_types(request.type or ALL_TYPES)
         return Random(request.random, request.seed or 0, types)
     if request.scenes:
         return read_scene_files(request.scenes)
@@ -210,7 +210,7 @@ def select_engines(request: Request) -> tuple[Engine, ...]:
     return engines
 
 
-def read_linkage_types(text: str) -> tuple[DrawnType, ...]:
+def _read_linkage_types(text: str) -> tuple[DrawnType, ...]:
     """Read the types named in a comma-separated list; none for uneven linkages."""
     if text == UNEVEN_TYPE:
         return ()
@@ -225,7 +225,7 @@ def read_linkage_types(text: str) -> tuple[DrawnType, ...]:
         ) from None
 
 
-def find_askable(
+def _find_askable(
     engines: tuple[Engine, ...], *, by_name: bool
 ) -> tuple[tuple[Engine, ...], list[tuple[str, str]]]:
     """Find those that can answer here, and the others with the reason.

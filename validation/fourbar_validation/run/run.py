@@ -51,7 +51,7 @@ from fourbar_validation.scenes.hard_families import Hard
 from fourbar_validation.scenes.suites import Suite
 
 TIMINGS = ("scene", "engine", "setting", "positions", "seconds", "times_formulas")
-OUTCOME = (TABLE, COLUMNS, ABOUT, "timings.csv", "report.md", "report.html", OUTPUT)
+_OUTCOME = (TABLE, COLUMNS, ABOUT, "timings.csv", "report.md", "report.html", OUTPUT)
 """Files that a run ends with. A run first removes those of an earlier run, so that none
 passes for its own if it ends early.
 """
@@ -84,8 +84,8 @@ def run(
 @contextmanager
 def open_store(plan: Plan, out: Path) -> Iterator[Store]:
     """Hold the folder of a run, without the files of an earlier one."""
-    with Store(out, plan.identity, OUTCOME).held() as store:
-        for name in OUTCOME:
+    with Store(out, plan.identity, _OUTCOME).held() as store:
+        for name in _OUTCOME:
             (out / name).unlink(missing_ok=True)
         yield store
 
@@ -125,7 +125,7 @@ def write_outcome(
         overview.baseline = before.describe()
     write_text(out / "report.md", write_markdown(summary))
     generated = any(engine.generated for engine in engines)
-    models, why_not = picture_models(suite, shown) if generated else ({}, "")
+    models, why_not = _picture_models(suite, shown) if generated else ({}, "")
     sections = collect_sections(
         read_columns(out / COLUMNS) if isinstance(suite, Hard) else None, out
     )
@@ -174,8 +174,8 @@ def _collect(
     """
     with (
         Columns(out) as columns,
-        draft_file(out / OUTPUT) as output,
-        draft_file(out / "timings.csv") as times,
+        _draft_file(out / OUTPUT) as output,
+        _draft_file(out / "timings.csv") as times,
     ):
         times.write(write_csv(TIMINGS, []))
         for number, scenes in enumerate(plan.chunks):
@@ -188,7 +188,7 @@ def _collect(
                     )
                 ]
                 summary.add(record)
-                times.write(write_csv((), list_timings(record)))
+                times.write(write_csv((), _list_timings(record)))
                 output.writelines(
                     f"{record.name}: {engine}\n{text}\n\n"
                     for engine, text in record.output.items()
@@ -215,7 +215,7 @@ def _redraw(
     return job
 
 
-def picture_models(suite: Suite, scenes: Iterable[int]) -> tuple[dict[str, str], str]:
+def _picture_models(suite: Suite, scenes: Iterable[int]) -> tuple[dict[str, str], str]:
     """Picture the MJCF of some scenes by MuJoCo, as base64 PNGs by name.
 
     The reason is returned if there are none.
@@ -232,7 +232,7 @@ def picture_models(suite: Suite, scenes: Iterable[int]) -> tuple[dict[str, str],
 
 
 @contextmanager
-def draft_file(path: Path) -> Iterator[TextIO]:
+def _draft_file(path: Path) -> Iterator[TextIO]:
     """Draft a text file line by line.
 
     It is in place once it is complete, and removed if it is empty.
@@ -248,7 +248,7 @@ def draft_file(path: Path) -> Iterator[TextIO]:
             draft.unlink(missing_ok=True)
 
 
-def list_timings(record: Record) -> Iterator[list[str]]:
+def _list_timings(record: Record) -> Iterator[list[str]]:
     """Give the seconds per answer, and their ratio to the formulas'.
 
     Both are on the same scene in the same process.

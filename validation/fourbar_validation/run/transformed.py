@@ -71,19 +71,19 @@ PART, APART = 0.3, 0.4
 """Part of a bar's mass that is split off, and the distance of both parts. The distance
 is in radii of gyration of the bar.
 """
-AT_A_REVERSAL = 1e-3
+_AT_A_REVERSAL = 1e-3
 """Part of its speeds below which a pin with dry friction may reverse."""
 FORCES = (*PIN_FORCES, "torque", "drive_force")
-TRANSFORMED_QUANTITIES = (
+_TRANSFORMED_QUANTITIES = (
     *(f"{name}_{bar}" for name in ("theta", "omega", "alpha") for bar in MOVING_BARS),
     *FORCES,
     "power",
 )
 """Quantities that are compared, as far as the scene has them."""
-OTHER_BAR = {1: 1, 2: 4, 3: 3, 4: 2}
+_OTHER_BAR = {1: 1, 2: 4, 3: 3, 4: 2}
 OTHER_PIN = {"O2": "O4", "A": "B", "B": "A", "O4": "O2"}
 """Bars and pins by their names in a linkage read from its other end."""
-OTHER_FORCE = {
+_OTHER_FORCE = {
     "F12": ("F14", 1.0),
     "F14": ("F12", 1.0),
     "F32": ("F43", -1.0),
@@ -125,7 +125,7 @@ class _Few:
         """List the quantities that the scene has, those of forces in one piece."""
         return [
             name
-            for name in TRANSFORMED_QUANTITIES
+            for name in _TRANSFORMED_QUANTITIES
             if getattr(self.solution, name, None) is not None
         ]
 
@@ -231,7 +231,7 @@ def _take_few(question: Question) -> _Few:
     if at.stroke is not None or at.time is not None:
         raise NotAskedError("a stroke or a motion law is commanded")
     for term in (*scene.loads, *scene.effects):
-        if type(term) not in CONVERTED:
+        if type(term) not in _CONVERTED:
             raise NotAskedError(f"the effect {term.key!r} has no counterpart")
     if any(load.table is not None for load in scene.loads):
         raise NotAskedError("a load over a table has no counterpart")
@@ -244,7 +244,7 @@ def _take_few(question: Question) -> _Few:
         (solution.status_code == OK)
         & (solution.condition >= WELL_CONDITIONED)
         & (solution.drive_condition >= WELL_CONDITIONED)
-        & ~question.reversing(AT_A_REVERSAL)
+        & ~question.reversing(_AT_A_REVERSAL)
         & _mark_long_springs(placed, solution)
     )
     indices = np.flatnonzero(fit)
@@ -331,7 +331,7 @@ class _Conversion:
         if not self.exchanged:
             return Place(place.bar, self.pair(place.from_pin))
         if place.bar in (2, 4):
-            return Place(OTHER_BAR[place.bar], place.from_pin)
+            return Place(_OTHER_BAR[place.bar], place.from_pin)
         length = linkage.lengths[place.bar - 1]
         return Place(place.bar, _from_other_end(length, place.from_pin))
 
@@ -353,7 +353,7 @@ def _from_other_end(length: float, pair: tuple[float, float]) -> tuple[float, fl
 
 def _convert_load(load: Load, to: _Conversion, linkage: FourBar) -> Load:
     force = None
-    bar = OTHER_BAR[load.bar] if to.exchanged else load.bar
+    bar = _OTHER_BAR[load.bar] if to.exchanged else load.bar
     places: dict[str, Any] = {}
     if load.force is not None:
         # a direction from the bar's line turns with the coupler's line
@@ -437,7 +437,7 @@ def _convert_torsion(effect: Torsion, to: _Conversion, linkage: FourBar) -> Tors
 
 
 def _convert_flywheel(effect: Flywheel, to: _Conversion, linkage: FourBar) -> Flywheel:
-    bar = OTHER_BAR[effect.bar] if to.exchanged else effect.bar
+    bar = _OTHER_BAR[effect.bar] if to.exchanged else effect.bar
     return Flywheel(to.length * to.length * effect.inertia, bar)
 
 
@@ -445,7 +445,7 @@ def _name(pin: str, to: _Conversion) -> str:
     return OTHER_PIN[pin] if to.exchanged else pin
 
 
-CONVERTED: dict[type[Effect], Callable[[Any, _Conversion, FourBar], Any]] = {
+_CONVERTED: dict[type[Effect], Callable[[Any, _Conversion, FourBar], Any]] = {
     Load: _convert_load,
     Gravity: _convert_gravity,
     Viscous: _convert_couples,
@@ -456,7 +456,7 @@ CONVERTED: dict[type[Effect], Callable[[Any, _Conversion, FourBar], Any]] = {
     Flywheel: _convert_flywheel,
 }
 """Loads and effects that can be stated otherwise."""
-NOT_IN_PARTS = (Friction, PinFriction)
+_NOT_IN_PARTS = (Friction, PinFriction)
 """Effects that are not the sum of what each adds."""
 
 
@@ -483,10 +483,10 @@ def _convert(scene: Scene, to: _Conversion) -> Scene:
     drive_bar = scene.drive_bar
     if to.exchanged:
         bars, theta_1 = bars[::-1], theta_1 + math.pi
-        drive_bar = OTHER_BAR.get(drive_bar, drive_bar)
+        drive_bar = _OTHER_BAR.get(drive_bar, drive_bar)
     two, three, four = bars
     terms = [
-        [CONVERTED[type(term)](term, to, link) for term in terms]
+        [_CONVERTED[type(term)](term, to, link) for term in terms]
         for terms in (scene.loads, scene.effects)
     ]
     return Scene(
@@ -557,7 +557,7 @@ def _measure_exchanged(few: _Few) -> Array:
     with which sin(theta_4 - theta_2), the sine of a command of bar 3, changes its sign.
     """
     command = few.command
-    bar = OTHER_BAR[command.bar]
+    bar = _OTHER_BAR[command.bar]
     reversed_ = bar == 3
     other = few.solve_alike(
         _convert(few.scene, _Conversion(exchanged=True)),
@@ -568,10 +568,10 @@ def _measure_exchanged(few: _Few) -> Array:
 
     def convert(name: str) -> Array:
         if name in PIN_FORCES:
-            same, sign = OTHER_FORCE[name]
+            same, sign = _OTHER_FORCE[name]
             return sign * np.array(getattr(other, same))
         if name[:6] in ("theta_", "omega_", "alpha_"):
-            values = getattr(other, f"{name[:6]}{OTHER_BAR[int(name[6])]}")
+            values = getattr(other, f"{name[:6]}{_OTHER_BAR[int(name[6])]}")
             return values - math.pi if name == "theta_3" else np.array(values)
         return np.array(getattr(other, name))
 
@@ -634,7 +634,7 @@ def _require_linear(scene: Scene) -> None:
 
     A part is what a load or an effect adds.
     """
-    if any(isinstance(effect, NOT_IN_PARTS) for effect in scene.effects):
+    if any(isinstance(effect, _NOT_IN_PARTS) for effect in scene.effects):
         raise NotAskedError("forces with dry friction are no sum of what each adds")
 
 

@@ -34,14 +34,14 @@ BARS = Ranges(
     centre_angle=draw_uniform(-0.5, 0.5),
 )
 Scenes = Iterator[tuple[str, Scene]]
-ROCKERS = (DrawnType.DOUBLE_ROCKER, DrawnType.TRIPLE_ROCKER)
+_ROCKERS = (DrawnType.DOUBLE_ROCKER, DrawnType.TRIPLE_ROCKER)
 CRANK, ROCKER = DrawnType.CRANK_ROCKER, DrawnType.TRIPLE_ROCKER
 REGULAR = (0.5, 0.4, 0.3)
 """rad from the singular position: positions that set the scale of each quantity."""
 TOGGLE = tuple(10.0**-k for k in range(1, 13))
 NEAR = (1e-1, 3e-2, 1e-2, 3e-3)
 """rad; as far as a simulation in time follows."""
-POLE = tuple(10.0**-k for k in range(1, 10))
+_POLE = tuple(10.0**-k for k in range(1, 10))
 PLAIN = (0.3, 0.1, 0.25, 0.22)
 """Lengths of an ordinary crank-rocker, m."""
 CHANGE = tuple(10.0**-k for k in range(1, 9))
@@ -133,7 +133,7 @@ def find_collinear_2_3(lengths: Lengths) -> list[tuple[float, int]]:
     return places
 
 
-def find_parallel_2_4(lengths: Lengths) -> list[tuple[float, int]]:
+def _find_parallel_2_4(lengths: Lengths) -> list[tuple[float, int]]:
     """Find (psi, branch) where bars 2, 4 are parallel, so omega_3 = 0.
 
     There (a - c) e^{i psi} + b e^{i psi_3} = d, or a + c.
@@ -154,7 +154,7 @@ def _find_side(one: complex, second: complex) -> int:
 
 def toggle(*, distances: tuple[float, ...] = TOGGLE, seeds: range = range(2)) -> Scenes:
     """Approach bars 3, 4 in line from inside, and the same distances beyond it."""
-    for kind in ROCKERS:
+    for kind in _ROCKERS:
         for seed in seeds:
             lengths = draw_linkage(kind, seed)
             for psi, stretched in find_collinear_3_4(lengths):
@@ -174,8 +174,8 @@ def toggle(*, distances: tuple[float, ...] = TOGGLE, seeds: range = range(2)) ->
                     )
 
 
-def approach_poles(
-    *, bar: int, distances: tuple[float, ...] = POLE, seeds: range = range(2)
+def _approach_poles(
+    *, bar: int, distances: tuple[float, ...] = _POLE, seeds: range = range(2)
 ) -> Scenes:
     """Approach the position where the driven bar 3 or 4 stands still.
 
@@ -186,7 +186,7 @@ def approach_poles(
     )
     for seed in seeds:
         lengths = draw_linkage(CRANK, seed)
-        poles = find_parallel_2_4(lengths) if bar == 3 else find_collinear_2_3(lengths)
+        poles = _find_parallel_2_4(lengths) if bar == 3 else find_collinear_2_3(lengths)
         for number, (psi, branch) in enumerate(poles[:3]):
             yield (
                 f"{seed} {number}",
@@ -194,7 +194,7 @@ def approach_poles(
             )
 
 
-def driven_output(*, steps: int = 180, seeds: range = range(2)) -> Scenes:
+def _driven_output(*, steps: int = 180, seeds: range = range(2)) -> Scenes:
     """Drive on bar 4 through a whole turn of the input.
 
     The turn leads across both positions where omega_4 = 0.
@@ -231,7 +231,7 @@ def approach_change_point(*, distances: tuple[float, ...] = CHANGE) -> Scenes:
                 )
 
 
-def sweep_change_point(*, steps: int = 145) -> Scenes:
+def _sweep_change_point(*, steps: int = 145) -> Scenes:
     """Sweep two turns through the change points in both assemblies."""
     for kind, (lengths, _, _) in CHANGE_POINTS.items():
         for branch, name in BRANCH_NAMES.items():
@@ -241,7 +241,7 @@ def sweep_change_point(*, steps: int = 145) -> Scenes:
             yield f"{kind} {name}", replace(scene, motion=motion)
 
 
-def miss_grashof(
+def _miss_grashof(
     *, gaps: tuple[float, ...] = (1e-3, 1e-6, 1e-9, 1e-12), steps: int = 60
 ) -> Scenes:
     """Miss s + l = p + q by a hair on either side.
@@ -275,13 +275,13 @@ def sweep_turn(scene: Scene, steps: int = 36) -> Scene:
     )
 
 
-def shorten_crank(*, exponents: range = range(-6, 0)) -> Scenes:
+def _shorten_crank(*, exponents: range = range(-6, 0)) -> Scenes:
     """Shorten the crank against the coupler, again and again."""
     for k in exponents:
         yield f"1e{k}", sweep_turn(dress((0.3, 0.25 * 10.0**k, 0.25, 0.22)))
 
 
-def vary_mass_ratio(*, exponents: tuple[int, ...] = (-6, -3, 3, 6)) -> Scenes:
+def _vary_mass_ratio(*, exponents: tuple[int, ...] = (-6, -3, 3, 6)) -> Scenes:
     """Make one bar heavier or lighter than the others by up to 1e6."""
     base = sweep_turn(dress(PLAIN))
     for name, bar in list_moving(base):
@@ -292,7 +292,7 @@ def vary_mass_ratio(*, exponents: tuple[int, ...] = (-6, -3, 3, 6)) -> Scenes:
             yield f"{name} 1e{k:+d}", replace_bars(base, **{name: heavy})
 
 
-def remove_inertia() -> Scenes:
+def _remove_inertia() -> Scenes:
     """Take bars without rotational inertia, and without mass.
 
     Some have loads only on massless bars.
@@ -312,7 +312,7 @@ def remove_inertia() -> Scenes:
     )
 
 
-def move_centres_out(*, times: tuple[float, ...] = (3.0, 100.0, 1e4)) -> Scenes:
+def _move_centres_out(*, times: tuple[float, ...] = (3.0, 100.0, 1e4)) -> Scenes:
     """Put mass centres far outside the bar."""
     base = sweep_turn(dress(PLAIN))
     for name, bar in list_moving(base):
@@ -325,13 +325,13 @@ def move_centres_out(*, times: tuple[float, ...] = (3.0, 100.0, 1e4)) -> Scenes:
             )
 
 
-def scale_sizes(*, exponents: range = range(-6, 7, 2)) -> Scenes:
+def _scale_sizes(*, exponents: range = range(-6, 7, 2)) -> Scenes:
     """Scale the same shape from micrometres to a thousand kilometres."""
     for k in exponents:
         yield f"1e{k:+d} m", sweep_turn(dress(tuple(x * 10.0**k for x in PLAIN)))  # type: ignore[arg-type]
 
 
-def scale_speeds(*, exponents: tuple[int, ...] = (-6, -3, 0, 3, 6)) -> Scenes:
+def _scale_speeds(*, exponents: tuple[int, ...] = (-6, -3, 0, 3, 6)) -> Scenes:
     """Vary omega_2 from 1e-6 to 1e6 rad/s, in both senses."""
     base = sweep_turn(dress(PLAIN))
     for k in exponents:
@@ -355,7 +355,7 @@ def scale_loads(*, exponents: tuple[int, ...] = (-9, -3, 3, 9)) -> Scenes:
         yield f"1e{k:+d}", replace(base, loads=tuple(scaled))
 
 
-def sweep_out_and_back(
+def _sweep_out_and_back(
     *, beyond: float = 0.5, steps: int = 40, seeds: range = range(2)
 ) -> Scenes:
     """Sweep out of the range in which the linkage assembles, and back."""
@@ -371,7 +371,7 @@ def sweep_out_and_back(
             )
 
 
-def drive_thesis_to_limits(*, steps: int = 120) -> Scenes:
+def _drive_thesis_to_limits(*, steps: int = 120) -> Scenes:
     """Drive the thesis's double rocker from one limit position to the other.
 
     Its bars are 20, 48, 55 and 20 cm.
@@ -410,29 +410,29 @@ class Family:
     scenes: Callable[[], Scenes]
 
 
-STATEMENTS = tomllib.loads(
+_STATEMENTS = tomllib.loads(
     Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
 )
 FAMILIES = tuple(
-    Family(name, STATEMENTS[name], scenes)
+    Family(name, _STATEMENTS[name], scenes)
     for name, scenes in {
         "toggle": toggle,
         "toggle-near": lambda: toggle(distances=NEAR),
-        "pole-T3": lambda: approach_poles(bar=3),
-        "pole-T4": lambda: approach_poles(bar=4),
-        "driven-output": driven_output,
+        "pole-T3": lambda: _approach_poles(bar=3),
+        "pole-T4": lambda: _approach_poles(bar=4),
+        "driven-output": _driven_output,
         "change-point": approach_change_point,
-        "change-point-through": sweep_change_point,
-        "near-grashof": miss_grashof,
-        "bar-ratio": shorten_crank,
-        "mass-ratio": vary_mass_ratio,
-        "no-inertia": remove_inertia,
-        "far-centres": move_centres_out,
-        "sizes": scale_sizes,
-        "speeds": scale_speeds,
+        "change-point-through": _sweep_change_point,
+        "near-grashof": _miss_grashof,
+        "bar-ratio": _shorten_crank,
+        "mass-ratio": _vary_mass_ratio,
+        "no-inertia": _remove_inertia,
+        "far-centres": _move_centres_out,
+        "sizes": _scale_sizes,
+        "speeds": _scale_speeds,
         "loads": scale_loads,
-        "out-and-back": sweep_out_and_back,
-        "thesis-limits": drive_thesis_to_limits,
+        "out-and-back": _sweep_out_and_back,
+        "thesis-limits": _drive_thesis_to_limits,
         "released": released,
     }.items()
 )

@@ -55,12 +55,12 @@ def draw_product(*draws: Draw) -> Draw:
     return lambda rng: math.prod(draw(rng) for draw in draws)
 
 
-ANY_ANGLE, ANY_PART, EITHER_SIGN = (
+_ANY_ANGLE, _ANY_PART, _EITHER_SIGN = (
     draw_uniform(-math.pi, math.pi),
     draw_uniform(0.0, 1.0),
     draw_uniform(-1.0, 1.0),
 )
-ANY_SPEED = draw_decades(-1.0, 2.0)
+_ANY_SPEED = draw_decades(-1.0, 2.0)
 
 
 PUSHED = 0.2
@@ -78,18 +78,18 @@ class Ranges:
     centre: Draw
     """Distance of the mass centre, in parts of the length."""
     centre_angle: Draw
-    ground_angle: Draw = ANY_ANGLE
-    load: Draw = ANY_PART
+    ground_angle: Draw = _ANY_ANGLE
+    load: Draw = _ANY_PART
     """Load: a force in parts of the weight of all bars, and a moment. The moment is in
     parts of that weight at the bar's length.
     """
-    arm: Draw = ANY_PART
+    arm: Draw = _ANY_PART
     """Distance from G at which a load acts, in parts of the length."""
     without_force: float = 0.0
     """Share of the loads that are a moment alone."""
-    speed: Draw = ANY_SPEED
+    speed: Draw = _ANY_SPEED
     """|omega_2|, rad/s."""
-    acceleration: Draw = EITHER_SIGN
+    acceleration: Draw = _EITHER_SIGN
     """alpha_2 where there is one, of omega_2 squared."""
     gravity: float = 0.5
     viscous: float = 0.0
@@ -178,12 +178,12 @@ def draw_scene(
     if not ranges.pushed or rng.random() >= ranges.pushed:
         return Scene(linkage, motion, bar, loads, tuple(effects))
     length = linkage.bar(bar).length
-    place = Place(bar, (length * (1.0 + ranges.arm(rng)), ANY_ANGLE(rng)))
-    drive = PointDrive(place, ANY_ANGLE(rng), str(rng.choice(FRAMES)))
+    place = Place(bar, (length * (1.0 + ranges.arm(rng)), _ANY_ANGLE(rng)))
+    drive = PointDrive(place, _ANY_ANGLE(rng), str(rng.choice(FRAMES)))
     return Scene(linkage, motion, loads=loads, effects=tuple(effects), drive=drive)
 
 
-PLACES_OF_A_FORCE = ("from_pin", "from_centre", "arm")
+_PLACES_OF_A_FORCE = ("from_pin", "from_centre", "arm")
 """Forms in which a drawn load states where it acts; an arm is for a fixed direction."""
 
 
@@ -193,11 +193,11 @@ def _draw_load(
     """Draw a force and a moment, or one of them, on any bar."""
     bar = int(rng.choice(MOVING_BARS))
     length, size = linkage.bar(bar).length, weight * ranges.load(rng)
-    force = None if rng.random() < ranges.without_force else (size, ANY_ANGLE(rng))
-    place = (length * ranges.arm(rng), ANY_ANGLE(rng))
-    moment = float(rng.choice([0.0, size * length * EITHER_SIGN(rng)]))
+    force = None if rng.random() < ranges.without_force else (size, _ANY_ANGLE(rng))
+    place = (length * ranges.arm(rng), _ANY_ANGLE(rng))
+    moment = float(rng.choice([0.0, size * length * _EITHER_SIGN(rng)]))
     frame = "bar" if rng.random() < 0.5 else "world"
-    forms = PLACES_OF_A_FORCE if frame == "world" else PLACES_OF_A_FORCE[:2]
+    forms = _PLACES_OF_A_FORCE if frame == "world" else _PLACES_OF_A_FORCE[:2]
     form = str(rng.choice(forms))
     at: Any = {} if force is None else {form: place}
     return Load(bar, force, moment=moment, frame=frame, **at)
@@ -217,7 +217,7 @@ def _draw_springs(
             int(bar) for bar in rng.choice([1, *MOVING_BARS], 2, replace=False)
         )
         start, end = (
-            Place(bar, (linkage.lengths[bar - 1] * ranges.arm(rng), ANY_ANGLE(rng)))
+            Place(bar, (linkage.lengths[bar - 1] * ranges.arm(rng), _ANY_ANGLE(rng)))
             for bar in (one, second)
         )
         length = max(linkage.lengths)
@@ -228,8 +228,8 @@ def _draw_springs(
                         start,
                         end,
                         (size or 1.0) / length,
-                        length * ANY_PART(rng),
-                        size * EITHER_SIGN(rng),
+                        length * _ANY_PART(rng),
+                        size * _EITHER_SIGN(rng),
                     ),
                 )
             )
@@ -241,8 +241,8 @@ def _draw_springs(
                 **{
                     str(rng.choice(list(PINS))): (
                         couple or 1.0,
-                        ANY_ANGLE(rng),
-                        couple * EITHER_SIGN(rng),
+                        _ANY_ANGLE(rng),
+                        couple * _EITHER_SIGN(rng),
                     )
                 }
             )
@@ -274,9 +274,9 @@ SHORTEST = {
 is a Grashof one.
 """
 UNEVEN_TYPE = "uneven"
-"""Name that stands for the family `UNEVEN_FAMILY` in place of types."""
+"""Name that stands for the family `_UNEVEN_FAMILY` in place of types."""
 POSITIONS = 37
-CLEARANCE = 0.02
+_CLEARANCE = 0.02
 """Distance of a random linkage from the equality of change points. It is this part of
 its longest bar, from s + l = p + q.
 """
@@ -294,12 +294,12 @@ def draw_lengths(
         lengths[3] = 1.0
         shortest, p, q, longest = lengths
         surplus = p + q - shortest - longest
-        if p + q + shortest - longest < CLEARANCE:
+        if p + q + shortest - longest < _CLEARANCE:
             continue
         if kind is DrawnType.TRIPLE_ROCKER:
-            if surplus < -CLEARANCE:
+            if surplus < -_CLEARANCE:
                 return tuple(float(x) for x in rng.permutation(lengths))  # type: ignore[return-value]
-        elif surplus > CLEARANCE:
+        elif surplus > _CLEARANCE:
             others = list(rng.permutation(lengths[1:]))
             others.insert(SHORTEST[kind], shortest)
             return tuple(float(x) for x in others)  # type: ignore[return-value]
@@ -322,17 +322,17 @@ def draw_uneven_lengths(
     return (d, a, b, c), angle
 
 
-TEN_DECADES = draw_decades(-5.0, 5.0)
+_TEN_DECADES = draw_decades(-5.0, 5.0)
 UNEVEN = Ranges(
     pushed=PUSHED,
-    mass=draw_chance(0.9, TEN_DECADES),
-    inertia=draw_product(draw_uniform(0.02, 0.4), draw_chance(0.5, TEN_DECADES, 1.0)),
-    centre=draw_product(draw_uniform(-1.0, 2.0), draw_chance(0.3, TEN_DECADES, 1.0)),
+    mass=draw_chance(0.9, _TEN_DECADES),
+    inertia=draw_product(draw_uniform(0.02, 0.4), draw_chance(0.5, _TEN_DECADES, 1.0)),
+    centre=draw_product(draw_uniform(-1.0, 2.0), draw_chance(0.3, _TEN_DECADES, 1.0)),
     centre_angle=draw_chance(0.5, draw_uniform(-3.0, 3.0)),
-    load=draw_product(EITHER_SIGN, TEN_DECADES),
-    arm=draw_product(ANY_PART, draw_chance(0.3, TEN_DECADES, 1.0)),
+    load=draw_product(_EITHER_SIGN, _TEN_DECADES),
+    arm=draw_product(_ANY_PART, draw_chance(0.3, _TEN_DECADES, 1.0)),
     without_force=0.2,
-    speed=TEN_DECADES,
+    speed=_TEN_DECADES,
     viscous=0.3,
     friction=0.2,
     sprung=0.3,
@@ -342,7 +342,7 @@ UNEVEN = Ranges(
 
 
 def _draw_uneven_place(rng: np.random.Generator) -> DrawnLinkage:
-    lengths, psi = draw_uneven_lengths(rng, TEN_DECADES, TEN_DECADES)
+    lengths, psi = draw_uneven_lengths(rng, _TEN_DECADES, _TEN_DECADES)
     size = 10.0 ** rng.uniform(-3.0, 3.0)
 
     def draw_angles(rng: np.random.Generator, linkage: FourBar) -> Any:
@@ -353,7 +353,7 @@ def _draw_uneven_place(rng: np.random.Generator) -> DrawnLinkage:
     return [size * x for x in lengths], draw_angles
 
 
-UNEVEN_FAMILY = RandomFamily(_draw_uneven_place, UNEVEN)
+_UNEVEN_FAMILY = RandomFamily(_draw_uneven_place, UNEVEN)
 """Linkages with ratios of 1e-5 to 1e5, and with every kind of effect. The ratios are
 those of lengths, masses, arms and loads.
 """
@@ -382,7 +382,7 @@ def _draw_machine_place(kind: DrawnType, rng: np.random.Generator) -> DrawnLinka
     return lengths, lambda _, linkage: Sweep(*choose_range(linkage), POSITIONS - 1)
 
 
-MACHINE_FAMILIES = {
+_MACHINE_FAMILIES = {
     kind: RandomFamily(partial(_draw_machine_place, kind), MACHINES)
     for kind in DrawnType
 }
@@ -391,8 +391,8 @@ MACHINE_FAMILIES = {
 def draw_random_scene(seed: int, index: int, types: tuple[DrawnType, ...]) -> Scene:
     """Draw a scene of one of the types, taken in turn; without types an uneven one."""
     rng = np.random.default_rng([seed, index])
-    family, name = UNEVEN_FAMILY, UNEVEN_TYPE
+    family, name = _UNEVEN_FAMILY, UNEVEN_TYPE
     if types:
         kind = types[index % len(types)]
-        family, name = MACHINE_FAMILIES[kind], kind.value
+        family, name = _MACHINE_FAMILIES[kind], kind.value
     return replace(family.draw(rng), title=f"{name} {index}")

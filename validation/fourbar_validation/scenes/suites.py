@@ -25,7 +25,7 @@ MOST_POSITIONS = 100_000
 """Most positions of a scene in a run. Every engine solves each of them: 3 ms each, with
 all engines.
 """
-MOST_SECONDS = 100.0
+_MOST_SECONDS = 100.0
 """Longest free motion in a run, s. The engines go through it in steps of 1 to 4 ms, a
 second in about a second.
 """
@@ -166,9 +166,9 @@ def _count_positions(scene: Scene, file: Path) -> int:
     for stated in (scene.motion.angle, scene.motion.law, scene.motion.free):
         if isinstance(stated, (Sweep, Law, Rise, Free)):
             seconds = stated.duration if isinstance(stated, Free) else 0.0
-            if seconds > MOST_SECONDS:
+            if seconds > _MOST_SECONDS:
                 allowed = (
-                    f"must not exceed {MOST_SECONDS:g} s in a run: engines go through"
+                    f"must not exceed {_MOST_SECONDS:g} s in a run: engines go through"
                     " it in steps of 1 ms"
                 )
                 raise InputError("motion.free.duration", seconds, allowed, str(file))

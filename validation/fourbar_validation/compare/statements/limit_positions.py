@@ -45,7 +45,7 @@ Place = tuple[float, int]
 """theta_2 (rad) and branch."""
 Seen = Mapping[Place, Mapping[str, float]]
 """Values that an engine finds at some places."""
-OF_BARS = [name for name in UNKNOWNS if name not in FORCES]
+_OF_BARS = [name for name in UNKNOWNS if name not in FORCES]
 
 
 class Finding(NamedTuple):
@@ -90,11 +90,11 @@ def look(engine: Adapter, linkage: FourBar, places: Iterable[Place]) -> Seen:
         Motion(0.0, 1.0),
     )
     theta_2, branch = (np.array(column) for column in zip(*ordered, strict=True))
-    answer = require_answer(
+    answer = _require_answer(
         engine, scene, Command(theta_2, branch.astype(np.int8), 1.0, 0.0)
     )
     assert answer.assembled is not None
-    names = ["assembled"] + [name for name in OF_BARS if name in answer.quantities]
+    names = ["assembled"] + [name for name in _OF_BARS if name in answer.quantities]
     columns = [answer.assembled] + [answer.quantities[name] for name in names[1:]]
     rows = zip(*(column.astype(float).tolist() for column in columns), strict=True)
     return {
@@ -103,7 +103,7 @@ def look(engine: Adapter, linkage: FourBar, places: Iterable[Place]) -> Seen:
     }
 
 
-def require_answer(engine: Adapter, scene: Scene, command: Command) -> Answer:
+def _require_answer(engine: Adapter, scene: Scene, command: Command) -> Answer:
     """Give an engine's answer; LimitError where it refuses those positions."""
     answer = engine.answer(scene, command)
     if answer.refusal is not None:
@@ -111,7 +111,7 @@ def require_answer(engine: Adapter, scene: Scene, command: Command) -> Answer:
     return answer
 
 
-def compare_angles(
+def _compare_angles(
     what: str, stated: Sequence[float], answered: Sequence[float], linkage: FourBar
 ) -> Finding:
     """Compare lists of angles, modulo 2 pi in any order.
@@ -132,18 +132,18 @@ def compare_angles(
     )
 
 
-BEYOND = 4.0 * TOUCHING_MARGIN
+_BEYOND = 4.0 * TOUCHING_MARGIN
 """Distance past a limit at which the engine is tried. The loop closes or misses by this
 part of the sum of the lengths.
 """
 
-LENGTHS_ROUNDED = (EPS / 4.0, 2.125 * EPS)
+_LENGTHS_ROUNDED = (EPS / 4.0, 2.125 * EPS)
 """Bounds of the gap, in parts of the perimeter, between which either answer holds.
 
 A length that is computed, as the distance of two points, is right to four units of
 round-off, 2 EPS; an eighth of EPS is for the comparison's own round-off.
 """
-PAST = 1e-3
+_PAST = 1e-3
 """Distance on either side of a change point, rad. The speeds of the two motions differ
 visibly there.
 """
@@ -164,19 +164,19 @@ def _compare_change_points(linkage: FourBar) -> Finding:
             abs(math.remainder(point - angle, TURN)) <= allowed for point in stated
         )
         decided += here
-        wrong += part > LENGTHS_ROUNDED[1] if here else part < LENGTHS_ROUNDED[0]
+        wrong += part > _LENGTHS_ROUNDED[1] if here else part < _LENGTHS_ROUNDED[0]
     return Finding(
         float(wrong + len(stated) - decided), 0.0, linkage.ground_angle, "change points"
     )
 
 
-def compute_step_beyond(linkage: FourBar, theta_2: float) -> float:
+def _compute_step_beyond(linkage: FourBar, theta_2: float) -> float:
     """Compute the angle by which bar 2 turns beyond a limit, rad.
 
     The loop then closes, or misses, by BEYOND more.
     """
     d, a, *_ = linkage.lengths
-    psi, little = theta_2 - linkage.ground_angle, BEYOND * sum(linkage.lengths)
+    psi, little = theta_2 - linkage.ground_angle, _BEYOND * sum(linkage.lengths)
     e = max(abs(d - a * np.exp(1j * psi)), little)
     # e grows by d a sin(psi)/e to first order, by d a/(2 e) to second where the bar
     # lies along the ground
@@ -229,12 +229,12 @@ def _try_bar(linkage: FourBar, bar: int) -> _Trial:
         )
         expected.append(
             (
-                start - min(compute_step_beyond(first, start + shift), 0.5 * before),
+                start - min(_compute_step_beyond(first, start + shift), 0.5 * before),
                 False,
             )
         )
         expected.append(
-            (stop + min(compute_step_beyond(first, stop + shift), 0.5 * after), False)
+            (stop + min(_compute_step_beyond(first, stop + shift), 0.5 * after), False)
         )
     along = [
         linkage.ground_angle + angle - shift for angle in (0.0, math.pi)
@@ -252,13 +252,13 @@ def _try_bar(linkage: FourBar, bar: int) -> _Trial:
         for limit in mobility.limit_positions(linkage, bar)
     ]
     findings = (
-        compare_angles(
+        _compare_angles(
             f"limits of bar {bar}",
             limits,
             [] if full else [end for span in spans for end in span],
             linkage,
         ),
-        compare_angles(
+        _compare_angles(
             f"swing of bar {bar}",
             [mobility.swing(linkage, bar)],
             [spans[0][1] - spans[0][0]],
@@ -275,7 +275,7 @@ def _try_bar(linkage: FourBar, bar: int) -> _Trial:
 
 def _compute_inwards(linkage: FourBar, theta_2: float) -> float:
     """Compute the angle of bar 2 from its limit to where the loop closes, rad."""
-    step = compute_step_beyond(linkage, theta_2)
+    step = _compute_step_beyond(linkage, theta_2)
     ahead, behind = find_margin(linkage, np.array([theta_2 + step, theta_2 - step]))
     return step if ahead > behind else -step
 
@@ -312,9 +312,9 @@ class _Passage(NamedTuple):
 
         Beyond it they have the stated sign and the other one.
         """
-        beyond = self.point + PAST
+        beyond = self.point + _PAST
         return [
-            (self.point - PAST, self.before),
+            (self.point - _PAST, self.before),
             (beyond, self.after),
             (beyond, -self.after),
         ]
@@ -326,7 +326,7 @@ def _list_passages(linkage: FourBar) -> Iterator[_Passage]:
         for turn, assembly in itertools.product((0, 1), (1, -1)):
             point = change_point + TURN * turn
             assemblies = np.full(2, assembly, dtype=np.int8)
-            around = np.array([point - PAST, point + PAST])
+            around = np.array([point - _PAST, point + _PAST])
             command = Command(around, assemblies, None, 0.0)
             before, after = with_signs(linkage, command).branch.tolist()
             yield _Passage(point, assembly, before, after)
@@ -392,7 +392,7 @@ def compare_ranges(
                 [seen[place]["assembled"] > 0.0 for place in tried.places]
             )
         else:
-            answer = require_answer(engine, tried.scene, tried.command)
+            answer = _require_answer(engine, tried.scene, tried.command)
             assert answer.assembled is not None
             closes = answer.assembled
         wrong = tried.decidable & (closes != tried.inside)

@@ -34,7 +34,7 @@ from fourbar_validation.compare.tolerance import (
     wrap_angle,
 )
 
-RADII = (0.2, 0.3)
+_RADII = (0.2, 0.3)
 """m; where the forces of the mechanical advantage act. Any two that differ."""
 
 
@@ -101,7 +101,7 @@ class StatedOver(NamedTuple):
         state = state_of(scene.linkage, command.theta_2, command.branch)
         half = state.position.half
         with np.errstate(divide="ignore", invalid="ignore"):
-            advantage = transmission.mechanical_advantage(state, *RADII)
+            advantage = transmission.mechanical_advantage(state, *_RADII)
         return cls(
             scene,
             command,
@@ -216,7 +216,7 @@ def _list_claims(over: StatedOver, answer: Answer) -> Iterator[_Claim]:
         half_turns = count_half_turns(linkage.ground_angle, command.theta_2)
         allowed = EQUIVALENCE.factor * half_turns / (find_lever(linkage) * sine)
         ratio = answer.quantities["omega_4"] / command.omega_2
-        gained = over.advantage * ratio * (RADII[1] / RADII[0]) - 1.0
+        gained = over.advantage * ratio * (_RADII[1] / _RADII[0]) - 1.0
         largest = np.maximum(
             1.0,
             np.maximum(

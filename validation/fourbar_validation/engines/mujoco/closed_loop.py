@@ -14,7 +14,7 @@ from fourbar_validation.compare.answer import Array
 from fourbar_validation.engines.loaded import Assembled
 from fourbar_validation.engines.tree import solve_closed
 
-CARRIED_BY = {
+_CARRIED_BY = {
     "input": ("input",),
     "coupler": ("coupler", "input"),
     "output": ("output",),
@@ -22,10 +22,11 @@ CARRIED_BY = {
 """The bodies whose parent bears what acts on a body."""
 O2, A, O4 = 0, 1, 2
 """Degrees of freedom, in the order of the bodies."""
-TURNED_BY = {2: [O2], 3: [O2, A], 4: [O4]}
+_TURNED_BY = {2: [O2], 3: [O2, A], 4: [O4]}
 """Joints whose angles a bar's rotation is the sum of."""
-COLUMN_OF = {
-    bar: np.isin((O2, A, O4), joints).astype(float) for bar, joints in TURNED_BY.items()
+_COLUMN_OF = {
+    bar: np.isin((O2, A, O4), joints).astype(float)
+    for bar, joints in _TURNED_BY.items()
 }
 """Derivative of each bar's rotation by the joint angles."""
 ENDS = (f"{CYLINDER}_start", f"{CYLINDER}_end")
@@ -103,7 +104,7 @@ class ClosedLoop(Assembled):
             name: self.data.cfrc_int[body, 3:5] for name, body in self.body.items()
         }
         self._borne = [
-            (*_split_load(self.model, i), CARRIED_BY[self.model.body(body).name])
+            (*_split_load(self.model, i), _CARRIED_BY[self.model.body(body).name])
             for i, body in self.loads
         ]
         actuators = {self.model.actuator(i).name: i for i in range(self.model.nu)}
@@ -221,7 +222,7 @@ class ClosedLoop(Assembled):
         Driven is the bar's rotation, or the cylinder's stroke.
         """
         if drive_bar is not None:
-            return COLUMN_OF[drive_bar]
+            return _COLUMN_OF[drive_bar]
         start, end = ENDS
         return np.asarray(
             self.line()
@@ -231,7 +232,7 @@ class ClosedLoop(Assembled):
 
     def angle(self, bar: int) -> float:
         """Sum of the joint angles that a bar's direction is, rad."""
-        return float(self.data.qpos[TURNED_BY[bar]].sum())
+        return float(self.data.qpos[_TURNED_BY[bar]].sum())
 
     def line(self) -> Array:
         """Return the vector from the cylinder's one site to the other, (2,), m."""
@@ -291,7 +292,7 @@ class ClosedLoop(Assembled):
         if drive_bar is None:
             self.data.ctrl[self.ram] = size
             return
-        for joint in TURNED_BY[drive_bar]:
+        for joint in _TURNED_BY[drive_bar]:
             applied[joint] += size
 
     def solve_drive(

@@ -13,13 +13,13 @@ import numpy as np
 
 from fourbar_validation.engines.mujoco.closed_loop import solve_couple
 
-REFINEMENTS = 3
+_REFINEMENTS = 3
 """Secant steps after the first: each gains the digits that the one before has."""
 LEAST = 1e-6
 """Acceleration of the driven joint that is not told from none. It is over that of the
 open tree's joints.
 """
-MISSED = 1e-9
+_MISSED = 1e-9
 """Part of the acceleration sought that a linear solve may leave. Its rounding is 1e-12,
 also near a change point.
 """
@@ -27,7 +27,7 @@ NOISE = 1e-3
 """Part of it that the noise of the file's solver may leave. Where the acceleration
 jumps, all of it is left.
 """
-DOUBLINGS = 40
+_DOUBLINGS = 40
 """Times that a trial's size is doubled in search of a couple, to both sides. Beyond
 1e12 times the size nothing is found.
 """
@@ -55,8 +55,8 @@ def find_couple(
     others = float(np.abs(data.qacc_smooth).max()) or 1.0
     sought = max(abs(wanted - free), LEAST * others)
     trial = float(model.dof_M0.sum()) * sought
-    couple = solve_couple(acceleration, wanted, 0.0, trial, REFINEMENTS)
-    if couple is None or abs(acceleration(couple) - wanted) <= MISSED * sought:
+    couple = solve_couple(acceleration, wanted, 0.0, trial, _REFINEMENTS)
+    if couple is None or abs(acceleration(couple) - wanted) <= _MISSED * sought:
         return couple
     # the solver starts from the same accelerations at every trial, or its noise would
     # look like a jump
@@ -89,7 +89,7 @@ def bracket_couple(
     if sought == 0.0:
         return 0.0
     above = below = 0.0
-    for doubling in range(DOUBLINGS):
+    for doubling in range(_DOUBLINGS):
         size = abs(trial) * 2.0**doubling
         for nearer, farther in ((above, size), (below, -size)):
             if miss(farther) * sought <= 0.0:

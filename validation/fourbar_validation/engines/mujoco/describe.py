@@ -22,7 +22,7 @@ Described = dict[str, ModelEntry]
 NONE = "none"
 FREE = "free"
 """Range of a pin that no stop ends."""
-GROUND_PINS = ("O2", "O4")
+_GROUND_PINS = ("O2", "O4")
 
 PIN = {
     "damping": ("dof_damping", "damping", "damper"),
@@ -37,7 +37,7 @@ FRICTION = {"dof_solref": "solreffriction", "dof_solimp": "solimpfriction"}
 """Fields of MjModel and attributes by which dry friction yields. They are compared if
 there is any.
 """
-TENDON = {
+_TENDON = {
     "stiffness": "stiffness",
     "damping": "damping",
     "frictionloss": "frictionloss",
@@ -64,9 +64,9 @@ WORDS = {
     "NEWTON": "Newton",
 }
 """Integrators and solvers as MJCF spells them, where MuJoCo spells them otherwise."""
-TORQUE_SCALE = 10
+_TORQUE_SCALE = 10
 """Place in eq_data of the factor on the rotation that a weld holds."""
-SOFTEST, STIFFEST = 1e-4, 0.9999
+_SOFTEST, STIFFEST = 1e-4, 0.9999
 """Impedances between which MuJoCo keeps that of a constraint."""
 
 
@@ -180,7 +180,7 @@ def _describe_bar(topology: Topology, bar: int, flywheel: float) -> Described:
     armature = _find_armature(topology, FIRST_PIN[bar])
     if bar == 2:
         armature -= flywheel
-    if FIRST_PIN[bar] in GROUND_PINS and armature:
+    if FIRST_PIN[bar] in _GROUND_PINS and armature:
         joint = topology.hinge[FIRST_PIN[bar]]
         hinge = _name_element("joint", model.joint(joint).name, joint)
         described[f"{key}.inertia"] = ModelEntry(
@@ -211,7 +211,7 @@ def _describe_pin(topology: Topology, pin: str) -> Described:
     )
     described = {}
     for name, (field, attribute, flag) in PIN.items():
-        if name == "armature" and pin in GROUND_PINS:
+        if name == "armature" and pin in _GROUND_PINS:
             continue  # it is inertia of the bar there
         size = float(getattr(model, field)[joint if field.startswith("jnt") else dof])
         acts = not flag or _is_on(
@@ -259,7 +259,7 @@ def _describe_closure(topology: Topology) -> Described:
     element = _name_element(
         topology.closed_by.partition(" ")[0], model.equality(number).name, number
     )
-    impedance = float(np.clip(model.eq_solimp[number, 0], SOFTEST, STIFFEST))
+    impedance = float(np.clip(model.eq_solimp[number, 0], _SOFTEST, STIFFEST))
     softness = (1.0 - impedance) / impedance * _sum_inverse_weights(topology, number)
     described["closure.solref"] = ModelEntry(
         _read_numbers(model.eq_solref[number]), element, "solref"
@@ -448,7 +448,7 @@ def _describe_tendons(topology: Topology) -> Described:
         element = _name_element("tendon", model.tendon(i).name, i)
         described[key] = ModelEntry("present", element)
         described[f"{key}.path"] = ModelEntry(numbers, element)
-        for attribute, written in TENDON.items():
+        for attribute, written in _TENDON.items():
             described[f"{key}.{written}"] = ModelEntry(
                 _read_numbers(getattr(model, f"tendon_{attribute}")[i]),
                 element,
@@ -667,7 +667,7 @@ def mend_entry(topology: Topology, key: str, value: Value | None) -> bool:
     if key == "contacts":
         model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
     elif key == "closure.by" and topology.closed_by.startswith("weld"):
-        model.eq_data[topology.closure, TORQUE_SCALE] = 0.0
+        model.eq_data[topology.closure, _TORQUE_SCALE] = 0.0
     elif subject == "pins" and what == "range":
         model.jnt_limited[topology.hinge[pin]] = 0
     elif subject == "pins" and what == "motor":

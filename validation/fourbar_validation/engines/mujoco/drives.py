@@ -15,11 +15,11 @@ WHEEL = 1e8
 """Armature of the kinematic wheel that a joint equality follows. It is relative to the
 crank's dof inertia.
 """
-POSITION_GAIN, VELOCITY_GAIN = 1e6, 1e4
+_POSITION_GAIN, _VELOCITY_GAIN = 1e6, 1e4
 """kp of the stiff servo, and kv of servo and velocity actuator. kp is per (inertia
 omega^2), kv per (inertia omega).
 """
-GENTLE_GAIN = 1.0
+_GENTLE_GAIN = 1.0
 """Gain of position and of speed that an explicit integrator can follow. The drive
 droops.
 """
@@ -63,7 +63,7 @@ class Driven(ClosedLoop):
         return float(self.data.actuator_force[self.servo])
 
 
-class Actuated(Driven):
+class _Actuated(Driven):
     """An actuator on O2.
 
     It is of speed alone, or a position servo whose target turns at omega, as that of
@@ -106,11 +106,11 @@ class Actuated(Driven):
             self.data.ctrl[self.servo] = self.omega
 
 
-Servo = partial(Actuated, position=POSITION_GAIN, velocity=VELOCITY_GAIN)
-GentleServo = partial(Actuated, position=GENTLE_GAIN, velocity=GENTLE_GAIN)
-VelocityActuator = partial(Actuated, position=0.0, velocity=VELOCITY_GAIN)
+Servo = partial(_Actuated, position=_POSITION_GAIN, velocity=_VELOCITY_GAIN)
+GentleServo = partial(_Actuated, position=_GENTLE_GAIN, velocity=_GENTLE_GAIN)
+VelocityActuator = partial(_Actuated, position=0.0, velocity=_VELOCITY_GAIN)
 """Drive that holds the speed. It droops, so the motion that happened is compared."""
-GentleVelocityActuator = partial(Actuated, position=0.0, velocity=GENTLE_GAIN)
+GentleVelocityActuator = partial(_Actuated, position=0.0, velocity=_GENTLE_GAIN)
 
 
 class WheelEquality(Driven):

@@ -137,7 +137,7 @@ class _Work:
         return power + float(d.efc_force[rubbing] @ d.efc_vel[rubbing])
 
 
-RUNGS = (0.9999, 0.9998, 0.9996, 0.9992)
+_RUNGS = (0.9999, 0.9998, 0.9996, 0.9992)
 """Impedances to extrapolate from; MuJoCo clamps at the first."""
 
 
@@ -148,7 +148,7 @@ class MujocoOneState:
     It is at one impedance, or extrapolated from several.
     """
 
-    impedances: tuple[float, ...] = RUNGS
+    impedances: tuple[float, ...] = _RUNGS
     name: str = ONE_STATE
 
     def answer(self, scene: Scene, command: Command) -> Answer:

@@ -38,7 +38,7 @@ def find_refusal(scene: Scene) -> str:
 
 
 @cache
-def compile_bars() -> mujoco.MjModel:
+def _compile_bars() -> mujoco.MjModel:
     """Compile the open tree of three bars of unit length and mass.
 
     Constraints are off; what is fixed lies at 0. Only numbers differ from tree to tree,
@@ -81,7 +81,7 @@ class MujocoTree(Tree):
         self, scene: Scene, memory: tuple[mujoco.MjModel, mujoco.MjData] | None = None
     ) -> None:
         if memory is None:
-            model = copy(compile_bars())
+            model = copy(_compile_bars())
             memory = model, mujoco.MjData(model)
         self.model, self.data = model, data = memory
         mujoco.mj_resetData(model, data)

@@ -32,7 +32,7 @@ from fourbar_validation.engines.tree import put_back, solve_multipliers
 
 
 @dataclass(frozen=True, slots=True)
-class ResidualLimit:
+class _ResidualLimit:
     """Greatest allowed value of a residual, and the reason."""
 
     value: float
@@ -40,33 +40,35 @@ class ResidualLimit:
 
 
 LIMITS = {
-    "acceleration_gap": ResidualLimit(
+    "acceleration_gap": _ResidualLimit(
         1e-3,
         "of the greatest a_B: healthy runs have 1e-7..1e-4, a step that errs by 98 %"
         " has 4",
     ),
-    "power_gap": ResidualLimit(
+    "power_gap": _ResidualLimit(
         1e-4,
         "of the greatest power: healthy runs have 1e-8..1e-5, that step 4e-2, a stopped"
         " solver 1",
     ),
-    "force_gap": ResidualLimit(
+    "force_gap": _ResidualLimit(
         1e-3,
         "of the greatest joint torque: the solver did not converge; healthy runs have"
         " 1e-8..1e-4",
     ),
 }
 """Residuals of motion and forces that `ResidualMonitor` measures."""
-EXCUSED = 1e-3
+_EXCUSED = 1e-3
 """A solver's residual excuses an error of this part of a force, not more."""
-OF_THE_DATA = {
-    "bad_states": ResidualLimit(
+_OF_THE_DATA = {
+    "bad_states": _ResidualLimit(
         0.0,
         "MuJoCo warned of a bad position, velocity or acceleration, and reset its data",
     ),
-    "time_went_back": ResidualLimit(0.0, "the time ran backwards: the data were reset"),
-    "closure_gap": ResidualLimit(1e-5, "of the sum of the lengths: the loop is open"),
-    "speed_error": ResidualLimit(
+    "time_went_back": _ResidualLimit(
+        0.0, "the time ran backwards: the data were reset"
+    ),
+    "closure_gap": _ResidualLimit(1e-5, "of the sum of the lengths: the loop is open"),
+    "speed_error": _ResidualLimit(
         1e-4, "of the greatest speed: the crank does not turn as commanded"
     ),
 }
@@ -82,7 +84,7 @@ def list_alarms(evidence: dict[str, float], size: float) -> list[str]:
     seen = {**evidence, "closure_gap": evidence["closure_gap_m"] / size}
     return [
         f"{name} = {seen[name]:.1e} > {limit.value:g}: {limit.reason}"
-        for name, limit in {**OF_THE_DATA, **LIMITS}.items()
+        for name, limit in {**_OF_THE_DATA, **LIMITS}.items()
         if name in seen and not seen[name] <= limit.value
     ]
 
@@ -171,7 +173,7 @@ class ResidualMonitor:
         )
         for name, error in remaining.items():
             size = seen.needed if name == COUPLE.value else seen.answer[name]
-            expected[name] += min(error, EXCUSED * float(np.linalg.norm(size)))
+            expected[name] += min(error, _EXCUSED * float(np.linalg.norm(size)))
         return expected
 
     def _keep(self, name: str, value: float, size: float) -> None:

@@ -18,7 +18,7 @@ SECONDS = 120.0
 """A picture takes half of one; a driver that takes this long for a handful hangs."""
 MOST = 8
 """Scenes that are drawn: more cost the reader of a long run minutes."""
-BACKENDS = ("egl", "osmesa") if sys.platform == "linux" else ("glfw",)
+_BACKENDS = ("egl", "osmesa") if sys.platform == "linux" else ("glfw",)
 """Values of MUJOCO_GL that are tried where the environment does not name one."""
 
 
@@ -32,7 +32,7 @@ def render_pictures(texts: dict[str, str]) -> tuple[dict[str, str], str]:
     if len(texts) > MOST:
         return {}, f"they are drawn for at most {MOST} scenes"
     named = os.environ.get("MUJOCO_GL")
-    for backend in (named,) if named else BACKENDS:
+    for backend in (named,) if named else _BACKENDS:
         environment = {**os.environ, "MUJOCO_GL": backend}
         try:
             done = subprocess.run(

@@ -303,7 +303,7 @@ def split_segments(
     return [segment for segment in split if segment]
 
 
-MOST_UNEVEN = 20.0
+_MOST_UNEVEN = 20.0
 """Greatest speed of the input over its mean: near a limit of what is commanded it grows
 without bound, and with it the steps of a window, which are those of the fastest
 throughout; here they are 40 000.
@@ -416,10 +416,10 @@ class LedSegment(SteadySegment):
         if not self.width or not self.turned:
             return 1e-3
         duration = self.run.time(self.run.stop)
-        if (uneven := duration * self.turning / self.turned) > MOST_UNEVEN:
+        if (uneven := duration * self.turning / self.turned) > _MOST_UNEVEN:
             raise LimitError(
                 f"the input is at most {uneven:.0f} times as fast as on the mean; up to"
-                f" {MOST_UNEVEN:g} it is led"
+                f" {_MOST_UNEVEN:g} it is led"
             )
         steps = duration * self.turning / (2.0 * np.pi) * settings.steps_per_revolution
         if 0.0 < self.turned < FULL_TURN:

@@ -69,9 +69,9 @@ COLLINEAR = 1e-9
 """Part of the sum of the lengths, and of half a turn, that counts as none. The time
 step itself resolves no less.
 """
-OF_TENDON = ("stroke", "stroke_speed")
+_OF_TENDON = ("stroke", "stroke_speed")
 """Quantities of a cylinder that MuJoCo has."""
-RESIDUALS = (
+_RESIDUALS = (
     "closure_gap_m",
     "speed_error",
     "time_went_back",
@@ -143,7 +143,7 @@ def _require_run(scene: Scene, command: Command) -> None:
         )
     if np.ptp(command.theta_2) == 0.0:
         raise LimitError("one position: nothing to run through")
-    run = make_run_scene(scene, command)
+    run = _make_run_scene(scene, command)
     if reason := find_exceeded(run, abs(run.motion.omega_2 or 0.0)):
         raise LimitError(reason)
     if _passes_change_point(scene, command):
@@ -175,7 +175,7 @@ def _passes_change_point(scene: Scene, command: Command) -> bool:
     return False
 
 
-def make_run_scene(scene: Scene, command: Command) -> Scene:
+def _make_run_scene(scene: Scene, command: Command) -> Scene:
     """Make the scene whose MJCF is run through.
 
     A law is stated by its greatest speed and acceleration.
@@ -212,7 +212,7 @@ class _Simulation:
         self.settings, self.command, self.law = settings, command, scene.motion.law
         # the text is that of the command, which a caller may have given instead of the
         # scene's own
-        self.scene = make_run_scene(scene, command) if lead is None else scene
+        self.scene = _make_run_scene(scene, command) if lead is None else scene
         self.supplied = evaluate_loads(scene)
         n = len(command.angle)
         values, speed = (
@@ -224,10 +224,10 @@ class _Simulation:
             values, command.time if self.law else None, speed or 0.0
         )
         self.out = make_blank(
-            n, [*MADE, *list_unknowns(scene), *(OF_TENDON if scene.drive else ())]
+            n, [*MADE, *list_unknowns(scene), *(_OF_TENDON if scene.drive else ())]
         )
         self.branch = command.branch.copy()
-        self.evidence = dict.fromkeys(RESIDUALS, 0.0) | {
+        self.evidence = dict.fromkeys(_RESIDUALS, 0.0) | {
             "mass_ratio": compute_mass_ratio(scene.linkage)
         }
         self.steps_per_revolution = 0.0

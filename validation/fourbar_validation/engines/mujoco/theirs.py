@@ -75,19 +75,19 @@ MOST_STEPS = 400_000
 """A revolution at 628 steps per turn is a thousandth of this; more would be minutes."""
 PRICING = 60.0
 """Seconds in which differences are tried one by one; each takes two evaluations."""
-TOUCHED = 1e-9
+_TOUCHED = 1e-9
 """rad. A position that is no farther beyond a limit is at it: scenes state angles with
 twelve digits, and the loop is assembled to 1e-12.
 """
-DRIVING = 1e3
+_DRIVING = 1e3
 """Armature over all other inertia from which it is a flywheel that drives. The speed
 then ripples by 1e-3.
 """
-SAME_GRAVITY = 1e-9
+_SAME_GRAVITY = 1e-9
 """Part of gravity by which its direction may differ in the axes of a scene."""
 GENERATED = Path("generated.xml")
 """Name of the file that is generated from a scene."""
-NO_BIAS = mujoco.mjtBias.mjBIAS_NONE
+_NO_BIAS = mujoco.mjtBias.mjBIAS_NONE
 SHARED = "theta_2, omega_2, alpha_2 and the branch; the rest is the file's"
 OWN = (
     "assembly, speeds, accelerations, drive torque and pin forces, by MuJoCo from the"
@@ -126,7 +126,7 @@ def collect_warnings() -> Iterator[list[str]]:
         mujoco.set_mju_user_warning(before)
 
 
-def compile_topology(
+def _compile_topology(
     file: RobotFile, names: Mapping[str, str], scene: Scene
 ) -> Topology:
     """Compile a file whose bars have these names, and see it as a scene does."""
@@ -148,7 +148,7 @@ def orient(topology: Topology, scene: Scene) -> Topology:
         (effect.vector for effect in scene.effects if isinstance(effect, Gravity)),
         start=np.zeros(2),
     )
-    allowed = SAME_GRAVITY * float(np.linalg.norm(gravity))
+    allowed = _SAME_GRAVITY * float(np.linalg.norm(gravity))
     # gravity alone does not tell the side: a file whose gravity is reversed has the
     # right one from behind
     behind = is_seen_from_behind(scene, *topology.rest_angles)
@@ -175,7 +175,7 @@ def _examine(scene: Scene, file: RobotFile, names: Mapping[str, str]) -> Examine
     list_unknown_parts(robot, set(range(robot.model.nbody)))
     topology, guessed = find_topology(robot.model, names, scene.linkage.lengths)
     topology = orient(topology, scene)
-    loop = UserLoop(topology, scene)
+    loop = _UserLoop(topology, scene)
     described = describe_model(topology, loop.flywheel)
     for key, (value, *_) in described.items():
         if key.startswith(("bars.", "lengths.")) and not math.isfinite(value):  # type: ignore[arg-type]
@@ -188,7 +188,7 @@ def _examine(scene: Scene, file: RobotFile, names: Mapping[str, str]) -> Examine
     return Examined(described, answers, notes, topology.names)
 
 
-def _free_unmet_stops(described: Described, loop: "UserLoop") -> Iterator[str]:
+def _free_unmet_stops(described: Described, loop: "_UserLoop") -> Iterator[str]:
     """Describe as free what no stop ended at any state.
 
     Yield a note of each such joint.
@@ -216,15 +216,15 @@ def examine_changed(
     """
     start, answered = time.perf_counter(), list[list[Answer] | None]()
     file = RobotFile(GENERATED, write_mjcf(scene, drive="none"))
-    generated = describe_model(compile_topology(file, {}, scene))
+    generated = describe_model(_compile_topology(file, {}, scene))
     texts = (set_entry(file.text, generated, key, value) for key, value in changes)
     for changed in chain([file.text], texts):
         answers = None
         if time.perf_counter() - start < PRICING and changed is not None:
             try:
                 with collect_warnings():
-                    topology = compile_topology(replace(file, text=changed), {}, scene)
-                    answers = _list_answers(UserLoop(topology, scene), scene)
+                    topology = _compile_topology(replace(file, text=changed), {}, scene)
+                    answers = _list_answers(_UserLoop(topology, scene), scene)
             except (
                 FourBarError
             ):  # with this entry it is no four-bar, or does not compile
@@ -244,14 +244,14 @@ def examine_mended(
     None if it cannot be.
     """
     start, answered = time.perf_counter(), list[list[Answer] | None]()
-    seen = compile_topology(file, names, scene)
+    seen = _compile_topology(file, names, scene)
     for key, value in changes:
         answers = None
         if time.perf_counter() - start < PRICING:
             topology = seen.copied()
             if mend_entry(topology, key, value):
                 with collect_warnings():
-                    answers = _list_answers(UserLoop(topology, scene), scene)
+                    answers = _list_answers(_UserLoop(topology, scene), scene)
         answered.append(answers)
     return answered
 
@@ -266,17 +266,17 @@ def predict_softness(
     it grows by itself, so the error is measured without anything to compare the file
     with. Empty where no connect or weld closes the loop.
     """
-    answers, seen = [], compile_topology(file, names, scene)
+    answers, seen = [], _compile_topology(file, names, scene)
     if seen.closure is None:
         return {}
     for times in (1.0, 2.0):
         topology = seen.copied()
         impedance = 1.0 / (1.0 + times * (1.0 / STIFFEST - 1.0))
         topology.model.eq_solimp[topology.closure, :2] = impedance
-        loop = UserLoop(topology, scene)
+        loop = _UserLoop(topology, scene)
         with collect_warnings():
             command = _choose_positions(command_of(scene))
-            answers.append(answer_one_state(loop, command).quantities)
+            answers.append(_answer_one_state(loop, command).quantities)
     stiff, softer = answers
     return {
         name: float(np.nanmax(magnitude(softer[name] - stiff[name]), initial=0.0))
@@ -284,9 +284,9 @@ def predict_softness(
     }
 
 
-def _list_answers(loop: "UserLoop", scene: Scene) -> list[Answer]:
+def _list_answers(loop: "_UserLoop", scene: Scene) -> list[Answer]:
     command = _choose_positions(command_of(scene))
-    answers = [_answer(ONE_STATE, scene, lambda: answer_one_state(loop, command))]
+    answers = [_answer(ONE_STATE, scene, lambda: _answer_one_state(loop, command))]
     if (
         command.omega_2 is not None
         and np.any(command.omega_2)
@@ -329,7 +329,7 @@ def _answer(name: str, scene: Scene, ask: Callable[[], Answer]) -> Answer:
     return answer
 
 
-class UserLoop(Assembled):
+class _UserLoop(Assembled):
     """Somebody's model with its drive taken off.
 
     Its coordinates are x = (theta_2, theta_3 - theta_2, theta_4).
@@ -367,7 +367,7 @@ class UserLoop(Assembled):
         ]
         # a sweep over the range of a joint ends at its limits, to round-off on either
         # side: they push where they are passed, not where they are touched
-        self.model.jnt_margin[:] -= TOUCHED
+        self.model.jnt_margin[:] -= _TOUCHED
         self._jac = np.zeros((3, self.model.nv))
 
     def _find_flywheel(self) -> float:
@@ -381,7 +381,7 @@ class UserLoop(Assembled):
             for effect in self.scene.effects
             if isinstance(effect, Flywheel)
         )
-        drives = self.armature > DRIVING * (mass_matrix + of_scene)
+        drives = self.armature > _DRIVING * (mass_matrix + of_scene)
         return self.armature if drives else 0.0
 
     def _take_off_the_drive(self) -> None:
@@ -406,7 +406,7 @@ class UserLoop(Assembled):
         for i in cylinders:  # takes the force itself as its control
             model.actuator_gaintype[i], model.actuator_biastype[i] = (
                 mujoco.mjtGain.mjGAIN_FIXED,
-                NO_BIAS,
+                _NO_BIAS,
             )
             model.actuator_gainprm[i], model.actuator_dyntype[i] = (
                 0.0,
@@ -593,7 +593,7 @@ class UserLoop(Assembled):
         return body == bearer
 
 
-def answer_one_state(loop: UserLoop, command: Command) -> Answer:
+def _answer_one_state(loop: _UserLoop, command: Command) -> Answer:
     """Answer every position by itself."""
     contacts = 0
 
@@ -629,7 +629,7 @@ def answer_one_state(loop: UserLoop, command: Command) -> Answer:
     return Answer(ONE_STATE, "as compiled", command, assembled, out, evidence=evidence)
 
 
-def answer_through_time(loop: UserLoop, command: Command) -> Answer:
+def answer_through_time(loop: _UserLoop, command: Command) -> Answer:
     """Run the longest segment of positions at the file's own timestep.
 
     The positions assemble.

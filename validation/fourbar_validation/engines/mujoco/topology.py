@@ -18,20 +18,20 @@ from fourbar.linkage import BAR_NAMES, ENDS, MOVING_BARS, PINS
 from fourbar.mjcf import Plane
 from fourbar_validation.compare.answer import Array
 
-PIN_OF = {frozenset(bars): pin for pin, bars in PINS.items()}
-PLANES = {2: ("x-y", (0, 1)), 1: ("x-z", (0, 2)), 0: ("y-z", (1, 2))}
+_PIN_OF = {frozenset(bars): pin for pin, bars in PINS.items()}
+_PLANES = {2: ("x-y", (0, 1)), 1: ("x-z", (0, 2)), 0: ("y-z", (1, 2))}
 """World axis of the hinges: the plane, and the world axes for x and y there."""
 STRAIGHT = 1e-9
 """A hinge tilted by more than this (sine) leaves the plane."""
 ROLES = tuple(BAR_NAMES[bar] for bar in MOVING_BARS)
-SITES = ("B3", "B4")
+_SITES = ("B3", "B4")
 ALIKE = 1e-9
 """Two guesses whose lengths fit equally well to this are distinguished by the drive."""
-MOST_BODIES = 8
+_MOST_BODIES = 8
 """Bodies on hinges among which three are looked for."""
 
 
-def find_body(model: mujoco.MjModel, name: str) -> int | None:
+def _find_body(model: mujoco.MjModel, name: str) -> int | None:
     """Find the body of a name, by what it is welded to; None where there is none."""
     number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name)
     return int(model.body_weldid[number]) if number >= 0 else None
@@ -44,13 +44,15 @@ def list_bodies(model: mujoco.MjModel) -> str:
     )
 
 
-def find_stated_body(model: mujoco.MjModel, names: Mapping[str, str], role: str) -> int:
+def _find_stated_body(
+    model: mujoco.MjModel, names: Mapping[str, str], role: str
+) -> int:
     """Find the body of a bar by its given name, or by the bar's.
 
     Raises InputError if there is none.
     """
     name = names.get(role, role)
-    body = find_body(model, name)
+    body = _find_body(model, name)
     if body is None:
         raise InputError(
             "--name",
@@ -80,7 +82,7 @@ class Topology:
         mujoco.mj_kinematics(model, self.data)
         mujoco.mj_comPos(model, self.data)
         self.root = {1: 0} | {
-            bar: find_stated_body(model, names, BAR_NAMES[bar]) for bar in MOVING_BARS
+            bar: _find_stated_body(model, names, BAR_NAMES[bar]) for bar in MOVING_BARS
         }
         self.bar_of_root = {body: bar for bar, body in self.root.items()}
         if len(self.bar_of_root) < len(self.root):
@@ -172,7 +174,7 @@ class Topology:
             )
         axis = self.data.xaxis[np.argmax(hinges)]
         across = int(np.argmax(np.abs(axis)))
-        self.plane, axes = PLANES[across]
+        self.plane, axes = _PLANES[across]
         self.axes = np.eye(3)[list(axes)]
         if np.abs(axis[list(axes)]).max() > STRAIGHT:
             # as `fourbar mjcf --axis` turns it
@@ -193,7 +195,7 @@ class Topology:
                 name,
                 f"every joint must be a hinge of the input, coupler or output{advice}",
             )
-        pin = PIN_OF.get(frozenset(bars))  # type: ignore[arg-type]
+        pin = _PIN_OF.get(frozenset(bars))  # type: ignore[arg-type]
         if pin is None or pin in self.hinge:
             raise InputError(
                 "MJCF",
@@ -250,7 +252,7 @@ class Topology:
                 continue
             ends = self._find_ends(number, kind)
             bars = [self.bar(body) for body, _ in ends]
-            if None in bars or PIN_OF.get(frozenset(bars)) != self.cut:  # type: ignore[arg-type]
+            if None in bars or _PIN_OF.get(frozenset(bars)) != self.cut:  # type: ignore[arg-type]
                 continue
             for bar, (_, world) in zip(bars, ends, strict=True):
                 assert bar is not None
@@ -265,7 +267,7 @@ class Topology:
             site = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, name)
             if self.cut != "B" or site < 0 or self.bar(model.site_bodyid[site]) != bar:
                 advice = self._advise(
-                    (*SITES,) if self.cut == "B" else (),
+                    (*_SITES,) if self.cut == "B" else (),
                     "where something else does, say where pin B is: "
                     "--name B3=SITE on the coupler, --name B4=SITE on the output",
                 )
@@ -427,18 +429,18 @@ def find_topology(
 
     Raises InputError in one line: why no three bodies fit.
     """
-    roles = {role: names.get(role, role) for role in (*ROLES, *SITES)}
+    roles = {role: names.get(role, role) for role in (*ROLES, *_SITES)}
     bodies = [
         (
-            find_stated_body(model, names, role)
+            _find_stated_body(model, names, role)
             if role in names
-            else find_body(model, role)
+            else _find_body(model, role)
         )
         for role in ROLES
     ]
     if None not in bodies and (
         _find_site(model, roles["B3"])
-        or names.keys() & {*SITES}
+        or names.keys() & {*_SITES}
         or not _open_sites(model)
     ):
         return Topology(model, names), []
@@ -449,7 +451,7 @@ def find_topology(
     missing = [role for role, body in zip(ROLES, bodies, strict=True) if body is None]
     guesses: list[tuple[float, bool, Topology, dict[str, str]]] = []
     refused: list[str] = []
-    for chosen in permutations(free[:MOST_BODIES], len(missing)):
+    for chosen in permutations(free[:_MOST_BODIES], len(missing)):
         guess = {
             role: model.body(body).name
             for role, body in zip(missing, chosen, strict=True)
@@ -481,7 +483,7 @@ def find_topology(
             f"no body is named {', '.join(missing) or 'B3, B4'}, and no guess makes a"
             f" four-bar ({why})"
         )
-        unstated = [role for role in missing or SITES if role not in names]
+        unstated = [role for role in missing or _SITES if role not in names]
         advice = ""
         if unstated:
             kind = "BODY" if missing else "SITE"
@@ -520,7 +522,7 @@ def _list_sites(
     """
     if (
         not _open_sites(model)
-        or names.keys() & {*SITES}
+        or names.keys() & {*_SITES}
         or _find_site(model, roles["B3"])
     ):
         return [{}]
@@ -530,7 +532,7 @@ def _list_sites(
             for i in range(model.nsite)
             if model.site(i).name
             and int(model.body_weldid[model.site_bodyid[i]])
-            == find_body(model, roles[role])
+            == _find_body(model, roles[role])
         ]
         for role in ("coupler", "output")
     }

@@ -59,7 +59,7 @@ held together over a revolution.
 """
 ORDER = 4.0
 """Order of RK4, for the first guess of the next number of steps; it decides nothing."""
-FIRST_STEPS, FIRST_ERROR = 60.0, 1e-5
+_FIRST_STEPS, _FIRST_ERROR = 60.0, 1e-5
 """Steps per revolution from which the search begins, by the order, for other errors."""
 FEWEST_STEPS = 6.0
 """A revolution cannot be followed by less."""
@@ -67,7 +67,7 @@ FLYWHEEL = 1e5
 """Flywheel, lighter than the recipe's. The torque, armature times acceleration, is
 rounded in proportion to it.
 """
-MOST_READINGS = 100
+_MOST_READINGS = 100
 """Readings that are timed at once, at most."""
 Build = Callable[[str, float], ClosedLoop]
 """Function from the MJCF text and the speed to keep (rad/s) to a loop."""
@@ -79,7 +79,7 @@ def guess(error: float) -> tuple[float, float]:
     The laws give them; the time constant is in steps.
     """
     tc = (STIFF / (error / 2.0)) ** (1.0 / ORDER)
-    steps = FIRST_STEPS * (FIRST_ERROR / error) ** (1.0 / ORDER)
+    steps = _FIRST_STEPS * (_FIRST_ERROR / error) ** (1.0 / ORDER)
     return max(steps, FEWEST_STEPS), min(max(tc, SHORTEST), LONGEST)
 
 
@@ -110,7 +110,7 @@ def describe_settings(settings: Settings, steps_per_revolution: float) -> str:
 
 
 @contextmanager
-def silence() -> Iterator[None]:
+def _silence() -> Iterator[None]:
     """Silence MuJoCo.
 
     A setting that fails is a result here, neither printed nor logged in the working
@@ -289,7 +289,7 @@ class TrialSetup:
         names = (*MADE, name_driving(self.scene), *PIN_FORCES)
         out = make_blank(len(samples), names)
         trial, first = Trial(self.command), 0
-        with silence():
+        with _silence():
             for segment in self.segments:
                 before, rows = trial.steps, slice(first, first + len(segment))
                 self._run(
@@ -362,20 +362,20 @@ class TrialSetup:
         start = self.start[segment[0]]
         run = SimulatedRun(self.scene, loop, light, motion_segment, start, timestep)
         data = loop.data
-        forces = np.empty((MOST_READINGS, *data.cfrc_int.shape))
-        closing = np.empty((MOST_READINGS, 2))
-        accelerations = np.empty(MOST_READINGS)
+        forces = np.empty((_MOST_READINGS, *data.cfrc_int.shape))
+        closing = np.empty((_MOST_READINGS, 2))
+        accelerations = np.empty(_MOST_READINGS)
 
         def time_steps(count: int) -> float:
             loop.set_state(start, self.omega)
-            with silence():
+            with _silence():
                 began = time.process_time()
                 mujoco.mj_step(loop.model, loop.data, count)
                 return time.process_time() - began
 
         def time_readings(count: int) -> float:
             loop.set_state(start, self.omega)
-            with silence():
+            with _silence():
                 mujoco.mj_step(loop.model, loop.data)
                 began = time.process_time()
                 for row in range(count):
@@ -400,7 +400,7 @@ ROUNDS = 6
 """Simulations of a scene at most; the laws are seldom wrong by more than one."""
 MARGIN = 0.5
 """The engine's own prediction must stay within this part of the wanted error."""
-LEAST_GROWTH, MOST_GROWTH = 1.15, 3.0
+_LEAST_GROWTH, _MOST_GROWTH = 1.15, 3.0
 """Factor on the steps from one round to the next."""
 
 
@@ -427,8 +427,8 @@ class SimulatedToError:
             if expected <= MARGIN * self.error and not answer.alarms:
                 break
             ratio = expected / (MARGIN * self.error)
-            growth = ratio ** (1.0 / ORDER) if np.isfinite(ratio) else MOST_GROWTH
-            growth = min(max(growth, LEAST_GROWTH), MOST_GROWTH)
+            growth = ratio ** (1.0 / ORDER) if np.isfinite(ratio) else _MOST_GROWTH
+            growth = min(max(growth, _LEAST_GROWTH), _MOST_GROWTH)
             # a run has at least as many steps as it has positions to read
             steps_made = float(
                 answer.setting.rpartition(" ")[2].removesuffix("/rev")

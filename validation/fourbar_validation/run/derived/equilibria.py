@@ -48,13 +48,13 @@ SAMPLES = 720
 """Positions of a turn of the input. Between two of them the torque changes its sign at
 an odd number of equilibria.
 """
-OFF_GRID = 0.381966
+_OFF_GRID = 0.381966
 """Part of a sample's step by which the samples are moved. No equilibrium of a round
 angle falls on one.
 """
 ANGLES = ("theta", "rest", "phi", "angle")
 """Parts of the names of inputs that are angles: they are rounded as 1 rad at least."""
-AT_LIMIT = EPS**-0.5
+_AT_LIMIT = EPS**-0.5
 """Most roundings by which a rounding of theta_2 moves theta_4. It is at a limit of
 theta_2.
 """
@@ -170,7 +170,7 @@ def _list_samples(question: Question) -> Array:
             max(low, float(swept.min())),
             min(high, float(swept.max()), float(swept.min()) + turn),
         )
-    return np.arange(low + OFF_GRID * turn / SAMPLES, high, turn / SAMPLES)
+    return np.arange(low + _OFF_GRID * turn / SAMPLES, high, turn / SAMPLES)
 
 
 def _hold(scene: Scene, angle: Array, branch: int) -> Array:
@@ -353,7 +353,8 @@ def _derive(
         weight = max(abs(float(value)), float(any(part in name for part in ANGLES)))
         if name == commanded:
             weight = max(
-                weight, min(AT_LIMIT, 1.0 / max(abs(float(rate.mid())), 1.0 / AT_LIMIT))
+                weight,
+                min(_AT_LIMIT, 1.0 / max(abs(float(rate.mid())), 1.0 / _AT_LIMIT)),
             )
         moved = next(
             (

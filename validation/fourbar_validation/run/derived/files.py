@@ -35,7 +35,7 @@ NUMBER = r"[-+.\deE]+"
 BARS = {BAR_NAMES[number]: number for number in MOVING_BARS}
 
 
-class FileBody(NamedTuple):
+class _FileBody(NamedTuple):
     """A bar as a file holds it; the numbers are those of the plane."""
 
     place: complex
@@ -48,7 +48,7 @@ class FileBody(NamedTuple):
 class Contents(NamedTuple):
     """Statements of a file on a linkage."""
 
-    bodies: dict[str, FileBody]
+    bodies: dict[str, _FileBody]
     pins: dict[str, complex]
     """Places of the pins in the world; NaN if the two bars of a pin do not meet."""
     turns: list[dict[str, float]]
@@ -89,7 +89,7 @@ def _judge_file(
         return [
             Row.unmeasured(question.name, engine, "exact", "all", REFUSES, str(limit))
         ]
-    theirs, rows = build_scene(held, opened), []
+    theirs, rows = _build_scene(held, opened), []
     with np.errstate(all="ignore"):
         for turns in held.turns:
             answer = ask_free_bodies(
@@ -109,7 +109,7 @@ def _judge_file(
         )
 
 
-def build_scene(held: Contents, scene: Scene) -> Scene:
+def _build_scene(held: Contents, scene: Scene) -> Scene:
     """Build the scene that a file describes.
 
     Its motion and drive are those of another scene.
@@ -156,7 +156,7 @@ def _read_sdf(text: str) -> Contents:
             numbers(link, "inertial/mass"),
             numbers(link, "inertial/inertia/izz"),
         )
-        bodies[link.get("name", "")] = FileBody(
+        bodies[link.get("name", "")] = _FileBody(
             complex(x, y), turn, mass, inertia, centre
         )
     pins: dict[str, complex] = {}
@@ -197,7 +197,7 @@ def _read_usd(text: str) -> Contents:
             text,
         )
     )
-    bodies = {"ground": FileBody(0j, 0.0, math.nan, math.nan, 0j)}
+    bodies = {"ground": _FileBody(0j, 0.0, math.nan, math.nan, 0j)}
     for bar in BARS:
         block = blocks[bar]
         place, centre = (
@@ -208,7 +208,7 @@ def _read_usd(text: str) -> Contents:
             numbers(block, "physics:mass")[0],
             numbers(block, "physics:diagonalInertia")[2],
         )
-        bodies[bar] = FileBody(
+        bodies[bar] = _FileBody(
             place, turn(block, "xformOp:orient"), mass, inertia, centre
         )
     size = sum(abs(body.place) + abs(body.centre) for body in bodies.values())
@@ -248,7 +248,7 @@ def _read_usd(text: str) -> Contents:
     )
 
 
-def _read_turns(bodies: dict[str, FileBody]) -> dict[str, float]:
+def _read_turns(bodies: dict[str, _FileBody]) -> dict[str, float]:
     return {bar: body.turn for bar, body in bodies.items()}
 
 

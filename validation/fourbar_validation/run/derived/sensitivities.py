@@ -39,15 +39,15 @@ from fourbar_validation.run.derived.variants import (
 )
 from fourbar_validation.run.question import NotAskedError, Question
 
-MEMBERS = 5
+_MEMBERS = 5
 """Members of the study, as many as positions. It is a square study, whose axes only its
 numbers tell apart.
 """
 APART = 1e-2
 """Difference of its numbers from member to member, relative, for angles in rad."""
-APART_NEAR_CHANGE_POINT = 1e-5
+_APART_NEAR_CHANGE_POINT = 1e-5
 """The same near a change point, where larger differences make linkages of their own."""
-CORNERS = (0.07, 2.3, 4.1, 0.07 + 2.0 * np.pi)
+_CORNERS = (0.07, 2.3, 4.1, 0.07 + 2.0 * np.pi)
 """rad from the first position; where the table of a load that the run adds is bent."""
 
 
@@ -74,7 +74,7 @@ def furnish(scene: Scene, question: Question) -> Scene:
     ):
         force, table = (
             0.5 * float(np.median(positive)),
-            Table(tuple(first + x for x in CORNERS), (1.0, -0.5, 2.0, 1.0)),
+            Table(tuple(first + x for x in _CORNERS), (1.0, -0.5, 2.0, 1.0)),
         )
         load = Load(
             3,
@@ -94,11 +94,11 @@ def study(question: Question) -> list[Row]:
     places, key = np.asarray(scene.motion.angle), command_key(scene)
     apart = APART
     if is_near_change_point(scene.linkage):
-        apart = APART_NEAR_CHANGE_POINT
+        apart = _APART_NEAR_CHANGE_POINT
     stated = SceneFile(scene).find_stated(fourbar.sensitivity(scene).keys)
     del stated[key]
     values = {
-        key: np.array([x + number * apart * step for number in range(MEMBERS)])
+        key: np.array([x + number * apart * step for number in range(_MEMBERS)])
         for key, (x, step) in stated.items()
     }
     # the places of each member lie within those of the scene: nothing says that a table
@@ -106,7 +106,7 @@ def study(question: Question) -> list[Row]:
     positions = np.array(
         [
             places + apart * number * (places.mean() - places)
-            for number in range(MEMBERS)
+            for number in range(_MEMBERS)
         ]
     )
     members: dict[int, Scene] = {}
@@ -143,27 +143,27 @@ SMALL = 1e-8
 """Step of the first order that tolerances are held to. Rounding adds 1e-7, and what
 bends a curve nothing.
 """
-CONVERGED = 1e-5
+_CONVERGED = 1e-5
 """Most that the fourth order may change the second by, in parts of the sum of the
 absolute terms: it leaves out some hundred times the square of that. Elsewhere a linkage
 that does not assemble is too near for differences.
 """
 SAMPLES, DRAWN = 1024, 20_000
 """Samples of the tolerances, and of the first-order sum for percentiles."""
-NEARLY_STRAIGHT, STRAIGHT = 0.1, 1e-4
+_NEARLY_STRAIGHT, STRAIGHT = 0.1, 1e-4
 """Relative differences of cubature and first order. Below the first, three points are
 enough for a deviation; below the second, percentiles are those of the first order: what
 bends a curve by q skews it by q and widens it by q^2.
 """
-SLIGHT = 1e-3
+_SLIGHT = 1e-3
 """Part of the greatest worst case of a quantity that is not judged. Differences and
 rounding are there as large as their result.
 """
 MOST = 3
 """Tolerances of a scene that are judged together: three points each."""
-GIVEN = 1e-4
+_GIVEN = 1e-4
 """Tolerance that the run gives the lengths, in parts of the shortest bar."""
-NODES = {False: (0.6**0.5, 5.0 / 18.0), True: (3.0**0.5, 1.0 / 6.0)}
+_NODES = {False: (0.6**0.5, 5.0 / 18.0), True: (3.0**0.5, 1.0 / 6.0)}
 """Outer nodes and weights of Gauss's three points. They are of an even and of a normal
 distribution; the nodes are in parts of the width.
 """
@@ -208,7 +208,7 @@ def sensitivity(question: Question) -> list[Row]:
             name not in FORCES
         )
         # a derivative that is no number is compared, and fails
-        bent = divide(magnitude(slope - coarse), size) > CONVERGED
+        bent = divide(magnitude(slope - coarse), size) > _CONVERGED
         comparable &= np.isfinite(magnitude(slope)) & ~bent
         error = np.where(
             comparable, divide(magnitude(terms.sum(axis=0) - slope), size), 0.0
@@ -235,7 +235,7 @@ def tolerances(question: Question) -> list[Row]:
     They are those of the scene, or those that the run gives it.
     """
     scene = take_few(question)
-    width, names = GIVEN * min(scene.linkage.lengths), ("input", "coupler", "output")
+    width, names = _GIVEN * min(scene.linkage.lengths), ("input", "coupler", "output")
     defaults = (
         fourbar.Tolerance(f"lengths.{name}", width, name == "output") for name in names
     )
@@ -251,7 +251,7 @@ def tolerances(question: Question) -> list[Row]:
         ]
         if not parts:
             continue
-        slight = SLIGHT * max(float(np.max(expected[part].worst)) for part in parts)
+        slight = _SLIGHT * max(float(np.max(expected[part].worst)) for part in parts)
         errors[name] = np.max(
             [
                 _compute_off(spread.spreads[part], expected[part], slight)
@@ -332,7 +332,7 @@ def _compute_expected(scene: Scene) -> dict[str, Expected]:
     weights, off = [], []
     nodes = [
         [(0.0, 1.0 - 2.0 * w), (x, w), (-x, w)]
-        for x, w in (NODES[tolerance.sigma] for tolerance in scene.tolerances)
+        for x, w in (_NODES[tolerance.sigma] for tolerance in scene.tolerances)
     ]
     for node in product(*nodes):
         off.append(
@@ -383,7 +383,7 @@ def _compute_expected(scene: Scene) -> dict[str, Expected]:
 def _compute_off(spread: Spread, expected: Expected, slight: float) -> Array:
     """Compute by what part the figures of a spread are off, (n,)."""
     bent = expected.bent
-    every, near, straight = bent >= 0.0, bent <= NEARLY_STRAIGHT, bent <= STRAIGHT
+    every, near, straight = bent >= 0.0, bent <= _NEARLY_STRAIGHT, bent <= STRAIGHT
     pairs = [
         (spread.worst, expected.worst, expected.worst, 1.0, every),
         (spread.first_order, expected.first_order, expected.first_order, 1.0, every),

@@ -46,7 +46,7 @@ from fourbar_validation.run.question import NotAskedError, Question
 
 ROWS = ("ranges", "peaks", "means", "pins", "frame_force", "bending", "bore")
 """Names of the rows."""
-CUT_BESIDE = 1e-10
+_CUT_BESIDE = 1e-10
 """Part of the length by which a bar is cut on either side of a place. A couple that
 acts there makes a jump.
 """
@@ -56,15 +56,15 @@ BETWEEN = 1e-3
 """Part by which a largest value without a place may exceed that of many positions. Its
 own position lies between two of them.
 """
-LEAST_CONDITION = 1e-2
+_LEAST_CONDITION = 1e-2
 """Condition below which a motion counts as one with poles. Beside a pole peaks are
 those of the positions.
 """
-REPEATS = 1e-9
+_REPEATS = 1e-9
 """Greatest difference, rad, of angles of which one repeats the other, and of rates in
 parts of the largest.
 """
-PRESSURE = 1e6
+_PRESSURE = 1e6
 """Pressure of the cylinder whose bore is judged, Pa."""
 TOLERANCES = {"bore": FOUR_DIGITS, "bending": LOCATED_ROUGHLY}
 
@@ -114,11 +114,11 @@ class _SummaryJudge:
             return False
         for bar in MOVING_BARS:
             theta = self.own.quantities[f"theta_{bar}"]
-            if abs(wrap_angle(theta[-1] - theta[0])) > REPEATS:
+            if abs(wrap_angle(theta[-1] - theta[0])) > _REPEATS:
                 return False
             for name in (f"omega_{bar}", f"alpha_{bar}"):
                 rate = self.own.quantities[name]
-                if abs(rate[-1] - rate[0]) > REPEATS * np.abs(rate).max():
+                if abs(rate[-1] - rate[0]) > _REPEATS * np.abs(rate).max():
                     return False
         return True
 
@@ -198,7 +198,7 @@ def _summarize(question: Question) -> Facts:
         raise NotAskedError("dry friction, whose forces jump between the positions")
     assert solution.drive_condition is not None
     worst = min(solution.condition.min(), solution.drive_condition.min())
-    if (solution.status_code != OK).any() or not worst > LEAST_CONDITION:
+    if (solution.status_code != OK).any() or not worst > _LEAST_CONDITION:
         raise NotAskedError("the motion has no forces somewhere, or nearly none")
     return summarize(scene, solution)
 
@@ -297,7 +297,7 @@ def _judge_bore(judged: _SummaryJudge, fine: Array) -> None:
     if judged.scene.drive is None or not judged.scene.drive.has_stroke:
         return
     units = {"m": ("mm", 1e3), "N": ("N", 1.0)}
-    lines = write_block(judged.scene, judged.solution, units, pressure=PRESSURE)
+    lines = write_block(judged.scene, judged.solution, units, pressure=_PRESSURE)
     text = " ".join(" ".join(lines).split()).partition("bore at least ")[2]
     printed = {
         word: 1e-3 * float(number)
@@ -305,7 +305,7 @@ def _judge_bore(judged: _SummaryJudge, fine: Array) -> None:
     }
     for word, force in (("push", float(fine.max())), ("pull", -float(fine.min()))):
         if not force <= 0.0:
-            bore = math.sqrt(4.0 * force / (math.pi * PRESSURE))
+            bore = math.sqrt(4.0 * force / (math.pi * _PRESSURE))
             judged.add_value("bore", printed.get(word), bore)
 
 
@@ -358,7 +358,8 @@ def _judge_bending(judged: _SummaryJudge) -> None:
         motion = move_bars(judged.scene, commanded, there)
         length = judged.scene.linkage.bar(bar).length
         beside = [
-            largest.x * (1.0 + off) + off * length for off in (-CUT_BESIDE, CUT_BESIDE)
+            largest.x * (1.0 + off) + off * length
+            for off in (-_CUT_BESIDE, _CUT_BESIDE)
         ]
         anywhere = [*beside, *(part * length for part in WHERE)]
         at_peak, others = (
@@ -403,5 +404,5 @@ def _judge_growth(judged: _SummaryJudge) -> None:
     # a sine that passes through zero between two positions is no further from it there
     # than it changes in a step
     least = conditions.min() - np.abs(np.diff(conditions)).max()
-    if least > LEAST_CONDITION:
+    if least > _LEAST_CONDITION:
         judged.add("peaks", math.inf)

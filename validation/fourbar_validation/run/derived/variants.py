@@ -47,11 +47,11 @@ from fourbar_validation.run.question import (
 
 SAMPLE = 5
 """Positions at which whatever takes more than one call is judged."""
-FROM_A_CORNER = 0.02
+_FROM_A_CORNER = 0.02
 """Distance from a point of a load's table without differences, rad. The table's slope
 jumps at the point.
 """
-NOT_AT_REST = 1e-3
+_NOT_AT_REST = 1e-3
 """Part of the speeds over sin^2 mu below which a dry pin may reverse. Small changes of
 a number reverse it then.
 """
@@ -59,9 +59,9 @@ NEAR_A_CHANGE_POINT = 1e-3
 """Part of the sum of the lengths by which a linkage near a change point misses it."""
 A_PERTURBATION = 5e-4
 """Part of the squared sum of the lengths. Changed linkages keep to the nominal assembly
-if they miss its change point by less than twice as much. See `measure_misses`.
+if they miss its change point by less than twice as much. See `_measure_misses`.
 """
-GOLDEN = 0.5 * (5.0**0.5 - 1.0)
+_GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 
 
 def take_few(question: Question) -> Scene:
@@ -88,14 +88,14 @@ def take_few(question: Question) -> Scene:
     fit &= (reference.drive_condition >= WELL_CONDITIONED) & (
         command.branch == scene.motion.branch
     )
-    fit &= ~mark_reversing(scene, solution, NOT_AT_REST) & (
+    fit &= ~mark_reversing(scene, solution, _NOT_AT_REST) & (
         np.asarray(command.speed) != 0.0
     )
     for load in scene.loads:
         for corner in () if load.table is None else load.table.theta_2:
             fit &= (
                 np.abs(np.angle(np.exp(1j * (solution.theta_2 - corner))))
-                > FROM_A_CORNER
+                > _FROM_A_CORNER
             )
     indices = np.flatnonzero(fit)
     if not len(indices):
@@ -109,7 +109,7 @@ def at_places(scene: Scene, places: Array) -> Scene:
     return replace(scene, motion=scene.motion.replace(angle=places))
 
 
-class FileNumber(NamedTuple):
+class _FileNumber(NamedTuple):
     """A number that a scene's file states, and what it may be moved by.
 
     Most of itself, or of an angle most of 1 rad.
@@ -132,7 +132,7 @@ class SceneFile:
             key: _write_line(key, value) for key, value in self._document.items()
         }
 
-    def find_stated(self, keys: Iterable[str]) -> dict[str, FileNumber]:
+    def find_stated(self, keys: Iterable[str]) -> dict[str, _FileNumber]:
         """Find those of the keys whose numbers the file states.
 
         Of motion.theta_2 it is the first.
@@ -145,8 +145,8 @@ class SceneFile:
                     table[last][0] if isinstance(table[last], list) else table[last]
                 ).partition(" ")
                 # no two alike, between 1/2 and 1
-                part = 0.5 + 0.5 * ((index + 1) * GOLDEN % 1.0)
-                stated[key] = FileNumber(
+                part = 0.5 + 0.5 * ((index + 1) * _GOLDEN % 1.0)
+                stated[key] = _FileNumber(
                     float(number), part * (1.0 if unit == "rad" else float(number))
                 )
         return stated
@@ -235,7 +235,7 @@ def is_near_change_point(linkage: FourBar) -> bool:
     return least <= NEAR_A_CHANGE_POINT * sum_lengths(linkage)
 
 
-def measure_misses(linkage: FourBar, bar: int) -> Array:
+def _measure_misses(linkage: FourBar, bar: int) -> Array:
     """Measure by how much change points are missed at the ends of the diagonal's range.
 
     With the bar commanded, the diagonal is at least |d - r| and at most d + r, where r
@@ -254,8 +254,8 @@ def measure_misses(linkage: FourBar, bar: int) -> Array:
 def stays_beside(member: Scene, scene: Scene) -> bool:
     """Return whether a member misses by little each change point that the scene has."""
     bar = scene.motion.bar
-    nominal = measure_misses(scene.linkage, bar)
-    changed = measure_misses(member.linkage, bar)
+    nominal = _measure_misses(scene.linkage, bar)
+    changed = _measure_misses(member.linkage, bar)
     return bool(np.all(changed[nominal <= A_PERTURBATION] <= A_PERTURBATION))
 
 

@@ -46,7 +46,7 @@ from fourbar_validation.engines.mujoco.robots.pose import (
     pose_robot,
 )
 
-PARALLEL = math.radians(0.5)
+_PARALLEL = math.radians(0.5)
 """Largest angle between the axes of a planar linkage, rad. Beyond it forces across the
 plane reach a hundredth.
 """
@@ -80,7 +80,7 @@ def list_closures(
     posed = pose_robot(compiled.model, options)
     closures = find_closures(posed, options)
     if name is not None:
-        closures = [find_closure(closures, name)]
+        closures = [_find_closure(closures, name)]
     return RobotReport(tuple(closures), (*compiled.notes, *posed.notes))
 
 
@@ -106,7 +106,7 @@ def find_closures(posed: PosedRobot, options: PoseOptions) -> list[RobotClosure]
     return closures
 
 
-def find_closure(closures: Sequence[RobotClosure], name: str) -> RobotClosure:
+def _find_closure(closures: Sequence[RobotClosure], name: str) -> RobotClosure:
     """Return the closure of a name, or raise an InputError that lists what is there."""
     for closure in closures:
         if closure.name == name:
@@ -122,7 +122,7 @@ def choose_loop(closures: Sequence[RobotClosure], name: str) -> RobotLoop:
 
     Raises an InputError that says why there is none.
     """
-    closure = find_closure(closures, name)
+    closure = _find_closure(closures, name)
     if closure.loop is None:
         raise InputError("--loop", name, f"is no four-bar: {closure.reason}")
     return closure.loop
@@ -152,7 +152,7 @@ def name_body(model: mujoco.MjModel, body: int) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class ClosureEnd:
+class _ClosureEnd:
     """One end of a connect or a weld."""
 
     body: int
@@ -160,14 +160,14 @@ class ClosureEnd:
     """Place in world axes in the pose, (3,), m."""
 
 
-def find_ends(posed: PosedRobot, number: int) -> tuple[ClosureEnd, ClosureEnd]:
+def _find_ends(posed: PosedRobot, number: int) -> tuple[_ClosureEnd, _ClosureEnd]:
     """Locate both ends of a connect or a weld."""
     model, data = posed.model, posed.data
     bodies = find_tied_bodies(model, number)
     if model.eq_objtype[number] == mujoco.mjtObj.mjOBJ_SITE:
         sites = (int(model.eq_obj1id[number]), int(model.eq_obj2id[number]))
         first, second = (
-            ClosureEnd(body, data.site_xpos[site].copy())
+            _ClosureEnd(body, data.site_xpos[site].copy())
             for body, site in zip(bodies, sites, strict=True)
         )
         return first, second
@@ -175,7 +175,7 @@ def find_ends(posed: PosedRobot, number: int) -> tuple[ClosureEnd, ClosureEnd]:
     if model.eq_type[number] == mujoco.mjtEq.mjEQ_WELD:
         anchors.reverse()  # it keeps the second body's anchor first
     first, second = (
-        ClosureEnd(body, data.xpos[body] + data.xmat[body].reshape(3, 3) @ anchor)
+        _ClosureEnd(body, data.xpos[body] + data.xmat[body].reshape(3, 3) @ anchor)
         for body, anchor in zip(bodies, anchors, strict=True)
     )
     return first, second
@@ -254,11 +254,11 @@ class _Finder:
         gap, left = (
             float(np.linalg.norm(first.place - second.place))
             for first, second in (
-                find_ends(self.stated, number),
-                find_ends(self.posed, number),
+                _find_ends(self.stated, number),
+                _find_ends(self.posed, number),
             )
         )
-        first, second = find_ends(self.posed, number)
+        first, second = _find_ends(self.posed, number)
         chain = _Chain(self, first.body, second.body)
         hinges = tuple(name_joint(model, j) for j in chain.joints)
         loop, reason = self._recognise(number, name, chain)
@@ -356,7 +356,7 @@ class _Finder:
 
     def _find_skew_axes(self, chain: _Chain) -> str:
         angle, names = self._measure_axes(chain)
-        if angle is None or angle <= PARALLEL:
+        if angle is None or angle <= _PARALLEL:
             return ""
         return (
             f"the axes of {names} are {math.degrees(angle):.3g} deg apart: "
@@ -430,7 +430,7 @@ class _Finder:
                 "weld",
             ):
                 continue
-            ends = find_ends(self.posed, other)
+            ends = _find_ends(self.posed, other)
             carried = {self._find_bar(end.body, bars) for end in ends}
             if len(carried - {None}) and len(carried) > 1:
                 names.append(self._name(other))
@@ -589,7 +589,7 @@ class _Finder:
             kind = KINDS.get(int(self.model.eq_type[other]))
             if other == number or kind not in ("connect", "weld"):
                 continue
-            ends = (end.body for end in find_ends(self.posed, other))
+            ends = (end.body for end in _find_ends(self.posed, other))
             tied = {self.root[body] for body in ends} & bars.keys()
             if self.model.eq_active0[other]:
                 pushed |= {bars[root]: self._name(other) for root in tied}
@@ -627,7 +627,7 @@ class _Finder:
                 continue
             if kind not in ("connect", "weld"):
                 continue
-            ends = find_ends(self.posed, other)
+            ends = _find_ends(self.posed, other)
             carried = [self._find_bar(end.body, moving) for end in ends]
             numbers = [1 if root is None else bars[root] for root in carried]
             if numbers[0] == numbers[1]:
@@ -663,7 +663,7 @@ class _Layout:
     ) -> None:
         self.finder, self.bodies, self.hinges = finder, bodies, hinges
         self.model, self.data = finder.model, finder.data
-        self.ends = find_ends(finder.posed, equality)
+        self.ends = _find_ends(finder.posed, equality)
         self.remarks: list[str] = []
         self.senses: dict[str, float] = {}
         self.points: dict[tuple[int, str], Array] = {}
@@ -753,7 +753,7 @@ class _Layout:
         along = self.data.xmat[self.bodies[1][0]].reshape(3, 3) @ self.along
         return float(vector @ along), float(vector @ self.across)
 
-    def is_at(self, pin: str, ends: tuple[ClosureEnd, ClosureEnd]) -> bool:
+    def is_at(self, pin: str, ends: tuple[_ClosureEnd, _ClosureEnd]) -> bool:
         """Tell whether both ends of another equality lie on the axis of a pin."""
         bar = PAIRS[pin][0]
         for end in ends:

@@ -11,13 +11,13 @@ import mujoco
 from fourbar.errors import InputError
 from fourbar_validation.engines.mujoco.robots.loop import RobotFile
 
-MOST_KEYFRAMES = 100_000
+_MOST_KEYFRAMES = 100_000
 """A robot has a few; MuJoCo reserves as many as a file asks for, minutes long."""
-STAND_IN = 0.01
+_STAND_IN = 0.01
 """m, radius of the sphere that stands where a mesh is missing and a mass unknown."""
 LIGHT = 1e-3
 """kg, mass of that sphere: MuJoCo moves no body without one."""
-FROM_GEOMS, AS_STATED = 1, 0
+_FROM_GEOMS, _AS_STATED = 1, 0
 """Values of the compiler's `inertiafromgeom`: all bodies, and none; 2 is in between."""
 
 
@@ -42,11 +42,11 @@ def compile_robot(file: RobotFile) -> CompiledRobot:
     """
     try:
         spec = mujoco.MjSpec.from_string(file.text, assets=dict(file.assets))
-        if spec.nkey > MOST_KEYFRAMES:
+        if spec.nkey > _MOST_KEYFRAMES:
             raise InputError(
                 "MJCF",
                 None,
-                f"asks for {spec.nkey} keyframes; up to {MOST_KEYFRAMES} are read",
+                f"asks for {spec.nkey} keyframes; up to {_MOST_KEYFRAMES} are read",
             )
         left_out, unknown = _take_out_meshes(spec, file)
         model = spec.compile()
@@ -119,7 +119,7 @@ def _take_out_meshes(spec: mujoco.MjSpec, file: RobotFile) -> tuple[set[str], se
             left_out.add(file.missing[gone[geom.meshname].file])
             spec.delete(geom)
         if body.name in unknown and body.joints:
-            size = [STAND_IN, 0.0, 0.0]
+            size = [_STAND_IN, 0.0, 0.0]
             kind = mujoco.mjtGeom.mjGEOM_SPHERE
             body.add_geom(type=kind, size=size, mass=LIGHT)
     if left_out:  # they may name the geoms, and move nothing
@@ -136,9 +136,9 @@ def _needs_geoms(
 ) -> bool:
     """Tell whether the inertia of a body follows from these geoms."""
     rule = spec.compiler.inertiafromgeom
-    if body.name == "world" or rule == AS_STATED:
+    if body.name == "world" or rule == _AS_STATED:
         return False
-    if body.explicitinertial and rule != FROM_GEOMS:
+    if body.explicitinertial and rule != _FROM_GEOMS:
         return False
     lowest, highest = spec.compiler.inertiagrouprange
     return any(geom.mass != 0.0 and lowest <= geom.group <= highest for geom in geoms)

@@ -51,16 +51,16 @@ from fourbar_validation.engines.mujoco.runner import Stepper
 
 CLOSED = 1e-12
 """m or rad; residual of the closure at which a state is closed."""
-CLOSING_STEPS = 50
+_CLOSING_STEPS = 50
 OPEN = 1e-6
 """Residual above which the loop does not close at a position, m or rad."""
-STRIDE = math.radians(2.0)
+_STRIDE = math.radians(2.0)
 """Largest turn of the driven hinge from one closed state to the next. The assembly is
 kept so.
 """
-SOLVE_STEPS = 60
+_SOLVE_STEPS = 60
 """Newton steps for the hinges' accelerations; without friction one is enough."""
-BALANCED = 1e-10
+_BALANCED = 1e-10
 """Part of the generalized forces that may be left on a hinge on which nothing acts."""
 HEAVY = 1e4
 """Armature that holds a joint while the model is stepped, over the largest inertia of
@@ -72,13 +72,13 @@ SETTLED = 5.0
 """Time constants after which the loop has yielded but for 1 %. They are at most half of
 the motion.
 """
-REACHED = 1.0 - 1e-6
+_REACHED = 1.0 - 1e-6
 """Part of its couple at which dry friction acts in full."""
 MOST_STEPS = 60_000
 """Steps of one run; at 0.1 ms a step of a humanoid these are six seconds."""
-FORCE_OF_PIN = {"O2": "F12", "A": "F32", "B": "F43", "O4": "F14"}
+_FORCE_OF_PIN = {"O2": "F12", "A": "F32", "B": "F43", "O4": "F14"}
 """Names of the pin forces. F_ij is the force of bar i on bar j."""
-FORCE_ON = {"F12": 2, "F32": 2, "F43": 3, "F14": 4}
+_FORCE_ON = {"F12": 2, "F32": 2, "F43": 3, "F14": 4}
 """The bar that each force acts on."""
 WARNINGS = (
     mujoco.mjtWarning.mjWARN_BADQPOS,
@@ -88,7 +88,7 @@ WARNINGS = (
 
 
 @dataclass(frozen=True, slots=True)
-class RobotState:
+class _RobotState:
     """Closed state of a robot."""
 
     qpos: Array
@@ -155,7 +155,7 @@ class LoopInside:
         It is reached from the last one in small strides.
         """
         start = self.angle(self._last)
-        strides = max(math.ceil(abs(theta_2 - start) / STRIDE), 1)
+        strides = max(math.ceil(abs(theta_2 - start) / _STRIDE), 1)
         qpos = self._last.copy()
         for angle in np.linspace(start, theta_2, strides + 1)[1:]:
             qpos[self.address] = self.position(float(angle))
@@ -170,7 +170,7 @@ class LoopInside:
         The residual is that of the closure. Tell whether it is closed.
         """
         size = math.inf
-        for _ in range(CLOSING_STEPS):
+        for _ in range(_CLOSING_STEPS):
             residual, jacobian = self._evaluate_closure(qpos)
             if np.abs(residual).max() <= CLOSED or np.abs(residual).max() >= size:
                 break
@@ -193,7 +193,7 @@ class LoopInside:
         jacobian = data.efc_J.reshape(-1, self.closure.nv)[: data.nefc]
         return data.efc_pos[: data.nefc].copy(), jacobian.copy()
 
-    def state(self, theta_2: float, omega_2: float) -> RobotState | None:
+    def state(self, theta_2: float, omega_2: float) -> _RobotState | None:
         """Return the closed state at an angle and a speed of bar 2.
 
         None if the loop does not close.
@@ -208,7 +208,7 @@ class LoopInside:
         qvel[self.passive] = np.linalg.lstsq(
             jacobian[:, self.passive], due, rcond=1e-9
         )[0]
-        return RobotState(qpos, qvel, theta_2)
+        return _RobotState(qpos, qvel, theta_2)
 
     def ask(self, qpos: Array, qvel: Array, alpha_2: float) -> InsideRow:
         """Evaluate a state in which bar 2 accelerates at alpha_2.
@@ -260,7 +260,7 @@ class LoopInside:
         names = []
         for row in np.flatnonzero(rubbing):
             dof = int(data.efc_id[row])
-            reached = abs(data.efc_force[row]) >= REACHED * model.dof_frictionloss[dof]
+            reached = abs(data.efc_force[row]) >= _REACHED * model.dof_frictionloss[dof]
             if dof in (self.drive, *self.passive) and not reached and data.qvel[dof]:
                 names.append(name_joint(model, int(model.dof_jntid[dof])))
         return tuple(names)
@@ -276,7 +276,7 @@ class LoopInside:
         return name_joint(self.model, self.loop.joint)
 
     def _solve_rigid(
-        self, state: RobotState, alpha_2: float
+        self, state: _RobotState, alpha_2: float
     ) -> tuple[PinsAndTorque, Array]:
         """Solve for torque and pin forces with rigid pins at a closed state.
 
@@ -324,11 +324,11 @@ class LoopInside:
 
         passive = self.passive
         left = forces(accelerations)
-        for _ in range(SOLVE_STEPS):
+        for _ in range(_SOLVE_STEPS):
             inertial = np.abs(data.qfrc_bias[passive]) + np.abs(
                 data.qfrc_constraint[passive]
             )
-            if np.all(np.abs(left[passive]) <= BALANCED * (inertial.max() or 1.0)):
+            if np.all(np.abs(left[passive]) <= _BALANCED * (inertial.max() or 1.0)):
                 break
             slopes = np.empty((len(passive), len(passive)))
             size = max(float(np.abs(accelerations[passive]).max()), 1.0)
@@ -364,14 +364,14 @@ class LoopInside:
             ]
         )
         forces = {}
-        for pin, name in FORCE_OF_PIN.items():
+        for pin, name in _FORCE_OF_PIN.items():
             joint = self.loop.hinges.get(pin)
             if joint is None:
                 force, bar = self._read_closure(data, pin)
             else:
                 body = int(self.model.jnt_bodyid[joint])
                 force, bar = self._read_hinge(data, body), self._find_bar(body, pin)
-            sign = 1.0 if bar == FORCE_ON[name] else -1.0
+            sign = 1.0 if bar == _FORCE_ON[name] else -1.0
             forces[name] = sign * (axes @ force)
         return forces
 

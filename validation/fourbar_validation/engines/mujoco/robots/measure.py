@@ -42,15 +42,15 @@ from fourbar_validation.engines.mujoco.theirs import collect_warnings
 
 POSITIONS = 37
 """Positions at which a loop is looked at."""
-TORN_POSITIONS = 5
+_TORN_POSITIONS = 5
 """Positions from which a motor's torque acts."""
-CONSTANTS = 10.0
+_CONSTANTS = 10.0
 """Time constants of the closure during which the torque acts. The loop has then yielded
 as far as it does.
 """
 ALIKE = 1e-6
 """Difference of logarithms of lengths below which two ways round fit a scene alike."""
-LIGHTER = 0.1
+_LIGHTER = 0.1
 """Factor on what holds the other joints, to see what it matters."""
 
 
@@ -154,14 +154,14 @@ def _measure_loop(
         if motion.omega_2 == 0.0 or len(closing.theta_2) < 2:
             raise LimitError("nothing moves: a sweep at a speed is needed")
         through = inside.answer_through_time(*closing)
-        lighter = inside.answer_through_time(*closing, HEAVY * LIGHTER)
+        lighter = inside.answer_through_time(*closing, HEAVY * _LIGHTER)
         influence = _compare(through, lighter)
     except LimitError as error:
         refusal = str(error)
     torn: tuple[TornState, ...] = ()
     if options.torque is not None:
-        seconds = CONSTANTS * inside.find_constant()
-        starts = closing.thin_out(TORN_POSITIONS).theta_2
+        seconds = _CONSTANTS * inside.find_constant()
+        starts = closing.thin_out(_TORN_POSITIONS).theta_2
         torn = tuple(inside.answer_under_torque(starts, options.torque, seconds))
     advice = None
     if options.error is not None:

@@ -19,7 +19,7 @@ from fourbar_validation.engines.mujoco.robots.loop import RobotFile
 from fourbar_validation.engines.mujoco.robots.pose import HINGE, find_joint
 from fourbar_validation.engines.mujoco.robots.scene import is_seen_from_behind
 
-SAME_LENGTH = 1e-3
+_SAME_LENGTH = 1e-3
 """Relative difference of a length in a file from that in a scene: files state three or
 four digits.
 """
@@ -152,7 +152,7 @@ def _find_line(
         if directions:
             first, *others = directions
             spread = (abs(math.remainder(one - first, math.tau)) for one in others)
-            return first if max(spread, default=0.0) <= SAME_LENGTH else None
+            return first if max(spread, default=0.0) <= _SAME_LENGTH else None
     return None
 
 
@@ -177,4 +177,4 @@ def _list_places(
 
 
 def _is_same(one: float, other: float) -> bool:
-    return math.isclose(one, other, rel_tol=SAME_LENGTH)
+    return math.isclose(one, other, rel_tol=_SAME_LENGTH)

@@ -33,7 +33,7 @@ OPEN = 1e-5
 MOST_STEPS = 100
 LONGEST_STEP = 0.3
 """rad or m; longer steps leave the region where the loops are nearly linear."""
-DAMPING = 1e-4
+_DAMPING = 1e-4
 """Weight of a step against the residuals. It keeps what no equality decides where it
 is.
 """
@@ -72,7 +72,7 @@ def pose_robot(model: mujoco.MjModel, options: PoseOptions) -> PosedRobot:
         fixed.add(joint)
     closing = _Closing(model, fixed)
     tied = {*closing.joints, *fixed}
-    outside = [joint for joint in find_outside(model, stated) if joint in tied]
+    outside = [joint for joint in _find_outside(model, stated) if joint in tied]
     names = _list_some([name_joint(model, joint) for joint in outside])
     notes = [f"outside their ranges {origin}: {names}"] if outside else []
     before = closing.size(stated)
@@ -110,7 +110,7 @@ def find_joint(model: mujoco.MjModel, name: str, option: str) -> int:
     return names.index(name)
 
 
-def find_outside(model: mujoco.MjModel, qpos: Array) -> list[int]:
+def _find_outside(model: mujoco.MjModel, qpos: Array) -> list[int]:
     """List the hinges and slides that are outside their ranges."""
     low, high = _list_bounds(model)
     outside = []
@@ -229,7 +229,7 @@ class _Closing:
         qpos = self._bring_inside(start)
         if not self.dofs:
             return qpos
-        damping = DAMPING * np.eye(len(self.dofs))
+        damping = _DAMPING * np.eye(len(self.dofs))
         for _ in range(MOST_STEPS):
             residuals, jacobian = self._move_to(qpos)
             if np.abs(residuals).max(initial=0.0) <= 1e-3 * CLOSED:

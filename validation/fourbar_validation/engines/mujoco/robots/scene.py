@@ -60,7 +60,7 @@ DIGITS = 12
 """Significant digits of a number of the scene. Those beyond are round-off of the
 compiler.
 """
-FLAT = 2e-3
+_FLAT = 2e-3
 """rad; where the outputs of both assemblies are nearer the pose does not tell which it
 is: a loop that is closed to 1e-12 m leaves about half as much open where its bars are
 in line.
@@ -73,11 +73,11 @@ SPEED = 1.0
 """rad/s, where none is stated."""
 NOTHING = 1e-9
 """Part of what acts below which a number is round-off."""
-ACROSS = 1e-6
+_ACROSS = 1e-6
 """Part of gravity below which none acts across the plane."""
-SKEW = 1e-6
+_SKEW = 1e-6
 """rad; axes less apart than this are parallel but for the digits of the file."""
-SAME_OUTPUT = 1e-6
+_SAME_OUTPUT = 1e-6
 """rad; two ways to see a linkage whose outputs miss that of the scene alike."""
 
 
@@ -128,7 +128,7 @@ def make_scene(
     return LoopScene(scene, loop, made.write_parts(), tuple(remarks), ())
 
 
-def list_carried(model: mujoco.MjModel, loop: RobotLoop) -> dict[int, list[int]]:
+def _list_carried(model: mujoco.MjModel, loop: RobotLoop) -> dict[int, list[int]]:
     """List the bodies that move with each moving bar.
 
     Those that hang on it by held joints are included.
@@ -142,7 +142,7 @@ def list_carried(model: mujoco.MjModel, loop: RobotLoop) -> dict[int, list[int]]
     return carried
 
 
-def reflect_armature(model: mujoco.MjModel, joint: int) -> float:
+def _reflect_armature(model: mujoco.MjModel, joint: int) -> float:
     """Return the armature of a hinge, kg m^2.
 
     That of its motors behind their gears is included.
@@ -150,7 +150,7 @@ def reflect_armature(model: mujoco.MjModel, joint: int) -> float:
     return _sum_over_motors(model, joint, model.dof_armature, "actuator_armature")
 
 
-def reflect_damping(model: mujoco.MjModel, joint: int) -> float:
+def _reflect_damping(model: mujoco.MjModel, joint: int) -> float:
     """Return the damping of a hinge, N m s/rad.
 
     That of its motors behind their gears is included.
@@ -176,7 +176,7 @@ def round_off(number: float) -> float:
     return float(f"{number:.{DIGITS}g}")
 
 
-def round_angle(angle: float) -> float:
+def _round_angle(angle: float) -> float:
     """Round an angle to the digits that a compiled model has, rad; -0.0 becomes 0.0."""
     return round(angle, DIGITS) + 0.0
 
@@ -205,7 +205,7 @@ def is_seen_from_behind(
     """
     missed = _miss_output(scene, theta_1, theta_2, theta_4)
     missed_behind = _miss_output(scene, -theta_1, -theta_2, -theta_4)
-    return missed_behind < missed - SAME_OUTPUT
+    return missed_behind < missed - _SAME_OUTPUT
 
 
 @dataclass(frozen=True, slots=True)
@@ -231,7 +231,7 @@ class _SceneOfLoop:
         self.normal = ground @ loop.axis
         self.along = ground @ loop.along
         self.across = np.cross(self.normal, self.along)
-        self.carried = list_carried(self.model, loop)
+        self.carried = _list_carried(self.model, loop)
         bodies = {body for carried in self.carried.values() for body in carried}
         parts = list_unknown_parts(compiled, bodies)
         if parts:
@@ -272,13 +272,13 @@ class _SceneOfLoop:
                     length,
                     round_off(lump.mass),
                     round_off(inertia),
-                    (round_off(lump.centre[0]), round_angle(lump.centre[1])),
+                    (round_off(lump.centre[0]), _round_angle(lump.centre[1])),
                 )
-        theta_1 = round_angle(self.loop.angles[0])
+        theta_1 = _round_angle(self.loop.angles[0])
         linkage = FourBar(lengths[0], bars[2], bars[3], bars[4], theta_1)
         path = self._find_sweep(linkage)
         whole = math.tau * math.ceil((-math.pi - path.start) / math.tau)
-        start, stop = (round_angle(end + whole) for end in (path.start, path.stop))
+        start, stop = (_round_angle(end + whole) for end in (path.start, path.stop))
         theta_2 = Sweep(start, stop, STEPS) if stop > start else start
         branch = self._find_branch(linkage, self.loop.angles[1] + whole)
         motion = Motion(theta_2, speed, branch=branch)
@@ -337,7 +337,7 @@ class _SceneOfLoop:
         """Return the armature of each hinge that has any, by its pin, kg m^2."""
         model, armature = self.model, dict[str, float]()
         for pin, joint in self.loop.hinges.items():
-            size = reflect_armature(model, joint)
+            size = _reflect_armature(model, joint)
             if size:
                 armature[pin] = size
                 name = name_joint(model, joint)
@@ -361,11 +361,11 @@ class _SceneOfLoop:
         pull = self._in_plane(self.gravity)
         if abs(pull) > NOTHING * float(np.linalg.norm(self.gravity)):
             angle = math.atan2(pull.imag, pull.real)
-            yield Gravity(round_off(abs(pull)), round_angle(angle))
+            yield Gravity(round_off(abs(pull)), _round_angle(angle))
         hinges = {
             pin: self.loop.hinges[pin] for pin in PAIRS if pin in self.loop.hinges
         }
-        damping = {pin: reflect_damping(model, joint) for pin, joint in hinges.items()}
+        damping = {pin: _reflect_damping(model, joint) for pin, joint in hinges.items()}
         rows = tuple((pin, round_off(k)) for pin, k in damping.items() if k)
         if rows:
             yield Viscous(rows)
@@ -407,7 +407,7 @@ class _SceneOfLoop:
             yield (
                 pin,
                 round_off(stiffness),
-                round_angle(angle),
+                _round_angle(angle),
                 round_off(stiffness * turns),
             )
 
@@ -426,8 +426,8 @@ class _SceneOfLoop:
             if not force:
                 continue
             place = self._find_polar(bar, lifted @ data.xipos[bodies] / lifted.sum())
-            size, angle = round_off(abs(force)), round_angle(cmath.phase(force))
-            from_pin = (round_off(place[0]), round_angle(place[1]))
+            size, angle = round_off(abs(force)), _round_angle(cmath.phase(force))
+            from_pin = (round_off(place[0]), _round_angle(place[1]))
             yield Load(bar, (size, angle), from_pin=from_pin)
 
     def _find_sweep(self, linkage: FourBar) -> "_Path":
@@ -513,7 +513,7 @@ class _SceneOfLoop:
             )
             for branch in (OPEN, CROSSED)
         ]
-        if not abs(apart[0] - apart[1]) > FLAT:
+        if not abs(apart[0] - apart[1]) > _FLAT:
             text = "the bars of pin B are in line in this pose: open is taken"
             self._remark(f"{text}; --pose states another")
             return OPEN
@@ -528,12 +528,12 @@ class _SceneOfLoop:
         model, loop = self.model, self.loop
         across = float(self.gravity @ self.normal)
         weights = {bar: abs(lump.mass * across) for bar, lump in lumps.items()}
-        if abs(across) > ACROSS * float(np.linalg.norm(self.gravity)):
+        if abs(across) > _ACROSS * float(np.linalg.norm(self.gravity)):
             texts = ", ".join(
                 f"{BAR_NAMES[bar]} {weight:.4g} N" for bar, weight in weights.items()
             )
             self._leave_out(f"weights across the plane: {texts}")
-        if loop.misaligned > SKEW:
+        if loop.misaligned > _SKEW:
             angle = math.degrees(loop.misaligned)
             self._leave_out(f"the {angle:.2g} deg between its axes")
         for number in loop.other_equalities:

@@ -36,20 +36,20 @@ POSITIONS = 9
 """Positions of a trial."""
 STIFF = (0.9999, 0.9999, 0.001, 0.5, 2.0)
 """The stiffest impedance: MuJoCo clamps it there."""
-FASTER = (0.5, 0.2, 0.1, 0.05)
+_FASTER = (0.5, 0.2, 0.1, 0.05)
 """Factors on the closure's time constant."""
 FEWEST = 2.0
 """Timesteps of the time constant, below which MuJoCo keeps it."""
-FINER = (0.5, 0.2, 0.1)
+_FINER = (0.5, 0.2, 0.1)
 """Factors on the timestep."""
 INTEGRATORS = ("Euler", "implicit", "implicitfast", "RK4")
-EVALUATIONS = {"RK4": 4.0}
+_EVALUATIONS = {"RK4": 4.0}
 """Evaluations of a step, for the order in which combinations are tried. The others have
 one.
 """
 SOLVER = ("Newton", 100, 1e-10)
 """Solver, iterations and tolerance at which the solver leaves nothing."""
-FIRST_CONSTANT = 0.02
+_FIRST_CONSTANT = 0.02
 """MuJoCo's own time constant, s. It is tried if the file states a stiffness in its
 place.
 """
@@ -75,7 +75,7 @@ def _name(kinds: type, value: int, words: Sequence[str]) -> str:
     return next(word for word in words if word.upper() == name)
 
 
-def set_settings(
+def _set_settings(
     model: mujoco.MjModel, loop: RobotLoop, settings: RobotSettings
 ) -> mujoco.MjModel:
     """Return a copy of a compiled model with other settings.
@@ -118,7 +118,7 @@ class SettingsSearch:
         before = self.measure(self.own)
         alone = sorted(map(self.measure, self._list_alone()), key=lambda one: one.error)
         best, reached = self._find_cheapest(wanted)
-        typed = write_elements(file, self.loop, best)
+        typed = _write_elements(file, self.loop, best)
         return SettingsAdvice(
             wanted, before, tuple(alone), best, reached, len(self.tried), typed
         )
@@ -127,7 +127,7 @@ class SettingsSearch:
         """Measure what settings reach."""
         if settings in self.tried:
             return self.tried[settings]
-        inside = LoopInside(set_settings(self.model, self.loop, settings), self.loop)
+        inside = LoopInside(_set_settings(self.model, self.loop, settings), self.loop)
         motion = self.motion
         states = through = gap = seconds = math.inf
         try:
@@ -162,10 +162,10 @@ class SettingsSearch:
         Those of the file come first.
         """
         own = self.own
-        constant = own.solref[0] if own.solref[0] > 0.0 else FIRST_CONSTANT
+        constant = own.solref[0] if own.solref[0] > 0.0 else _FIRST_CONSTANT
         ratio = own.solref[1] if own.solref[0] > 0.0 else 1.0
         shortest = FEWEST * own.timestep
-        constants = {max(factor * constant, shortest) for factor in FASTER}
+        constants = {max(factor * constant, shortest) for factor in _FASTER}
         faster = sorted((one for one in constants if one < constant), reverse=True)
         return {
             "solimp": [own.solimp, *([STIFF] if own.solimp != STIFF else [])],
@@ -174,7 +174,7 @@ class SettingsSearch:
                 own.integrator,
                 *(name for name in INTEGRATORS if name != own.integrator),
             ],
-            "timestep": [own.timestep, *(factor * own.timestep for factor in FINER)],
+            "timestep": [own.timestep, *(factor * own.timestep for factor in _FINER)],
         }
 
     def _find_cheapest(self, wanted: float) -> tuple[TriedSettings, bool]:
@@ -211,7 +211,7 @@ class SettingsSearch:
 
         It is by evaluations of a simulated second, changes, stiffness.
         """
-        evaluations = EVALUATIONS.get(settings.integrator, 1.0) / settings.timestep
+        evaluations = _EVALUATIONS.get(settings.integrator, 1.0) / settings.timestep
         changes = settings.list_changes(self.own)
         return evaluations, len(changes), -settings.solref[0]
 
@@ -234,7 +234,7 @@ def _find_worst(answer: InsideAnswer) -> float:
     return worst
 
 
-def write_elements(
+def _write_elements(
     file: RobotFile, loop: RobotLoop, tried: TriedSettings
 ) -> tuple[str, ...]:
     """Write the elements of the file that are to be changed.
