@@ -48,6 +48,7 @@ from fourbar_validation.engines.description import (
     reduce_angle,
 )
 from fourbar_validation.engines.effects import has_term, list_acting
+from fourbar_validation.engines.linear import solve_refined
 from fourbar_validation.engines.loaded import Loaded, Values
 from fourbar_validation.engines.loop import Exact
 
@@ -254,14 +255,14 @@ class ExudynBars(Loaded):
         )  # a cylinder's is that of closed pins
         jacobian = np.vstack((of_drive[:-1], np.eye(SIZE)[self.turn[bar]]))
         try:
-            self.v = v = np.linalg.solve(jacobian, commanded * speed)
+            self.v = v = solve_refined(jacobian, commanded * speed)
             self.state.SetODE2Coordinates_t(v)
             self.state.SetODE2Coordinates_tt(np.zeros(SIZE))
             at_b = self.acceleration("end3") - self.acceleration("end4")
             drift = np.concatenate(
                 (np.zeros(2), self.acceleration("end2"), at_b, np.zeros(3))
             )
-            self.a = a = np.linalg.solve(jacobian, commanded * acceleration - drift)
+            self.a = a = solve_refined(jacobian, commanded * acceleration - drift)
         except np.linalg.LinAlgError:
             return {}
         self.state.SetODE2Coordinates_tt(a)

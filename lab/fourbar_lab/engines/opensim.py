@@ -29,6 +29,7 @@ from fourbar_validation.engines.description import (
     reduce_angle,
 )
 from fourbar_validation.engines.effects import has_term, list_acting
+from fourbar_validation.engines.linear import solve_refined
 from fourbar_validation.engines.loaded import Loaded, Values
 from fourbar_validation.engines.loop import Exact
 
@@ -287,7 +288,7 @@ class _OpenSimBars(Loaded):
         They are per speed commanded; the accelerations are solved for too.
         """
         equations = self._differentiate_constraints()
-        turns = np.linalg.solve(equations, np.eye(3)[0])
+        turns = solve_refined(equations, np.eye(3)[0])
         self.state.setTime(acceleration)
         self.state.setU(make_vector(turns * speed))
         self.model.realizeVelocity(self.state)
@@ -298,7 +299,7 @@ class _OpenSimBars(Loaded):
         self.least_conditioned = min(
             self.least_conditioned, float(sizes[-1] / sizes[0])
         )
-        return turns, np.linalg.solve(equations, -np.array(bias.to_numpy())[:3])
+        return turns, solve_refined(equations, -np.array(bias.to_numpy())[:3])
 
     def _motion(self) -> Values:
         values: Values = {}

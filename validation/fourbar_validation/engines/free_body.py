@@ -42,6 +42,7 @@ from fourbar_validation.engines.free_body_effects import (
     make_vector,
     sum_acting,
 )
+from fourbar_validation.engines.linear import solve_refined
 
 NAME = "free-body"
 COLUMN = {"F12": 0, "F32": 2, "F23": 4, "F43": 6, "F34": 8, "F14": 10}
@@ -451,15 +452,13 @@ def _make_right_sides(linkage: FourBar, wrenches: BodyWrenches) -> Array:
 def solve_system(matrix: Array, right: Array) -> tuple[Array, float]:
     """Solve linear systems, NaN where singular.
 
-    The largest residual over |matrix| |x| + |right| is returned too. One step of
-    refinement makes each equation hold to the rounding of its own terms.
+    The largest residual over |matrix| |x| + |right| is returned too.
     """
     x = np.full(right.shape, np.nan)
     finite = np.asarray(np.isfinite(matrix).all(axis=(1, 2)))
     finite[finite] = np.linalg.det(matrix[finite]) != 0.0
     matrix, right = matrix[finite], right[finite]
-    x[finite] = np.linalg.solve(matrix, right)
-    x[finite] += np.linalg.solve(matrix, right - matrix @ x[finite])
+    x[finite] = solve_refined(matrix, right)
     terms = np.abs(matrix) @ np.abs(x[finite]) + np.abs(right)
     remaining = np.abs(right - matrix @ x[finite]) / np.where(terms == 0.0, 1.0, terms)
     return x, float(np.max(remaining, initial=0.0, where=np.isfinite(remaining)))

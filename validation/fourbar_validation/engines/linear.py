@@ -1,0 +1,27 @@
+"""Linear systems whose equations have terms of very different size."""
+
+import numpy as np
+
+from fourbar_validation.compare.answer import Array
+
+
+def solve_refined(matrix: Array, right: Array) -> Array:
+    """Solve linear systems by elimination and one step of refinement.
+
+    Elimination leaves in every unknown the rounding of the largest one: the
+    acceleration of a bar that is commanded to turn steadily gets that of the bar that
+    turns fastest. After the step each equation holds to the rounding of its own terms,
+    and an unknown that equations without the large ones fix keeps its digits.
+
+    Parameters
+    ----------
+    matrix : (..., n, n).
+    right : (n,), or (..., n, k).
+
+    Raises LinAlgError for a singular matrix.
+
+    Source: R. D. Skeel, Iterative refinement implies numerical stability for Gaussian
+    elimination, Mathematics of Computation 35 (1980).
+    """
+    x = np.linalg.solve(matrix, right)
+    return np.asarray(x + np.linalg.solve(matrix, right - matrix @ x))
