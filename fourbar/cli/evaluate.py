@@ -477,7 +477,8 @@ def equilibrium(scene: Path, as_json: bool, out: Path | None) -> None:
 
     with given.open_scene(scene) as described, show_running("zeros are sought"):
         rest = found(described)
-    given.print_to(
-        (write_equilibria_json if as_json else write_equilibria)(described.title, rest),
-        out,
-    )
+    if as_json:
+        text = write_equilibria_json(described.title, rest)
+    else:
+        text = write_equilibria(described.title, rest, given.suit_units())
+    given.print_to(text, out)

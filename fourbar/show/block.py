@@ -5,7 +5,6 @@ The duty in its JSON belongs to it.
 
 import math
 from collections.abc import Iterator
-from textwrap import wrap
 from typing import Any
 
 import numpy as np
@@ -27,6 +26,7 @@ from fourbar.show.duty import DUTY_UNITS, bearing_load, describe_drive
 from fourbar.show.gas import list_gas_notes
 from fourbar.show.position import PositionSheet
 from fourbar.show.summary import Facts, find_duty, locate_between, summarize
+from fourbar.show.tables import WIDTH, wrap_line
 from fourbar.show.units import (
     COMMON,
     DIGITS,
@@ -38,7 +38,6 @@ from fourbar.show.units import (
 )
 from fourbar.solution import Conversion, Solution, find_unit_in
 
-WIDTH = 80
 _TIED = "\u00a0"
 """Stands between a number and its unit until the lines are broken."""
 COLUMN = 12
@@ -109,7 +108,7 @@ class _Block:
         lines: list[str] = []
         for paragraph in filter(None, paragraphs):
             for line in [*([""] if lines else []), *paragraph]:
-                lines += [line] if len(line) <= WIDTH else _wrap(line)
+                lines += wrap_line(line)
         return [line.replace(_TIED, " ") for line in lines]
 
     def _write_loads(self, pressure: float | None) -> list[str]:
@@ -752,10 +751,6 @@ class _Block:
     @staticmethod
     def _row(label: str, text: str) -> str:
         return f"  {label:<{LABEL - 2}}{text}"
-
-
-def _wrap(line: str) -> list[str]:
-    return wrap(line, WIDTH, subsequent_indent="    ", break_on_hyphens=False)
 
 
 def _align(rows: list[tuple[str, list[str]]]) -> list[str]:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from fourbar.errors import clean_line
 from fourbar.formulas.mobility import (
     TURN,
     change_points,
@@ -30,11 +31,12 @@ from fourbar.show.gas import list_gas_notes
 from fourbar.show.tables import (
     MOST_ROWS,
     make_plain_table,
+    wrap_line,
     write_cells,
     write_table,
 )
 from fourbar.show.units import COMMON, choose_unit
-from fourbar.solution import Conversion, find_unit
+from fourbar.solution import Conversion, find_unit, find_unit_in
 from fourbar.studies.circuit_curve import RestPosition
 from fourbar.studies.derivatives import Sensitivity
 from fourbar.studies.equilibrium import Equilibria, Equilibrium
@@ -301,35 +303,66 @@ _EQUILIBRIUM_SCHEMA = "fourbar-equilibrium/1"
 _MOVES = {0: "stays", 1: "theta_2 grows", -1: "theta_2 falls"}
 
 
-def write_equilibria(title: str, rest: Equilibria) -> str:
+def write_equilibria(title: str, rest: Equilibria, units: Conversion = COMMON) -> str:
     """Write both tables as text.
 
     The branch that they name is the assembly, as a scene states it with the position.
+
+    `units`: units of the numbers; one that is left out is the SI unit.
     """
     rest = _name_assemblies(rest)
-    friction = bool(rest.held)
+    reached = [position for position in rest.found if position.reached]
+    others = [position for position in rest.found if not position.reached]
+    lines = _count_equilibria(rest, len(reached), units)
+    blocks = [_write_resting(title, lines, reached, units)]
+    if others:
+        line = (
+            f"{_write_count(len(others))} in the other assembly at angles theta_2 of"
+            " this sweep, which does not reach it"
+        )
+        blocks.append(_write_resting("", wrap_line(line), others, units))
+    blocks.append(write_table("", *_write_holding(rest, units)))
+    return "\n\n".join(block.rstrip("\n") for block in blocks) + "\n"
+
+
+def _write_resting(
+    title: str, lines: list[str], found: list[Equilibrium], units: Conversion
+) -> str:
+    """Write the table of some equilibria with its title and lines."""
+    if not found:
+        return "\n".join([*([clean_line(title)] if title else []), *lines])
+    torque = find_unit_in("N m", units)[0]
     heads = [
-        "theta_2 (deg)",
-        "theta_4 (deg)",
+        "theta_2\n(deg)",
+        "theta_4\n(deg)",
         "branch",
         "",
         "by",
-        "dQ/dq (N m/rad)",
-        "J (kg m^2)",
-        "frequency (Hz)",
+        f"dQ/dq\n({torque}/rad)",
+        f"J\n({_find_inertia_unit(units)[0]})",
+        "frequency\n(Hz)",
     ]
-    rows = [_write_equilibrium(position, friction=friction) for position in rest.found]
-    table = make_plain_table(
-        [*heads, *(["friction holds (deg)"] if friction else [])],
-        rows,
-        left=("branch", "", "by"),
-    )
-    text = (
-        write_table(title, _count_equilibria(rest), table)
-        if rows
-        else "\n".join([*([title] if title else []), *_count_equilibria(rest)])
-    )
-    return text.rstrip("\n") + "\n\n" + write_table("", *_write_holding(rest))
+    rows = [_write_equilibrium(position, units) for position in found]
+    table = make_plain_table(heads, rows, left=("branch", "", "by"))
+    held = [
+        f"friction holds {_write_range(position.held)} about theta_2 ="
+        f" {_write_degrees(position.place.theta_2)} deg"
+        for position in found
+        if position.held is not None
+    ]
+    return write_table(title, lines, table, held)
+
+
+def _find_inertia_unit(units: Conversion) -> tuple[str, float]:
+    """Return the unit of a moment of inertia and its factor from kg m^2.
+
+    It is that of pounds and inches where both are asked for, otherwise kg m^2.
+    """
+    if "kg" not in units or "m" not in units:
+        return "kg m^2", 1.0
+    mass, per_mass = units["kg"]
+    length, per_length = units["m"]
+    return f"{mass} {length}^2", per_mass * per_length**2
 
 
 def _name_assemblies(rest: Equilibria) -> Equilibria:
@@ -357,12 +390,16 @@ def _name_assemblies(rest: Equilibria) -> Equilibria:
     )
 
 
-def _count_equilibria(rest: Equilibria) -> list[str]:
-    count = len(rest.found)
+def _write_count(count: int) -> str:
+    return f"{count} equilibri{'um' if count == 1 else 'a'}"
+
+
+def _count_equilibria(rest: Equilibria, reached: int, units: Conversion) -> list[str]:
     grid = (
         f"found between {rest.samples} positions where Q changes its sign or touches 0"
     )
-    lines = [f"{count} equilibri{'um' if count == 1 else 'a'} without friction, {grid}"]
+    within = "" if reached == len(rest.found) else " in this sweep"
+    lines = [f"{_write_count(reached)}{within} without friction,", grid]
     if rest.not_decided:
         angles = " and ".join(
             f"theta_2 = {_write_degrees(place.theta_2)}" for place in rest.not_decided
@@ -380,17 +417,21 @@ def _count_equilibria(rest: Equilibria) -> list[str]:
         for ends in rest.held
         if all(position.held != ends for position in rest.found)
     ]
-    return lines + _list_notes(rest)
+    return [
+        part
+        for line in (*lines, *_list_notes(rest, units))
+        for part in wrap_line(line)
+    ]
 
 
-def _list_notes(rest: Equilibria) -> list[str]:
+def _list_notes(rest: Equilibria, units: Conversion) -> list[str]:
     """List where gas springs of the scene are beyond their stroke."""
     scene = rest.positions.scene
     assert scene is not None
-    return list_gas_notes(scene, rest.positions, COMMON)
+    return list_gas_notes(scene, rest.positions, units)
 
 
-def _write_holding(rest: Equilibria) -> tuple[list[str], Any]:
+def _write_holding(rest: Equilibria, units: Conversion) -> tuple[list[str], Any]:
     """Write what holds the scene's positions, thinned out to what can be read."""
     positions = rest.positions
     drive = read_drive(positions)
@@ -400,15 +441,12 @@ def _write_holding(rest: Equilibria) -> tuple[list[str], Any]:
         getattr(positions, drive.keys.high),
     )
     assert values is not None
-    heads, columns = (
-        ["theta_2 (deg)", f"{drive.name} ({drive.unit})"],
-        [np.degrees(positions.theta_2), values],
-    )
+    unit, factor = find_unit_in(drive.unit, units)
+    heads = ["theta_2 (deg)", f"{drive.name} ({unit})"]
+    columns = [np.degrees(positions.theta_2), factor * values]
     if low is not None and high is not None:
-        heads, columns = (
-            [heads[0], f"from ({drive.unit})", f"to ({drive.unit})"],
-            [columns[0], low, high],
-        )
+        heads = [heads[0], f"from ({unit})", f"to ({unit})"]
+        columns = [columns[0], factor * low, factor * high]
     still = np.isin(positions.status_code, (NOT_ASSEMBLED, SINGULAR))
     released = [
         status if no else _MOVES[move]
@@ -423,34 +461,27 @@ def _write_holding(rest: Equilibria) -> tuple[list[str], Any]:
         most = int(np.nanargmax(np.abs(values)))
         largest = "largest" if low is None else "largest without friction"
         lines.append(
-            f"{largest}: {values[most]:.6g} {drive.unit} at theta_2 ="
+            f"{largest}: {factor * values[most]:.6g} {unit} at theta_2 ="
             f" {_write_degrees(positions.theta_2[most])} deg"
         )
     return lines, make_plain_table([*heads, "released"], rows, left=("released",))
 
 
-def _write_equilibrium(equilibrium: Equilibrium, *, friction: bool) -> list[str]:
-    place, frequency = (
-        equilibrium.place,
-        "-" if equilibrium.frequency is None else f"{equilibrium.frequency:.10g}",
-    )
-    row = [
+def _write_equilibrium(equilibrium: Equilibrium, units: Conversion) -> list[str]:
+    place = equilibrium.place
+    frequency = equilibrium.frequency
+    slope = find_unit_in("N m", units)[1] * equilibrium.slope
+    inertia = _find_inertia_unit(units)[1] * equilibrium.inertia
+    return [
         _write_degrees(place.theta_2),
         _write_degrees(place.theta_4),
         BRANCH_NAMES.get(place.branch, "limit"),
         equilibrium.stability,
-    ]
-    row += [
         equilibrium.angle,
-        f"{equilibrium.slope:.6g}",
-        f"{equilibrium.inertia:.6g}",
-        frequency,
+        f"{slope:.6g}",
+        f"{inertia:.6g}",
+        "-" if frequency is None else f"{frequency:.9g}",
     ]
-    return row + (
-        [_write_range(equilibrium.held) if equilibrium.held else "-"]
-        if friction
-        else []
-    )
 
 
 def _write_range(ends: tuple[RestPosition, RestPosition]) -> str:
@@ -483,7 +514,7 @@ def write_equilibria_json(title: str, rest: Equilibria) -> str:
         indifferent=rest.indifferent,
         held=rest.held,
         not_decided=rest.not_decided,
-        notes=_list_notes(rest),
+        notes=_list_notes(rest, COMMON),
         positions={
             "drive_bar": positions.drive_bar,
             "status": positions.status,

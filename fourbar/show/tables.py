@@ -7,6 +7,7 @@ import io
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from textwrap import wrap
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -32,6 +33,8 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 
+WIDTH = 80
+"""Columns of a printed block."""
 MOST_DIGITS = 16
 """Largest number of significant digits of a double."""
 GAP = 2
@@ -63,6 +66,13 @@ def write_table(
     for part in (*([clean_line(title)] if title else []), *lines, shown, *after):
         console.print(Text(part) if isinstance(part, str) else part)
     return "\n".join(line.rstrip() for line in text.getvalue().split("\n"))
+
+
+def wrap_line(line: str) -> list[str]:
+    """Break a line that is wider than a block; what follows is indented."""
+    if len(line) <= WIDTH:
+        return [line]
+    return wrap(line, WIDTH, subsequent_indent="    ", break_on_hyphens=False)
 
 
 def make_plain_table(

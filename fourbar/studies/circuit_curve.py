@@ -13,6 +13,7 @@ All three vanish at change points alone.
 """
 
 import math
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -147,6 +148,10 @@ class CircuitCurve:
         if self.assembly:
             self.branches = (int(commanded.branch[0]),)
         self.low, self.high = (end - self.theta_1 for end in self.circuit.theta_2)
+        self.signs = with_signs(linkage, commanded).branch
+        """Sign of sin mu at each position of the command."""
+        self.places = commanded.theta_2 - self.theta_1
+        """psi at each position of the command."""
         stated = isinstance(scene.motion.angle, Sweep) or scene.motion.law is not None
         self.sweep = (
             (float(commanded.theta_2.min()), float(commanded.theta_2.max()))
@@ -173,6 +178,43 @@ class CircuitCurve:
         )
         away = psi - middle - TURN * np.rint((psi - middle) / TURN)
         return np.asarray(np.abs(away) <= half + radius + AT_END)
+
+    def reached(self, points: Array) -> NDArray[np.bool_]:
+        """Mark the points that the sweep passes, all of them without a sweep.
+
+        The others have the same theta_2 on the other side of a limit or change point
+        at which the sweep does not arrive.
+        """
+        if self.sweep is None:
+            return np.ones(len(points), dtype=bool)
+        sines = np.sin(points[:, 1])
+        passed = np.zeros(len(points), dtype=bool)
+        for low, high, sign in self._list_runs():
+            middle, half = 0.5 * (low + high), 0.5 * (high - low)
+            apart = np.abs(np.remainder(points[:, 0] - middle + math.pi, TURN) - math.pi)
+            here = (apart <= half + AT_END) & (sign * sines >= -AT_END)
+            passed |= here
+        return passed
+
+    def _list_runs(self) -> list[tuple[float, float, int]]:
+        """List the ranges of psi that the sweep passes with one sign of sin mu.
+
+        The sign changes at a limit or a change point between two positions.
+        """
+        between = np.array([self.low, self.high, *(psi for psi, _ in self.singular)])
+        changes = np.flatnonzero(np.diff(self.signs)) + 1
+        bounds = [0, *changes.tolist(), len(self.signs)]
+        runs = list[tuple[float, float, int]]()
+        for first, stop in pairwise(bounds):
+            psi = self.places[first:stop].tolist()
+            inner = [first] if first > 0 else []
+            if stop < len(self.signs):
+                inner.append(stop - 1)
+            for place in self.places[inner].tolist():
+                away = np.remainder(between - place + math.pi, TURN) - math.pi
+                psi.append(place + float(away[np.argmin(np.abs(away))]))
+            runs.append((min(psi), max(psi), int(self.signs[first])))
+        return runs
 
     def point(self, tau: Array, branch: int) -> Array:
         """Return psi and mu, (n, 2), at places of a row.

@@ -94,6 +94,10 @@ class Equilibrium(NamedTuple):
     """
     held: tuple[RestPosition, RestPosition] | None
     """Ends of the positions around it that dry friction holds; None: there are none."""
+    reached: bool
+    """True if the scene's sweep or law passes here, and where the scene has neither.
+    False: theta_2 is in the sweep, but the linkage is in its other assembly.
+    """
 
 
 class Equilibria(NamedTuple):
@@ -114,7 +118,9 @@ class Equilibria(NamedTuple):
     not_decided: tuple[RestPosition, ...]
     """Change points, nearer than 1e-4 rad to which nothing is decided."""
     held: tuple[tuple[RestPosition, RestPosition], ...]
-    """Ends of all ranges that dry friction holds, those without an equilibrium too."""
+    """Ends of all ranges that dry friction holds, those without an equilibrium too.
+    What the sweep does not reach is left out, here and of `indifferent`.
+    """
     positions: Solution
     """The scene's positions at rest. `torque` holds them; with friction anything from
     `torque_low` to `torque_high` does.
@@ -131,7 +137,8 @@ def equilibrium(scene: Scene) -> Equilibria:
     It tells whether they are stable, and what holds the others. The search covers the
     circuit of the scene's first position that assembles, on both branches where the
     circuit has both. If the scene states a sweep (of theta_2, of another bar or of a
-    stroke) or a motion law, the search stays within it. Speed, acceleration and drive
+    stroke) or a motion law, the search stays within the angles theta_2 of it, and
+    `reached` tells apart what the sweep itself passes. Speed, acceleration and drive
     of the scene play no part, nor does viscous damping. Zeros of the generalized force
     Q are sought between the positions of a grid (3600 a turn, and the ends of the
     sweep): where Q changes its sign, and where its size is least.
@@ -170,7 +177,10 @@ def equilibrium(scene: Scene) -> Equilibria:
             np.stack([psi, positions.branch * transmission(curve.ratios, psi)], axis=1),
         )
         sense[np.isin(positions.status_code, (NOT_ASSEMBLED, SINGULAR))] = 0
-        flat, ends = (tuple(part.ends for part in ranges) for ranges in (level, held))
+        flat, ends = (
+            tuple(part.ends for part in ranges if _is_reached(curve, part))
+            for ranges in (level, held)
+        )
         return Equilibria(
             tuple(equilibria), flat, len(samples), singular, ends, positions, sense
         )
@@ -226,8 +236,10 @@ def _describe(
     frequency = None
     if stability == "stable" and J > 0.0:
         frequency = math.sqrt(-slope / J) / TURN
+    reached = bool(curve.reached(point[None])[0])
+    place = curve.place(point)
     return Equilibrium(
-        curve.place(point), stability, f"theta_{bar}", slope, J, frequency, held
+        place, stability, f"theta_{bar}", slope, J, frequency, held, reached
     )
 
 
@@ -474,6 +486,13 @@ def _is_inside(curve: CircuitCurve, point: Array, part: _CircuitRange) -> bool:
     return bool(
         row[0] == part.row and np.remainder(tau[0] - part.low, TURN) <= part.width
     )
+
+
+def _is_reached(curve: CircuitCurve, part: _CircuitRange) -> bool:
+    """Return True if the scene's sweep passes an end or the middle of a range."""
+    tau = part.low + np.array([0.0, 0.5, 1.0]) * part.width
+    points = curve.point(tau, curve.rows[part.row])
+    return bool(curve.reached(points).any())
 
 
 def _find_edge(

@@ -14,8 +14,9 @@ import pytest
 import fourbar
 from fourbar.cli import status
 from fourbar.scene.motion import Law
-from fourbar.show.block import WIDTH, write_block, write_motor
+from fourbar.show.block import write_block, write_motor
 from fourbar.show.summary import summarize
+from fourbar.show.tables import WIDTH
 from fourbar.show.units import suit_units
 from fourbar.solving import find_last_stage
 from tests.support.scenes import CYLINDER, crank_rocker, thesis

@@ -33,6 +33,7 @@ from fourbar.cli import status
 from fourbar.effects import Place
 from fourbar.mjcf import write_mjcf
 from fourbar.scene.motion import Free
+from fourbar.show.tables import WIDTH
 from fourbar.studies.circuit_curve import SAMPLES, CircuitCurve
 from fourbar.studies.equilibrium import Equilibria, Equilibrium, equilibrium
 from tests.support.scenes import CYLINDER, crank_rocker
@@ -409,6 +410,79 @@ def test_a_sweep_bounds_the_search() -> None:
     assert equilibria.found[0].place.theta_2 == pytest.approx(
         -math.pi / 2 - 0.3, abs=CLOSE
     )
+
+
+def springy_table(**motion: object) -> Scene:
+    """A folding table on two legs, pressed up by torsion springs: a double rocker."""
+    bars = Bar(0.35, 0.6), Bar(0.45, 8.0), Bar(0.35, 0.6)
+    leg = 12.0, math.radians(120.0), 0.0
+    springs = Torsion.at(O2=leg, O4=leg)
+    return Scene(FourBar(0.5, *bars), Motion(**motion), effects=(DOWN, springs))  # type: ignore[arg-type]
+
+
+SWEPT = Sweep(math.radians(20.0), math.radians(140.0), 60)
+
+
+@pytest.mark.parametrize("branch", [1, -1])
+def test_what_a_sweep_does_not_reach_is_told_apart(branch: int) -> None:
+    """The other assembly has the same angles and an equilibrium among them."""
+    (rest,) = equilibrium(springy_table(theta_2=SWEPT, branch=branch)).found
+    assert rest.place.branch == -1
+    assert rest.reached == (branch == -1)
+    everywhere = equilibrium(springy_table(branch=branch)).found
+    assert all(rest.reached for rest in everywhere)
+
+
+def points_of(scene: Scene, low: float, high: float) -> np.ndarray:
+    """Return psi and mu where bar 4 turns between two angles, deg."""
+    sweep = Sweep(math.radians(low), math.radians(high), 977)
+    solution = fourbar.solve(replace(scene, motion=Motion(theta_4=sweep)), "position")
+    assert solution.assembled.all()
+    return np.stack([solution.theta_2, solution.theta_4 - solution.theta_3], axis=1)
+
+
+def test_a_sweep_of_another_bar_reaches_both_sides_of_a_limit_and_no_more() -> None:
+    """Bar 2 turns back at its limit, theta_4 = 196.4 deg, within the sweep."""
+    sweep = Sweep(math.radians(150.0), math.radians(230.0), 60)
+    scene = springy_table(theta_4=sweep)
+    curve = CircuitCurve(scene)
+    within = points_of(scene, 150.0, 230.0)
+    assert set(np.sign(np.sin(within[:, 1]))) == {1.0, -1.0}
+    assert curve.reached(within).all()
+    assert not curve.reached(points_of(scene, 60.0, 149.9)).any()
+    assert not curve.reached(points_of(scene, 230.1, 300.0)).any()
+
+
+def test_the_other_assembly_stands_apart_in_the_print(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    fourbar.save(springy_table(theta_2=SWEPT), tmp_path / "table.toml")
+    assert status(["equilibrium", str(tmp_path / "table.toml")]) == 0
+    first, second, _ = capsys.readouterr().out.split("\n\n")
+    assert first.startswith("0 equilibria in this sweep without friction,")
+    assert second.startswith("1 equilibrium in the other assembly at angles theta_2")
+    assert "138.3165" in second and "crossed" in second
+    assert max(map(len, [*first.splitlines(), *second.splitlines()])) <= WIDTH
+
+
+def test_equilibria_are_printed_in_the_units_of_the_file(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    scene = crank_as_pendulum(DOWN)
+    fourbar.save(scene, tmp_path / "metres.toml")
+    text = (tmp_path / "metres.toml").read_text()
+    ground = f'ground = "{0.3 / 0.0254!r} in"'
+    assert 'ground = "0.3 m"' in text
+    text = text.replace('ground = "0.3 m"', ground)
+    (tmp_path / "inches.toml").write_text(text)
+    assert status(["equilibrium", str(tmp_path / "inches.toml")]) == 0
+    printed = capsys.readouterr().out
+    assert "(lbf in/rad)" in printed and "(lb in^2)" in printed
+    pound, inch = 0.45359237, 0.0254
+    J = (INERTIA + M * R * R) / (pound * inch**2)
+    slope = M * 9.81 * R / (pound * 9.80665 * inch)
+    assert f"{J:.6g}" in printed and f"{slope:.6g}" in printed
+    assert "torque (lbf in)" in printed
 
 
 def crossings(time: np.ndarray, angle: np.ndarray, middle: float) -> float:
