@@ -8,6 +8,9 @@ import os
 import re
 import select
 import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, TextIO
@@ -17,6 +20,33 @@ if TYPE_CHECKING:
 
 LONGEST_SHOWN = 160
 """Characters of a value that an error repeats."""
+
+
+_UNITS = ContextVar[Mapping[str, tuple[str, float]]]("units of messages")
+"""Name and factor of the unit in which messages state numbers of each SI unit."""
+
+
+@contextmanager
+def state_messages_in(units: Mapping[str, tuple[str, float]]) -> Iterator[None]:
+    """Let messages that are written in the body state numbers in these units.
+
+    A reader compares them with the file, which is seldom in SI units.
+    """
+    token = _UNITS.set(units)
+    try:
+        yield
+    finally:
+        _UNITS.reset(token)
+
+
+def write_in_units(unit: str, *values: float) -> str:
+    """Write numbers of an SI unit in the unit of messages, which follows them.
+
+    >>> write_in_units("m", 0.0254, 0.3)
+    '0.0254, 0.3 m'
+    """
+    name, factor = _UNITS.get({}).get(unit, (unit, 1.0))
+    return ", ".join(f"{factor * value:.6g}" for value in values) + f" {name}"
 
 
 class FourBarError(Exception):
@@ -32,21 +62,32 @@ class InputError(FourBarError):
     value : what was given; None is not shown, as of an entry that is left out.
     allowed : one phrase that says what would have been accepted.
     file : the file it stands in, where there is one.
+    unit : SI unit of a value that is a number, or several. It is then shown in the unit
+        of messages.
     """
 
     def __init__(
-        self, key: str, value: object, allowed: str, file: str | None = None
+        self,
+        key: str,
+        value: object,
+        allowed: str,
+        file: str | None = None,
+        unit: str | None = None,
     ) -> None:
         self.key: str = key
         self.value: object = value
         self.allowed: str = allowed
         self.file: str | None = file
+        self.unit: str | None = unit
         # a reader wants 0.21, not np.float64(0.21); an interruption while numpy is
         # imported is one line too, so that this module does not import it
         numpy = sys.modules.get("numpy")
         if numpy is not None and isinstance(value, numpy.generic):
             value = value.item()
         shown = " ".join(repr(value).split())  # arrays take several lines
+        if unit is not None:
+            numbers = value if isinstance(value, tuple) else (value,)
+            shown = write_in_units(unit, *map(float, numbers))
         if len(shown) > LONGEST_SHOWN:  # of a long path the end says which
             shown = (
                 f"{shown[: LONGEST_SHOWN // 2 - 3]}...{shown[-LONGEST_SHOWN // 2 :]}"
@@ -58,11 +99,11 @@ class InputError(FourBarError):
 
     def __reduce__(self) -> tuple[type, tuple[object, ...]]:
         """Let the error cross from one process to another as it was made."""
-        return type(self), (self.key, self.value, self.allowed, self.file)
+        return type(self), (self.key, self.value, self.allowed, self.file, self.unit)
 
     def in_file(self, file: str) -> "InputError":
         """Return the same mistake with the name of the file that holds it."""
-        return InputError(self.key, self.value, self.allowed, file)
+        return InputError(self.key, self.value, self.allowed, file, self.unit)
 
 
 def expect(name: str, value: object, *kinds: type) -> None:

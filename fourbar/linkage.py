@@ -16,7 +16,7 @@ from typing import Any, ClassVar, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.errors import InputError
+from fourbar.errors import InputError, write_in_units
 from fourbar.quantities import PIN_FORCES
 
 BAR_NAMES = {1: "ground", 2: "input", 3: "coupler", 4: "output"}
@@ -376,11 +376,14 @@ class FourBar:
             )
         # exact sum: a linkage that closes by one rounding is still a linkage
         if math.fsum((*self.lengths, -2.0 * longest)) < 0.0:
+            others = math.fsum((*self.lengths, -longest))
             raise InputError(
                 "lengths",
                 self.lengths,
                 "the bars (ground, input, coupler, output) can never close: "
-                "the longest must not exceed the sum of the other three",
+                "the longest must not exceed the sum of the other three,"
+                f" {write_in_units('m', others)}",
+                unit="m",
             )
 
     @property

@@ -15,7 +15,7 @@ from fourbar.effects.effect import Actions
 from fourbar.effects.force_drive import ForceDrive
 from fourbar.effects.place import Place, require_ends
 from fourbar.effects.spring import COINCIDE
-from fourbar.errors import InputError
+from fourbar.errors import InputError, write_in_units
 from fourbar.formulas.arithmetic import Number, is_any
 from fourbar.formulas.motion import State
 from fourbar.formulas.path import NO_DIGIT_LEFT
@@ -73,7 +73,9 @@ class LinearDrive(ForceDrive):
                 " holds both"
             )
             raise InputError(
-                "drive.to", f"bar {self.end.bar} at {self.end.distance:g} m", allowed
+                "drive.to",
+                f"bar {self.end.bar} at {write_in_units('m', self.end.distance)}",
+                allowed,
             )
 
     def line(self, state: State) -> tuple[Number, Number]:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from fourbar.effects.effect import Actions, Effect
 from fourbar.effects.place import STATED_PLACES, Place, change_each, require_ends
-from fourbar.errors import InputError, expect
+from fourbar.errors import InputError, expect, write_in_units
 from fourbar.formulas.arithmetic import is_any, select
 from fourbar.formulas.motion import State
 from fourbar.linkage import (
@@ -110,13 +110,16 @@ class Spring:
             raise InputError(
                 f"{key}.stroke",
                 stroke,
-                f"must be less than the extended length, {extended:.6g} m",
+                "must be less than the extended length,"
+                f" {write_in_units('m', extended)}",
+                unit="m",
             )
         if last < first:
             raise InputError(
                 f"{key}.compressed_force",
                 last,
-                f"must be no less than the extended_force, {first:.6g} N",
+                f"must be no less than the extended_force, {write_in_units('N', first)}",
+                unit="N",
             )
         return cls(start, end, (last - first) / stroke, extended, -first, stroke)
 

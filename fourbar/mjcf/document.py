@@ -11,7 +11,13 @@ import numpy as np
 
 from fourbar.effects import LinearDrive
 from fourbar.effects.effect import PinRows
-from fourbar.errors import InputError, LimitError, NotAssembledError, clean_line
+from fourbar.errors import (
+    InputError,
+    LimitError,
+    NotAssembledError,
+    clean_line,
+    write_in_units,
+)
 from fourbar.formulas.mobility import change_points, choose_range, turns_fully
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, FourBar, uniform
 from fourbar.mjcf.model import (
@@ -428,7 +434,8 @@ class WindowMotion:
         squared = self.omega**2 + 2.0 * self.alpha * angle
         if squared <= 0.0:
             raise LimitError(
-                f"alpha_2 brings the input to rest before theta_2 = {theta_2:.6g} rad"
+                "alpha_2 brings the input to rest before theta_2 ="
+                f" {write_in_units('rad', theta_2)}"
             )
         return (
             2.0 * angle / (self.omega + math.copysign(math.sqrt(squared), self.omega))

@@ -8,7 +8,7 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from fourbar.errors import InputError
+from fourbar.errors import InputError, write_in_units
 from fourbar.linkage import BAR_NAMES, FIRST_PIN, MOVING_BARS, PINS, FourBar
 
 if TYPE_CHECKING:
@@ -263,7 +263,8 @@ def require_carriable(linkage: FourBar) -> None:
         bar = linkage.bar(number)
         for key, value in (("mass", bar.mass), ("inertia", bar.moment_of_inertia)):
             if value < FLOOR:
-                instead = f'mass = "{enough:.2g} kg" ({part}) and no inertia stated'
+                mass = write_in_units("kg", float(f"{enough:.2g}"))
+                instead = f'mass = "{mass}" ({part}) and no inertia stated'
                 allowed = (
                     "MuJoCo cannot carry a massless bar; "
                     f"with {instead} the simulation holds, and hardly a force moves"

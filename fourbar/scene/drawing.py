@@ -40,6 +40,7 @@ class DrawnPins:
                     f"pins.{second}",
                     self.place(second),
                     f"lies where {first} does: {name}",
+                    unit="m",
                 )
         size = max(abs(self.vector(bar)) for bar in BAR_NAMES)
         across = (

@@ -12,7 +12,13 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from fourbar.errors import DependencyError, InputError, expect, say_install
+from fourbar.errors import (
+    DependencyError,
+    InputError,
+    expect,
+    say_install,
+    write_in_units,
+)
 from fourbar.formulas.mobility import TURN
 from fourbar.linkage import (
     A_BRANCH,
@@ -613,10 +619,9 @@ def _require_command(
     if speed is not None:
         speed = require(f"motion.{omega}", speed, per_second)
         if not math.isfinite(speed * speed):
-            allowed = (
-                f"must be below {FASTEST:.4g} rad/s: every acceleration has its square"
-            )
-            raise InputError(f"motion.{omega}", speed, allowed)
+            fastest = write_in_units(per_second, FASTEST)
+            allowed = f"must be below {fastest}: every acceleration has its square"
+            raise InputError(f"motion.{omega}", speed, allowed, unit=per_second)
     return angle, speed, require(f"motion.{alpha}", acceleration, growth)
 
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from fourbar.effects.effect import Effect
 from fourbar.effects.place import change_each, settler
-from fourbar.errors import InputError, LimitError, expect
+from fourbar.errors import InputError, LimitError, expect, write_in_units
 from fourbar.formulas.arithmetic import (
     PI_LOW,
     Number,
@@ -600,7 +600,9 @@ def command_at(scene: Scene, places: Array) -> Command:
             raise InputError(
                 "motion.stroke",
                 stroke,
-                f"this cylinder can have {least:.6g} to {most:.6g} m",
+                f"this cylinder can have {write_in_units('m', least)} to"
+                f" {write_in_units('m', most)}",
+                unit="m",
             )
         return command_stroke(scene, places, motion.speed, motion.acceleration)
     branch = np.full(places.shape, motion.branch, dtype=np.int8)

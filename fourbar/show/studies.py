@@ -418,9 +418,7 @@ def _count_equilibria(rest: Equilibria, reached: int, units: Conversion) -> list
         if all(position.held != ends for position in rest.found)
     ]
     return [
-        part
-        for line in (*lines, *_list_notes(rest, units))
-        for part in wrap_line(line)
+        part for line in (*lines, *_list_notes(rest, units)) for part in wrap_line(line)
     ]
 
 

@@ -191,7 +191,9 @@ class CircuitCurve:
         passed = np.zeros(len(points), dtype=bool)
         for low, high, sign in self._list_runs():
             middle, half = 0.5 * (low + high), 0.5 * (high - low)
-            apart = np.abs(np.remainder(points[:, 0] - middle + math.pi, TURN) - math.pi)
+            apart = np.abs(
+                np.remainder(points[:, 0] - middle + math.pi, TURN) - math.pi
+            )
             here = (apart <= half + AT_END) & (sign * sines >= -AT_END)
             passed |= here
         return passed

@@ -9,7 +9,7 @@ import numpy as np
 from fourbar.effects import Gravity, Springs
 from fourbar.effects.effect import PinRows
 from fourbar.effects.place import STATED_PLACES
-from fourbar.errors import InputError, expect
+from fourbar.errors import InputError, expect, write_in_units
 from fourbar.linkage import (
     ANY,
     AT_LEAST_ZERO,
@@ -253,7 +253,8 @@ def find_misfit(scene: Scene, entry: SceneNumber, tolerance: Tolerance) -> str |
         )
     if entry.bound != ANY and tolerance.reach >= number:
         three = "three sigma of it " if tolerance.sigma else ""
-        return f"{three}must be less than the number itself, {number:.6g} {entry.unit}"
+        itself = write_in_units(entry.unit, number)
+        return f"{three}must be less than the number itself, {itself}"
     return None
 
 

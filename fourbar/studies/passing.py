@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.errors import InputError, NotAssembledError
+from fourbar.errors import InputError, NotAssembledError, write_in_units
 from fourbar.formulas.mobility import TURN, find_intervals
 from fourbar.quantities import Array
 from fourbar.scene import Command, Scene, command, command_at
@@ -189,10 +189,9 @@ def _bisect(gap: Callable[[float], float], low: float, high: float) -> float:
 
 def _never_passed(name: str, value: float, values: Array) -> NotAssembledError:
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
-    factor, unit = (math.degrees(1.0), "deg") if name in ANGLES else (1.0, "m")
     return NotAssembledError(
         f"{_say(name, value)}: the motion does not pass it; it stays within "
-        f"{factor * low:.6g} and {factor * high:.6g} {unit}"
+        f"{_write_place(name, low)} and {_write_place(name, high)}"
     )
 
 
@@ -204,9 +203,13 @@ def _require_values(values: Array | None, name: str) -> Array:
 
 def _say(name: str, value: float) -> str:
     """Say a place as the command line has it."""
+    return f"at {name} = {_write_place(name, value)}"
+
+
+def _write_place(name: str, value: float) -> str:
     if name in ANGLES:
-        return f"at {name} = {math.degrees(value):.6g} deg"
-    return f"at {name} = {value:.6g} {'s' if name == 'time' else 'm'}"
+        return f"{math.degrees(value):.6g} deg"
+    return write_in_units("s" if name == "time" else "m", value)
 
 
 def _find_released(scene: Scene, name: str, value: float) -> Command:
