@@ -39,14 +39,23 @@ def state_messages_in(units: Mapping[str, tuple[str, float]]) -> Iterator[None]:
         _UNITS.reset(token)
 
 
-def write_in_units(unit: str, *values: float) -> str:
+def name_unit(unit: str, otherwise: str | None = None) -> str:
+    """Return the unit of messages for an SI unit.
+
+    `otherwise`: the unit where messages have none for it; left out: the SI unit.
+    """
+    return _UNITS.get({}).get(unit, (otherwise or unit, 1.0))[0]
+
+
+def write_in_units(unit: str, *values: float, digits: int = 6) -> str:
     """Write numbers of an SI unit in the unit of messages, which follows them.
 
     >>> write_in_units("m", 0.0254, 0.3)
     '0.0254, 0.3 m'
     """
     name, factor = _UNITS.get({}).get(unit, (unit, 1.0))
-    return ", ".join(f"{factor * value:.6g}" for value in values) + f" {name}"
+    numbers = ", ".join(f"{factor * value:.{digits}g}" for value in values)
+    return f"{numbers} {name}".rstrip()
 
 
 class FourBarError(Exception):
@@ -103,7 +112,11 @@ class InputError(FourBarError):
 
     def in_file(self, file: str) -> "InputError":
         """Return the same mistake with the name of the file that holds it."""
-        return InputError(self.key, self.value, self.allowed, file, self.unit)
+        return self.moved_to(self.key, file)
+
+    def moved_to(self, key: str, file: str | None) -> "InputError":
+        """Return the same mistake at another key, of a file."""
+        return InputError(key, self.value, self.allowed, file, self.unit)
 
 
 def expect(name: str, value: object, *kinds: type) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from fourbar.cli import given
-from fourbar.errors import InputError, NotAssembledError
+from fourbar.errors import InputError, NotAssembledError, state_messages_in
 from fourbar.linkage import POSITIVE
 from fourbar.scene import Scene
 from fourbar.solution import DEGREES, SI, Array, Conversion, Solution
@@ -37,7 +37,7 @@ def classify(
     """
     from fourbar.linkage import Bar, FourBar
     from fourbar.show.studies import write_type, write_type_json
-    from fourbar.show.units import suit_units
+    from fourbar.show.units import suit_units, units_of_length
 
     ratios = [given.is_bare(text) for text in lengths]
     if any(ratios) and not all(ratios):
@@ -47,8 +47,10 @@ def classify(
             "must be four ratios, or four lengths each with its unit",
         )
     d, a, b, c = given.read_lengths(lengths)
-    linkage = FourBar(d, Bar(a), Bar(b), Bar(c))
     units = None if all(ratios) else suit_units(lengths[0])
+    ratios_only = {"m": ("", 1.0)}
+    with state_messages_in(ratios_only if all(ratios) else units_of_length(lengths[0])):
+        linkage = FourBar(d, Bar(a), Bar(b), Bar(c))
     lines = write_type(linkage, units, everything=everything)
     given.print_to(
         write_type_json(linkage) if as_json else "\n".join([*lines, ""]), out
@@ -88,6 +90,7 @@ def new(
     Each number has a unit, like 300mm; or --unit mm is the unit of all.
     """
     from fourbar.files.scene_text import write_drawn_scene, write_new_scene
+    from fourbar.show.units import units_of_length
     from fourbar.writing import STANDARD_STREAM, write_text
 
     if (lengths is None) == (pins is None):
@@ -103,9 +106,14 @@ def new(
         )
     if lengths is not None:
         texts = [_add_unit("--lengths", text, unit) for text in lengths]
-        write_text(file, write_new_scene(texts))
+        with state_messages_in(units_of_length(texts[0])):
+            scene = write_new_scene(texts)
+        write_text(file, scene)
     elif pins is not None:
-        write_text(file, write_drawn_scene(_read_pins(pins, unit)))
+        places = _read_pins(pins, unit)
+        with state_messages_in(units_of_length(places["A"][0])):
+            scene = write_drawn_scene(places)
+        write_text(file, scene)
     if file == STANDARD_STREAM:
         return
     # to be copied into any shell
@@ -357,9 +365,11 @@ def _list_chosen(columns: "list[Column]", units: Conversion) -> dict[str, Array]
 
 
 def _assembles_nowhere(path: Path, scene: Scene) -> NotAssembledError:
+    from fourbar.studies.passing import say_range
+
     return NotAssembledError(
         f"{path}: motion.{scene.motion.commanded}: the linkage assembles at none of the"
-        " positions requested"
+        f" positions requested; {say_range(scene)}"
     )
 
 

@@ -10,7 +10,12 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from fourbar.cli import given
-from fourbar.errors import DependencyError, InputError, say_install
+from fourbar.errors import (
+    DependencyError,
+    InputError,
+    say_install,
+    state_messages_in,
+)
 from fourbar.scene import Scene
 from fourbar.solution import Conversion
 
@@ -73,13 +78,15 @@ def _describe(
             yield described
         return
     from fourbar.mjcf import list_defaults, make_scene
+    from fourbar.show.units import units_of_length
     from fourbar.writing import STANDARD_STREAM
 
     assert lengths is not None
     speed = {}
     if omega is not None:
         speed["omega"] = given.read_number("--omega", omega, "rad/s")
-    made = make_scene(*given.read_lengths(lengths), **speed)
+    with state_messages_in(units_of_length(lengths[0])):
+        made = make_scene(*given.read_lengths(lengths), **speed)
     yield made
     to_output = out == STANDARD_STREAM
     for line in list_defaults(made):

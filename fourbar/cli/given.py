@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from fourbar.errors import InputError
+from fourbar.errors import InputError, state_messages_in
 from fourbar.linkage import ANY, POSITIVE, require
 from fourbar.scene import Scene
 from fourbar.solution import Conversion
@@ -123,20 +123,22 @@ def open_scene(path: Path) -> Iterator[Scene]:
     """
     from fourbar.files import loads, read_text
     from fourbar.scene.motion import require_steps
+    from fourbar.show.units import units_of_text
     from fourbar.writing import require_file
 
     context, text = click.get_current_context(), read_text(path)
     context.meta[_SCENE_TEXT] = text
-    scene, out = loads(text, str(path)), context.params.get("out")
-    if out is not None:
-        require_file(out, path)
-    require_steps(scene.motion, MOST_POSITIONS, "here", str(path))
-    try:
-        yield scene
-    except InputError as error:
-        if error.file is None and error.key.startswith(_KEYS_OF_A_SCENE):
-            raise error.in_file(str(path)) from None
-        raise
+    with state_messages_in(units_of_text(text)):
+        scene, out = loads(text, str(path)), context.params.get("out")
+        if out is not None:
+            require_file(out, path)
+        require_steps(scene.motion, MOST_POSITIONS, "here", str(path))
+        try:
+            yield scene
+        except InputError as error:
+            if error.file is None and error.key.startswith(_KEYS_OF_A_SCENE):
+                raise error.in_file(str(path)) from None
+            raise
 
 
 @contextmanager
@@ -163,11 +165,9 @@ def read_lengths(texts: tuple[str, ...]) -> list[float]:
 
 def suit_units() -> Conversion:
     """Return the units that suit the file of `open_scene`."""
-    import tomllib
+    from fourbar.show.units import units_of_text
 
-    from fourbar.show.units import units_of_scene
-
-    return units_of_scene(tomllib.loads(click.get_current_context().meta[_SCENE_TEXT]))
+    return units_of_text(click.get_current_context().meta[_SCENE_TEXT])
 
 
 def is_bare(text: str) -> bool:

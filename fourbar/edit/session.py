@@ -16,7 +16,7 @@ import numpy as np
 from fourbar.edit.document import SceneDocument, list_offers, name_entry
 from fourbar.edit.dragging import Dragged, drag, parse_place, put_place, write_rounded
 from fourbar.edit.exports import Exports, evaluate_scene
-from fourbar.errors import FourBarError, InputError
+from fourbar.errors import FourBarError, InputError, state_messages_in
 from fourbar.files import loads, read_text
 from fourbar.files.drawing import DRAWN
 from fourbar.files.fields import Reader
@@ -26,7 +26,7 @@ from fourbar.linkage import PINS, POSITIVE
 from fourbar.quantities.units import UnitError, find_unit, to_si
 from fourbar.scene import Scene
 from fourbar.scene.motion import COMMANDS, SIDES, STROKE_COMMAND, require_steps
-from fourbar.show.units import find_length, units, units_of_scene
+from fourbar.show.units import find_length, units, units_of_scene, units_of_text
 from fourbar.solution import Conversion, Solution, find_unit_in
 from fourbar.solving import solve
 from fourbar.studies.keys import list_entries, read_place
@@ -204,7 +204,8 @@ class Session:
             raise InputError(
                 "scene file", len(text), f"must not exceed {LARGEST_FILE} bytes"
             )
-        scene = loads(text, str(self.path))
+        with state_messages_in(units_of_text(text)):
+            scene = loads(text, str(self.path))
         require_steps(scene.motion, MOST_POSITIONS, "in the workbench", str(self.path))
         return SceneState(text, scene, tomllib.loads(text))
 

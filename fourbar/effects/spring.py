@@ -27,8 +27,11 @@ COINCIDE = 16.0 * 2.0**-52
 """Part of the paths from O2, bar by bar, below which two points count as one. There is
 no direction between them.
 """
+STROKE = Declared("m", POSITIVE)
+"""By how much a gas spring can be shortened."""
 GAS = {
-    **dict.fromkeys(("extended", "stroke"), Declared("m", POSITIVE)),
+    "extended": Declared("m", POSITIVE),
+    "stroke": STROKE,
     **dict.fromkeys(
         ("extended_force", "compressed_force"), Declared("N", AT_LEAST_ZERO)
     ),
@@ -74,6 +77,14 @@ class Spring:
         ):
             object.__setattr__(self, name, point)
         check_numbers(self, "effects.springs")
+        if self.stroke is not None:
+            key = "effects.springs.stroke"
+            stroke = require(key, self.stroke, *STROKE[:2])
+            if stroke >= self.length:
+                longest = write_in_units("m", self.length)
+                allowed = f"must be less than the length, {longest}"
+                raise InputError(key, stroke, allowed, unit="m")
+            object.__setattr__(self, "stroke", stroke)
 
     @classmethod
     def gas(
@@ -118,7 +129,8 @@ class Spring:
             raise InputError(
                 f"{key}.compressed_force",
                 last,
-                f"must be no less than the extended_force, {write_in_units('N', first)}",
+                "must be no less than the extended_force,"
+                f" {write_in_units('N', first)}",
                 unit="N",
             )
         return cls(start, end, (last - first) / stroke, extended, -first, stroke)

@@ -9,7 +9,7 @@ import re
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from fourbar.errors import InputError
+from fourbar.errors import InputError, name_unit
 from fourbar.linkage import ANY, REQUIRED, Declared, is_within
 from fourbar.quantities.units import UNIT_MISSING, UnitError, to_si
 
@@ -140,7 +140,7 @@ class Reader:
             return default
         if unit == "1":
             return self.number(key, value)
-        wanted = f"must be {bound} {self.QUANTITY.format(unit)}"
+        wanted = f"must be {bound} {self.QUANTITY.format(name_unit(unit))}"
         number = self.in_si(key, value, unit, wanted)
         if not is_within(number, bound):
             raise self.refuse(key, value, wanted)
@@ -148,8 +148,9 @@ class Reader:
 
     def in_si(self, key: str, value: object, unit: str, wanted: str) -> float:
         """Convert a text with a unit to a number in `unit`."""
+        likely = name_unit(unit, _LIKELY.get(unit))
         if isinstance(value, (int, float)) and not isinstance(value, bool):
-            like = f"{value:.6g} {_LIKELY.get(unit, unit)}"
+            like = f"{value:.6g} {likely}"
             missing = f'the unit is missing; did you mean "{like}"? {wanted}'
             raise self.refuse(key, value, missing)
         if value == "drawn":
@@ -164,7 +165,7 @@ class Reader:
             if unit == "rad" and value.casefold() in DIRECTIONS:
                 hint = f'did you mean "{DIRECTIONS[value.casefold()]}"? '
             elif str(error) == UNIT_MISSING:
-                hint = f'did you mean "{value.strip()} {_LIKELY.get(unit, unit)}"? '
+                hint = f'did you mean "{value.strip()} {likely}"? '
             raise self.refuse(key, value, f"{error}; {hint}{wanted}") from None
 
     def declared(self, key: str, value: object, by: Declared) -> Any:
@@ -200,9 +201,8 @@ class Reader:
     def quantities(self, key: str, value: object, unit: str) -> tuple[float, ...]:
         """Read a list of numbers with units, in `unit`."""
         if not isinstance(value, list):
-            raise self.refuse(
-                key, value, f"must be a list like {self.QUANTITIES.format(unit)}"
-            )
+            form = self.QUANTITIES.format(name_unit(unit))
+            raise self.refuse(key, value, f"must be a list like {form}")
         return tuple(
             self.quantity(f"{key}[{index}]", entry, unit)
             for index, entry in enumerate(value)
@@ -220,12 +220,9 @@ class Reader:
             self.coordinates[key] = x, y
             return convert_to_polar(x, y)
         if not isinstance(value, list) or len(value) != 2:
-            form = self.COORDINATES.format(unit)
-            raise self.refuse(
-                key,
-                value,
-                f"must be a pair like {self.POLAR.format(unit)} {form}".strip(),
-            )
+            named = name_unit(unit)
+            polar, form = self.POLAR.format(named), self.COORDINATES.format(named)
+            raise self.refuse(key, value, f"must be a pair like {polar} {form}".strip())
         return (
             self.quantity(f"{key}[0]", value[0], unit),
             self.quantity(f"{key}[1]", value[1], "rad"),

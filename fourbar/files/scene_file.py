@@ -30,7 +30,7 @@ from fourbar.effects import (
 from fourbar.effects.effect import PinRows
 from fourbar.effects.load import FRAMES
 from fourbar.effects.place import AT_FIRST_PIN, STATED_PLACES, settler
-from fourbar.effects.spring import GAS
+from fourbar.effects.spring import GAS, STROKE
 from fourbar.errors import InputError, expect
 from fourbar.files.drawing import (
     choose_assembly,
@@ -495,9 +495,7 @@ def _read_load(read: Reader, key: str, value: object, bars: Mapping[str, int]) -
     try:
         return Load(**place._asdict(), **stated, frame=frame, table=table)
     except InputError as error:  # which knows of one load alone
-        raise read.refuse(
-            error.key.replace("loads", key), error.value, error.allowed
-        ) from None
+        raise error.moved_to(error.key.replace("loads", key), read.file) from None
 
 
 def _read_effect(
@@ -545,7 +543,7 @@ def _read_springs(
     springs = []
     for index, entry in enumerate(value):
         path = f"{key}[{index}]"
-        row = read.table(path, entry, ("from", "to", *Spring.numbers, "gas"))
+        row = read.table(path, entry, ("from", "to", *Spring.numbers, "stroke", "gas"))
         start, end = _read_ends(read, path, row, bars)
         if gas := "gas" in row:
             read.table(path, entry, ("from", "to", "gas"))
@@ -557,6 +555,9 @@ def _read_springs(
             )
         else:
             stated = read.numbers(path, row, Spring.numbers)
+            if "stroke" in row:
+                stroke = read.declared(f"{path}.stroke", row["stroke"], STROKE)
+                stated["stroke"] = stroke
         try:
             springs.append(
                 Spring.gas(start, end, **stated)
@@ -564,9 +565,7 @@ def _read_springs(
                 else Spring(start, end, **stated)
             )
         except InputError as error:  # which knows of one spring alone
-            raise read.refuse(
-                error.key.replace(key, path), error.value, error.allowed
-            ) from None
+            raise error.moved_to(error.key.replace(key, path), read.file) from None
     return Springs(tuple(springs))
 
 

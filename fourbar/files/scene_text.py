@@ -36,6 +36,7 @@ from fourbar.files.fields import (
     write_quantity,
 )
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, PINS, POSITIVE, Bar, FourBar
+from fourbar.quantities.units import IMPERIAL, find_unit, to_si
 from fourbar.scene import Scene
 from fourbar.scene.drawing import DrawnPins
 from fourbar.scene.motion import BRANCH_NAMES, FromLimit, Law, Motion, Rise, Sweep
@@ -80,6 +81,7 @@ def dump(scene: Scene) -> str:
         point.name: {"bar": point.bar, **write_numbers(point)} for point in scene.points
     }
     bars = described["bars"]
+    _add_strokes(described["effects"], scene)
     for picture in scene.pictures:
         bars.setdefault(BAR_NAMES[picture.bar], {})["picture"] = picture.name
     _restore_coordinates({**described, "points": points}, scene.coordinates)
@@ -95,6 +97,19 @@ def dump(scene: Scene) -> str:
         ("tolerances", _write_tolerances(scene)),
     ]
     return "\n".join(_write_table(name, entries) for name, entries in tables if entries)
+
+
+def _add_strokes(effects: dict[str, Any], scene: Scene) -> None:
+    """Add the strokes of gas springs.
+
+    They change no force, and a guest is told of forces alone.
+    """
+    for effect in scene.effects:
+        if not isinstance(effect, Springs):
+            continue
+        for entry, spring in zip(effects[effect.key], effect.springs, strict=True):
+            if spring.stroke is not None:
+                entry["stroke"] = write_quantity(spring.stroke, "m")
 
 
 def _write_lengths(
@@ -377,7 +392,8 @@ def write_new_scene(lengths: tuple[str, ...] | list[str]) -> str:
     FourBar(d, Bar(a), Bar(b), Bar(c))
     lines = "\n".join(f"{name} = {_quote(text)}" for name, text in stated)
     lines = f'[lengths]\n{lines}\nground_angle = "0 deg"  # from O2 to O4'
-    return _fill_in(lines, (a, b, c), _BRANCH_LINE)
+    unit = find_unit(stated[0][1], "m")
+    return _fill_in(lines, (a, b, c), _BRANCH_LINE, unit)
 
 
 _BRANCH_LINE = '# branch = "crossed"  # left out: open\n'
@@ -395,7 +411,8 @@ def write_drawn_scene(pins: dict[str, tuple[str, str]]) -> str:
     rows = (f"{pin} = [{_quote(x)}, {_quote(y)}]" for pin, (x, y) in pins.items())
     lines = "\n".join(["[pins]  # x and y in the position that is drawn", *rows])
     a, b, c = (drawing.length(bar) for bar in MOVING_BARS)
-    return _fill_in(lines, (a, b, c), "")
+    unit = find_unit(pins["A"][0], "m")
+    return _fill_in(lines, (a, b, c), "", unit)
 
 
 def _quote(text: str) -> str:
@@ -407,10 +424,55 @@ def _quote(text: str) -> str:
     return json.dumps(f"{inches[1]} in" if inches else text, ensure_ascii=False)
 
 
-def _fill_in(lines: str, lengths: tuple[float, float, float], branch: str) -> str:
-    """Fill in the template of a new scene file; each bar weighs 1 kg/m."""
-    a, b, c = (float(f"{length:.12g}") for length in lengths)
+_METRIC_EXAMPLES = {
+    "pound": "kg",
+    "long": "m",
+    "per_length": "1",
+    "inertia": "0.01 kg m^2",
+    "force": "10 N",
+    "gravity": "9.81 m/s^2",
+    "damping": "0.01 N m s/rad",
+}
+"""What the comments of a new file show, and its gravity."""
+_EXAMPLES = {
+    unit: {**_METRIC_EXAMPLES, "centre": centre, "place": place, "moment": moment}
+    for unit, centre, place, moment in (
+        ("mm", "100 mm", "50 mm", "150 N mm"),
+        ("cm", "10 cm", "5 cm", "15 N cm"),
+        ("m", "0.1 m", "0.05 m", "0.15 N m"),
+    )
+}
+"""Examples by the unit of the lengths; another unit has those of metres."""
+_IMPERIAL_EXAMPLES = {
+    "pound": "lb",
+    "long": "in",
+    "per_length": "0.05",
+    "inertia": "30 lb in^2",
+    "force": "2 lbf",
+    "gravity": "386.09 in/s^2",
+    "damping": "0.1 lbf in s/rad",
+    "centre": "4 in",
+    "place": "2 in",
+    "moment": "1.5 lbf in",
+}
+"""Examples for lengths in inches or feet."""
+
+
+def _fill_in(
+    lines: str, lengths: tuple[float, float, float], branch: str, unit: str
+) -> str:
+    """Fill in the template of a new scene file; each bar weighs 1 kg/m or 0.05 lb/in.
+
+    `unit`: of its lengths, in which the comments are too.
+    """
+    examples = _EXAMPLES.get(unit, _EXAMPLES["m"])
+    if unit.casefold() in IMPERIAL:
+        examples = _IMPERIAL_EXAMPLES
+    length = to_si(f"1 {examples['long']}", "m")
+    per_metre = float(examples["per_length"]) / length
+    masses = (f"{float(f'{per_metre * x:.12g}')!r}" for x in lengths)
+    moving = zip(("input", "coupler", "output"), masses, strict=True)
     text = files("fourbar.files").joinpath("new.toml").read_text(encoding="utf-8")
     return Template(text).substitute(
-        linkage=lines, input=repr(a), coupler=repr(b), output=repr(c), branch=branch
+        linkage=lines, branch=branch, **dict(moving), **examples
     )

@@ -261,7 +261,10 @@ def require_carriable(linkage: FourBar) -> None:
     )
     for number in MOVING_BARS:
         bar = linkage.bar(number)
-        for key, value in (("mass", bar.mass), ("inertia", bar.moment_of_inertia)):
+        for key, value, unit in (
+            ("mass", bar.mass, "kg"),
+            ("inertia", bar.moment_of_inertia, "kg m^2"),
+        ):
             if value < FLOOR:
                 mass = write_in_units("kg", float(f"{enough:.2g}"))
                 instead = f'mass = "{mass}" ({part}) and no inertia stated'
@@ -269,7 +272,8 @@ def require_carriable(linkage: FourBar) -> None:
                     "MuJoCo cannot carry a massless bar; "
                     f"with {instead} the simulation holds, and hardly a force moves"
                 )
-                raise InputError(f"bars.{BAR_NAMES[number]}.{key}", value, allowed)
+                name = f"bars.{BAR_NAMES[number]}.{key}"
+                raise InputError(name, value, allowed, unit=unit)
 
 
 class Model:

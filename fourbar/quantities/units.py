@@ -82,6 +82,8 @@ UNIT = re.compile(
 parser, no tower of powers. Names are taken whole (`++`), so that a text which does not
 fit is refused in one pass.
 """
+IMPERIAL = ("in", "inch", "inches", "ft", "foot", "feet")
+"""Units of a length with which a scene is shown in imperial units."""
 _LONGEST_UNIT = 60
 UNIT_MISSING = "the unit is missing"
 """Reason of the error for a number alone."""

@@ -28,8 +28,9 @@ from fourbar.formulas.mobility import (
     MARGIN,
     choose_range,
     find_limit_angles,
+    turns_fully,
 )
-from fourbar.formulas.path import prepare_path
+from fourbar.formulas.path import count_turns, prepare_path
 from fourbar.formulas.position import Loop
 from fourbar.linkage import BAR_NAMES, FourBar, copy_with, require_bar
 from fourbar.quantities import Array
@@ -507,8 +508,10 @@ def _reverse(point: "Place") -> Any:
 def default_places(scene: Scene, holding: float | None = None) -> Array:
     """List the angles or strokes that are swept if a scene names none, (n,).
 
-    The angles are those of the range that holds one.
+    The angles are those of the range that holds one. With a single change point they
+    go through two turns, after which the assembly repeats.
     """
+    steps = DEFAULT_STEPS
     if scene.motion.stroke is not None:
         triangle, half = (
             _find_triangle(scene.linkage, scene.settled_drive()),
@@ -519,8 +522,12 @@ def default_places(scene: Scene, holding: float | None = None) -> Array:
             triangle.length - triangle.reach, twice_mean * np.sin(half)
         ).tolist()
     else:
-        first, last = choose_range(scene.linkage, scene.motion.bar, holding)
-    return np.linspace(first, last, DEFAULT_STEPS + 1)
+        linkage, bar = scene.linkage, scene.motion.bar
+        first, last = choose_range(linkage, bar, holding)
+        if turns_fully(linkage, bar):
+            turns = int(count_turns(linkage.lengths, bar))
+            last, steps = first + turns * (last - first), turns * DEFAULT_STEPS
+    return np.linspace(first, last, steps + 1)
 
 
 def compute_bar_motion(

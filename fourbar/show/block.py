@@ -746,7 +746,8 @@ class _Block:
         sines[LOST[solution.drive_bar]] = solution.drive_condition[worst]
         bars = min(sines, key=lambda pair: sines[pair])
         gap = math.asin(min(sines[bars], 1.0))
-        return [f"{start}: bars {bars} are {gap:.2g} rad from being in line"]
+        apart = write_short(gap, "rad", self.units, digits=2)
+        return [f"{start}: bars {bars} are {apart} from being in line"]
 
     @staticmethod
     def _row(label: str, text: str) -> str:

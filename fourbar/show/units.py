@@ -4,6 +4,7 @@ They are a list like "mm N N.mm deg", those of a scene file, or SI with prefixes
 """
 
 import math
+import tomllib
 from collections.abc import Mapping
 from functools import cache
 from typing import Any
@@ -22,8 +23,6 @@ DERIVED = {"m/s": ("m", "{}/s"), "m/s^2": ("m", "{}/s^2"), "J": ("N m", "{}")}
 """Units that follow another one if not stated. Energy follows the unit of torque,
 speeds that of length.
 """
-_IMPERIAL = ("in", "inch", "inches", "ft", "foot", "feet")
-"""Units of lengths.ground with which a scene is shown in imperial units."""
 _POUNDS = ("lb", "lbs", "pound", "pounds", "lbm")
 """Names of the pound, a mass; a list that names no force may mean pounds-force."""
 _METRIC = ("mm", "cm", "dm", "m")
@@ -108,11 +107,30 @@ def suit_units(length: str) -> Conversion:
 
     They are imperial for inches and feet, otherwise `COMMON`.
     """
-    from fourbar.quantities.units import find_unit
+    from fourbar.quantities.units import IMPERIAL, find_unit
 
     return (
-        units("imperial") if find_unit(length, "m").casefold() in _IMPERIAL else COMMON
+        units("imperial") if find_unit(length, "m").casefold() in IMPERIAL else COMMON
     )
+
+
+def units_of_length(length: str) -> Conversion:
+    """Return the units of messages on a length as it was typed.
+
+    They are imperial for inches and feet; other lengths keep their unit.
+    """
+    return _suit_texts(length, ())
+
+
+def units_of_text(text: str) -> Conversion:
+    """Return the units that suit the text of a scene file.
+
+    They are `COMMON` if the text is no scene: the reader says what is wrong with it.
+    """
+    try:
+        return units_of_scene(tomllib.loads(text))
+    except (ValueError, RecursionError, LookupError, TypeError, AttributeError):
+        return COMMON
 
 
 def units_of_scene(document: Mapping[str, Any]) -> Conversion:
@@ -133,10 +151,10 @@ def units_of_scene(document: Mapping[str, Any]) -> Conversion:
 @cache
 def _suit_texts(length: str, rates: tuple[tuple[str, str], ...]) -> Conversion:
     """Return the units that suit a length, speeds and accelerations as written."""
-    from fourbar.quantities.units import find_unit
+    from fourbar.quantities.units import IMPERIAL, find_unit
 
     name = find_unit(length, "m")
-    if name.casefold() in _IMPERIAL:
+    if name.casefold() in IMPERIAL:
         shown = dict(units("imperial"))
     else:
         shown = {**COMMON, **(units(name) if name in _METRIC else {})}

@@ -14,6 +14,7 @@ Fundamentals of Vibrations, ch. 2.
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
 
@@ -25,14 +26,14 @@ from fourbar.formulas.mobility import (
     MARGIN,
     TURN,
     Circuit,
-    choose_range,
     turns_fully,
 )
 from fourbar.formulas.motion import Coefficients
 from fourbar.formulas.torque import inertia
 from fourbar.quantities import JAMMED, NOT_ASSEMBLED, SINGULAR
 from fourbar.scene import Command, Scene
-from fourbar.scene.motion import DEFAULT_STEPS
+from fourbar.scene.motion import DEFAULT_STEPS, Motion
+from fourbar.scene.scene import default_places
 from fourbar.solution import Array, Solution
 from fourbar.solving import solve
 from fourbar.studies.circuit_curve import (
@@ -193,13 +194,12 @@ def _solve_at_rest(scene: Scene, circuit: Circuit) -> Solution:
     """
     commanded = of_input(scene)
     if len(commanded.theta_2) == 1:
-        low, high = (
-            choose_range(scene.linkage)
-            if turns_fully(scene.linkage)
-            else circuit.theta_2
-        )
-        margin = 0.0 if turns_fully(scene.linkage) else min(MARGIN, 0.25 * (high - low))
-        theta_2 = np.linspace(low + margin, high - margin, DEFAULT_STEPS + 1)
+        if turns_fully(scene.linkage):
+            theta_2 = default_places(replace(scene, motion=Motion()))
+        else:
+            low, high = circuit.theta_2
+            margin = min(MARGIN, 0.25 * (high - low))
+            theta_2 = np.linspace(low + margin, high - margin, DEFAULT_STEPS + 1)
         commanded = Command(
             theta_2,
             np.full(theta_2.shape, commanded.branch[0], dtype=np.int8),

@@ -16,7 +16,7 @@ from fourbar.formulas.mobility import TURN, find_intervals
 from fourbar.quantities import Array
 from fourbar.scene import Command, Scene, command, command_at
 from fourbar.scene.motion import COMMANDS, SIDES, STROKE_COMMAND, Motion
-from fourbar.scene.scene import Independent
+from fourbar.scene.scene import Independent, default_places
 from fourbar.solving import solve
 
 ANGLES = tuple(names[0] for names in COMMANDS.values())
@@ -24,6 +24,8 @@ PLACES = (*ANGLES, STROKE_COMMAND[0], "time")
 """Names by which a position may be stated."""
 SAME = 1e-6
 """rad, or part of a length: two places that the formulas give in two ways are one."""
+_GRID_DIGITS = 4
+"""Digits of an end of a range that is read from the positions of the default sweep."""
 FINE = 2000
 """Instants of a motion by a law among which passings are looked for."""
 LAST_DIGIT = 1e-15
@@ -72,8 +74,13 @@ def _find_places(scene: Scene, name: str, value: float) -> list[float]:
         if math.isfinite(reached) and _is_same(name, reached, value):
             places.append(place)
     if not places:
+        whole = solve(scene, "position", at=command_at(scene, default_places(scene)))
+        values = _require_values(getattr(whole, name), name)
+        low, high = _find_extent(values)
         raise NotAssembledError(
-            f"{_say(name, value)}: no position of this assembly has it"
+            f"{_say(name, value)}: no position of this assembly has it; {name} goes"
+            f" from {_write_place(name, low, _GRID_DIGITS)} to"
+            f" {_write_place(name, high, _GRID_DIGITS)}"
         )
     return sorted(places)
 
@@ -86,15 +93,19 @@ def _require_assembled(scene: Scene, name: str, value: float) -> None:
     at = command_at(scene, np.array([value]))  # which refuses a stroke out of range
     if solve(scene, "position", at=at).assembled[0]:
         return
+    raise NotAssembledError(
+        f"{_say(name, value)}: the linkage does not assemble there; {say_range(scene)}"
+    )
+
+
+def say_range(scene: Scene) -> str:
+    """Say between which angles the commanded bar can be."""
     bar = scene.motion.bar
-    ranges = " and ".join(
+    ranges = " and from ".join(
         f"{math.degrees(low):.6g} to {math.degrees(high):.6g} deg"
         for low, high in find_intervals(scene.linkage, bar)
     )
-    raise NotAssembledError(
-        f"{_say(name, value)}: the linkage does not assemble there; "
-        f"theta_{bar} goes from {ranges}"
-    )
+    return f"theta_{bar} goes from {ranges}"
 
 
 def _list_candidates(scene: Scene, name: str, value: float) -> list[float]:
@@ -188,11 +199,15 @@ def _bisect(gap: Callable[[float], float], low: float, high: float) -> float:
 
 
 def _never_passed(name: str, value: float, values: Array) -> NotAssembledError:
-    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    low, high = _find_extent(values)
     return NotAssembledError(
         f"{_say(name, value)}: the motion does not pass it; it stays within "
         f"{_write_place(name, low)} and {_write_place(name, high)}"
     )
+
+
+def _find_extent(values: Array) -> tuple[float, float]:
+    return float(np.nanmin(values)), float(np.nanmax(values))
 
 
 def _require_values(values: Array | None, name: str) -> Array:
@@ -206,10 +221,10 @@ def _say(name: str, value: float) -> str:
     return f"at {name} = {_write_place(name, value)}"
 
 
-def _write_place(name: str, value: float) -> str:
+def _write_place(name: str, value: float, digits: int = 6) -> str:
     if name in ANGLES:
-        return f"{math.degrees(value):.6g} deg"
-    return write_in_units("s" if name == "time" else "m", value)
+        return f"{math.degrees(value):.{digits}g} deg"
+    return write_in_units("s" if name == "time" else "m", value, digits=digits)
 
 
 def _find_released(scene: Scene, name: str, value: float) -> Command:

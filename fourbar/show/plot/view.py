@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fourbar.errors import NotAssembledError
+from fourbar.errors import NotAssembledError, write_in_units
 from fourbar.evaluation.case import compute_state
 from fourbar.formulas.motion import State
 from fourbar.linkage import MOVING_BARS
@@ -127,11 +127,10 @@ def axis_of(scene: Scene, positions: Command, units: Conversion) -> Axis:
 
 def where_in_words(solution: Solution) -> str:
     """Say the first position of a solution as the scene's file has it."""
-    angle, stroke = math.degrees(solution.at.angle[0]), solution.at.stroke
-    return (
-        f"{solution.commanded} ="
-        f" {f'{angle:.6g} deg' if stroke is None else f'{stroke[0]:.6g} m'}"
-    )
+    stroke = solution.at.stroke
+    if stroke is not None:
+        return f"{solution.commanded} = {write_in_units('m', stroke[0])}"
+    return f"{solution.commanded} = {math.degrees(solution.at.angle[0]):.6g} deg"
 
 
 def collect_point_vectors(

@@ -855,3 +855,96 @@ def test_standard_output_that_is_full() -> None:
         BROKEN,
         1,
     ) and "No space left" in done.stderr
+
+
+INCHES = """\
+[lengths]
+ground = "5 in"
+input = "2 in"
+coupler = "4 in"
+output = "4.5 in"
+[bars.coupler]
+mass = "1 lb"
+[motion]
+theta_2 = "60 deg"
+omega_2 = "60 rpm"
+"""
+RAM = """\
+[drive]
+from = { bar = 1, from_pin = ["3 in", "-60 deg"] }
+to = { bar = 2, from_pin = ["1 in", "0 deg"] }
+"""
+GAS_SPRING = """\
+[effects]
+springs = [{ from = { bar = 1, from_pin = ["3 in", "-60 deg"] }, to = { bar = 3, from_pin = ["1 in", "0 deg"] }, gas = { extended = "4 in", stroke = "2 in", extended_force = "30 lbf", compressed_force = "40 lbf" } }]
+"""
+BY_STROKE = INCHES.replace('theta_2 = "60 deg"', 'stroke = "1 in"\nside = "left"')
+BY_STROKE = BY_STROKE.replace('omega_2 = "60 rpm"', 'stroke_speed = "1 in/s"') + RAM
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (INCHES.replace('"5 in"', '"50 in"'), "lengths = 50, 2, 4, 4.5 in: the bars"),
+        (INCHES.replace('"5 in"', '"50 in"'), "of the other three, 10.5 in"),
+        (INCHES.replace('"2 in"', "2"), 'did you mean "2 in"?'),
+        (INCHES.replace('"1 lb"', '"1 in"'), 'like "1 lb"'),
+        (BY_STROKE, "motion.stroke = 1 in: this cylinder can have 2 in to 4 in"),
+        (INCHES + RAM.replace('"1 in"', '"0 in"'), "drive.to = 'bar 2 at 0 in'"),
+        (
+            INCHES + GAS_SPRING.replace('"2 in"', '"6 in"'),
+            "springs[0].gas.stroke = 6 in: must be less than the extended length, 4 in",
+        ),
+        (
+            INCHES + GAS_SPRING.replace('"40 lbf"', '"20 lbf"'),
+            "compressed_force = 20 lbf: must be no less than the extended_force, 30 lbf",
+        ),
+        (
+            INCHES + '[tolerances]\n"lengths.input" = "3 in"\n',
+            "must be less than the number itself, 2 in",
+        ),
+        (
+            INCHES.replace('"5 in"', '"7 in"').replace('"60 deg"', '"180 deg"'),
+            "positions requested; theta_2 goes from -133.433 to 133.433 deg",
+        ),
+        (
+            '[pins]\nO2 = ["1 in", "2 in"]\nA = ["1 in", "2 in"]\n'
+            'B = ["7 in", "2 in"]\nO4 = ["9 in", "1 in"]\n',
+            "pins.A = 1, 2 in: lies where O2 does",
+        ),
+    ],
+)
+def test_a_message_has_the_units_of_the_scene(
+    text: str, words: str, tmp_path: Path, run: Fourbar
+) -> None:
+    """The limit of bar 2 by cosines: (49 + 4 - 72.25)/28 is that of 133.4 deg."""
+    (tmp_path / "scene.toml").write_text(text)
+    code, _, err = run("analyze", tmp_path / "scene.toml")
+    assert code == BAD_INPUT and words in err, err
+
+
+def test_a_message_has_the_units_of_the_lengths_that_were_typed(run: Fourbar) -> None:
+    lengths = ("50in", "2in", "4in", "4.5in")
+    words = "lengths = 50, 2, 4, 4.5 in: the bars"
+    for command in (
+        ("classify", *lengths),
+        ("new", "never.toml", "--lengths", *lengths),
+        ("mjcf", "--lengths", *lengths, "-o", "never.xml"),
+    ):
+        code, _, err = run(*command)
+        assert code == BAD_INPUT and words in err, err
+    code, _, err = run("classify", "50", "2", "4", "4.5")
+    assert "lengths = 50, 2, 4, 4.5: the bars" in err
+
+
+def test_an_output_angle_out_of_range_is_refused_with_the_range(
+    tmp_path: Path, run: Fourbar
+) -> None:
+    (tmp_path / "scene.toml").write_text(INCHES)
+    scene = tmp_path / "scene.toml"
+    code, _, err = run("analyze", scene, "--at", "theta_4=200 deg")
+    # the crank in line with the coupler: sides 5, 4.5 and 2 or 6
+    cosines = ((5**2 + 4.5**2 - side**2) / (2 * 5 * 4.5) for side in (2, 6))
+    high, low = (180.0 - math.degrees(math.acos(cosine)) for cosine in cosines)
+    assert code == BAD_INPUT
+    assert f"theta_4 goes from {low:.4g} deg to {high:.4g} deg" in err

@@ -18,6 +18,7 @@ import fourbar
 from fourbar.effects import Place
 from fourbar.errors import InputError
 from fourbar.files import dump, load, loads, save
+from fourbar.files.scene_text import write_new_scene
 from fourbar.quantities.units import UnitError, to_si
 from tests.support.scenes import crank_rocker
 from tests.support.texts import LENGTHS
@@ -455,3 +456,49 @@ def test_three_sigma_less_than_the_number_are_written_and_more_are_not() -> None
         else:
             with pytest.raises(InputError, match="three sigma of it must be less"):
                 dump(scene)
+
+
+def test_the_stroke_of_a_gas_spring_is_saved() -> None:
+    ends = Place(1, (0.03, -1.0)), Place(3, (0.02, 0.3))
+    spring = fourbar.Spring.gas(*ends, 0.35, 0.1, 100.0, 151.0)
+    scene = replace(crank_rocker(), effects=(fourbar.Springs((spring,)),))
+    read = loads(dump(scene)).effects[0]
+    assert isinstance(read, fourbar.Springs)
+    assert (read.springs[0], read.springs[0].stroke) == (spring, 0.1)
+
+
+def test_a_stroke_is_less_than_the_spring_is_long() -> None:
+    ends = Place(1, (0.03, -1.0)), Place(3, (0.02, 0.3))
+    with pytest.raises(InputError, match=r"stroke = 0\.3 m: must be less than the"):
+        fourbar.Spring(*ends, 10.0, 0.3, stroke=0.3)
+    with pytest.raises(
+        InputError, match=r"stroke = -0\.1: must be a finite number > 0"
+    ):
+        fourbar.Spring(*ends, 10.0, 0.3, stroke=-0.1)
+
+
+@pytest.mark.parametrize(
+    ("length", "units", "gravity"),
+    [
+        ("4 in", {"lb", "in", "lb in^2", "lbf", "lbf in"}, 386.09 * 0.0254),
+        ("300 mm", {"kg", "mm", "kg m^2", "N", "N mm"}, 9.81),
+        ("30cm", {"kg", "cm", "kg m^2", "N", "N cm"}, 9.81),
+        ("2 ft", {"lb", "in", "lb in^2", "lbf", "lbf in"}, 386.09 * 0.0254),
+    ],
+)
+def test_the_comments_of_a_new_file_have_its_units_and_can_be_used(
+    length: str, units: set[str], gravity: float
+) -> None:
+    text = write_new_scene([length] * 4)
+    used = re.sub(r"^# (?=\w+ = |\[)", "", text, flags=re.MULTILINE)
+    scene = loads(used)
+    assert len(scene.loads) == 2 and scene.points and len(scene.effects) == 2
+    weight = scene.effects[0]
+    assert isinstance(weight, fourbar.Gravity)
+    assert weight.magnitude == pytest.approx(gravity)
+    for entry in ("mass", "centre", "inertia", "force", "moment"):
+        stated = re.search(rf'^(?:# )?{entry} = \[?"[-\d.]+ ([^"]*)"', text, re.M)
+        assert stated is not None and stated[1] in units, entry
+    bar = scene.linkage.input
+    per_length = {"lb": 0.05 * 0.45359237 / 0.0254}.get("lb" if "lb" in units else "")
+    assert bar.mass == pytest.approx((per_length or 1.0) * bar.length)

@@ -78,7 +78,7 @@ MISTAKES = [
     ("unknown key of a load", "from_pin =", "where =", ["loads[0].where"]),
     ("wrong dimension", '"0.1 m"', '"48 kg"', ["lengths.input", "48 kg", "does not convert to m"]),
     ("wrong force unit", '"3 N"', '"3 kg"', ["loads[0].force[0]", "3 kg", "N"]),
-    ("Hz is no angular speed", '"10 rad/s"', '"10 Hz"', ["motion.omega_2", "10 Hz", "rad/s"]),
+    ("Hz is no angular speed", '"10 rad/s"', '"10 Hz"', ["motion.omega_2", "10 Hz", 'like "1 rpm"']),
     ("damping without an angle", '"0.01 N m s/rad"', '"0.01 N m s"', ["effects.viscous.O2", "N m s/rad"]),
     ("temperature", '"0.2 kg"', '"20 degC"', ["bars.input.mass", "20 degC"]),
     ("inches without quotes", '"0.1 m"', "9 in", ["line 4, column", 'in quotes, like "9 in"']),

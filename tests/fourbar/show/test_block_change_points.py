@@ -181,6 +181,24 @@ def test_a_single_change_point_takes_two_turns() -> None:
     assert np.abs(np.sin(0.5 * apart)).max() < 1e-12
 
 
+def test_a_scene_without_a_range_covers_both_turns_of_a_single_change_point() -> None:
+    """The drive then gives as much energy as it takes back: only weights act."""
+    linkage = fourbar.uniform(0.4, 0.2, 0.3, 0.3)
+    scene = fourbar.Scene(
+        linkage, fourbar.Motion(omega_2=6.0), effects=(fourbar.Gravity(),)
+    )
+    solution = fourbar.solve(scene)
+    assert len(solution) == 721
+    assert solution.theta_2[[0, -1]].tolist() == [0.0, 2.0 * math.tau]
+    duty = fourbar.motor_duty(solution)
+    assert duty is not None and duty.closed
+    assert duty.energy_in == pytest.approx(duty.energy_out, rel=1e-6)
+    text = " ".join(write_block(scene, solution))
+    assert "in 2 turns given" in text
+    with_both = fourbar.uniform(0.3, 0.1, 0.3, 0.1)
+    assert len(fourbar.solve(fourbar.Scene(with_both))) == 361
+
+
 def test_lengths_are_equal_within_the_rounding_of_what_is_stated(
     tmp_path: Path,
 ) -> None:

@@ -505,6 +505,33 @@ def test_an_engine_that_broke_down_alone_is_named_without_a_quantity() -> None:
     )
 
 
+def refuse(scene: str, reason: str) -> Row:
+    return Row.unmeasured(scene, "theirs", "", "all", REFUSES, reason)
+
+
+def test_a_reason_keeps_its_numbers_and_counts_those_like_it() -> None:
+    """Reasons that differ in their numbers alone are one."""
+    rows = [refuse(f"s{k}", f"2 of {k} signs were predicted") for k in (7, 8, 9)]
+    rows.append(refuse("s", "it reads no cylinder"))
+    overview = summary_of([record_of(row.scene, [row]) for row in rows]).overview
+    assert overview.silent == [
+        "theirs: nothing compared (3 scenes): 2 of 7 signs were predicted (and 2 more"
+        " like it, with other numbers)"
+    ]
+    alike = [record_of(f"s{k}", [refuse(f"s{k}", "4 bars, not 5")]) for k in (1, 2)]
+    assert summary_of(alike).overview.silent == [
+        "theirs: nothing compared (2 scenes): 4 bars, not 5"
+    ]
+
+
+def test_an_engine_without_an_answer_is_named_with_its_numbers() -> None:
+    """A failing number beside it does not take the place of the reason."""
+    dead = Row.unmeasured("a", "theirs", "", "all", FAILS, "exit status 3 after 4 s")
+    beside = fail(replace(OF_MINE, engine="theirs"), error=1e6)
+    (cause,) = summary_of([record_of("a", [beside, dead])]).overview.causes
+    assert cause.text == "no answer: exit status 3 after 4 s"
+
+
 def test_a_weaker_rule_stands_before_a_verdict_that_holds() -> None:
     summary = summary_of([record_of("a", [OF_MINE])])
     assert summary.good

@@ -24,6 +24,7 @@ class Group:
     engine: str
     kind: Kind
     cause: str
+    """What came of it, and the reason without its numbers."""
     rows: int = 0
     scenes: int = 0
     of_scenes: int = 0
@@ -47,11 +48,17 @@ class Group:
             for name, n in self.quantities.most_common(6)
         )
         more = ", ..." if len(self.quantities) > 6 else ""
-        cause = f", {self.cause}" if self.cause else ""
+        cause = f", {self._write_cause()}" if self.cause else ""
         return (
             f"{self.engine}, {self.scenes} of {self.of_scenes} scenes, {self.rows} rows"
             f" ({names}{more}){cause}"
         )
+
+    def _write_cause(self) -> str:
+        """Write the cause with the numbers of the worst row."""
+        if self.worst is None or self.cause != _find_cause(self.worst):
+            return self.cause
+        return _write_cause(self.worst)
 
 
 class Fault:
@@ -140,6 +147,11 @@ def _is_compared_exactly(row: Row | None) -> bool:
 
 def _find_cause(change: Change) -> str:
     """Take the reason without its numbers: one cause has one text in all scenes."""
+    return NUMBER.sub("#", _write_cause(change))
+
+
+def _write_cause(change: Change) -> str:
+    """Say how the verdict changed, and why."""
     if (
         change.kind in (Kind.VERDICT_WORSE, Kind.VERDICT_BETTER, Kind.NEW_FAILURE)
         and change.new is not None
@@ -149,7 +161,7 @@ def _find_cause(change: Change) -> str:
             if change.old is not None
             else change.new.verdict
         )
-        return f"{came}: {NUMBER.sub('#', change.new.reason)}"
+        return f"{came}: {change.new.reason}"
     return ""
 
 

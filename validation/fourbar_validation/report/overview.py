@@ -20,7 +20,7 @@ from fourbar_validation.compare.rows import (
 )
 from fourbar_validation.compare.tolerance import find_used
 from fourbar_validation.report.record import Record
-from fourbar_validation.report.words import NUMBER
+from fourbar_validation.report.words import NUMBER, AlikeTexts
 
 OWN_ENGINES = (FORMULAS, *DERIVED)
 """Engines whose rows check fourbar against itself. They are identities, and functions
@@ -108,7 +108,7 @@ class OverviewLine:
     """True if any number of it was compared. The reason why none was is not in the
     table.
     """
-    reasons: Counter[str] = field(default_factory=Counter)
+    reasons: AlikeTexts = field(default_factory=AlikeTexts)
     """Why it was not compared, by scene."""
 
 
@@ -188,7 +188,7 @@ class Overview:
         self._add_agreement(scene.rows)
         self._add_causes(scene)
         for engine, reason in _list_reasons(scene):
-            self._line(engine).reasons[NUMBER.sub("#", reason)] += 1
+            self._line(engine).reasons.add(reason)
 
     def _line(self, engine: str) -> OverviewLine:
         return self._lines.setdefault(engine, OverviewLine(engine, engine))
@@ -233,8 +233,10 @@ class Overview:
             if row.failed:
                 failing.setdefault(row.engine, []).append(row)
         for engine, rows in failing.items():
-            used = [float(find_used(row.error, row.allowed)) for row in rows]
-            worst = rows[used.index(max(used))]
+            # without an answer the rest is a consequence
+            whole = [row for row in rows if row.quantity == "all"]
+            used = [float(find_used(row.error, row.allowed)) for row in whole or rows]
+            worst = (whole or rows)[used.index(max(used))]
             key = (engine, tuple(_name_causes(scene, engine, rows)))
             if key not in self._kinds and len(self._kinds) >= _MOST_KINDS:
                 key = (engine, (OTHERS,))
@@ -305,7 +307,7 @@ class Overview:
         lines = []
         for line in sorted(self._lines.values(), key=lambda one: one.engine):
             if not line.compared and not line.failed and line.reasons:
-                reason, count = line.reasons.most_common(1)[0]
+                reason, count = line.reasons.find_commonest()
                 scenes = f"{count} scene{'s' if count > 1 else ''}"
                 lines.append(f"{line.engine}: nothing compared ({scenes}): {reason}")
         return lines

@@ -1,7 +1,38 @@
 """Words that several parts of a report share."""
 
 import re
+from collections import Counter
 
 NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 """Pattern of a number in a reason. Reasons that differ in numbers alone count as one.
 """
+
+
+class AlikeTexts:
+    """Texts counted by their words: those that differ in numbers alone count as one."""
+
+    def __init__(self) -> None:
+        self._counts: Counter[str] = Counter()
+        self._first: dict[str, str] = {}
+        self._differing: set[str] = set()
+
+    def __bool__(self) -> bool:
+        return bool(self._counts)
+
+    def add(self, text: str) -> None:
+        """Take in a text."""
+        words = NUMBER.sub("#", text)
+        self._counts[words] += 1
+        if self._first.setdefault(words, text) != text:
+            self._differing.add(words)
+
+    def find_commonest(self) -> tuple[str, int]:
+        """Return the first of the commonest texts with its numbers, and their count.
+
+        The text says if the others have other numbers.
+        """
+        words, count = self._counts.most_common(1)[0]
+        text = self._first[words]
+        if words in self._differing:
+            text += f" (and {count - 1} more like it, with other numbers)"
+        return text, count

@@ -13,10 +13,12 @@ from pathlib import Path
 from typing import Protocol
 
 from fourbar import writing
-from fourbar.errors import InputError
+from fourbar.errors import InputError, state_messages_in
 from fourbar.files import loads, read_text
 from fourbar.scene import Scene
-from fourbar.scene.motion import DEFAULT_STEPS, Free, Law, Rise, Sweep, require_steps
+from fourbar.scene.motion import Free, Law, Rise, Sweep, require_steps
+from fourbar.scene.scene import default_places
+from fourbar.show.units import units_of_text
 from fourbar_validation.compare.rows import make_plain
 from fourbar_validation.places import MODELS
 from fourbar_validation.scenes.random import DrawnType, draw_random_scene
@@ -72,7 +74,8 @@ class Files:
     def scene(self, index: int) -> Scene:
         """Read a scene."""
         name, text = self.texts[index]
-        return loads(text, name)
+        with state_messages_in(units_of_text(text)):
+            return loads(text, name)
 
     def fingerprint(self) -> str:
         """Hash the texts."""
@@ -146,7 +149,9 @@ def read_scene_files(paths: Iterable[Path]) -> Files:
                 f"must have a name of its own: another file is {name!r} too",
             )
         text = read_text(file)
-        most = max(most, _count_positions(loads(text, str(file)), file))
+        with state_messages_in(units_of_text(text)):
+            scene = loads(text, str(file))
+        most = max(most, _count_positions(scene, file))
         texts[name] = text
     if not texts:
         raise InputError("SCENE", [], "no scene file to run")
@@ -173,7 +178,7 @@ def _count_positions(scene: Scene, file: Path) -> int:
                 )
                 raise InputError("motion.free.duration", seconds, allowed, str(file))
             return stated.steps + 1 + math.ceil(AS_LONG_AS * seconds)
-    return DEFAULT_STEPS + 1
+    return len(default_places(scene))
 
 
 LARGEST_LIST = 16 * 2**20
