@@ -11,6 +11,8 @@ LONG := kills package oldest prereleases machines engines simulators problems be
 validate: setup
 	@echo "validate: scenes in MuJoCo and Pinocchio, half a minute; the report is results/report.html"
 	$(BIN)/python -m validation run
+	@echo "validate: what six digits of torque and pin forces cost MuJoCo, some seconds"
+	$(BIN)/python -m validation advise models/crank_rocker.toml --error 1e-6
 
 # the contributor's loop: some five minutes on two idle cores
 test: check

@@ -4,6 +4,8 @@ It is tested too what it says where nothing serves.
 """
 
 import math
+import re
+import time
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -282,6 +284,34 @@ def test_what_matters_for_a_scene_is_measured_and_stated_with_its_reason() -> No
     assert matters.write_sentence(quiet).startswith("No setting matters by itself")
 
 
+def test_the_time_of_the_settings_is_told() -> None:
+    """A second of 10 rad/s has 1.59 revolutions.
+
+    A trial takes longer than its steps and readings, for it assembles the model too;
+    fifty of its steps and readings alone take longer than one.
+    """
+    scene = turning(10.0, 36)
+    setup = TrialSetup(scene, advise.choose_positions(scene))
+    best = advise.advise(scene, 1e-4, setup).best
+    words = advise._describe_time(setup, best)
+    found = re.fullmatch(
+        r"This costs (\S+) ms of processor time per simulated second \((\S+) ms per"
+        r" revolution\): (\d+) steps, and (\d+) readings of torque and pin forces\.",
+        words,
+    )
+    assert found, words
+    second, revolution, steps, readings = map(float, found.groups())
+    two_digits = 0.1  # of the numbers printed
+    assert second / revolution == pytest.approx(10.0 / (2.0 * math.pi), rel=two_digits)
+    assert (steps, readings) == (best.steps, best.readings)
+    began = time.process_time()
+    setup.try_out(best.settings)
+    trial = time.process_time() - began
+    assert 0.0 < revolution / 1e3 * setup.revolutions < trial
+    time_steps, time_readings = setup.make_clocks(best.settings)
+    assert time_steps(50 * best.steps) + time_readings(100) > revolution / 1e3
+
+
 def test_several_scenes_have_one_table(tmp_path: Path) -> None:
     files = []
     for name, scene in (
@@ -295,7 +325,7 @@ def test_several_scenes_have_one_table(tmp_path: Path) -> None:
     )
     assert process.return_value == 1  # one of them cannot be run through
     lines = process.output.splitlines()
-    assert lines[1].startswith(
+    assert lines[2].startswith(
         "The timestep matters most here. If it is twice as long, the error is"
     )
     assert lines[-2].split()[0] == "one.toml" and lines[-1].split()[:2] == [

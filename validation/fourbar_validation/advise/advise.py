@@ -218,6 +218,29 @@ def choose_positions(scene: Scene) -> Command:
     )
 
 
+def _time_attempt(setup: TrialSetup, attempt: Attempt) -> float:
+    """Time the steps and readings of an attempt, CPU seconds.
+
+    The time of each is the least of several rounds.
+    """
+    time_steps, time_readings = setup.make_clocks(attempt.settings)
+    step = min(time_steps(TIMED_STEPS) for _ in range(ROUNDS)) / TIMED_STEPS
+    reading = min(time_readings(TIMED_READINGS) for _ in range(ROUNDS)) / TIMED_READINGS
+    return attempt.steps * step + attempt.readings * reading
+
+
+def _describe_time(setup: TrialSetup, attempt: Attempt) -> str:
+    """Write the CPU time of a simulated second and of a revolution."""
+    seconds = _time_attempt(setup, attempt)
+    second = 1e3 * seconds / setup.simulated_seconds
+    revolution = 1e3 * seconds / setup.revolutions
+    return (
+        f"This costs {second:.2g} ms of processor time per simulated second"
+        f" ({revolution:.2g} ms per revolution): {attempt.steps} steps, and"
+        f" {attempt.readings} readings of torque and pin forces."
+    )
+
+
 class _CheapestSearch:
     """Settings tried on one scene, for one required error."""
 
@@ -485,6 +508,7 @@ def command(
             continue
         influences = measure_influences(scene, setup, advice.best.settings)
         click.echo(f"{file.name}: {advice.reason}")
+        click.echo(_describe_time(setup, advice.best))
         click.echo(f"{write_sentence(influences)}")
         steps = sum(attempt.steps for attempt in advice.attempts)
         click.echo(
