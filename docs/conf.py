@@ -8,7 +8,8 @@ import re
 import runpy
 from pathlib import Path
 
-from docutils.nodes import SkipNode
+import imagesize
+from docutils.nodes import SkipNode, image
 from latex2mathml.converter import convert
 from pygments.lexers.special import TextLexer
 
@@ -22,10 +23,12 @@ myst_heading_anchors = 3
 html_theme = "furo"
 html_title = f"fourbar {version}"
 html_static_path = ["style"]
-html_css_files = ["narrow.css"]
+html_css_files = ["pages.css"]
 html_math_renderer = "mathml"
 html_show_copyright = False
 exclude_patterns = ["ci"]
+TELEPHONE = 560
+"""Width of a picture above which its words are too small on a telephone, px."""
 SPACE = '<mspace width="0.17em" />'
 """Space on both sides of a function's name, as in TeX."""
 
@@ -39,6 +42,14 @@ def append_reference(app, page, source):
         source[0] += (
             "\n" + runpy.run_path(str(Path(__file__).with_name(f"{page}.py")))["text"]()
         )
+
+
+def mark_wide_pictures(app, doctree):
+    """Give pictures of many parts a class, by which a telephone shows them larger."""
+    for picture in doctree.findall(image):
+        width, _ = imagesize.get(Path(app.srcdir) / picture["uri"])
+        if width > TELEPHONE:
+            picture["classes"].append("of-many-parts")
 
 
 def setup(app):
@@ -66,3 +77,4 @@ def setup(app):
     app.add_html_math_renderer("mathml", written("inline"), written("block"))
     app.add_lexer("csv", TextLexer)
     app.connect("source-read", append_reference)
+    app.connect("doctree-read", mark_wide_pictures)

@@ -95,7 +95,9 @@ def text() -> str:
         ".diagonal{stroke-width:2;stroke:#c1440e;stroke-dasharray:7 4}"
         ".ray{stroke-width:.8;stroke-dasharray:3 3}.arc{stroke-width:1.2}"
         "circle{fill:#fff;stroke:#1b2733;stroke-width:2}"
-        "@media(prefers-color-scheme:dark){text{fill:#dfe7ee}path{stroke:#dfe7ee}circle{fill:#24323f;stroke:#dfe7ee}}"
+        "@media(prefers-color-scheme:dark){text{fill:#dfe7ee}path{stroke:#dfe7ee}"
+        ".bar{stroke:#6fa8d6}.diagonal{stroke:#f08a4b}"
+        "circle{fill:#24323f;stroke:#dfe7ee}}"
     )
     return (
         '<svg xmlns="http://www.w3.org/2000/svg" width="480" height="320"'

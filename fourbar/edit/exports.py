@@ -135,13 +135,11 @@ class Exports:
     def free_bodies(scene: Scene, position: float, units: Conversion) -> str:
         """Draw the free bodies at a position, as the address of a picture."""
         from fourbar.show.plot.figures import draw_figure
+        from fourbar.show.plot.style import add_dark_form
 
-        text = draw_figure(
-            scene, "freebody", position=position, units=units
-        )._repr_svg_()
-        return "data:image/svg+xml;base64," + base64.b64encode(text.encode()).decode(
-            "ascii"
-        )
+        figure = draw_figure(scene, "freebody", position=position, units=units)
+        drawn = add_dark_form(figure._repr_svg_().encode())
+        return f"data:image/svg+xml;base64,{base64.b64encode(drawn).decode('ascii')}"
 
 
 def find_harness() -> list[str]:

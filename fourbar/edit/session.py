@@ -3,6 +3,7 @@
 import hashlib
 import json
 import os
+import re
 import secrets
 import tomllib
 from collections.abc import Callable
@@ -315,8 +316,15 @@ def _hash_text(data: bytes) -> str:
     return hashlib.sha256(data).hexdigest()
 
 
-_SUITED = ("m", "N", "N m", "kg")
-"""SI units whose quantities a new entry states in the scene's own units."""
+_SUITED = {
+    **{"m": "m", "N": "N", "N m": "N m", "kg": "kg"},
+    **{"N/m": "N", "kg m^2": "kg", "kg/m^3": "kg"},
+}
+"""SI units whose quantities a new entry states in the scene's own units.
+
+The value is the unit for which the scene must have one of its own: lengths in mm make
+no density in kg/mm^3.
+"""
 
 
 def _suit_entry(value: Any, plain: dict[str, Any]) -> Any:
@@ -327,13 +335,18 @@ def _suit_entry(value: Any, plain: dict[str, Any]) -> Any:
         return [_suit_entry(inner, plain) for inner in value]
     if not isinstance(value, str):
         return value
-    for si in _SUITED:
-        unit, factor = find_unit_in(si, units_of_scene(plain))
+    own = units_of_scene(plain)
+    names = {si: find_unit_in(si, own)[0] for si in ("m", "N", "N m", "kg")}
+    for si, base in _SUITED.items():
+        unit = re.sub(r"N m|kg|N|m", lambda part: names[part[0]], si)
         try:
-            number = factor * to_si(value, si)
+            number = to_si(value, si)
         except UnitError:
             continue
-        return value if unit == si else f"{float(f'{number:.2g}'):g} {unit}"
+        if base not in own:
+            return value
+        shown = number / to_si(f"1 {unit}", si)
+        return f"{float(f'{shown:.2g}'):g} {unit}"
     return value
 
 
@@ -455,6 +468,7 @@ def _command(session: Session, asked: dict[str, Any]) -> None:
     inset = 1e-3 * (
         values[last] - values[first]
     )  # so that rounding leads to no position beyond
+    shown_units = units_of_scene(session.now.plain)
     ground = find_unit(find_length(session.now.plain), "m")
     unit, si = (ground, "m") if place == "stroke" else ("deg", "rad")
     factor = to_si(f"1 {si}", unit)
@@ -462,9 +476,11 @@ def _command(session: Session, asked: dict[str, Any]) -> None:
         write_rounded(factor * x, abs(factor * inset), unit)
         for x in (values[first] + inset, values[last] - inset)
     ]
-    rate = getattr(before, names[place][1], None)
+    rates = getattr(before, names[place][1], None)
     speed = (
-        0.1 * abs(values[last] - values[first]) if rate is None else float(rate[middle])
+        0.1 * abs(values[last] - values[first])
+        if rates is None
+        else float(rates[middle])
     )
     stated = {*chain(*names.values()), "side", "free", "law"} & session.now.plain[
         "motion"
@@ -476,9 +492,13 @@ def _command(session: Session, asked: dict[str, Any]) -> None:
         {"from": ends[0], "to": ends[1], "steps": max(60, min(last - first, 360))},
     )
     if scene.motion.speed is not None:
+        rate_unit, rate_factor = f"{unit}/s", factor
+        if place != "stroke":
+            rate_unit, rate_factor = find_unit_in("rad/s", shown_units)
+        rate = rate_factor * speed
         document.put(
             ["motion", names[place][1]],
-            write_rounded(factor * speed, abs(factor * speed) / 100.0, f"{unit}/s"),
+            write_rounded(rate, abs(rate) / 100.0, rate_unit),
         )
     pose, distances = _read_pose(before, middle), dict[str, float]()
     # a drawing states the assembly by its pins, and refuses a branch beside them
@@ -615,7 +635,12 @@ _ACTIONS: dict[str, Callable[[Session, dict[str, Any]], dict[str, Any] | None]] 
         )
     },
     "hello": lambda session, asked: {
-        "offers": list_offers() | {"units": UNITS},
+        "offers": list_offers()
+        | {
+            name: _suit_entry(list_offers()[name], session.now.plain)
+            for name in ("fields", "commands")
+        }
+        | {"units": UNITS},
         "file": session.path.name,
         "fresh": session.fresh,
         "refer": True,

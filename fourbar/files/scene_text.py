@@ -470,7 +470,7 @@ def _fill_in(
         examples = _IMPERIAL_EXAMPLES
     length = to_si(f"1 {examples['long']}", "m")
     per_metre = float(examples["per_length"]) / length
-    masses = (f"{float(f'{per_metre * x:.12g}')!r}" for x in lengths)
+    masses = (f"{float(f'{per_metre * x:.4g}')!r}" for x in lengths)
     moving = zip(("input", "coupler", "output"), masses, strict=True)
     text = files("fourbar.files").joinpath("new.toml").read_text(encoding="utf-8")
     return Template(text).substitute(

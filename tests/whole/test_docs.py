@@ -478,6 +478,24 @@ def test_every_figure_has_a_form_for_dark_pages(path: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_pictures_follow_the_switch_of_the_site(browse: Any, theme: str) -> None:
+    """A reader of a light system may switch the site to dark, and the other way."""
+    image = pytest.importorskip("PIL.Image", reason="pixels are read by pillow")
+    style = read("docs/style/pages.css")
+    picture = (DOCS / "thesis.svg").as_uri()
+    driver = browse(
+        f'<style>{style}</style><body data-theme="{theme}" style="margin:0">'
+        f'<img src="{picture}" alt="">',
+        540,
+        dark=theme == "light",
+    )
+    shown = image.open(io.BytesIO(driver.get_screenshot_as_png())).convert("L")
+    corner = shown.getpixel((8, 480))  # of the picture, beneath its axes
+    assert corner > 240 if theme == "light" else corner < 40
+
+
+@pytest.mark.slow
 def test_the_gallery_is_a_suite_with_pictures_and_sources() -> None:
     suite = read_suite(GALLERY / "suite.txt")
     names = [suite.name(index) for index in range(len(suite))]

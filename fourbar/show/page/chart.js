@@ -66,14 +66,14 @@ function changeOf(then, now) {
   if (!(then > 1e-9 * now)) return "";
   const grown = now / then - 1;
   if (grown > 9) return ` (${text(now / then, 3)} times)`;
-  return ` (${grown < 0 ? "\u2212" : "+"}${Math.abs(100 * grown).toFixed(Math.abs(grown) < 0.1 ? 1 : 0)} %)`;
+  return ` (${grown < 0 ? "\u2212" : "+"}${Math.abs(100 * grown).toFixed(Math.abs(grown) < 0.1 ? 1 : 0)}\u00a0%)`;
 }
 function comparison(name, values) {
   const before = reference?.values[name];
   if (!before || unchanged) return "";
   const [then, now] = [peakOf(before), peakOf(values)].map(Math.abs), label = QUANTITIES.find(q => q[0] === name)[1], cut = label.lastIndexOf(", ");
   const change = changeOf(then, now);
-  return `peak ${label.slice(0, cut)} ${text(then, 3)} \u2192 ${text(now, 3)} ${label.slice(cut + 2)}${change}, against ${reference.name}`;
+  return `Peak ${label.slice(0, cut)}: ${text(then, 3)} \u2192 ${text(now, 3)} ${label.slice(cut + 2)}${change}, against ${reference.name}.`;
 }
 
 function drawChart() {
@@ -87,7 +87,7 @@ function drawChart() {
   if (limit.cut) { low = Math.max(low, -limit.top); high = Math.min(high, limit.top); }
   if (!wanted.startsWith("theta")) { low = Math.min(low, 0); high = Math.max(high, 0); }
   if (high - low < 1e-300) { high += 1; low -= 1; }
-  byId("chart-note").textContent = limit.cut ? `cut at ${text(limit.top, 3)}; it reaches ${text(finite.reduce((m, v) => Math.abs(v) > Math.abs(m) ? v : m, 0), 4)}` : "";
+  byId("chart-note").textContent = limit.cut ? `It is cut at ${text(limit.top, 3)} and reaches ${text(finite.reduce((m, v) => Math.abs(v) > Math.abs(m) ? v : m, 0), 4)}.` : "";
   plotted = { ...chartFrame(chart, low, high), values, low, high };
   const { over, x, y, width, height, bottom } = plotted;
   const curve = (values, over, kind) => {

@@ -73,7 +73,7 @@ function dragged(place) {
 }
 
 // ---- a linkage drawn by four clicks ----------------------------------------------------------------
-const PINS_IN_TURN = ["O2", "A", "B", "O4"], PURPOSES = { O2: "of the input in the ground", A: "of input and coupler", B: "of coupler and output", O4: "of the output in the ground" };
+const PINS_IN_TURN = ["O2", "A", "B", "O4"], JOINED = { O2: "the input to the ground", A: "the coupler to the input", B: "the output to the coupler", O4: "the output to the ground" };
 const sketched = make(picture, "g", { id: "sketched" });
 const sketchBar = element("div", { id: "sketch-bar", className: "bar", hidden: true },
   element("p", { id: "next-pin", className: "hint", role: "status" }),
@@ -99,7 +99,7 @@ function endSketch() {
 }
 function drawSketch() {
   const next = PINS_IN_TURN[sketch.pins.length];
-  byId("next-pin").textContent = `Click where pin ${next} is, ${PURPOSES[next]}; or move the cross by the arrow keys and press Enter.`;
+  byId("next-pin").textContent = `Click where pin ${next} joins ${JOINED[next]}; or move the cross with the arrow keys and press Enter.`;
   sketched.replaceChildren();
   for (let x = 0.1; x < 1; x += 0.1) make(sketched, "line", { class: "grid", x1: x * view.width, x2: x * view.width, y1: 0, y2: view.height });
   for (let y = 0.1 * view.width; y < view.height; y += 0.1 * view.width) make(sketched, "line", { class: "grid", x1: 0, x2: view.width, y1: y, y2: y });

@@ -115,15 +115,17 @@ function show(about, own) {
   document.querySelector(".source").textContent = about.plain.source ?? "";
   byId("computing").hidden = "summary" in about.data;
   showStrip();
-  if (about.data.summary) byId("summary").replaceChildren(...about.data.summary.map(line => {
-    const shown = document.createElement("div");
-    shown.textContent = line || "\u00a0";
-    if (/\S {2,}\S.* {2,}\S/.test(line)) shown.className = "columns";   // a table; other lines break
-    return shown;
-  }));
+  if (about.data.summary) byId("summary").replaceChildren(...about.data.summary.map(lineOf));
   if (about.saved !== undefined) say(about.saved ? `${fileName} is saved` : `${fileName}: not saved yet; kept in ${fileName}.edit`);
   else if (own && own.request.do !== "hello") say(`${fileName}: changed`);
   showPositions();
+}
+
+// A line of what is printed: one of a table keeps its columns, any other breaks.
+function lineOf(line) {
+  const shown = element("div", { textContent: line || "\u00a0" });
+  if (/^ {20,}\S|\S {2,}\S.* {2,}\S|\u2500/.test(line)) shown.className = "columns";
+  return shown;
 }
 
 // ---- the strip beside the drawing: the largest numbers, while one drags -----------------------------------
@@ -185,7 +187,7 @@ function showCheck(check) {
   byId("check").disabled = check.running;
   byId("verdict").hidden = false;
   const state = check.running ? `checking, ${check.seconds.toFixed(0)} s` : check.stopped ? "stopped" : check.status === 0 ? "all hold" : "not all hold, or the check did not run";
-  byId("verdict").textContent = [state, ...check.lines].join("\n");
+  byId("verdict").replaceChildren(...[state, ...check.lines].map(lineOf));
   byId("report").hidden = !check.report;
   byId("report").href = location.href.replace(/[^/]*$/, "report");
 }

@@ -9,6 +9,7 @@ const nameOfKey = key => key.replace(/^(theta|omega|alpha)_(\d)$/, (_, letter, n
 // The name of the entry at a path as it is written beside it: one of a list has the name of the list and its number.
 function labelOf(path) {
   const key = path[path.length - 1], holder = path[path.length - 2];
+  if (path[0] === "pins" && path.length === 3 || holder === "drawn") return "xy"[key];
   return offers.pairs[holder]?.[key] ?? (typeof key === "number" ? `${nameOfKey(holder).replace(/s$/, "")} ${key + 1}` : nameOfKey(key));
 }
 // What an entry can be, as rows of value and name; undefined where it is not one of a few.
@@ -119,7 +120,7 @@ function group(path, node, example) {
     other.addEventListener("click", () => ask({ do: "restate", path, by }));
     box.append(other);
   }
-  if ((path.length > 1 || path[0] === "drive" && node?.from) && entryAt(plain, path) !== undefined && !(path[0] === "bars" && path.length === 2) && !["from", "to"].includes(path[path.length - 1])) {
+  if ((path.length > 1 || path[0] === "drive" && node?.from) && entryAt(plain, path) !== undefined && !(["bars", "pins"].includes(path[0]) && path.length === 2) && !["from", "to"].includes(path[path.length - 1])) {
     const take = element("button", { type: "button", className: "take", textContent: `Remove ${labelOf(path)}` });
     take.addEventListener("click", () => ask({ do: "remove", path }));
     box.append(take);

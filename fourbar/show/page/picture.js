@@ -57,6 +57,14 @@ function barPoint(p, k, r) {
   return [foot[0] + r[0] * c - r[1] * s, foot[1] + r[0] * s + r[1] * c];
 }
 
+// The name of a bar stands beside its middle, to one side. One with a length is long: its box clears the bar at any angle.
+function nameBeside(k, p1, p2, side) {
+  const long = Math.hypot(p2[0] - p1[0], p2[1] - p1[1]) || 1, normal = [(p1[1] - p2[1]) / long, (p2[0] - p1[0]) / long];
+  const box = [7.5 * parts.label[k].textContent.length, 15], sign = normal[0] * side[0] + normal[1] * side[1] < 0 ? -1 : 1;
+  const away = sign * Math.max(15, 7 + 0.5 * (Math.abs(normal[0]) * box[0] + Math.abs(normal[1]) * box[1]));
+  set(parts.label[k], { x: 0.5 * (p1[0] + p2[0]) + away * normal[0], y: 0.5 * (p1[1] + p2[1]) + away * normal[1] });
+}
+
 const coupler = p => barPoint(p, 3, data.centres[3] ?? [0.5 * lengths[2], 0]);
 
 let held = false;   // while something is dragged the scale stays
@@ -206,7 +214,7 @@ function drawLinkage(p, i) {
   }
   if (show("show-dimensions")) {
     visible("1", true);
-    set(parts.label["1"], { x: 0.5 * (s.O2[0] + s.O4[0]), y: 0.5 * (s.O2[1] + s.O4[1]) + 14 });
+    nameBeside("1", s.O2, s.O4, [0, 1]);
   }
   barLines = [2, 3, 4].map(k => [s[FIRST_PIN[k]], s[LAST_PIN[k]]]).filter(([p1, p2]) => p1 && p2);
   for (const k of [2, 3, 4]) {
@@ -221,7 +229,7 @@ function drawLinkage(p, i) {
     const normal = [-(p2[1] - p1[1]) / long, (p2[0] - p1[0]) / long];
     let side = (mid[0] - middle[0]) * normal[0] + (mid[1] - middle[1]) * normal[1] >= 0 ? 15 : -15;
     if (data.centres[k] && Math.abs(data.centres[k][1]) * view.k > 10) side = data.centres[k][1] > 0 ? 15 : -15;   // off the bar, G has the other side
-    set(parts.label[k], { x: mid[0] + side * normal[0], y: mid[1] + side * normal[1] });
+    nameBeside(k, p1, p2, normal.map(x => side * x));
     if (data.pictures[k]) {
       const height = long * (parts.image[k].ratio ?? 0.3), angle = Math.atan2(p2[1] - p1[1], p2[0] - p1[0]) * DEG;
       set(parts.image[k], { x: 0, y: -0.5 * height, width: long, height, transform: `translate(${p1[0]} ${p1[1]}) rotate(${angle})` });

@@ -168,6 +168,16 @@ def test_the_table_of_limits_keeps_its_columns_in_a_narrow_window(
     )
     assert any("limit positions" in line for line in told) and len(told) > 2
     assert len(set(heights)) == 1  # of one line each
+    # so does the table of a check, whose sentences break
+    printed = (
+        "                     torque        pin forces            motion",
+        " free bodies     1.1e-15 of 3e-14  1.1e-15 of 2e-14  9.1e-16 of 2e-14",
+        "All 219 comparisons on 1 scene hold",
+    )
+    kinds = chromium.execute_script(
+        "return arguments[0].map(line => lineOf(line).className)", printed
+    )
+    assert kinds == ["columns", "columns", ""]
     assert chromium.execute_script("return document.documentElement.scrollWidth") <= 400
 
 
@@ -205,7 +215,7 @@ def test_a_designer_goes_from_an_empty_scene_to_a_saved_file(
     wait_for(driver, "plain.loads?.length === 1 && data.handles.length === 4")
     drag_pin_B(driver)
     wait_for(driver, "'torque_error' in table()")
-    assert driver.find_element("id", "compared").text.startswith("peak torque on bar 2")
+    assert driver.find_element("id", "compared").text.startswith("Peak torque on bar 2")
     assert (
         driver.execute_script(
             "return document.querySelectorAll('#chart .behind').length"
@@ -259,6 +269,10 @@ def test_a_linkage_is_drawn_by_four_clicks_and_its_numbers_are_typed_over(
     driver.get(opened(path))
     wait_for(driver, "offers && sketch")
     assert not driver.find_element("id", "bar-2").is_displayed()  # the drawing is empty
+    # nor do numbers of a linkage stand beside it that nobody sees
+    assert not driver.find_element("id", "strip").is_displayed()
+    said = driver.find_element("id", "next-pin").text
+    assert said.startswith("Click where pin O2 joins the input to the ground; or")
     pixels = {"O2": (120, 300), "A": (170, 220), "B": (400, 120), "O4": (380, 330)}
     click_pins(driver, "50 in", *pixels.values())
     scale = 50.0 / driver.find_element("id", "picture").size["width"]
@@ -285,6 +299,12 @@ def test_a_linkage_is_drawn_by_four_clicks_and_its_numbers_are_typed_over(
         )
     assert "lbf" in driver.find_element("id", "forces").text  # results follow the file
     assert not driver.find_elements("id", "field:lengths/input")  # the pins state them
+    coordinates = (
+        driver.find_element("id", f"field:pins/A/{n}").accessible_name for n in (0, 1)
+    )
+    assert [*coordinates] == ["x", "y"]
+    # a linkage keeps its four pins: none can be removed
+    assert not driver.find_elements("xpath", "//button[.='Remove A']")
     type_into(driver, "field:pins/A/1", "6 in")
     typed = 0.0254 * abs(complex(stated["A"].real, 6.0) - stated["O2"])
     wait_for(driver, f"Math.abs(data.lengths[1] - {typed!r}) < 1e-12")
@@ -675,6 +695,8 @@ def test_choosing_another_commanded_angle_keeps_the_position(
     choose = "const s = document.getElementById('command'); s.value = 'theta_4'; "
     driver.execute_script(choose + "s.dispatchEvent(new Event('change'))")
     wait_for(driver, "plain.motion.theta_4 && data.over.commanded === 'theta_4'")
+    speed = driver.execute_script("return plain.motion.omega_4")
+    assert speed.endswith(" rpm")  # as the file stated it
     assert driver.execute_script("return grid[row]") == pytest.approx(2.0, abs=0.03)
 
 
@@ -688,4 +710,4 @@ def test_a_change_beyond_ten_times_is_no_percentage(
         "return [changeOf(1, 8835.11), changeOf(2, 3), changeOf(2, 1.9),"
         " changeOf(1e-17, 1), changeOf(0, 1)]"
     )
-    assert said == [" (8.84e3 times)", " (+50 %)", " (\u22125.0 %)", "", ""]
+    assert said == [" (8.84e3 times)", " (+50\u00a0%)", " (\u22125.0\u00a0%)", "", ""]

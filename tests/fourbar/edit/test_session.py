@@ -769,11 +769,20 @@ def test_new_entries_and_limits_have_the_units_of_the_scene(tmp_path: Path) -> N
     path = tmp_path / "inches.toml"
     path.write_text(write_new_scene(["12 in", "4 in", "10 in", "9 in"]))
     session = Session(path, tmp_path / "exports")
-    offered = session.do({"do": "hello"})["offers"]["parts"]
+    offers = session.do({"do": "hello"})["offers"]
+    offered = offers["parts"]
     numbers = {row["label"]: n for n, row in enumerate(offered) if "label" in row}
     for label in ("force", "moment", "point"):
         session.do({"do": "add", "part": numbers[label], "name": "P"})
+    springs = next(
+        n for n, row in enumerate(offered) if row["at"] == ["effects", "springs"]
+    )
+    session.do({"do": "add", "part": springs, "name": ""})
     stated = session.now.plain
+    bar = offers["fields"]["bars"]["input"]
+    assert bar["density"] == "0.28 lb/in^3" and bar["inertia"] == "0.68 lb in^2"
+    assert stated["effects"]["springs"][0]["stiffness"] == "1.1 lbf/in"
+    assert stated["bars"]["input"]["mass"] == "0.2 lb"  # 4 in of 0.05 lb/in
     assert [load.get("force") for load in stated["loads"]] == [
         ["2.2 lbf", "-90 deg"],
         None,

@@ -717,6 +717,22 @@ def test_a_scene_without_bands_says_why_or_shows_nothing(browse) -> None:
     )
 
 
+CLEAR_OF_ITS_BAR = """
+go(arguments[1]);
+const [bar, box] = [parts.bars[arguments[0]], parts.label[arguments[0]].getBBox()];
+const end = n => [bar[`x${n}`].baseVal.value, bar[`y${n}`].baseVal.value];
+let least = Infinity;
+for (let n = 0; n <= 200; n++) {
+  const [x, y] = [0, 1].map(j => end(1)[j] + n / 200 * (end(2)[j] - end(1)[j]));
+  const across = Math.max(box.x - x, x - box.x - box.width, 0);
+  const along = Math.max(box.y - y, y - box.y - box.height, 0);
+  least = Math.min(least, Math.hypot(across, along));
+}
+return least;
+"""
+"""Least distance of the name of a bar from the middle line of the bar, px."""
+
+
 def test_a_printed_page_is_one_sheet_with_lengths_bars_and_the_chart_s_name(
     browse,
 ) -> None:
@@ -733,6 +749,10 @@ def test_a_printed_page_is_one_sheet_with_lengths_bars_and_the_chart_s_name(
     for bar, length in enumerate((300, 100, 250, 220), start=1):
         assert f"{bar}: {length} mm" in labels
     assert driver.find_element("id", "plotted").text == "torque on bar 2, N m"
+    for bar in (2, 3, 4):  # no length stands on its bar, at no position
+        for row in (60, 140, 300):
+            clear = driver.execute_script(CLEAR_OF_ITS_BAR, bar, row)
+            assert clear > 3.0, (bar, row)
     rows = driver.find_elements("css selector", "#bars tbody tr")
     cells = [row.find_elements("tag name", "td") for row in rows]
     for moving, row in zip((2, 3, 4), cells[1:], strict=True):
