@@ -767,7 +767,7 @@ def test_another_command_goes_over_the_position_that_is_shown(tmp_path: Path) ->
 
 def test_new_entries_and_limits_have_the_units_of_the_scene(tmp_path: Path) -> None:
     path = tmp_path / "inches.toml"
-    path.write_text(write_new_scene(["12 in", "4 in", "10 in", "9 in"]))
+    path.write_text(write_new_scene(["12 in", "4 in", "10.123456789 in", "9 in"]))
     session = Session(path, tmp_path / "exports")
     offers = session.do({"do": "hello"})["offers"]
     offered = offers["parts"]
@@ -790,4 +790,6 @@ def test_new_entries_and_limits_have_the_units_of_the_scene(tmp_path: Path) -> N
     assert stated["loads"][1]["moment"] == "-8.9 lbf in"
     assert stated["points"]["P"]["from_pin"] == ["2 in", "20 deg"]
     data = evaluate_scene(session.now.scene, session.units, settled=True)
-    assert "s + l = 16 in < p + q = 19 in" in data["summary"]
+    assert "s + l = 16 in < p + q = 19.1235 in" in data["summary"]
+    # a mass that nobody weighed has no twelve digits, which its field would cut off
+    assert stated["bars"]["coupler"]["mass"] == "0.5062 lb"
