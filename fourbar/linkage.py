@@ -204,7 +204,10 @@ def copy_with(description: Description, /, **changed: Any) -> Description:
 
     The new values may be arrays; nothing is checked again.
     """
-    if all(value is getattr(description, name) for name, value in changed.items()):
+    for name, value in changed.items():
+        if value is not getattr(description, name):
+            break
+    else:
         return description
     kind: Any = description.__class__
     copied: Description = object.__new__(kind)

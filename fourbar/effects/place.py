@@ -1,6 +1,7 @@
 """Places of bars: from the first pin, from the mass centre, or at a named point."""
 
 from collections.abc import Callable, Iterable, Mapping
+from operator import is_
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -196,6 +197,6 @@ def require_ends(key: str, start: object, end: object) -> tuple[Place, Place]:
 
 def change_each(terms: Any, change: Callable[[Place], Place]) -> Any:
     """Return terms with their places changed: the same tuple where no place is."""
-    changed = tuple(term.with_places(change) for term in terms)
-    same = all(one is other for one, other in zip(changed, terms, strict=True))
-    return terms if same else changed
+    changed = [term.with_places(change) for term in terms]
+    same = all(map(is_, changed, terms))
+    return terms if same else tuple(changed)

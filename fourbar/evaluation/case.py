@@ -112,7 +112,7 @@ class Case(NamedTuple):
     """Drive that exerts a force in place of the couple on the driven bar."""
 
     @classmethod
-    def of(cls, scene: Scene, bar: int = 2) -> "Case":
+    def of(cls, scene: Scene, bar: int = 2, side: Any = 0) -> "Case":
         """Collect the numbers that stay the same over the positions of a command.
 
         The command is that of bar 2, 3 or 4.
@@ -132,7 +132,8 @@ class Case(NamedTuple):
             scene.drive_bar,
             path,
             points,
-            drive=scene.drive,
+            side,
+            scene.drive,
         )
 
     def beside(self, nominal: Scene) -> "Case":
@@ -273,7 +274,7 @@ class Case(NamedTuple):
 
         It is read in the angle of bar 2 or 4.
         """
-        return cls.of(scene, bar)._replace(drive_bar=bar, drive=None, side=side)
+        return cls.of(scene, bar, side)._replace(drive_bar=bar, drive=None)
 
     def begin_at(self, start: Command) -> "Case":
         """Return a copy whose path-dependent effects begin at this position.

@@ -33,6 +33,8 @@ def is_any(mask: Number) -> bool:
 
     For one value `np.any` takes fifty times as long.
     """
+    if type(mask) is bool:
+        return mask
     return bool(mask) if isinstance(mask, PLAIN) else bool(mask.any())
 
 

@@ -133,10 +133,11 @@ def loop(d: Number, a: Number, b: Number, c: Number) -> Loop:
     >>> loop(0.3, 0.1, 0.3, 0.1).E1  # a parallelogram, which has change points
     0.0
     """
-    parallelogram = _are_equal(c, a) & _are_equal(b, d)
-    kite_at_B = _are_equal(b, a) & _are_equal(c, d)
-    kite_at_A = _are_equal(a, d) & _are_equal(c, b)
-    if is_any(parallelogram | kite_at_B | kite_at_A):
+    as_c, as_b, as_d = _are_equal(c, a), _are_equal(b, a), _are_equal(a, d)
+    if is_any(as_c | as_b | as_d):  # the input is as long as another bar
+        parallelogram = as_c & _are_equal(b, d)
+        kite_at_B = as_b & _are_equal(c, d)
+        kite_at_A = as_d & _are_equal(c, b)
         b, c = _replace(b, d, parallelogram), _replace(c, a, parallelogram)
         b, c = _replace(b, a, kite_at_B), _replace(c, d, kite_at_B)
         a, c = _replace(a, d, kite_at_A), _replace(c, b, kite_at_A)
@@ -218,8 +219,8 @@ def half_angle(
     sk = t * kk
     ss = t * sk
     squares = (kk, ss, -sk) if opposite else (ss, kk, sk)
-    half = compute_factors(lengths, *squares)
-    return half._replace(side=find_side(psi, passing, opposite=opposite))
+    side = find_side(psi, passing, opposite=opposite)
+    return compute_factors(lengths, *squares, side)
 
 
 def find_side(psi: Number, passing: Passing, *, opposite: bool) -> Number:
@@ -246,7 +247,9 @@ def signed_root(half: HalfAngle, branch: Number) -> Number:
     return branch * half.side * square_root(half.outer * half.inner)
 
 
-def compute_factors(lengths: Loop, ss: Number, kk: Number, sk: Number) -> HalfAngle:
+def compute_factors(
+    lengths: Loop, ss: Number, kk: Number, sk: Number, side: Number = 1.0
+) -> HalfAngle:
     """Compute the factors of Heron's formula from sin^2 h, cos^2 h and sin h cos h."""
     four_ad, four_bc = 4.0 * lengths.a * lengths.d, 4.0 * lengths.b * lengths.c
     outer, inner = lengths.E1 + four_ad * kk, lengths.E2 + four_ad * ss
@@ -258,7 +261,7 @@ def compute_factors(lengths: Loop, ss: Number, kk: Number, sk: Number) -> HalfAn
             select(short & (ss < kk), four_bc - inner, outer),
             select(short & (kk <= ss), four_bc - outer, inner),
         )
-    return HalfAngle(ss, kk, sk, outer, inner)
+    return HalfAngle(ss, kk, sk, outer, inner, side)
 
 
 def close_loop(

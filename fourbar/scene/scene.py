@@ -207,12 +207,13 @@ class Scene:
 
         The places are those of its points, loads, effects and drive.
         """
-        changed = {
-            name: change_each(getattr(self, name), change)
-            for name in ("points", "loads", "effects")
-        }
-        drive = None if self.drive is None else self.drive.with_places(change)
-        return copy_with(self, **changed, drive=drive)
+        return copy_with(
+            self,
+            points=change_each(self.points, change),
+            loads=change_each(self.loads, change),
+            effects=change_each(self.effects, change),
+            drive=None if self.drive is None else self.drive.with_places(change),
+        )
 
     def settled(self) -> "Scene":
         """Return the scene with every place from the first pin of its bar.
@@ -356,10 +357,10 @@ class Command(NamedTuple):
 
     def part(self, index: Any) -> "Command":
         """Take some of the positions."""
-        rows: Any = (
+        rows: list[Any] = [
             value[index] if isinstance(value, np.ndarray) and value.ndim else value
             for value in self
-        )
+        ]
         part = Command(*rows)
         if self.independent is None:
             return part

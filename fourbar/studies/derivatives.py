@@ -366,7 +366,7 @@ class _SlopedPath(Path):
         squares = (k * k, s * s, -(s * k)) if opposite else (s * s, k * k, s * k)
         # a sign has no slope: the linkages beside keep the assembly
         side = find_side(without_slopes(psi), self.passing, opposite=opposite)
-        return compute_factors(self.lengths, *squares)._replace(side=side)
+        return compute_factors(self.lengths, *squares, side)
 
     def input_direction(self, q: Number, half: HalfAngle) -> Number:
         """Compute e^{i q}."""

@@ -86,8 +86,7 @@ class Study:
                 begins = self.begin(rows) if request.asks_forces else self.scene
                 for columns in split(n, block):
                     scene = self.members(rows, columns.stop - columns.start, begins)
-                    case = Case.of(scene, commanded.bar).beside(self.scene)
-                    case = case._replace(side=side)
+                    case = Case.of(scene, commanded.bar, side).beside(self.scene)
                     positions = _take_members(commanded, rows, columns)
                     # kept until the next block is evaluated, so that its memory is used
                     # again
