@@ -151,6 +151,8 @@ class Results:
         for name in request.wanted:
             shape_of_one = shape if name in SCALARS else (*shape, 2)
             self.arrays[name] = given[name] if name in given else np.empty(shape_of_one)
+        self.reverses = False
+        """True if sin(theta_4 - theta_3) may have another sign than the branch."""
 
     def store(self, case: Case, evaluated: Evaluated, part: Part) -> None:
         """Write what was evaluated.
@@ -158,6 +160,7 @@ class Results:
         What is no number has the status that says so.
         """
         withhold_infinite(case, evaluated)
+        self.reverses = self.reverses or _may_reverse(case)
         shape = self.codes[part].shape
         self.codes[part] = evaluated.codes.reshape(shape)
         for name, value in evaluated.values.items():
@@ -173,6 +176,11 @@ class Results:
                 array[*part, 0], array[*part, 1] = value.real, value.imag
 
 
+def _may_reverse(case: Case) -> bool:
+    """Return True if sin(theta_4 - theta_3) may have another sign than the branch."""
+    return case.path.bar != 2 or case.path.has_change_point
+
+
 def _make_case(
     scene: Scene, commanded: Command, request: _Requested, side: int
 ) -> Case:
@@ -180,7 +188,7 @@ def _make_case(
 
     Its effects count turns from where the motion begins.
     """
-    case = Case.of(scene, commanded.bar)._replace(side=side)
+    case = Case.of(scene, commanded.bar, side)
     if not request.asks_forces or not scene.counts_turns:
         return case
     stated = command(scene)
@@ -208,6 +216,7 @@ def _solve_alone(case: Case, commanded: Command, request: _Requested) -> Results
         return None
     results = Results.__new__(Results)
     results.codes = np.array([codes], dtype=np.uint8)
+    results.reverses = _may_reverse(case)
     vectors = table.view(float).reshape(-1, 1, 2)
     scalars = vectors[:, :, 0]
     results.arrays = {
@@ -428,23 +437,22 @@ def make_solution(
         quantities = {
             name: array for name, array in quantities_by_name.items() if name in UNITS
         }
-    branch, theta_2 = np.asarray(commanded.branch), commanded.angle
+    theta_2 = commanded.angle
     if commanded.bar != 2:
         theta_2 = quantities["theta_2"]
         quantities = {
             name: array for name, array in quantities.items() if name != "theta_2"
         }
-    if (sine := quantities.get("sin_mu")) is not None:
-        branch = np.where(np.abs(sine) > 0.0, np.sign(sine), branch).astype(np.int8)
-    else:
-        branch = with_signs(scene.linkage, commanded).branch
-    quantities = {**quantities, "time": commanded.time}
-    return Solution(
-        scene.title,
-        scene.drive_bar,
-        codes,
-        branch,
+    branch = commanded.branch
+    if results.reverses:
+        branch = _find_signs(scene, commanded, quantities.get("sin_mu"))
+    return Solution.of(
+        title=scene.title,
+        drive_bar=scene.drive_bar,
+        status_code=codes,
+        branch=np.array(branch, dtype=np.int8),
         theta_2=theta_2,
+        time=commanded.time,
         **quantities,
         points=of_points[""],
         velocity=of_points["v_"],
@@ -456,6 +464,17 @@ def make_solution(
         change_points=change_points,
         at=commanded,
     )
+
+
+def _find_signs(scene: Scene, commanded: Command, sine: Array | None) -> Any:
+    """Find the sign of sin(theta_4 - theta_3) at each position.
+
+    It is the branch where the sine is zero or NaN. `sine`: None if it was not
+    evaluated.
+    """
+    if sine is None:
+        return with_signs(scene.linkage, commanded).branch
+    return np.where(np.abs(sine) > 0.0, np.sign(sine), commanded.branch)
 
 
 def _unwrap_angles(arrays: Mapping[str, Array], bar: int) -> None:

@@ -97,9 +97,14 @@ class Path(NamedTuple):
         Twice applied it returns its argument: of that sign at the angle it is the
         assembly.
         """
-        if not is_any(self.passing.outer | self.passing.inner):
+        if not self.has_change_point:
             return branch
         return branch * self.half_angle(q).side
+
+    @property
+    def has_change_point(self) -> bool:
+        """True if a root passes through zero with its sign."""
+        return is_any(self.passing.outer | self.passing.inner)
 
     def passes_zero(self, half: HalfAngle) -> Number:
         """Mark where the smaller root is one that passes through zero.

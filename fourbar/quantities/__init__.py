@@ -40,7 +40,7 @@ def _vector(*line: str | None) -> Any:
     return field(default=None, metadata={"line": ("vector", *line)})
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Quantities:
     """The quantities, one line each.
 
