@@ -143,3 +143,12 @@ def test_the_other_pictures_are_those_that_are_drawn(name: str) -> None:
         drawn = write_alone(DRAWS[f"draw_{name.replace('-', '_')}"](), name)
     kept = (DOCS / "cost" / f"{name}.svg").read_text(encoding="utf-8")
     assert read_words(drawn) == read_words(kept)
+
+
+def test_every_point_of_the_hard_picture_stays_below_the_limit() -> None:
+    """The title of the picture says so; each engine has points on three approaches."""
+    points = list(DRAWS["list_hard_points"]())
+    engines = [engine for *_, engine in points]
+    assert min(map(engines.count, engines)) == 3
+    for condition, error, engine in points:
+        assert (error <= DRAWS["K"] * DRAWS["EPS"] / condition).all(), engine

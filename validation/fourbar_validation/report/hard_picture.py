@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from fourbar.quantities import OK
-from fourbar.scene import Command, Scene
+from fourbar.scene import Command, Scene, with_signs
 from fourbar.scene import command as command_of
 from fourbar.solving import solve
 from fourbar_validation.compare.answer import Answer, Array
@@ -92,7 +92,7 @@ def list_errors(
 
     None if it refuses.
     """
-    command = command_of(scene)
+    command = with_signs(scene.linkage, command_of(scene))
     if engine.through_time:
         psi = np.abs(command.theta_2 - command.theta_2[0]) - abs(
             command.theta_2[-1] - command.theta_2[0]
@@ -109,7 +109,9 @@ def list_errors(
         or answer.at is None
     ):
         return None
-    ours = solve(scene, "force", at=answer.at)
+    # an engine is told the sign of the sine, `solve` the assembly: each of the other
+    at = with_signs(scene.linkage, answer.at)
+    ours = solve(scene, "force", at=at)
     values = getattr(ours, quantity)
     error = find_error(quantity, values, answer.quantities[quantity], magnitude(values))
     keep = (ours.status_code == OK) & np.isfinite(error)
