@@ -186,6 +186,20 @@ def test_every_drive_exerts_the_torque_of_the_formulas(
     assert tried(turning(), drive=build)(settings).worst <= allowed
 
 
+def test_a_study_past_a_change_point_stays_on_the_assembly(tmp_path: Path) -> None:
+    """The sign of an antiparallelogram's sine changes there; its assembly does not."""
+    bars = (fourbar.Bar(0.1, 0.2), fourbar.Bar(0.3, 0.6), fourbar.Bar(0.1, 0.2))
+    linkage = fourbar.FourBar(0.3, *bars)
+    sweep = fourbar.Sweep(math.radians(200.0), math.radians(340.0), 20)
+    motion = fourbar.Motion(sweep, 10.0, branch=-1)
+    scene = fourbar.Scene(linkage, motion, effects=(fourbar.Gravity(),))
+    made = study.CostStudy("past a change point", scene, tmp_path)
+    assert tried(scene)(replace(BEST, steps_per_revolution=640)).worst < 1e-4
+    assert all(p.errors.worst < 1e-11 for p in made._time_inverse())
+    *_, extrapolated = made._try_one_state()
+    assert extrapolated.errors.worst < 1e-5
+
+
 def test_one_state_is_wrong_in_proportion_and_right_in_the_limit() -> None:
     for scene in (
         turning(positions=12),

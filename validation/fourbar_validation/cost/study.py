@@ -17,7 +17,7 @@ import numpy as np
 from fourbar.errors import FourBarError, LimitError
 from fourbar.files import dump
 from fourbar.formulas.mobility import turns_fully
-from fourbar.scene import Command, Scene
+from fourbar.scene import Command, Scene, with_signs
 from fourbar.scene import command as command_of
 from fourbar_validation.advise.advise import advise
 from fourbar_validation.advise.matters import judge_trial
@@ -347,8 +347,9 @@ class CostStudy:
             except LimitError as error:
                 self.left_out.append(f"{label}: {error}")
                 continue
-            errors = compute_errors(self.scene, command, loop.answer(command))
-            times = [time_call(partial(loop.answer, command)) for _ in range(ROUNDS)]
+            signed = with_signs(self.scene.linkage, command)
+            errors = compute_errors(self.scene, command, loop.answer(signed))
+            times = [time_call(partial(loop.answer, signed)) for _ in range(ROUNDS)]
             points.append(
                 self._make_point("inverse", EXACT, label, errors, times, len(rows))
             )
@@ -368,7 +369,8 @@ class CostStudy:
         tried.append(("MuJoCo at one state, extrapolated", MujocoOneState(), 0.0))
         points = []
         for label, engine, softness in tried:
-            answer = engine.answer(self.scene, self.command)
+            signed = with_signs(self.scene.linkage, self.command)
+            answer = engine.answer(self.scene, signed)
             if answer.refusal is not None:
                 raise LimitError(f"{engine.name}: {answer.refusal}")
             assert answer.assembled is not None

@@ -25,7 +25,7 @@ import numpy as np
 from fourbar.errors import LimitError
 from fourbar.mjcf import Settings, write_mjcf
 from fourbar.quantities import PIN_FORCES
-from fourbar.scene import Command, Scene
+from fourbar.scene import Command, Scene, with_signs
 from fourbar_validation.compare.answer import Answer, Array
 from fourbar_validation.compare.compare import COMPARED_QUANTITIES, mark_turning
 from fourbar_validation.compare.tolerance import divide, magnitude
@@ -192,7 +192,8 @@ class TrialSetup:
         position = Assembler(
             ClosedLoop(write_mjcf(self.scene, Settings(timestep=1e-3), keyframe=False))
         )
-        assembled = find_assembled(position, command, order)
+        signed = with_signs(scene.linkage, command)
+        assembled = find_assembled(position, signed, order)
         self.segments = [
             segment for segment in split_segments(assembled, order) if len(segment) > 1
         ]
