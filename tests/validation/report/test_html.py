@@ -6,12 +6,15 @@ Quiet, readable in the dark, its links and its download right.
 import base64
 import gzip
 import json
+import re
 
 import pytest
 
 from fourbar_validation.compare.rows import write_rows
 from fourbar_validation.report.html import ALL_OPEN
+from fourbar_validation.report.overview import OWN_ENGINES
 from tests.validation.report.test_report import copies, report
+from tests.whole.test_imports import ROOT
 
 pytest.importorskip(
     "selenium", reason="pages are driven by selenium: pip install selenium"
@@ -93,6 +96,48 @@ def test_all_text_is_readable(browse, dark: bool) -> None:
     worst = driver.execute_script(CONTRASTS)
     assert len(worst) == 5
     assert worst[0][0] >= CONTRAST, worst
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("dark", [False, True])
+def test_each_letter_of_the_benchmark_is_readable(browse, dark: bool) -> None:
+    """Its matrix has grounds of green, yellow and red."""
+    page = (ROOT / "docs" / "examples" / "benchmark.html").read_text()
+    matrix = page[: page.index("</table>")]
+    driver = browse(matrix, dark=dark)
+    worst = driver.execute_script(CONTRASTS)
+    assert len(worst) == 5
+    assert worst[0][0] >= CONTRAST, worst
+
+
+@pytest.mark.slow
+def test_engines_stand_before_what_checks_fourbar_against_itself(browse) -> None:
+    """The columns that a phone shows are those of engines, and so are the marks."""
+    driver = browse(report(copies(2, failing=1))[1], 400)
+    heads = driver.execute_script(
+        "return [...document.querySelectorAll('details.scene[open] table')][0]"
+        ".querySelectorAll('thead th').values().map(e => e.textContent).toArray()"
+    )
+    names = [re.sub("^[^a-z]+", "", head) for head in heads[1:]]
+    own = [name in OWN_ENGINES for name in names]
+    assert own == sorted(own) and True in own and False in own
+    caption = driver.find_element("css selector", "details.scene[open] .pictures + p")
+    told = [name for name in names if re.search(rf"\W {name}\b", caption.text)]
+    assert told == [name for name in names if name not in OWN_ENGINES]
+
+
+@pytest.mark.slow
+def test_the_table_of_orders_fits_a_phone(browse) -> None:
+    pages = copies(2)
+    orders = {"error_at_4h": 1e-3, "error_at_2h": 1e-4, "observed_order": 3.0}
+    for record in pages:
+        record.evidence = {"mujoco-simulated": orders}
+    driver = browse(report(pages)[1], 400)
+    widths = driver.execute_script(
+        "return [...document.querySelectorAll('table.short')]"
+        ".map(e => [e.scrollWidth, e.parentElement.clientWidth])"
+    )
+    assert widths and all(table <= room for table, room in widths)
 
 
 @pytest.mark.slow

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from fourbar.quantities import LINE, UNKNOWNS
+from fourbar.quantities import COUPLE, LINE, PIN_FORCES, UNKNOWNS
 from fourbar_validation.compare.rows import (
     FAILS,
     REFUSES,
@@ -38,6 +38,10 @@ they are opened.
 """
 ORDER = (*UNKNOWNS, "torque_inertia", LINE.value, f"{LINE.value}_inertia")
 """Quantities in the order of the computation; others follow by name."""
+
+
+_DRAWN = (COUPLE.value, LINE.value, *PIN_FORCES)
+"""Quantities of which the pictures of a scene show some."""
 
 
 class _Cell(NamedTuple):
@@ -110,6 +114,20 @@ class _SceneView:
     """engine: its comparison that used most."""
     picture: str | None
     """Base64 of a PNG of the MJCF."""
+
+    @property
+    def drawn(self) -> list[str]:
+        """Return the independent engines whose answers the pictures show."""
+        return [
+            engine
+            for engine in self.engines
+            if engine not in OWN_ENGINES
+            and any(
+                cell.row.compared
+                for (quantity, name), cell in self.by_place.items()
+                if name == engine and quantity in _DRAWN
+            )
+        ]
 
     @property
     def counts(self) -> Counts:
@@ -239,7 +257,8 @@ def _make_view(
 
 
 def _list_engines(rows: Any) -> list[str]:
-    """List the engines by name, the formulas (their identities) last."""
+    """List the engines by name: independent ones first, the formulas last."""
     return sorted(
-        {row.engine for row in rows}, key=lambda name: (name == "formulas", name)
+        {row.engine for row in rows},
+        key=lambda name: (name in OWN_ENGINES, name == OWN, name),
     )

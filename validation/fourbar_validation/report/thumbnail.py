@@ -6,6 +6,7 @@ They are the linkage, and the torque over the motion.
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fourbar.quantities import COUPLE, LINE, OK
 from fourbar.solution import Solution
@@ -82,7 +83,7 @@ def _draw_curve(record: Record, solution: Solution) -> str:
     marks = ""
     answers = [one for one in record.answers if name in one.quantities]
     for turn, answer in enumerate(answers):
-        marks += _draw_marks(answer, name, turn / max(len(answers), 1), place)
+        marks += _draw_marks(answer, name, turn / max(len(answers), 1), place, good)
     return f'<path class="formulas" d="{drawn}"/>{marks}'
 
 
@@ -98,9 +99,18 @@ def _write_path(x: Array, y: Array) -> list[str]:
     return parts
 
 
-def _draw_marks(answer: Answer, name: str, phase: float, place: Place) -> str:
+def _draw_marks(
+    answer: Answer, name: str, phase: float, place: Place, good: NDArray[np.bool_]
+) -> str:
+    """Draw some answers of an engine.
+
+    Where the formulas have no value, as at a change point, nothing is judged, and a
+    mark beside the curve would look like an error.
+    """
     values = answer.quantities[name]
     x, y = place(values)
+    if len(values) == len(good):  # a simulation makes positions of its own
+        y = np.where(good, y, np.nan)
     rows = ((np.arange(MARKS) + phase) / MARKS * len(values)).astype(int)
     colour = choose_style(answer.engine).variable
     return "".join(
