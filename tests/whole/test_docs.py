@@ -447,7 +447,12 @@ def test_the_figure_of_the_theory_is_the_one_that_is_drawn() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "options"), [("crank_rocker.svg", ()), ("bars.svg", ("--figure", "bars"))]
+    ("name", "options"),
+    [
+        ("crank_rocker.svg", ()),
+        ("crank_rocker-linkage.svg", ("--figure", "linkage")),
+        ("bars.svg", ("--figure", "bars")),
+    ],
 )
 def test_the_pictures_are_those_that_are_drawn(
     name: str, options: tuple[str, ...], tmp_path: Path
