@@ -105,7 +105,7 @@ JUDGED_BY = {
     ),
     "validation/report/test_report.py": (
         "validation/report: figures machine overview record "
-        "summary svg templating thumbnail words"
+        "summary svg templating words"
     ),
     # studies: each through its command
     "lab/test_bench.py": "lab: contenders",

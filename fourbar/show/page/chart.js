@@ -87,7 +87,7 @@ function drawChart() {
   if (limit.cut) { low = Math.max(low, -limit.top); high = Math.min(high, limit.top); }
   if (!wanted.startsWith("theta")) { low = Math.min(low, 0); high = Math.max(high, 0); }
   if (high - low < 1e-300) { high += 1; low -= 1; }
-  byId("chart-note").textContent = limit.cut ? `It is cut at ${text(limit.top, 3)} and reaches ${text(finite.reduce((m, v) => Math.abs(v) > Math.abs(m) ? v : m, 0), 4)}.` : "";
+  byId("chart-note").textContent = limit.cut ? `The curve is cut at ${text(limit.top, 3)}; it reaches ${text(finite.reduce((m, v) => Math.abs(v) > Math.abs(m) ? v : m, 0), 4)}.` : "";
   plotted = { ...chartFrame(chart, low, high), values, low, high };
   const { over, x, y, width, height, bottom } = plotted;
   const curve = (values, over, kind) => {
