@@ -15,7 +15,7 @@ _NO_INERTIA = 1e-12
 """
 
 
-class _MujocoSlider:
+class MujocoSlider:
     """The tree, with sites at the rod's end and the slider."""
 
     def __init__(

@@ -9,7 +9,7 @@ from fourbar_validation.compare.answer import Array
 VERSION = pin.__version__
 
 
-class _PinocchioSlider:
+class PinocchioSlider:
     """The tree, with frames at the rod's end and the slider."""
 
     def __init__(
